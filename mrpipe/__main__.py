@@ -1,0 +1,6 @@
+"""`python -m mrpipe`."""
+
+from mrpipe.cli import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,278 @@
+"""The damper as a chain of steps: one contract for base forms, effects, bench simulation and closed loop.
+
+A damper is an ordered tuple of *steps*. A step is a small numba function
+
+    step(wire, state, parameters, dt)
+
+that reads and writes the `wire` (what flows along the chain at one instant), keeps its own memory in `state` (zeros at
+first) and has its numbers in `parameters`. All steps share one compiled signature, so that any chain runs in one
+compiled kernel without compiling again: steps are called through function pointers (about 5 ns each).
+
+The same chain serves the bench (:func:`run_chain` over recorded motion) and the closed loop (the simulation calls
+:func:`advance` once a plant step). To try a step and take it back, copy `state` before and restore it after.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numba import NumbaExperimentalFeatureWarning, float64, int64, njit, types, void
+
+from mrpipe.artifacts import FloatArray, IntArray
+
+# numba calls function pointers experimental; the signature below is fixed, which is the case that is stable
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
+
+# --- the wire -------------------------------------------------------------------------------------------------------
+TIME = 0  # s
+FIRST = 1  # 1.0 at the first call of a run, else 0.0: the time to set initial values in `state`
+DISPLACEMENT = 2  # rod motion relative to the housing [m]; motion effects may change it
+VELOCITY = 3  # m/s
+ACCELERATION = 4  # m/s^2
+DRIVE = 5  # command: coil current [A] or voltage [V]
+CURRENT = 6  # effective drive after the driver's lag, u of (2.4)
+YIELD_FORCE = 7  # alpha(u) z_max: force of the fully yielded hysteresis [N]
+VISCOSITY = 8  # c0(u) [N s/m]
+HYSTERESIS = 9  # hysteretic variable normalised to its limit, -1..1
+HYSTERETIC_FORCE = 10  # YIELD_FORCE x HYSTERESIS [N]
+VISCOUS_FORCE = 11  # N
+EXTRA_FORCE = 12  # forces that effects add [N]
+FORCE = 13  # at the load cell [N]
+WORK = 14  # energy dissipated since the start [J]
+SLIP = 15  # path since the last reversal [m]
+SINCE_REVERSAL = 16  # time since the last reversal [s]
+PAST_CURRENT = 17  # largest |effective current| so far in this run [A]
+RATE_YIELD = 18  # factor 0..1 of YIELD_FORCE from rate-dependent base forms (1 where unused)
+SPARE = 19  # for effects of the user's own
+WIRE_SIZE = 24
+
+STEP_SIGNATURE = void(float64[::1], float64[::1], float64[::1], float64)
+"""The one compiled signature of a step: `@njit(STEP_SIGNATURE, cache=True)`."""
+
+CHAIN_LENGTH = 16
+"""Longest chain; shorter ones are padded with a step that does nothing."""
+
+
+class Phase(IntEnum):
+    """Where in the chain a step works; a chain is sorted by phase, then by order of mention."""
+
+    MOTION = 10  # rod motion before the damper (bearing play, compliance)
+    CURRENT = 20  # drive -> effective current (the base's lag)
+    CURRENT_EFFECT = 25  # what changes the effective current (remanence, second lag)
+    COEFFICIENTS = 30  # effective current -> yield force and viscosity
+    COEFFICIENT_EFFECT = 35  # what changes them (heating, Stribeck, migration)
+    HYSTERESIS = 40  # the hysteretic variable
+    SUM = 50  # HYSTERETIC_FORCE + VISCOUS_FORCE
+    FORCE_EFFECT = 60  # forces in parallel (accumulator, inertia, end stop)
+    SENSOR = 70  # what the load cell makes of it
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step with its numbers.
+
+    Attributes
+    ----------
+    name
+        For messages.
+    phase
+        Where in the chain.
+    function
+        Compiled with :data:`STEP_SIGNATURE`.
+    parameters
+        Its numbers, shape (p,), SI.
+    state_size
+        Length of its memory.
+    """
+
+    name: str
+    phase: Phase
+    function: Any
+    parameters: FloatArray
+    state_size: int = 0
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Steps in the form that compiled kernels take."""
+
+    functions: tuple[Any, ...]
+    parameters: FloatArray
+    parameter_offsets: IntArray
+    state_offsets: IntArray
+    names: tuple[str, ...]
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def state_size(self) -> int:
+        """Length of the state of the whole chain."""
+        return int(self.state_offsets[-1])
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """Return (functions, parameters, parameter_offsets, state_offsets) for :func:`advance` and :func:`run_chain`."""
+        return self.functions, self.parameters, self.parameter_offsets, self.state_offsets
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def idle_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Do nothing: padding of short chains."""
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def sum_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Add up (2.1): f = alpha z + c0 v."""
+    wire[HYSTERETIC_FORCE] = wire[YIELD_FORCE] * wire[RATE_YIELD] * wire[HYSTERESIS]
+    wire[VISCOUS_FORCE] = wire[VISCOSITY] * wire[VELOCITY]
+    wire[FORCE] = wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]
+
+
+def build_chain(steps: Sequence[Step]) -> Chain:
+    """Sort the steps by phase and pack them; the sum of (2.1) is put in.
+
+    Raises
+    ------
+    ValueError
+        If there are more than :data:`CHAIN_LENGTH` steps.
+    """
+    ordered = sorted([*steps, Step("sum", Phase.SUM, sum_step, np.zeros(0))], key=lambda step: step.phase)
+    if len(ordered) > CHAIN_LENGTH:
+        raise ValueError(f"{len(ordered)} steps in a chain; at most {CHAIN_LENGTH}")
+    padding = CHAIN_LENGTH - len(ordered)
+    parameters = [np.ascontiguousarray(step.parameters, dtype=np.float64) for step in ordered]
+    return Chain(
+        functions=tuple(step.function for step in ordered) + (idle_step,) * padding,
+        parameters=np.concatenate([*parameters, np.zeros(1)]),
+        parameter_offsets=np.cumsum([0, *(len(values) for values in parameters)], dtype=np.int64),
+        state_offsets=np.cumsum([0, *(step.state_size for step in ordered)], dtype=np.int64),
+        names=tuple(step.name for step in ordered),
+    )
+
+
+_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
+
+
+@njit(
+    void(_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64),
+    cache=True,
+)
+def advance(
+    functions: Any,
+    parameters: FloatArray,
+    parameter_offsets: IntArray,
+    state_offsets: IntArray,
+    state: FloatArray,
+    wire: FloatArray,
+    dt: float,
+) -> None:
+    """Advance the chain by one step: set TIME, FIRST and the motion and drive on the wire first, read FORCE after.
+
+    `state` holds the chain's state followed by four bookkeeping numbers (see :func:`new_state`); WORK, SLIP,
+    SINCE_REVERSAL and PAST_CURRENT are kept here for all steps to read. WORK counts the force of the step before.
+    """
+    memory = state_offsets[-1]
+    if wire[FIRST] > 0.5:
+        for index in range(memory, memory + 5):
+            state[index] = 0.0
+        state[memory + 4] = wire[VELOCITY]
+    else:
+        if wire[VELOCITY] * state[memory + 4] < 0.0:
+            state[memory + 1] = 0.0
+            state[memory + 2] = 0.0
+        if wire[VELOCITY] != 0.0:
+            state[memory + 4] = wire[VELOCITY]
+        state[memory + 1] += abs(wire[VELOCITY]) * dt
+        state[memory + 2] += dt
+    wire[WORK] = state[memory]
+    wire[SLIP] = state[memory + 1]
+    wire[SINCE_REVERSAL] = state[memory + 2]
+    wire[PAST_CURRENT] = state[memory + 3]
+    wire[CURRENT] = wire[DRIVE]
+    wire[RATE_YIELD] = 1.0
+    wire[EXTRA_FORCE] = 0.0
+    for index in range(parameter_offsets.shape[0] - 1):
+        functions[index](
+            wire,
+            state[state_offsets[index] : state_offsets[index + 1]],
+            parameters[parameter_offsets[index] : parameter_offsets[index + 1]],
+            dt,
+        )
+    state[memory] += (wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]) * wire[VELOCITY] * dt
+    state[memory + 3] = max(state[memory + 3], abs(wire[CURRENT]))
+
+
+@njit(
+    void(
+        _FUNCTIONS,
+        float64[::1],
+        int64[::1],
+        int64[::1],
+        float64[::1],
+        float64[::1],
+        float64[::1],
+        float64[::1],
+        float64,
+        float64[:, ::1],
+    ),
+    cache=True,
+)
+def _run(
+    functions: Any,
+    parameters: FloatArray,
+    parameter_offsets: IntArray,
+    state_offsets: IntArray,
+    displacement: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    drive: FloatArray,
+    dt: float,
+    wires: FloatArray,
+) -> None:
+    state = np.zeros(state_offsets[-1] + 5)
+    wire = np.zeros(WIRE_SIZE)
+    for index in range(displacement.shape[0]):
+        wire[TIME] = index * dt
+        wire[FIRST] = 1.0 if index == 0 else 0.0
+        wire[DISPLACEMENT] = displacement[index]
+        wire[VELOCITY] = velocity[index]
+        wire[ACCELERATION] = acceleration[index]
+        wire[DRIVE] = drive[index]
+        advance(functions, parameters, parameter_offsets, state_offsets, state, wire, dt)
+        wires[index, :] = wire
+
+
+def new_state(chain: Chain) -> FloatArray:
+    """Return a fresh state for :func:`advance`: the chain's own and five numbers of bookkeeping."""
+    return np.zeros(chain.state_size + 5)
+
+
+def run_chain(
+    chain: Chain,
+    displacement: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    drive: FloatArray,
+    dt: float,
+) -> FloatArray:
+    """Run the chain over recorded motion.
+
+    Parameters
+    ----------
+    displacement, velocity, acceleration, drive
+        Shape (n,); m, m/s, m/s^2, A or V.
+    dt
+        Sampling interval [s].
+
+    Returns
+    -------
+    Shape (n, WIRE_SIZE): the wire after each step; column FORCE is the damper force [N].
+    """
+    wires = np.empty((len(displacement), WIRE_SIZE))
+    signals = [np.ascontiguousarray(item, dtype=np.float64) for item in (displacement, velocity, acceleration, drive)]
+    _run(*chain.arguments, *signals, float(dt), wires)
+    return wires

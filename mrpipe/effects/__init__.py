@@ -1,0 +1,1 @@
+"""Physical effects that a damper or frame model may lack, one file each."""

@@ -1,0 +1,48 @@
+"""The small family of exceptions that the program raises on purpose.
+
+Every message is one line that names the file, the key or row, what is wrong and what would be right.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class MrpipeError(Exception):
+    """Base of everything that mrpipe raises on purpose."""
+
+
+class UserError(MrpipeError):
+    """The user's input is wrong (exit status 2).
+
+    Parameters
+    ----------
+    source
+        The file, directory or command-line option at fault.
+    where
+        Key, row, column or test within it; empty where the whole source is meant.
+    problem
+        What is wrong.
+    remedy
+        What would be right.
+    """
+
+    def __init__(self, source: str | Path, where: str, problem: str, remedy: str) -> None:
+        self.source = str(source)
+        self.where = where
+        self.problem = problem
+        self.remedy = remedy
+        place = f"{self.source}: {where}" if where else self.source
+        super().__init__(" ".join(f"{place}: {problem}; {remedy}".split()))
+
+
+class CheckFailed(MrpipeError):
+    """The program ran, but a check that was asked for failed (exit status 1)."""
+
+
+class StageSkipped(MrpipeError):
+    """A stage has no data to work on; the message says which (no failure in `mrpipe run`)."""
+
+
+class DivergedError(MrpipeError):
+    """A fit or a simulation diverged; the message says where and what to try."""

@@ -1,0 +1,1 @@
+"""The virtual rig that stands in for hardware."""

@@ -1,0 +1,1 @@
+"""Modal parameters from measured frequency responses and decays."""

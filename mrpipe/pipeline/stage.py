@@ -1,0 +1,124 @@
+"""What a stage is: declared inputs, outputs and settings, and a function that does the work.
+
+The function sees the world through its :class:`StageContext` alone, which refuses settings and inputs that were not
+declared; so a stage's cache key depends on nothing else than what it reads.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from mrpipe.artifacts import Artifact, ArtifactWriter, Progress, Provenance
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+class ReportSink(Protocol):
+    """Where a stage writes its own part of the report, in the order of the calls."""
+
+    def text(self, paragraph: str) -> None:
+        """Add a paragraph in plain words (Markdown inline marks allowed)."""
+
+    def table(self, name: str, frame: pd.DataFrame, caption: str) -> None:
+        """Add a table; it is also saved as tables/<stage>-<name>.csv."""
+
+    def figure(self, name: str, figure: Figure, caption: str) -> None:
+        """Add a figure; it is also saved as figures/<stage>-<name>.png."""
+
+
+@dataclass(frozen=True)
+class StageContext:
+    """All that the function of a stage may use.
+
+    Attributes
+    ----------
+    settings
+        Attribute access to the declared sections: `context.settings.prepare.cutoff_hz`. Others raise LookupError.
+    inputs
+        Declared input -> path. Stage inputs are artifacts (`prepare` -> …/prepared.h5), campaign inputs are directories
+        (`campaign:bench`). Optional inputs that are not there are missing from the mapping.
+    run_directory
+        The run directory; outputs are named relative to it.
+    rng
+        Generator seeded from the run's seed and the stage's name.
+    jobs
+        How many processes may be used (does not change results).
+    progress
+        Told how far the stage is.
+    report
+        The stage's part of the report.
+    log
+        Log lines of the run.
+    """
+
+    stage: str
+    settings: Any
+    inputs: Mapping[str, Path]
+    run_directory: Path
+    rng: np.random.Generator
+    seed: int
+    jobs: int
+    progress: Progress
+    report: ReportSink
+    log: logging.Logger
+    provenance: Provenance
+    warnings: list[str] = field(default_factory=list)
+
+    def artifact(self, name: str) -> Artifact:
+        """Open a declared input artifact."""
+        return Artifact(self.inputs[name])
+
+    @contextmanager
+    def write(self, file: str) -> Iterator[ArtifactWriter]:
+        """Write an output artifact of this name in the run directory, atomically and with its provenance."""
+        with ArtifactWriter.create(self.run_directory / file, self.provenance) as artifact:
+            yield artifact
+
+    def warn(self, message: str) -> None:
+        """Tell the user something that does not stop the stage; kept with the result and shown in the report."""
+        self.warnings.append(message)
+        self.log.warning("%s: %s", self.stage, message)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A step of the pipeline.
+
+    Attributes
+    ----------
+    name
+        As on the command line (`train-forward`).
+    summary
+        One line for help texts and the report.
+    run
+        Does the work and returns the summary that `--json` prints (JSON-able, SI, keys with unit suffix). To say that
+        there is nothing to do for want of data it raises :class:`~mrpipe.errors.StageSkipped`.
+    inputs
+        Names of stages whose artifact is read, or `campaign:bench`, `campaign:frame`, `campaign:closed-loop`.
+    optional_inputs
+        The same, used where they are there.
+    settings
+        Dotted names of the settings read: whole sections (`prepare`) or single ones (`simulate.excitation`).
+    outputs
+        Files (or directories) written, relative to the run directory; the first is the stage's artifact.
+    modules
+        Modules whose source, with all of mrpipe that they import, makes up the stage's code version.
+    """
+
+    name: str
+    summary: str
+    run: Callable[[StageContext], Mapping[str, Any]]
+    inputs: tuple[str, ...] = ()
+    optional_inputs: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    modules: tuple[str, ...] = ()

@@ -1,0 +1,1 @@
+"""Filtering, offsets, differentiation, cycles."""
