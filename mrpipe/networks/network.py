@@ -1,0 +1,220 @@
+"""A feed-forward network as plain arrays: tanh hidden layers, linear output (thesis 2.7).
+
+Layout, for those who evaluate the arrays in a kernel of their own
+-------------------------------------------------------------------
+A feature row holds, channel after channel in the order of `FeatureSpec.channels`, the present value and then the
+past values of k-1, k-2 .. k-p, as in (2.8) and (2.9):
+
+    [c1(k), c1(k-1), .. c1(k-p), c2(k), c2(k-1), .. c2(k-p), ...]
+
+of samples `1 / sampling_rate_hz` apart, each made absolute where `FeatureSpec.absolute`. Then
+
+    a = (features - input_shift) / input_scale
+    a = tanh(weights[j] @ a + biases[j])               for each hidden layer j
+    y = (weights[-1] @ a + biases[-1])[0] * output_scale + output_shift
+
+`weights[j]` has shape (neurons of layer j, neurons of layer j-1). A network without biases has zeros there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
+
+CHANNEL_UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
+"""SI unit of each channel that can be input or target; the unit of `drive` is that of the campaign (A or V)."""
+
+
+@dataclass(frozen=True)
+class FeatureSpec:
+    """What the features of a network are.
+
+    Attributes
+    ----------
+    channels
+        Input channels in order, such as ("velocity", "drive") of (2.8) or ("velocity", "force") of (2.9).
+    past_values
+        How many past values of each channel besides the present one.
+    absolute
+        Absolute values of all channels are taken, as in (2.9).
+    sampling_rate_hz
+        Rate at which past values lie.
+    target
+        Channel that the network estimates: `force` (forward) or `drive` (inverse).
+    past_target
+        The target itself is an input through its past values k-1 .. k-p only (a model with output feedback);
+        they follow after all channels.
+    """
+
+    channels: tuple[str, ...]
+    past_values: int
+    absolute: bool
+    sampling_rate_hz: float
+    target: str
+    past_target: bool = False
+
+    @property
+    def width(self) -> int:
+        """Number of features."""
+        return len(self.channels) * (self.past_values + 1) + (self.past_values if self.past_target else 0)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Return the name of each feature: velocity(k), velocity(k-1), ..."""
+        names = [
+            f"{name}(k-{lag})" if lag else f"{name}(k)"
+            for name in self.channels
+            for lag in range(self.past_values + 1)
+        ]
+        if self.past_target:
+            names += [f"{self.target}(k-{lag})" for lag in range(1, self.past_values + 1)]
+        return tuple(names)
+
+
+def lagged(channels: Sequence[FloatArray], past_values: int, *, absolute: bool = False) -> FloatArray:
+    """Return the feature rows of one uninterrupted record in the order of (2.8) and (2.9).
+
+    Parameters
+    ----------
+    channels
+        Arrays of shape (n,), uniformly sampled, in the order of the specification.
+    past_values
+        Number p of past values.
+    absolute
+        Take absolute values.
+
+    Returns
+    -------
+    Shape (n - p, channels x (p + 1)); row j belongs to sample j + p. Empty where the record is too short.
+    """
+    length = min(len(channel) for channel in channels)
+    rows = max(length - past_values, 0)
+    columns = [
+        np.asarray(channel, dtype=np.float64)[past_values - lag : past_values - lag + rows]
+        for channel in channels
+        for lag in range(past_values + 1)
+    ]
+    features = np.stack(columns, axis=1)
+    return np.abs(features) if absolute else features
+
+
+@dataclass(frozen=True)
+class Network:
+    """A trained network; see the module's text for the layout.
+
+    Attributes
+    ----------
+    weights, biases
+        Of each layer, shapes (out, in) and (out,); the last layer has one neuron.
+    input_scale, input_shift
+        Shape (features,), in the units of the features.
+    output_scale, output_shift
+        In the unit of the target.
+    features
+        What the features are.
+    feature_minimum, feature_maximum
+        Range of each feature in the training set, shape (features,); empty where unknown.
+    has_biases
+        Whether the biases were trained (the thesis has none).
+    """
+
+    weights: tuple[FloatArray, ...]
+    biases: tuple[FloatArray, ...]
+    input_scale: FloatArray
+    input_shift: FloatArray
+    output_scale: float
+    output_shift: float
+    features: FeatureSpec
+    feature_minimum: FloatArray = field(default_factory=lambda: np.zeros(0))
+    feature_maximum: FloatArray = field(default_factory=lambda: np.zeros(0))
+    has_biases: bool = True
+
+    @property
+    def layers(self) -> tuple[int, ...]:
+        """Neurons of every layer, input and output included."""
+        return (self.weights[0].shape[1], *(len(matrix) for matrix in self.weights))
+
+    @property
+    def architecture(self) -> str:
+        """As the thesis writes it: `8-6-6-1`."""
+        return "-".join(str(count) for count in self.layers)
+
+    @property
+    def parameters(self) -> int:
+        """Number of trained numbers."""
+        count = sum(matrix.size for matrix in self.weights)
+        return count + sum(bias.size for bias in self.biases) if self.has_biases else count
+
+    def predict(self, features: FloatArray) -> FloatArray:
+        """Return the estimate of the target, shape (n,), of feature rows (n, R)."""
+        signal = ((np.asarray(features, dtype=np.float64) - self.input_shift) / self.input_scale).T
+        for matrix, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            signal = np.tanh(matrix @ signal + bias[:, None])
+        output = (self.weights[-1] @ signal + self.biases[-1][:, None])[0]
+        return np.asarray(output * self.output_scale + self.output_shift)
+
+    def outside_training_range(self, features: FloatArray, margin: float = 0.02) -> float:
+        """Return the share of feature rows (n, R) with any feature beyond its range in training.
+
+        Parameters
+        ----------
+        features
+            Feature rows as for :meth:`predict`.
+        margin
+            How far beyond counts as within, as a share of the range (noise at the edge is no extrapolation).
+        """
+        if not len(self.feature_minimum) or not len(features):
+            return 0.0
+        slack = margin * (self.feature_maximum - self.feature_minimum)
+        outside = (features < self.feature_minimum - slack) | (features > self.feature_maximum + slack)
+        return float(np.mean(np.any(outside, axis=1)))
+
+
+def write_network(artifact: ArtifactWriter, group: str, network: Network) -> None:
+    """Store a network as arrays under `group`; :func:`read_network` gives it back bit for bit."""
+    for index, (matrix, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        artifact.put(f"{group}/weights_{index}", matrix, unit="1", dims=("neuron", "input"))
+        artifact.put(f"{group}/biases_{index}", bias, unit="1", dims=("neuron",))
+    for name in ("input_scale", "input_shift", "feature_minimum", "feature_maximum"):
+        artifact.put(f"{group}/{name}", getattr(network, name), unit="SI of each feature", dims=("feature",))
+    for name in ("output_scale", "output_shift"):
+        artifact.put(f"{group}/{name}", getattr(network, name), unit="SI of the target")
+    spec = network.features
+    artifact.put_json(
+        f"{group}/features",
+        {
+            "channels": list(spec.channels),
+            "past_values": spec.past_values,
+            "absolute": spec.absolute,
+            "sampling_rate_hz": spec.sampling_rate_hz,
+            "target": spec.target,
+            "past_target": spec.past_target,
+        },
+    )
+    artifact.attributes(
+        group, architecture=network.architecture, layers=len(network.weights), has_biases=network.has_biases
+    )
+
+
+def read_network(artifact: Artifact, group: str) -> Network:
+    """Read what :func:`write_network` wrote."""
+    notes = artifact.attributes(group)
+    layers = range(int(notes["layers"]))
+    spec: dict[str, Any] = artifact.json(f"{group}/features")
+    return Network(
+        weights=tuple(artifact.array(f"{group}/weights_{index}") for index in layers),
+        biases=tuple(artifact.array(f"{group}/biases_{index}") for index in layers),
+        input_scale=artifact.array(f"{group}/input_scale"),
+        input_shift=artifact.array(f"{group}/input_shift"),
+        output_scale=artifact.scalar(f"{group}/output_scale"),
+        output_shift=artifact.scalar(f"{group}/output_shift"),
+        features=FeatureSpec(**{**spec, "channels": tuple(spec["channels"])}),
+        feature_minimum=artifact.array(f"{group}/feature_minimum"),
+        feature_maximum=artifact.array(f"{group}/feature_maximum"),
+        has_biases=bool(notes["has_biases"]),
+    )
