@@ -26,7 +26,14 @@ SI_UNITS: dict[str, str] = {
 }
 """The SI unit of each quantity that a channel can carry."""
 
-_WORDS = {"": "dimensionless", "1": "dimensionless", "-": "dimensionless", "g": "standard_gravity", "gal": "cm/s^2", "Gal": "cm/s^2"}
+_WORDS = {
+    "": "dimensionless",
+    "1": "dimensionless",
+    "-": "dimensionless",
+    "g": "standard_gravity",
+    "gal": "cm/s^2",
+    "Gal": "cm/s^2",
+}
 
 
 @cache
@@ -45,7 +52,9 @@ def _parse(unit: str, where: str) -> Any:
     try:
         return registry.parse_units(_WORDS.get(text, text))
     except Exception as error:
-        raise UserError(where or "unit", f"unit {unit!r}", "is not a unit", "write one such as mm, m/s^2, kN, A, V") from error
+        raise UserError(
+            where or "unit", f"unit {unit!r}", "is not a unit", "write one such as mm, m/s^2, kN, A, V"
+        ) from error
 
 
 def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> float:
@@ -70,11 +79,15 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
     if quantity is not None:
         wanted = SI_UNITS[quantity]
         if parsed.dimensionality != registry.parse_units(wanted).dimensionality:
-            raise UserError(where or "unit", f"unit {unit!r}", f"is no unit of {quantity}", f"write one such as {wanted}")
+            raise UserError(
+                where or "unit", f"unit {unit!r}", f"is no unit of {quantity}", f"write one such as {wanted}"
+            )
     return float((1.0 * parsed).to_base_units().magnitude)
 
 
-def to_si(values: ArrayLike, unit: str, *, where: str = "", quantity: str | None = None) -> NDArray[np.float64]:
+def to_si(
+    values: ArrayLike, unit: str, *, where: str = "", quantity: str | None = None
+) -> NDArray[np.float64]:
     """Return `values` in SI (see :func:`conversion`)."""
     return np.asarray(values, dtype=np.float64) * conversion(unit, where=where, quantity=quantity)
 

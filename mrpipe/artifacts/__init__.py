@@ -2,7 +2,12 @@
 
 from mrpipe.artifacts.atomic import atomic_path, atomic_write_text, sha256_of
 from mrpipe.artifacts.hdf5 import Artifact, ArtifactWriter, Provenance
-from mrpipe.artifacts.resources import ParameterSet, config_directory, load_parameter_set, public_data_directory
+from mrpipe.artifacts.resources import (
+    ParameterSet,
+    config_directory,
+    load_parameter_set,
+    public_data_directory,
+)
 from mrpipe.artifacts.types import BoolArray, FloatArray, IntArray, Progress, no_progress
 
 __all__ = [

@@ -65,20 +65,19 @@ class ArtifactWriter:
     @contextmanager
     def create(cls, path: Path, provenance: Provenance) -> Iterator[ArtifactWriter]:
         """Open a new artifact that appears at `path` when the block ends without an exception."""
-        with atomic_path(path) as temporary:
-            with h5py.File(temporary, "w", track_order=True) as handle:
-                attributes = handle.attrs
-                attributes["schema"] = SCHEMA
-                attributes["stage"] = provenance.stage
-                attributes["mrpipe_version"] = __version__
-                attributes["inputs"] = json.dumps(dict(provenance.inputs))
-                attributes["seed"] = provenance.seed
-                attributes["created_utc"] = datetime.now(UTC).isoformat(timespec="seconds")
-                for library, version in library_versions().items():
-                    attributes[f"{library}_version"] = version
-                # a long text does not fit the 64 KiB of a compact attribute
-                attributes["config"] = provenance.config[:60000]
-                yield cls(handle)
+        with atomic_path(path) as temporary, h5py.File(temporary, "w", track_order=True) as handle:
+            attributes = handle.attrs
+            attributes["schema"] = SCHEMA
+            attributes["stage"] = provenance.stage
+            attributes["mrpipe_version"] = __version__
+            attributes["inputs"] = json.dumps(dict(provenance.inputs))
+            attributes["seed"] = provenance.seed
+            attributes["created_utc"] = datetime.now(UTC).isoformat(timespec="seconds")
+            for library, version in library_versions().items():
+                attributes[f"{library}_version"] = version
+            # a long text does not fit the 64 KiB of a compact attribute
+            attributes["config"] = provenance.config[:60000]
+            yield cls(handle)
 
     def put(
         self, name: str, values: ArrayLike, *, unit: str, dims: Sequence[str] = (), description: str = ""
@@ -141,9 +140,13 @@ class Artifact:
             with h5py.File(self.path, "r") as handle:
                 self.root: dict[str, Any] = {key: _plain(value) for key, value in handle.attrs.items()}
         except OSError as error:
-            raise UserError(self.path, "", "not a readable HDF5 file", "build it again with --force") from error
+            raise UserError(
+                self.path, "", "not a readable HDF5 file", "build it again with --force"
+            ) from error
         if self.root.get("schema") != SCHEMA:
-            raise UserError(self.path, "attribute schema", f"is {self.root.get('schema')!r}", f"{SCHEMA!r} expected")
+            raise UserError(
+                self.path, "attribute schema", f"is {self.root.get('schema')!r}", f"{SCHEMA!r} expected"
+            )
 
     @property
     def stage(self) -> str:

@@ -94,7 +94,9 @@ def load_parameter_set(kind: str, name: str | Path) -> ParameterSet:
     for key, entry in content["parameters"].items():
         if not isinstance(entry, dict) or not {"value", "unit"} <= entry.keys():
             raise UserError(path, f"parameters.{key}", "has no value or no unit", "write {value: …, unit: …}")
-        values[key] = np.asarray(to_si(np.asarray(entry["value"], dtype=np.float64), str(entry["unit"]), where=str(path)))
+        values[key] = np.asarray(
+            to_si(np.asarray(entry["value"], dtype=np.float64), str(entry["unit"]), where=str(path))
+        )
         units[key] = str(entry["unit"])
     return ParameterSet(
         name=str(content.get("name", path.stem)),

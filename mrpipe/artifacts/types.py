@@ -19,5 +19,5 @@ class Progress(Protocol):
         """Report `fraction` (0 to 1) done, with a short `text`."""
 
 
-def no_progress(fraction: float, text: str = "") -> None:  # noqa: ARG001
+def no_progress(fraction: float, text: str = "") -> None:
     """Ignore the report: the default of every `progress` argument."""

@@ -1,0 +1,84 @@
+"""A measured campaign in memory: recordings in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mrpipe.artifacts import FloatArray
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One test of a campaign.
+
+    Attributes
+    ----------
+    name, role
+        As in campaign.yaml; role is training, validation or repeat.
+    kind
+        Frame tests: sweep, free-decay, closed-loop or random; empty on a bench.
+    sampling_rate_hz
+        Nominal rate.
+    time_s
+        Shape (n,), strictly increasing.
+    channels
+        Quantity (`displacement`, `drive`, `force`, `floor_acceleration_1`, ...) -> shape (n,), SI.
+    segments
+        Half-open index ranges to use; the whole test where none were given.
+    details
+        What else campaign.yaml says of the test (mode, law, gains, shaker floor, ...).
+    """
+
+    name: str
+    role: str
+    sampling_rate_hz: float
+    time_s: FloatArray
+    channels: Mapping[str, FloatArray]
+    segments: tuple[tuple[int, int], ...]
+    kind: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A measured campaign.
+
+    Attributes
+    ----------
+    name, rig
+        As in campaign.yaml; rig is damper-bench or shear-frame.
+    directory
+        Where campaign.yaml lies.
+    recordings
+        The tests in order.
+    drive_unit
+        `A` or `V`, empty where no drive was recorded.
+    drive_is_set_point
+        True where the drive is a constant written in campaign.yaml and not a recorded channel.
+    declared_effects
+        Names of effects that the campaign itself declares.
+    floor_masses_kg
+        Frame campaigns, floor 1 first; empty otherwise.
+    declared
+        Everything else of campaign.yaml.
+    findings
+        What the reader noticed and the user should know (clipping, sign of force, jitter), one line each.
+    """
+
+    name: str
+    rig: str
+    directory: Path
+    recordings: tuple[Recording, ...]
+    drive_unit: str = ""
+    drive_is_set_point: bool = False
+    declared_effects: tuple[str, ...] = ()
+    floor_masses_kg: tuple[float, ...] = ()
+    declared: Mapping[str, Any] = field(default_factory=dict)
+    findings: tuple[str, ...] = ()
+
+    def with_role(self, role: str) -> tuple[Recording, ...]:
+        """Return the recordings of one role."""
+        return tuple(item for item in self.recordings if item.role == role)

@@ -1,0 +1,75 @@
+"""Turns what pydantic finds into one line with file, line, key and the nearest known key."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from mrpipe.errors import UserError
+
+
+def nearest(word: str, known: list[str]) -> str:
+    """Return a remedy that names the nearest known word, or all of them where none is near."""
+    matches = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    if matches:
+        return f"did you mean {matches[0]}?"
+    return f"known: {', '.join(sorted(known))}"
+
+
+def section_of(model: type[BaseModel], path: tuple[str | int, ...]) -> type[BaseModel] | None:
+    """Return the model that the keys of `path` lead to, or None where they leave the models."""
+    current: type[BaseModel] | None = model
+    for key in path:
+        if current is None or key not in current.model_fields:
+            return None
+        current = model_in(current.model_fields[str(key)].annotation)
+    return current
+
+
+def model_in(annotation: Any) -> type[BaseModel] | None:
+    """Return the model that a type annotation holds (itself, in a tuple, dict or union), or None."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in get_args(annotation):
+        found = model_in(argument)
+        if found is not None:
+            return found
+    return None
+
+
+def explain(
+    error: ValidationError,
+    model: type[BaseModel],
+    source: str | Path,
+    lines: Mapping[tuple[str | int, ...], int],
+) -> UserError:
+    """Return the first finding of `error` as a :class:`UserError`.
+
+    Parameters
+    ----------
+    model
+        The model that was validated.
+    source
+        File, or `--set`.
+    lines
+        Path of keys -> line number in the file.
+    """
+    first = error.errors()[0]
+    path = tuple(first["loc"])
+    known_path = path
+    while known_path and known_path not in lines:
+        known_path = known_path[:-1]
+    line = lines.get(known_path)
+    dotted = ".".join(str(part) for part in path)
+    where = f"line {line}, {dotted}" if line else dotted
+    if first["type"] == "extra_forbidden":
+        section = section_of(model, path[:-1])
+        known = list(section.model_fields) if section is not None else []
+        return UserError(source, where, "unknown key", nearest(str(path[-1]), known))
+    given = first.get("input")
+    shown = f"is {given!r}" if not isinstance(given, Mapping) else "is a section of its own"
+    return UserError(source, where, shown, first["msg"][0].lower() + first["msg"][1:])

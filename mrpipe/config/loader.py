@@ -1,0 +1,155 @@
+"""Reads a configuration: YAML with line numbers, overrides, validation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from mrpipe.artifacts import config_directory
+from mrpipe.config.errors import explain, nearest, section_of
+from mrpipe.config.model import Config
+from mrpipe.errors import UserError
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class LoadedConfig:
+    """A validated configuration and where it came from."""
+
+    config: Config
+    path: Path
+    overrides: tuple[str, ...] = ()
+
+    def as_yaml(self) -> str:
+        """Return the resolved configuration (every default written out) as YAML."""
+        return yaml.safe_dump(self.config.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+
+def default_config_path() -> Path:
+    """Return configs/thesis.yaml of the working directory, else of the program."""
+    here = Path("configs/thesis.yaml")
+    return here if here.is_file() else config_directory() / "thesis.yaml"
+
+
+def load_config(path: Path, overrides: Sequence[str] = ()) -> LoadedConfig:
+    """Read and validate a configuration.
+
+    Parameters
+    ----------
+    path
+        YAML file; a bare name such as `utfsm` means the file of that name that comes with the program.
+    overrides
+        `section.key=value`, the value in YAML.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, no YAML, has a key twice, an unknown key or a wrong value.
+    """
+    path = _locate(path)
+    content, lines = read_yaml_with_lines(path)
+    content.setdefault("name", path.stem)
+    for override in overrides:
+        _apply(content, override)
+    try:
+        config = Config.model_validate(content)
+    except ValidationError as error:
+        at = tuple(error.errors()[0]["loc"])
+        from_option = any(_override_path(item) == at[: len(_override_path(item))] for item in overrides)
+        raise explain(
+            error, Config, "--set" if from_option else path, {} if from_option else lines
+        ) from error
+    return LoadedConfig(config, path.resolve(), tuple(overrides))
+
+
+def _locate(path: Path) -> Path:
+    if path.is_file():
+        return path
+    named = config_directory() / f"{path.name.removesuffix('.yaml')}.yaml"
+    if str(path) in {named.stem, f"configs/{named.name}"} and named.is_file():
+        return named
+    known = sorted(item.stem for item in config_directory().glob("*.yaml"))
+    raise UserError(path, "", "no such configuration", f"give a YAML file, or one of {', '.join(known)}")
+
+
+def read_yaml_with_lines(path: Path) -> tuple[dict[str, Any], dict[KeyPath, int]]:
+    """Return the mapping in a YAML file and the line of each key."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        content = yaml.safe_load(text)
+    except UnicodeDecodeError as error:
+        raise UserError(path, "", "is not UTF-8 text", "save it as UTF-8") from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"line {mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or str(error)
+        raise UserError(path, where, f"not valid YAML ({problem})", "mend the syntax") from error
+    if content is None:
+        return {}, {}
+    if not isinstance(content, dict):
+        raise UserError(path, "line 1", "is no mapping", "write `key: value` lines")
+    lines: dict[KeyPath, int] = {}
+    _collect_lines(node, (), lines, path)
+    return content, lines
+
+
+def _collect_lines(node: Any, prefix: KeyPath, lines: dict[KeyPath, int], path: Path) -> None:
+    if isinstance(node, yaml.MappingNode):
+        for key_node, value_node in node.value:
+            place = (*prefix, key_node.value)
+            line = key_node.start_mark.line + 1
+            if place in lines:
+                dotted = ".".join(str(part) for part in place)
+                raise UserError(
+                    path,
+                    f"line {line}, {dotted}",
+                    f"stands already in line {lines[place]}",
+                    "keep one of the two",
+                )
+            lines[place] = line
+            _collect_lines(value_node, place, lines, path)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            lines[(*prefix, index)] = item.start_mark.line + 1
+            _collect_lines(item, (*prefix, index), lines, path)
+
+
+def _override_path(override: str) -> KeyPath:
+    return tuple(override.partition("=")[0].strip().split("."))
+
+
+def _apply(content: dict[str, Any], override: str) -> None:
+    """Set one `section.key=value` in place."""
+    keys, separator, text = override.partition("=")
+    if not separator or not keys.strip():
+        raise UserError("--set", override, "is no assignment", "write section.key=value")
+    path = _override_path(override)
+    for depth, key in enumerate(path):
+        section = section_of(Config, path[:depth])
+        if section is None:
+            break
+        if key not in section.model_fields:
+            raise UserError(
+                "--set",
+                ".".join(map(str, path)),
+                "unknown key",
+                nearest(str(key), list(section.model_fields)),
+            )
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise UserError("--set", override, "value is not valid YAML", "quote it") from error
+    target = content
+    for key in path[:-1]:
+        inner = target.setdefault(str(key), {})
+        if not isinstance(inner, dict):
+            inner = target[str(key)] = {}
+        target = inner
+    target[str(path[-1])] = value

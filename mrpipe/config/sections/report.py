@@ -1,0 +1,18 @@
+"""Settings of the report."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from mrpipe.config.section import Section
+
+
+class ReportSettings(Section):
+    """What the report shows."""
+
+    title: str = Field("", description="Title of the report; empty: the name of the configuration.")
+    formats: tuple[Literal["html", "markdown"], ...] = Field(
+        ("html", "markdown"), description="Files to write: html (one file that opens offline), markdown."
+    )

@@ -1,0 +1,104 @@
+"""What is remembered of a stage that ran, and the comparison with what would run now."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mrpipe.artifacts import atomic_write_text
+from mrpipe.pipeline.fingerprint import FileHashes, flatten
+
+
+@dataclass(frozen=True)
+class StageKey:
+    """Everything the result of a stage depends on.
+
+    Attributes
+    ----------
+    inputs
+        Declared input -> digest; `absent` for an optional input that is not there.
+    settings
+        Dotted name -> value, of the settings that the stage reads.
+    code
+        Module -> hash of its source.
+    seed
+        Seed of the run.
+    """
+
+    inputs: Mapping[str, str]
+    settings: Mapping[str, Any]
+    code: Mapping[str, str]
+    seed: int
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a finished stage left: its key, outputs, summary and warnings; `skipped` says why it had nothing to do."""
+
+    stage: str
+    key: StageKey
+    outputs: Mapping[str, str]
+    summary: Mapping[str, Any]
+    warnings: list[str] = field(default_factory=list)
+    skipped: str = ""
+    seconds: float = 0.0
+
+    def save(self, directory: Path) -> None:
+        """Write `<directory>/<stage>.json` atomically."""
+        atomic_write_text(directory / f"{self.stage}.json", json.dumps(asdict(self), indent=1))
+
+    @classmethod
+    def load(cls, directory: Path, stage: str) -> Manifest | None:
+        """Read the manifest of a stage, or None where there is none that can be read."""
+        try:
+            content = json.loads((directory / f"{stage}.json").read_text(encoding="utf-8"))
+            return cls(**{**content, "key": StageKey(**content["key"])})
+        except (OSError, ValueError, TypeError, KeyError):
+            return None
+
+
+def reasons_stale(
+    manifest: Manifest | None, key: StageKey, run_directory: Path, hashes: FileHashes
+) -> list[str]:
+    """Return why a stage has to run, in plain words; empty where what is there can be used."""
+    if manifest is None:
+        return ["never built"]
+    reasons = []
+    for name in sorted({*manifest.key.inputs, *key.inputs}):
+        before, now = manifest.key.inputs.get(name), key.inputs.get(name)
+        if before != now:
+            reasons.append(f"input {name} {_change(before, now)}")
+    before_settings, now_settings = (
+        flatten(manifest.key.settings),
+        flatten(json.loads(json.dumps(key.settings))),
+    )
+    for name in sorted({*before_settings, *now_settings}):
+        before, now = before_settings.get(name), now_settings.get(name)
+        if before != now:
+            reasons.append(f"setting {name} was {before}, is {now}")
+    changed = sorted(
+        name for name in {*manifest.key.code, *key.code} if manifest.key.code.get(name) != key.code.get(name)
+    )
+    if changed:
+        shown = ", ".join(changed[:3]) + (f" and {len(changed) - 3} more" if len(changed) > 3 else "")
+        reasons.append(f"code of {shown} changed")
+    if manifest.key.seed != key.seed:
+        reasons.append(f"seed was {manifest.key.seed}, is {key.seed}")
+    for name, digest in manifest.outputs.items():
+        path = run_directory / name
+        if not path.exists():
+            reasons.append(f"output {name} is missing")
+        elif hashes.digest(path) != digest:
+            reasons.append(f"output {name} was changed by other hands")
+    return reasons
+
+
+def _change(before: str | None, now: str | None) -> str:
+    if now is None or now == "absent":
+        return "is gone"
+    if before is None or before == "absent":
+        return "is new"
+    return "changed"

@@ -1,0 +1,59 @@
+"""The parts of the report that stages leave in the run directory: texts, tables and figures."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.artifacts import atomic_path, atomic_write_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+PARTS = "report-parts"
+
+
+@dataclass
+class PartWriter:
+    """Collects one stage's part of the report and keeps it as `report-parts/<stage>.json` and files beside it."""
+
+    stage: str
+    run_directory: Path
+    items: list[dict[str, Any]] = field(default_factory=list)
+
+    def text(self, paragraph: str) -> None:
+        """Add a paragraph."""
+        self.items.append({"kind": "text", "text": " ".join(paragraph.split())})
+
+    def table(self, name: str, frame: pd.DataFrame, caption: str) -> None:
+        """Add a table and save it as CSV."""
+        file = f"tables/{self.stage}-{name}.csv"
+        with atomic_path(self.run_directory / file) as temporary:
+            frame.to_csv(temporary, index=False)
+        self.items.append({"kind": "table", "file": file, "caption": caption})
+
+    def figure(self, name: str, figure: Figure, caption: str) -> None:
+        """Add a figure and save it as PNG."""
+        file = f"figures/{self.stage}-{name}.png"
+        with atomic_path(self.run_directory / file) as temporary:
+            # no time stamp or version inside, so that the same figure is the same file
+            figure.savefig(temporary, format="png", dpi=120, metadata={"Software": None})
+        self.items.append({"kind": "figure", "file": file, "caption": caption})
+
+    def save(self) -> None:
+        """Write the part."""
+        atomic_write_text(
+            self.run_directory / PARTS / f"{self.stage}.json",
+            json.dumps({"stage": self.stage, "items": self.items}),
+        )
+
+
+def read_part(run_directory: Path, stage: str) -> list[dict[str, Any]]:
+    """Return the items of a stage's part; empty where it left none."""
+    path = run_directory / PARTS / f"{stage}.json"
+    if not path.is_file():
+        return []
+    return list(json.loads(path.read_text(encoding="utf-8"))["items"])

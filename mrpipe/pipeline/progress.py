@@ -1,0 +1,82 @@
+"""Progress: bars on a terminal, log lines elsewhere; always on standard error."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mrpipe.artifacts import Progress
+
+LOGGER_NAME = "mrpipe"
+_LOG_EVERY_S = 10.0
+
+
+def make_logger(log_file: Path, level: str, quiet: bool) -> logging.Logger:
+    """Return a logger that writes to `log_file` and, unless `quiet`, to standard error."""
+    logger = logging.getLogger(LOGGER_NAME)
+    for handler in list(logger.handlers):
+        logger.removeHandler(handler)
+        handler.close()
+    logger.setLevel(level.upper())
+    logger.propagate = False
+    log_file.parent.mkdir(parents=True, exist_ok=True)
+    to_file = logging.FileHandler(log_file, encoding="utf-8")
+    to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    logger.addHandler(to_file)
+    to_error = logging.StreamHandler(sys.stderr)
+    to_error.setFormatter(logging.Formatter("%(message)s"))
+    to_error.setLevel(logging.ERROR if quiet else level.upper())
+    logger.addHandler(to_error)
+    return logger
+
+
+@contextmanager
+def stage_progress(stage: str, logger: logging.Logger, quiet: bool) -> Iterator[Progress]:
+    """Yield the `progress` that a stage reports to."""
+    if sys.stderr.isatty() and not quiet:
+        with _bar(stage) as progress:
+            yield progress
+    else:
+        yield _lines(stage, logger)
+
+
+@contextmanager
+def _bar(stage: str) -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns: list[Any] = [
+        TextColumn("{task.description:>20}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+    ]
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(stage, total=1.0, note="")
+
+        def progress(fraction: float, text: str = "") -> None:
+            bar.update(task, completed=fraction, note=text)
+
+        yield progress
+
+
+def _lines(stage: str, logger: logging.Logger) -> Progress:
+    started = last = time.monotonic()
+
+    def progress(fraction: float, text: str = "") -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= _LOG_EVERY_S:
+            last = now
+            left = (now - started) * (1 - fraction) / fraction if fraction > 0.02 else float("nan")
+            remaining = f", about {left:.0f} s left" if left == left else ""
+            logger.info("%s: %.0f %%%s %s", stage, 100 * fraction, remaining, text)
+
+    return progress

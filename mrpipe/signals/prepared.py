@@ -1,0 +1,106 @@
+"""A prepared test: filtered, offset-free, differentiated, ready for every estimator of the bench."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class PreparedTest:
+    """One test after `prepare`; all channels on one clock, SI, shape (n,).
+
+    Attributes
+    ----------
+    name, role
+        As in campaign.yaml (training, validation, repeat).
+    sampling_rate_hz
+        Working rate.
+    drive
+        Coil current [A] or voltage [V], see `drive_unit`.
+    force_raw_n, displacement_raw_m
+        Offset-free but unfiltered, for estimators that bring their own noise model.
+    cycles
+        Start indices of the steady cycles at upward zero crossings of displacement, with the end of the last one;
+        empty where the motion is not periodic.
+    excitation
+        `periodic` or `random`.
+    drive_is_set_point
+        The drive is a set point and no record.
+    """
+
+    name: str
+    role: str
+    sampling_rate_hz: float
+    time_s: FloatArray
+    displacement_m: FloatArray
+    velocity_m_s: FloatArray
+    acceleration_m_s2: FloatArray
+    drive: FloatArray
+    force_n: FloatArray
+    displacement_raw_m: FloatArray
+    force_raw_n: FloatArray
+    cycles: IntArray
+    drive_unit: str = "A"
+    excitation: str = "periodic"
+    drive_is_set_point: bool = False
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
+        return 1.0 / self.sampling_rate_hz
+
+
+_CHANNELS = {
+    "time": ("time_s", "s"),
+    "displacement": ("displacement_m", "m"),
+    "velocity": ("velocity_m_s", "m/s"),
+    "acceleration": ("acceleration_m_s2", "m/s^2"),
+    "drive": ("drive", ""),
+    "force": ("force_n", "N"),
+    "displacement_raw": ("displacement_raw_m", "m"),
+    "force_raw": ("force_raw_n", "N"),
+}
+
+
+def write_prepared(artifact: ArtifactWriter, tests: list[PreparedTest]) -> None:
+    """Write tests to `tests/<name>/...` of an artifact."""
+    for test in tests:
+        for channel, (attribute, unit) in _CHANNELS.items():
+            artifact.put(
+                f"tests/{test.name}/{channel}", getattr(test, attribute), unit=unit or test.drive_unit, dims=("time",)
+            )
+        artifact.put(f"tests/{test.name}/cycles", test.cycles.astype(np.int64), unit="1", dims=("cycle",))
+        artifact.attributes(
+            f"tests/{test.name}",
+            role=test.role,
+            sampling_rate_hz=test.sampling_rate_hz,
+            drive_unit=test.drive_unit,
+            excitation=test.excitation,
+            drive_is_set_point=test.drive_is_set_point,
+        )
+
+
+def read_prepared(artifact: Artifact) -> list[PreparedTest]:
+    """Read what :func:`write_prepared` wrote, in the order of writing."""
+    tests = []
+    for name in artifact.members("tests"):
+        group = f"tests/{name}"
+        notes = artifact.attributes(group)
+        channels = {attribute: artifact.array(f"{group}/{key}") for key, (attribute, _) in _CHANNELS.items()}
+        tests.append(
+            PreparedTest(
+                name=name,
+                role=str(notes["role"]),
+                sampling_rate_hz=float(notes["sampling_rate_hz"]),
+                cycles=artifact.array(f"{group}/cycles").astype(np.int64),
+                drive_unit=str(notes["drive_unit"]),
+                excitation=str(notes["excitation"]),
+                drive_is_set_point=bool(notes["drive_is_set_point"]),
+                **channels,
+            )
+        )
+    return tests

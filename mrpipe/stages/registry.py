@@ -1,0 +1,59 @@
+"""All stages by name, in the order of the pipeline."""
+
+from __future__ import annotations
+
+import importlib
+from functools import cache
+
+from mrpipe.errors import UserError
+from mrpipe.pipeline.stage import Stage
+
+_MODULES = (
+    "record",
+    "prepare",
+    "assemble",
+    "sweep",
+    "train_forward",
+    "train_inverse",
+    "identify_damper",
+    "identify_frame",
+    "calibrate",
+    "simulate",
+    "close_loop",
+    "reproduce",
+    "export_controller",
+)
+
+
+@cache
+def all_stages() -> dict[str, Stage]:
+    """Return name -> stage in the order of the pipeline."""
+    stages: dict[str, Stage] = {}
+    for name in _MODULES:
+        module = importlib.import_module(f"mrpipe.stages.{name}")
+        for stage in getattr(module, "STAGES", None) or (module.STAGE,):
+            stages[stage.name] = stage
+    # the closed loop is recorded with a calibrated controller, so it comes after it though its file comes first
+    recorded = stages.pop("record-closed-loop")
+    ordered: dict[str, Stage] = {}
+    for name, stage in stages.items():
+        if name == "close-loop":
+            ordered[recorded.name] = recorded
+        ordered[name] = stage
+    return ordered
+
+
+def stage_named(name: str) -> Stage:
+    """Return one stage.
+
+    Raises
+    ------
+    UserError
+        If there is no such stage; the nearest name is given.
+    """
+    from mrpipe.config.errors import nearest
+
+    stages = all_stages()
+    if name not in stages:
+        raise UserError("stages", name, "no such stage", nearest(name, list(stages)))
+    return stages[name]
