@@ -1,0 +1,232 @@
+"""Modes, state space and exact steps of a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eigh, expm
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.structures.frame import Frame
+
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class NaturalModes:
+    """Undamped modes in rising order.
+
+    Attributes
+    ----------
+    angular_frequencies
+        Shape (n,) [rad/s]; a negative squared frequency (unstable) shows as NaN.
+    mode_shapes
+        Shape (n, n), a row a floor, a column a mode, U'MU = I [1/sqrt(kg)], top floor positive in the first mode.
+    """
+
+    angular_frequencies: FloatArray
+    mode_shapes: FloatArray
+
+    @property
+    def frequencies_hz(self) -> FloatArray:
+        """Natural frequencies [Hz]."""
+        return np.asarray(self.angular_frequencies / (2.0 * np.pi))
+
+
+@dataclass(frozen=True)
+class ComplexModes:
+    """Damped modes, one of each conjugate pair, in rising order of |s|; overdamped (real) ones come last.
+
+    Attributes
+    ----------
+    poles
+        Shape (m,) complex [rad/s]; s = -zeta omega + i omega_d. A real pole counts as a mode of its own.
+    mode_shapes
+        Shape (n, m) complex, displacement part, largest element 1.
+    """
+
+    poles: ComplexArray
+    mode_shapes: ComplexArray
+
+    @property
+    def angular_frequencies(self) -> FloatArray:
+        """|s| [rad/s]."""
+        return np.asarray(np.abs(self.poles))
+
+    @property
+    def damping_ratios(self) -> FloatArray:
+        """-Re s/|s| [1]; negative where the mode grows."""
+        return np.asarray(-self.poles.real / np.maximum(np.abs(self.poles), 1e-300))
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """z' = A z + B u with z = [x, v] relative to the ground; u = [ground acceleration, force 1, ...].
+
+    Attributes
+    ----------
+    A, B
+        Shape (2n, 2n), (2n, 1 + k).
+    """
+
+    A: FloatArray
+    B: FloatArray
+
+    @property
+    def floors(self) -> int:
+        """Number of floors n."""
+        return int(self.A.shape[0] // 2)
+
+    def absolute_acceleration(self) -> tuple[FloatArray, FloatArray]:
+        """Return C (n, 2n) and D (n, 1 + k) of the absolute accelerations x'' + x_g'' = C z + D u.
+
+        The ground's part cancels: M (x'' + x_g'') = f - C x' - K x.
+        """
+        n = self.floors
+        D = self.B[n:].copy()
+        D[:, 0] = 0.0
+        return self.A[n:].copy(), D
+
+
+def natural_modes(frame: Frame) -> NaturalModes:
+    """Return the undamped modes of (K - omega2 M) u = 0 (4.4), unit modal mass.
+
+    A stiffness that is not symmetric to rounding is symmetrised (the route (3.16) leaves rounding).
+    """
+    squared, shapes = eigh(0.5 * (frame.stiffness + frame.stiffness.T), frame.mass)
+    signs = np.where(shapes[-1] < 0.0, -1.0, 1.0)
+    omega = np.full(squared.shape, np.nan)
+    omega[squared >= 0.0] = np.sqrt(squared[squared >= 0.0])
+    return NaturalModes(omega, np.asarray(shapes * signs))
+
+
+def normalise_to_largest(mode_shapes: FloatArray) -> FloatArray:
+    """Return shapes (n, m) whose element of largest magnitude in each column is +1, as (3.5) prints them."""
+    shapes = np.asarray(mode_shapes, dtype=np.float64)
+    largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None, :], axis=0)
+    return np.asarray(shapes / largest)
+
+
+def floor_position(floors: int, floor: int = 1) -> FloatArray:
+    """Return the connectivity vector w of (4.1), shape (n,): a device between ground and `floor` (from 1)."""
+    position = np.zeros(floors)
+    position[floor - 1] = 1.0
+    return position
+
+
+def storey_position(floors: int, storey: int) -> FloatArray:
+    """Return w, shape (n,), of a device across `storey` (1 is between ground and floor 1): drift x_s - x_(s-1)."""
+    position = floor_position(floors, storey)
+    if storey > 1:
+        position[storey - 2] = -1.0
+    return position
+
+
+def state_space(frame: Frame, force_positions: ArrayLike | None = None) -> StateSpace:
+    """Return the state space of (3.12) with ground acceleration and forces as inputs.
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    force_positions
+        Shape (n, k), a column a force acting on the floors [1]; none if left out. A damper force f that resists
+        (4.1) has the column -w.
+    """
+    n = frame.floors
+    inverse = np.linalg.inv(frame.mass)
+    A = np.zeros((2 * n, 2 * n))
+    A[:n, n:] = np.eye(n)
+    A[n:, :n] = -inverse @ frame.stiffness
+    A[n:, n:] = -inverse @ frame.damping
+    columns = [-np.ones((n, 1))]
+    if force_positions is not None:
+        columns.append(inverse @ np.asarray(force_positions, dtype=np.float64).reshape(n, -1))
+    B = np.vstack([np.zeros((n, sum(c.shape[1] for c in columns))), np.hstack(columns)])
+    return StateSpace(A, B)
+
+
+def complex_modes(
+    frame: Frame, *, position: ArrayLike | None = None, stiffness: float = 0.0, damping: float = 0.0
+) -> ComplexModes:
+    """Return the damped modes, with a linear device f = damping v + stiffness x at `position` where one is given.
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    position
+        Connectivity vector w, shape (n,); floor 1 to ground if left out.
+    stiffness, damping
+        Of the device [N/m], [N s/m].
+    """
+    w = floor_position(frame.floors) if position is None else np.asarray(position, dtype=np.float64)
+    device = np.outer(w, w)
+    with_device = Frame(frame.mass, frame.damping + damping * device, frame.stiffness + stiffness * device)
+    poles, vectors = np.linalg.eig(state_space(with_device).A)
+    keep = poles.imag >= -1e-12 * np.abs(poles)
+    poles, shapes = poles[keep], vectors[: frame.floors, keep]
+    order = np.lexsort((np.abs(poles), poles.imag <= 1e-9 * np.abs(poles)))
+    poles, shapes = poles[order], shapes[:, order]
+    largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None, :], axis=0)
+    return ComplexModes(np.asarray(poles, dtype=np.complex128), np.asarray(shapes / largest, dtype=np.complex128))
+
+
+def discretise_zero_order(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+    """Return Ad, Bd of the exact step with inputs constant over `dt` [s]: z+ = Ad z + Bd u."""
+    n, m = B.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n] = A
+    block[:n, n:] = B
+    step = expm(block * dt)
+    return np.asarray(step[:n, :n]), np.asarray(step[:n, n:])
+
+
+def discretise_first_order(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return Ad, B0, B1 of the exact step with inputs linear over `dt` [s]: z+ = Ad z + B0 u + B1 u+."""
+    n, m = B.shape
+    block = np.zeros((n + 2 * m, n + 2 * m))
+    block[:n, :n] = A * dt
+    block[:n, n : n + m] = B * dt
+    block[n : n + m, n + m :] = np.eye(m)
+    step = expm(block)
+    ramp = step[:n, n + m :]
+    return np.asarray(step[:n, :n]), np.asarray(step[:n, n : n + m] - ramp), np.asarray(ramp)
+
+
+def frequency_response(
+    frame: Frame, omega: ArrayLike, *, shaker_floor: int = 0, absolute_acceleration: bool = True
+) -> ComplexArray:
+    """Return the frequency response of every floor, shape (number of frequencies, n).
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    omega
+        Shape (m,) [rad/s].
+    shaker_floor
+        0: the input is the ground acceleration; else a force on that floor.
+    absolute_acceleration
+        Absolute acceleration to input ([1] or [1/kg]); else displacement relative to the ground ([s2] or [m/N]).
+    """
+    w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+    n = frame.floors
+    load = -frame.mass @ np.ones(n) if shaker_floor == 0 else floor_position(n, shaker_floor)
+    dynamic = frame.stiffness + 1j * w[:, None, None] * frame.damping - w[:, None, None] ** 2 * frame.mass
+    relative = np.linalg.solve(dynamic, np.broadcast_to(load.astype(np.complex128)[:, None], (w.size, n, 1)))[..., 0]
+    if not absolute_acceleration:
+        return np.asarray(relative)
+    ground = 1.0 if shaker_floor == 0 else 0.0
+    return np.asarray(ground - w[:, None] ** 2 * relative)
+
+
+def modal_assurance(first: ArrayLike, second: ArrayLike) -> FloatArray:
+    """Return the modal assurance criterion, shape (m1, m2), of shapes (n, m1) and (n, m2), real or complex."""
+    a = np.asarray(first)
+    b = np.asarray(second)
+    cross = np.abs(a.conj().T @ b) ** 2
+    norms = np.outer(np.sum(np.abs(a) ** 2, axis=0), np.sum(np.abs(b) ** 2, axis=0))
+    return np.asarray(cross / norms, dtype=np.float64)
