@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from mrpipe.structures import (
+    Frame,
     complex_modes,
     discretise_first_order,
     discretise_zero_order,
@@ -60,7 +61,9 @@ def test_frequency_response_is_that_of_the_state_space():
 
 @pytest.mark.literature
 def test_exact_damping_of_the_viscous_law_on_the_first_floor():
-    frame = frame_from_parameter_set("thesis")
+    thesis = frame_from_parameter_set("thesis")
+    # the figures leave the frame's own damping (0.003) out
+    frame = Frame(thesis.mass, np.zeros((5, 5)), thesis.stiffness)
     assert complex_modes(frame, damping=650.0).damping_ratios[0] == pytest.approx(0.154, abs=5e-4)
     assert complex_modes(frame, damping=538.0).damping_ratios[0] == pytest.approx(0.160, abs=5e-4)
 
