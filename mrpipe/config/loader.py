@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from mrpipe.artifacts import config_directory
 from mrpipe.config.errors import explain, nearest, section_of
 from mrpipe.config.model import Config
+from mrpipe.config.sections.campaigns import LABORATORY, CampaignsSettings
 from mrpipe.errors import UserError
 
 KeyPath = tuple[str | int, ...]
@@ -62,10 +63,17 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> LoadedConfig:
     except ValidationError as error:
         at = tuple(error.errors()[0]["loc"])
         from_option = any(_override_path(item) == at[: len(_override_path(item))] for item in overrides)
-        raise explain(
-            error, Config, "--set" if from_option else path, {} if from_option else lines
-        ) from error
-    return LoadedConfig(config, path.resolve(), tuple(overrides))
+        raise explain(error, Config, "--set" if from_option else path, {} if from_option else lines) from error
+    return LoadedConfig(_with_absolute_campaigns(config, path.resolve().parent), path.resolve(), tuple(overrides))
+
+
+def _with_absolute_campaigns(config: Config, base: Path) -> Config:
+    """Resolve campaign paths against the configuration's folder, so that a kept copy means the same campaigns."""
+    resolved = {
+        rig: source if source in (None, LABORATORY) else str((base / source).resolve())
+        for rig, source in config.campaigns.model_dump().items()
+    }
+    return config.model_copy(update={"campaigns": CampaignsSettings(**resolved)})
 
 
 def _locate(path: Path) -> Path:

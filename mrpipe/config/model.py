@@ -52,33 +52,21 @@ DEFAULT_STAGES = (
 class Config(Section):
     """Everything that can be set, a section a stage; defaults are the thesis' own run on the virtual laboratory."""
 
-    name: str = Field(
-        "", description="Name of the run: its directory is runs/<name> unless --run says otherwise."
-    )
-    description: str = Field(
-        "", description="What this configuration is for, in a sentence; shown in the report."
-    )
-    seed: int = Field(
-        2011, ge=0, description="Seed of all randomness; the same inputs and seed give the same numbers."
-    )
+    name: str = Field("", description="Name of the run: its directory is runs/<name> unless --run says otherwise.")
+    description: str = Field("", description="What this configuration is for, in a sentence; shown in the report.")
+    seed: int = Field(2011, ge=0, description="Seed of all randomness; the same inputs and seed give the same numbers.")
     stages: tuple[str, ...] = Field(
         DEFAULT_STAGES, description="Stages of `mrpipe run`, by name; what they need is built too."
     )
     campaigns: CampaignsSettings = Field(CampaignsSettings(), description="Where the measurements come from.")
     laboratory: LaboratorySettings = Field(LaboratorySettings(), description="The virtual rig.")
-    prepare: PrepareSettings = Field(
-        PrepareSettings(), description="Filtering, offsets, differentiation, cycles."
-    )
+    prepare: PrepareSettings = Field(PrepareSettings(), description="Filtering, offsets, differentiation, cycles.")
     assemble: AssembleSettings = Field(AssembleSettings(), description="The training set.")
     sweep: SweepSettings = Field(SweepSettings(), description="The architecture sweep.")
     train_forward: TrainForwardSettings = Field(TrainForwardSettings(), description="The forward network.")
     train_inverse: TrainInverseSettings = Field(TrainInverseSettings(), description="The inverse network.")
-    identify_damper: IdentifyDamperSettings = Field(
-        IdentifyDamperSettings(), description="The parametric damper."
-    )
-    identify_frame: IdentifyFrameSettings = Field(
-        IdentifyFrameSettings(), description="The frame's M, C, K and modes."
-    )
+    identify_damper: IdentifyDamperSettings = Field(IdentifyDamperSettings(), description="The parametric damper.")
+    identify_frame: IdentifyFrameSettings = Field(IdentifyFrameSettings(), description="The frame's M, C, K and modes.")
     calibrate: CalibrateSettings = Field(CalibrateSettings(), description="Gains of the control laws.")
     simulate: SimulateSettings = Field(SimulateSettings(), description="The closed loop.")
     close_loop: CloseLoopSettings = Field(CloseLoopSettings(), description="From residual to missing effect.")

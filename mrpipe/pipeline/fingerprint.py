@@ -112,11 +112,7 @@ def _is_artifact(path: Path) -> bool:
 
 def plain_settings(settings: Any) -> Any:
     """Return settings as JSON-able plain values."""
-    return (
-        settings.model_dump(mode="json")
-        if hasattr(settings, "model_dump")
-        else json.loads(json.dumps(settings))
-    )
+    return settings.model_dump(mode="json") if hasattr(settings, "model_dump") else json.loads(json.dumps(settings))
 
 
 def flatten(value: Any, prefix: str = "") -> dict[str, Any]:

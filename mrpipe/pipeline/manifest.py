@@ -60,9 +60,7 @@ class Manifest:
             return None
 
 
-def reasons_stale(
-    manifest: Manifest | None, key: StageKey, run_directory: Path, hashes: FileHashes
-) -> list[str]:
+def reasons_stale(manifest: Manifest | None, key: StageKey, run_directory: Path, hashes: FileHashes) -> list[str]:
     """Return why a stage has to run, in plain words; empty where what is there can be used."""
     if manifest is None:
         return ["never built"]

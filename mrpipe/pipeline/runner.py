@@ -101,11 +101,7 @@ class Pipeline:
         if provider is not None:
             return self.run_directory / self.stages[provider].outputs[0]
         source = self.campaign_source(name.partition(":")[2])
-        return None if source is None else self._outside_path(source)
-
-    def _outside_path(self, source: str) -> Path:
-        path = Path(source)
-        return path if path.is_absolute() else self.loaded.path.parent / path
+        return None if source is None else Path(source)
 
     def _digest_of_input(self, name: str, path: Path) -> str:
         if name.startswith("campaign:"):
@@ -145,9 +141,7 @@ class Pipeline:
         if provider is None:
             if self.input_path(name) is None:
                 rig = name.partition(":")[2]
-                return (
-                    f"there is no {rig} campaign (give campaigns.{rig.replace('-', '_')}, or --campaign DIR)"
-                )
+                return f"there is no {rig} campaign (give campaigns.{rig.replace('-', '_')}, or --campaign DIR)"
             return ""
         return self.build(provider).manifest.skipped
 
@@ -188,8 +182,7 @@ class Pipeline:
 
     def _key(self, stage: Stage, inputs: Mapping[str, Path]) -> StageKey:
         digests = {
-            name: self._digest_of_input(name, path) if path.exists() else ABSENT
-            for name, path in inputs.items()
+            name: self._digest_of_input(name, path) if path.exists() else ABSENT for name, path in inputs.items()
         }
         for name in stage.optional_inputs:
             digests.setdefault(name, ABSENT)
@@ -202,9 +195,7 @@ class Pipeline:
         key = self._key(stage, inputs)
         manifest = Manifest.load(self._manifests, stage.name)
         reasons = (
-            ["--force"]
-            if stage.name in self.force
-            else reasons_stale(manifest, key, self.run_directory, self._hashes)
+            ["--force"] if stage.name in self.force else reasons_stale(manifest, key, self.run_directory, self._hashes)
         )
         if not reasons and manifest is not None:
             self.logger.info(
@@ -216,9 +207,7 @@ class Pipeline:
         self.logger.info("%-20s starts: %s", stage.name, "; ".join(reasons))
         return self._run(stage, key, inputs, reasons)
 
-    def _run(
-        self, stage: Stage, key: StageKey, inputs: Mapping[str, Path], reasons: Sequence[str]
-    ) -> Outcome:
+    def _run(self, stage: Stage, key: StageKey, inputs: Mapping[str, Path], reasons: Sequence[str]) -> Outcome:
         part = PartWriter(stage.name, self.run_directory)
         started = time.monotonic()
         skipped = ""
@@ -241,16 +230,10 @@ class Pipeline:
             except StageSkipped as reason:
                 summary, skipped = {}, str(reason)
                 self._remove_outputs(stage)
-        outputs = (
-            {}
-            if skipped
-            else {name: self._hashes.digest(self.run_directory / name) for name in stage.outputs}
-        )
+        outputs = {} if skipped else {name: self._hashes.digest(self.run_directory / name) for name in stage.outputs}
         part.save()
         seconds = time.monotonic() - started
-        manifest = Manifest(
-            stage.name, key, outputs, plain(summary), context.warnings, skipped, round(seconds, 3)
-        )
+        manifest = Manifest(stage.name, key, outputs, plain(summary), context.warnings, skipped, round(seconds, 3))
         manifest.save(self._manifests)
         self._hashes.save()
         if skipped:
@@ -307,9 +290,7 @@ class Pipeline:
                 else:
                     reasons.append(f"{provider} before it is stale")
         manifest = Manifest.load(self._manifests, name)
-        own = reasons_stale(
-            manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self._hashes
-        )
+        own = reasons_stale(manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self._hashes)
         found[name] = own if own[:1] == ["never built"] else reasons + own
         return found[name]
 

@@ -1,0 +1,65 @@
+# Targets for people and CI; every one makes its own environment in .venv.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+CONFIG ?= configs/thesis.yaml
+LAW ?= fdns
+RUN_STAMP := $(VENV)/.installed
+TEST_STAMP := $(VENV)/.installed-test
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
+
+.DEFAULT_GOAL := help
+.PHONY: help run test lint bench bench-tracing reproduce train-inverse identify-frame simulate close-loop clean
+
+help:  ## list the targets
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(RUN_STAMP): pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) -e .
+	@touch $@
+
+$(TEST_STAMP): pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) -e '.[test]'
+	@touch $@ $(RUN_STAMP)
+
+run: $(RUN_STAMP)  ## the whole main job on the virtual laboratory; prints where the report is
+	$(BIN)/mrpipe run $(CONFIG)
+
+lint: $(TEST_STAMP)  ## style, types and import rules
+	$(BIN)/ruff check mrpipe tests benchmarks
+	$(BIN)/ruff format --check mrpipe tests benchmarks
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint  ## linters and the whole test suite
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadscope
+
+bench: $(RUN_STAMP)  ## timings: optimiser, closed loop
+	$(BIN)/python -m benchmarks.levenberg_marquardt
+	$(BIN)/python -m benchmarks.closed_loop
+
+bench-tracing: $(RUN_STAMP)  ## how often planted effects are found, by effect, strength and noise
+	$(BIN)/python -m benchmarks.tracing
+
+reproduce: $(RUN_STAMP)  ## every printed figure of the thesis beside ours
+	$(BIN)/mrpipe reproduce --config $(CONFIG)
+
+train-inverse: $(RUN_STAMP)  ## the inverse network
+	$(BIN)/mrpipe train-inverse --config $(CONFIG)
+
+identify-frame: $(RUN_STAMP)  ## the frame's M, C, K and modes
+	$(BIN)/mrpipe identify-frame --config $(CONFIG)
+
+simulate: $(RUN_STAMP)  ## the closed loop under LAW (default fdns)
+	$(BIN)/mrpipe simulate --law $(LAW) --config $(CONFIG)
+
+close-loop: $(RUN_STAMP)  ## trace the residual to a missing effect
+	$(BIN)/mrpipe close-loop --config $(CONFIG)
+
+clean:  ## remove the environment, the runs and all caches
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist
+	find runs -mindepth 1 ! -name README.md -delete
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,85 @@
+"""Options that all commands share, put on a command by a decorator."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+@dataclass(frozen=True)
+class CommonOptions:
+    """What the common options said."""
+
+    config: Path | None = None
+    run: Path | None = None
+    overrides: list[str] = field(default_factory=list)
+    campaign: Path | None = None
+    jobs: int | None = None
+    seed: int | None = None
+    force: bool = False
+    quiet: bool = False
+    json: bool = False
+
+
+_COMMON: dict[str, tuple[Any, Any]] = {
+    "config": (
+        Annotated[
+            Path | None,
+            typer.Option(help="Configuration file or the name of one that comes along. Default: configs/thesis.yaml."),
+        ],
+        None,
+    ),
+    "run": (Annotated[Path | None, typer.Option(help="Run directory. Default: runs/<name of the config>.")], None),
+    "overrides": (
+        Annotated[
+            list[str] | None,
+            typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Change one setting; may be given several times."),
+        ],
+        None,
+    ),
+    "campaign": (
+        Annotated[
+            Path | None,
+            typer.Option(metavar="DIR", help="Measured campaign: directory with campaign.yaml, or a campaign file."),
+        ],
+        None,
+    ),
+    "jobs": (Annotated[int | None, typer.Option(min=1, help="Processes to use. Default: one a core.")], None),
+    "seed": (Annotated[int | None, typer.Option(min=0, help="Seed of all randomness.")], None),
+    "force": (Annotated[bool, typer.Option("--force", help="Build again even where nothing changed.")], False),
+    "quiet": (Annotated[bool, typer.Option("--quiet", help="Say nothing but errors and the result.")], False),
+    "json": (Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")], False),
+}
+
+
+def with_common_options(*left_out: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the common options (but those left out); it gets them as one `options` argument."""
+
+    def decorate(function: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(function, eval_str=True)
+        parameters = [item for name, item in own.parameters.items() if name != "options"]
+        for name, (annotation, default) in _COMMON.items():
+            if name not in left_out:
+                parameters.append(
+                    inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+                )
+
+        @functools.wraps(function)
+        def command(**values: Any) -> None:
+            common = {name: values.pop(name) for name in _COMMON if name in values}
+            common["overrides"] = common.get("overrides") or []
+            function(options=CommonOptions(**common), **values)
+
+        signature = own.replace(parameters=sorted(parameters, key=lambda item: item.kind))
+        command.__signature__ = signature  # type: ignore[attr-defined]
+        command.__annotations__ = {item.name: item.annotation for item in signature.parameters.values()}
+        del command.__wrapped__  # type: ignore[attr-defined]
+        return command
+
+    return decorate

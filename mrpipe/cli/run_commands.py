@@ -1,0 +1,201 @@
+"""`run`, `report` and `status`: the pipeline as a whole."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mrpipe.cli.options import CommonOptions, with_common_options
+from mrpipe.errors import UserError
+
+if TYPE_CHECKING:
+    from mrpipe.pipeline.runner import Pipeline
+
+
+def _with_config(options: CommonOptions, config: Path | None) -> CommonOptions:
+    from dataclasses import replace
+
+    return options if config is None else replace(options, config=config)
+
+
+@with_common_options("config")
+def run(
+    options: CommonOptions,
+    config: Annotated[
+        Path | None, typer.Argument(metavar="CONFIG", help="Configuration file. Default: configs/thesis.yaml.")
+    ] = None,
+    until: Annotated[str | None, typer.Option(metavar="STAGE", help="Stop after this stage.")] = None,
+) -> None:
+    """Run every stage that the configuration lists."""
+    from mrpipe.cli.output import print_json
+    from mrpipe.cli.session import session
+
+    started = time.monotonic()
+    with session(_with_config(options, config)) as pipeline:
+        names = _until(list(pipeline.loaded.config.stages), until)
+        if options.force:
+            pipeline.force = frozenset(pipeline.stages)
+        for name in names:
+            if name != "report":
+                pipeline.build(name)
+        report = _write_report(pipeline) if "report" in names else []
+    content = _run_summary(pipeline, report, time.monotonic() - started)
+    if options.json:
+        print_json(content)
+    else:
+        _print_run(pipeline, content)
+
+
+def _until(names: list[str], until: str | None) -> list[str]:
+    if until is None:
+        return names
+    from mrpipe.stages.registry import stage_named
+
+    if until != "report":
+        stage_named(until)
+    if until not in names:
+        raise UserError("--until", until, "is not among the stages of the configuration", f"one of {', '.join(names)}")
+    return names[: names.index(until) + 1]
+
+
+def _run_summary(pipeline: Pipeline, report: list[Path], seconds: float) -> dict[str, Any]:
+    stages = {
+        name: {
+            "outcome": outcome.what,
+            "seconds": outcome.manifest.seconds if outcome.what == "built" else 0.0,
+            "reasons": list(outcome.reasons),
+            **({"skipped": outcome.manifest.skipped} if outcome.what == "skipped" else {}),
+            "warnings": outcome.manifest.warnings,
+            "summary": outcome.manifest.summary,
+        }
+        for name, outcome in pipeline.outcomes.items()
+    }
+    return {
+        "run": str(pipeline.run_directory),
+        "seconds": seconds,
+        "stages": stages,
+        "report": [str(path) for path in report],
+    }
+
+
+def _print_run(pipeline: Pipeline, content: dict[str, Any]) -> None:
+    from mrpipe.reporting.headlines import headline
+
+    for name, stage in content["stages"].items():
+        text = stage.get("skipped") or headline(name, stage["summary"])
+        print(f"{name:20} {stage['outcome']:8} {text}")
+        for warning in stage["warnings"]:
+            print(f"{'':20} warning: {warning}")
+    print(f"done in {content['seconds']:.1f} s, in {pipeline.run_directory}")
+    for path in content["report"]:
+        print(f"report: {path}")
+
+
+def _write_report(pipeline: Pipeline) -> list[Path]:
+    from mrpipe.pipeline.manifest import Manifest
+    from mrpipe.pipeline.parts import read_part
+    from mrpipe.reporting.page import ReportStage, write_report
+
+    directory = pipeline.run_directory
+    parts = []
+    for name, stage in pipeline.stages.items():
+        manifest = Manifest.load(directory / "manifests", name)
+        if manifest is None:
+            continue
+        items = read_part(directory, name)
+        parts.append(
+            ReportStage(
+                name, stage.summary, items, manifest.summary, manifest.warnings, manifest.skipped, manifest.seconds
+            )
+        )
+    config = pipeline.loaded.config
+    if not parts:
+        raise UserError(
+            directory, "", "no stage has run here", "run `mrpipe run` first, or name the directory with --run"
+        )
+    return write_report(
+        directory,
+        title=config.report.title or config.name,
+        description=config.description,
+        stages=parts,
+        formats=config.report.formats,
+    )
+
+
+@with_common_options("campaign", "jobs", "seed", "force")
+def report(
+    options: CommonOptions,
+    directory: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help="Run directory. Default: runs/<name of the config>.")
+    ] = None,
+) -> None:
+    """Write the report of a run from what its stages left there."""
+    from dataclasses import replace
+
+    from mrpipe.cli.output import print_json
+    from mrpipe.cli.session import load, pipeline_of, run_directory
+
+    if directory is not None:
+        options = replace(options, run=directory)
+    options = _config_of_run(options)
+    loaded = load(options)
+    if not run_directory(options, loaded).is_dir():
+        raise UserError(run_directory(options, loaded), "", "no such run directory", "run `mrpipe run` first")
+    paths = _write_report(pipeline_of(options, loaded))
+    if options.json:
+        print_json({"report": [str(path) for path in paths]})
+    else:
+        for path in paths:
+            print(f"report: {path}")
+
+
+def _config_of_run(options: CommonOptions) -> CommonOptions:
+    """Take the configuration that a run directory was made with, where none is named."""
+    from dataclasses import replace
+
+    kept = options.run / "config.yaml" if options.run else None
+    if options.config is None and kept is not None and kept.is_file():
+        return replace(options, config=kept)
+    return options
+
+
+@with_common_options("jobs", "force", "quiet")
+def status(
+    options: CommonOptions,
+    directory: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help="Run directory. Default: runs/<name of the config>.")
+    ] = None,
+) -> None:
+    """Say which stages are stale in a run directory, and why."""
+    from dataclasses import replace
+
+    from mrpipe.cli.output import print_json
+    from mrpipe.cli.session import load, pipeline_of
+
+    if directory is not None:
+        if not directory.is_dir():
+            raise UserError(directory, "", "no such run directory", "run `mrpipe run` first")
+        options = replace(options, run=directory)
+    loaded = load(options if options.config else _config_of_run(options))
+    pipeline = pipeline_of(options, loaded, to_log=False)
+    found = pipeline.status([name for name in loaded.config.stages if name != "report"])
+    if options.json:
+        print_json(
+            {
+                "run": str(pipeline.run_directory),
+                "stages": {name: {"stale": bool(reasons), "reasons": reasons} for name, reasons in found.items()},
+            }
+        )
+        return
+    for name, reasons in found.items():
+        print(f"{name:20} {'; '.join(reasons) if reasons else 'up to date'}")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the program."""
+    app.command(name="run")(run)
+    app.command(name="report")(report)
+    app.command(name="status")(status)

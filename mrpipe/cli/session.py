@@ -1,0 +1,92 @@
+"""From options to a pipeline in a locked run directory, and from outcomes to what is printed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mrpipe.cli.options import CommonOptions
+from mrpipe.errors import UserError
+
+if TYPE_CHECKING:
+    from mrpipe.config.loader import LoadedConfig
+    from mrpipe.pipeline.runner import Pipeline
+
+
+def load(options: CommonOptions) -> LoadedConfig:
+    """Read the configuration that the options name, with their overrides."""
+    from mrpipe.config.loader import default_config_path, load_config
+
+    overrides = list(options.overrides)
+    if options.seed is not None:
+        overrides.append(f"seed={options.seed}")
+    if options.campaign is not None:
+        overrides.append(f"campaigns.{rig_key(options.campaign)}={_absolute(options.campaign)!r}")
+    return load_config(options.config or default_config_path(), overrides)
+
+
+def _absolute(path: Path) -> str:
+    return str(path.resolve())
+
+
+def rig_key(path: Path) -> str:
+    """Return which entry of `campaigns` a campaign belongs to: bench, frame or closed_loop."""
+    from mrpipe.campaigns import read_header
+
+    header = read_header(path)
+    if header.rig == "damper-bench":
+        return "bench"
+    return "closed_loop" if header.kinds == {"closed-loop"} else "frame"
+
+
+def run_directory(options: CommonOptions, loaded: LoadedConfig) -> Path:
+    """Return the run directory."""
+    directory = options.run or Path("runs") / loaded.config.name
+    if directory.exists() and not directory.is_dir():
+        raise UserError("--run", str(directory), "is a file", "give a directory")
+    return directory
+
+
+def pipeline_of(options: CommonOptions, loaded: LoadedConfig, *, to_log: bool = True) -> Pipeline:
+    """Return the pipeline; nothing is locked or written yet but the log."""
+    import logging
+
+    from mrpipe.pipeline.progress import LOGGER_NAME, make_logger
+    from mrpipe.pipeline.runner import Pipeline
+    from mrpipe.stages.registry import all_stages, stage_named
+
+    for name in loaded.config.stages:
+        if name != "report":
+            stage_named(name)
+    directory = run_directory(options, loaded)
+    execution = loaded.config.execution
+    logger = (
+        make_logger(directory / "log.txt", execution.log_level, options.quiet)
+        if to_log
+        else logging.getLogger(LOGGER_NAME)
+    )
+    return Pipeline(
+        loaded=loaded,
+        stages=all_stages(),
+        run_directory=directory,
+        logger=logger,
+        jobs=options.jobs or execution.jobs or os.cpu_count() or 1,
+        quiet=options.quiet,
+        campaign_given=options.campaign is not None,
+    )
+
+
+@contextmanager
+def session(options: CommonOptions) -> Iterator[Pipeline]:
+    """Yield a pipeline that holds its run directory."""
+    from mrpipe.pipeline.lock import run_lock
+
+    loaded = load(options)
+    directory = run_directory(options, loaded)
+    with run_lock(directory):
+        pipeline = pipeline_of(options, loaded)
+        pipeline.write_config()
+        yield pipeline

@@ -1,0 +1,117 @@
+"""One command a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+
+from mrpipe.cli.options import CommonOptions, with_common_options
+from mrpipe.errors import UserError
+
+_PLAIN = {
+    "prepare": "Filter, remove offset, differentiate and cut steady cycles of a bench campaign.",
+    "assemble": "Join, decimate and lag the prepared tests into training sets.",
+    "sweep": "Compare network architectures.",
+    "train-forward": "Train the forward network: velocity and current to force.",
+    "train-inverse": "Train the inverse network: velocity and force to current.",
+    "identify-damper": "Fit the parametric damper model to the bench tests.",
+    "identify-frame": "Identify M, C, K and modes of the frame from sweep and decay tests.",
+    "calibrate": "Compute limiting frequencies and the gains of every control law.",
+    "close-loop": "Trace the residual between model and measurement to a missing effect and add it.",
+    "reproduce": "Put every printed figure of the thesis beside ours.",
+}
+_RIGS = ("bench", "frame", "closed-loop")
+
+
+def build_and_print(names: list[str], options: CommonOptions) -> None:
+    """Bring stages up to date and print the summary of each.
+
+    Raises
+    ------
+    UserError
+        If a stage that was asked for has no data to work on.
+    """
+    from mrpipe.cli.output import print_json, print_summary
+    from mrpipe.cli.session import session
+
+    with session(options) as pipeline:
+        if options.force:
+            pipeline.force = frozenset(names)
+        outcomes = [pipeline.build(name) for name in names]
+    for outcome in outcomes:
+        if outcome.what == "skipped":
+            raise UserError(
+                outcome.stage, "", f"nothing to work on: {outcome.manifest.skipped}", "name the data it needs"
+            )
+    if options.json:
+        summaries = {outcome.stage: outcome.manifest.summary for outcome in outcomes}
+        print_json(summaries if len(names) > 1 else outcomes[0].manifest.summary)
+        return
+    for outcome in outcomes:
+        note = " (up to date)" if outcome.what == "reused" else ""
+        print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
+    print(f"in {pipeline.run_directory}")
+
+
+def _plain_command(name: str) -> Callable[..., None]:
+    @with_common_options()
+    def command(options: CommonOptions) -> None:
+        build_and_print([name], options)
+
+    return command
+
+
+@with_common_options("campaign")
+def record(
+    options: CommonOptions,
+    rig: Annotated[
+        str | None, typer.Option(metavar="RIG", help="bench, frame or closed-loop. Default: all the config lists.")
+    ] = None,
+) -> None:
+    """Let the virtual laboratory record a campaign."""
+    from mrpipe.cli.session import load
+
+    if rig is not None and rig not in _RIGS:
+        raise UserError("--rig", rig, "is no rig", f"one of {', '.join(_RIGS)}")
+    listed = [name for name in load(options).config.stages if name.startswith("record-")]
+    build_and_print([f"record-{rig}"] if rig else listed or ["record-bench"], options)
+
+
+@with_common_options()
+def simulate(
+    options: CommonOptions,
+    law: Annotated[
+        str, typer.Option(metavar="LAW", help="vd, vdps, vdns, fdns, nnc, lqg, passive-off, passive-on; or all.")
+    ],
+) -> None:
+    """Run the closed loop under a control law."""
+    from mrpipe.config.errors import nearest
+    from mrpipe.stages.registry import all_stages
+
+    known = [name.removeprefix("simulate-") for name in all_stages() if name.startswith("simulate-")]
+    if law != "all" and law not in known:
+        raise UserError("--law", law, "is no control law", nearest(law, [*known, "all"]))
+    build_and_print([f"simulate-{item}" for item in (known if law == "all" else [law])], options)
+
+
+@with_common_options("campaign")
+def export(
+    options: CommonOptions,
+    what: Annotated[str, typer.Argument(metavar="WHAT", help="controller")],
+) -> None:
+    """Write the calibrated controller as C (and JSON) for a real-time target."""
+    if what != "controller":
+        raise UserError("export", what, "cannot be exported", "one of controller")
+    build_and_print(["export-controller"], options)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the program."""
+    app.command(name="record")(record)
+    for name, text in _PLAIN.items():
+        app.command(name=name, help=text)(_plain_command(name))
+        if name == "calibrate":
+            app.command(name="simulate")(simulate)
+    app.command(name="export")(export)

@@ -1,0 +1,122 @@
+"""What `mrpipe show` says and draws of an artifact or a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from mrpipe.artifacts import Artifact, atomic_path
+from mrpipe.campaigns import describe, load_campaign
+from mrpipe.reporting.style import figure_with_axes, label
+
+_PANELS = 12
+
+
+def describe_file(path: Path) -> dict[str, Any]:
+    """Return what is inside an artifact (its root notes and datasets) or a campaign (its tests and channels).
+
+    Raises
+    ------
+    UserError
+        If it is neither, or cannot be read.
+    """
+    if _is_campaign(path):
+        return {"kind": "campaign", **describe(load_campaign(path))}
+    artifact = Artifact(path)
+    root = {key: value for key, value in artifact.root.items() if key != "config"}
+    return {"kind": "artifact", "file": str(path), **root, "datasets": _datasets(path)}
+
+
+def _is_campaign(path: Path) -> bool:
+    return path.is_dir() or path.suffix in {".yaml", ".yml"}
+
+
+def _datasets(path: Path) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+
+    def visit(name: str, item: Any) -> None:
+        if not isinstance(item, h5py.Dataset):
+            return
+        row: dict[str, Any] = {"name": name, "shape": list(item.shape), "unit": str(item.attrs.get("unit", ""))}
+        row["dims"] = [str(name) for name in np.atleast_1d(item.attrs.get("dims", "")) if str(name)]
+        if item.size and np.issubdtype(item.dtype, np.number):
+            values = item[()]
+            row["minimum"], row["maximum"] = float(np.nanmin(values)), float(np.nanmax(values))
+        rows.append(row)
+
+    with h5py.File(path, "r") as handle:
+        handle.visititems(visit)
+    return rows
+
+
+def print_description(description: Mapping[str, Any]) -> None:
+    """Print what :func:`describe_file` returned, a line a test or dataset."""
+    rows = description.get("datasets") if description["kind"] == "artifact" else description.get("tests")
+    for key, value in description.items():
+        if value is not rows and key not in {"findings"}:
+            print(f"{key}: {_plain(value)}")
+    for row in rows or []:
+        print("  " + _row(row))
+    for finding in description.get("findings") or []:
+        print(f"finding: {finding}")
+
+
+def _row(row: Mapping[str, Any]) -> str:
+    if "shape" in row:
+        shape = " x ".join(str(size) for size in row["shape"]) or "scalar"
+        span = f"  {row['minimum']:.4g} to {row['maximum']:.4g}" if "minimum" in row else ""
+        return f"{row['name']}  [{shape}]{span} {row['unit']}"
+    return ", ".join(f"{key} {_plain(value)}" for key, value in row.items())
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} {_plain(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return " ".join(_plain(item) for item in value)
+    return str(value)
+
+
+def plot_file(path: Path, picture: Path) -> None:
+    """Draw the channels of a campaign's first tests, or the larger datasets of an artifact, into one picture."""
+    panels = _campaign_panels(path) if _is_campaign(path) else _artifact_panels(path)
+    rows = max(1, (len(panels) + 1) // 2)
+    figure, axes = figure_with_axes(rows, 2 if len(panels) > 1 else 1, width=11.0, height=2.0)
+    for axis, (title, x, y, x_label, y_label) in zip(axes.ravel(), panels, strict=False):
+        axis.plot(x, y, linewidth=0.6)
+        label(axis, x_label, y_label, title)
+    for axis in axes.ravel()[len(panels) :]:
+        axis.set_visible(False)
+    with atomic_path(picture) as temporary:
+        figure.savefig(temporary, format=picture.suffix.lower().lstrip("."), dpi=110)
+
+
+def _campaign_panels(path: Path) -> list[tuple[str, Any, Any, str, str]]:
+    panels = []
+    campaign = load_campaign(path)
+    for recording in campaign.recordings:
+        for quantity, values in recording.channels.items():
+            panels.append((f"{recording.name}: {quantity}", recording.time_s, values, "time [s]", f"{quantity} (SI)"))
+            if len(panels) == _PANELS:
+                return panels
+    return panels
+
+
+def _artifact_panels(path: Path) -> list[tuple[str, Any, Any, str, str]]:
+    panels: list[tuple[str, Any, Any, str, str]] = []
+
+    def visit(name: str, item: Any) -> None:
+        if len(panels) < _PANELS and isinstance(item, h5py.Dataset) and item.ndim == 1 and item.size >= 8:
+            if not np.issubdtype(item.dtype, np.number):
+                return
+            panels.append((name, np.arange(item.size), item[()], "index", f"[{item.attrs.get('unit', '')}]"))
+
+    with h5py.File(path, "r") as handle:
+        handle.visititems(visit)
+    return panels

@@ -1,0 +1,78 @@
+"""One line for each stage's result: what a reader wants to know first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def headline(stage: str, summary: Mapping[str, Any]) -> str:
+    """Return a line that says what a stage found, from its summary."""
+    if stage.startswith("simulate-"):
+        return _simulation(summary)
+    if stage.startswith("train-"):
+        return _training(summary)
+    lines = {
+        "identify-damper": _damper,
+        "identify-frame": _frame,
+        "calibrate": _calibration,
+        "close-loop": _close_loop,
+    }
+    return lines[stage](summary) if stage in lines and summary else _plain(summary)
+
+
+def _number(value: Any, factor: float = 1.0, digits: int = 3) -> str:
+    return "-" if value is None else f"{value * factor:.{digits}g}"
+
+
+def _training(summary: Mapping[str, Any]) -> str:
+    return (
+        f"{summary.get('architecture', '')}: validation NRMSE {_number(summary.get('validation_nrmse'))}, "
+        f"fit {_number(summary.get('validation_fit_percent'))} %"
+    )
+
+
+def _simulation(summary: Mapping[str, Any]) -> str:
+    return (
+        f"rms x_top {_number(summary.get('rms_x_top_m'), 1e3)} mm, x1 {_number(summary.get('rms_x1_m'), 1e3)} mm, "
+        f"a1 {_number(summary.get('rms_a1_m_s2'))} m/s2, damping ratio {_number(summary.get('damping_ratio'))}"
+    )
+
+
+def _damper(summary: Mapping[str, Any]) -> str:
+    form = summary.get("form") or summary.get("model", "")
+    return (
+        f"{form}: validation NRMSE {_number(summary.get('validation_nrmse'))}, "
+        f"fit {_number(summary.get('validation_fit_percent'))} %"
+    )
+
+
+def _frame(summary: Mapping[str, Any]) -> str:
+    frequencies = summary.get("frequencies_hz") or []
+    return f"{len(frequencies)} modes: " + ", ".join(_number(value) for value in frequencies) + " Hz"
+
+
+def _calibration(summary: Mapping[str, Any]) -> str:
+    return (
+        f"omega_0 {_number(summary.get('omega_0'), digits=4)} rad/s, omega_inf {_number(summary.get('omega_inf'), digits=4)}"
+        f" rad/s, {len(summary.get('laws') or {})} laws"
+    )
+
+
+def _close_loop(summary: Mapping[str, Any]) -> str:
+    before = (summary.get("before") or {}).get("nrmse")
+    after = (summary.get("after") or {}).get("nrmse")
+    found = ", ".join(effect["name"] for effect in summary.get("effects") or [])
+    unexplained = (summary.get("unexplained") or {}).get("structured")
+    verdict = found or ("no known effect explains the residual" if unexplained else "nothing is missing")
+    return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {_number(summary.get('noise_floor_nrmse'))})"
+
+
+def _plain(summary: Mapping[str, Any]) -> str:
+    """Return the first few plain numbers and words."""
+    shown = []
+    for key, value in summary.items():
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            continue
+        shown.append(f"{key} {_number(value, digits=4) if isinstance(value, float) else value}")
+    return ", ".join(shown[:4])

@@ -1,0 +1,107 @@
+"""Exit statuses, one-line messages, clean JSON, and a start without heavy imports."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mrpipe.cli import run
+
+COMMANDS = [
+    "run", "record", "prepare", "assemble", "sweep", "train-forward", "train-inverse", "identify-damper",
+    "identify-frame", "calibrate", "simulate", "close-loop", "benchmark", "reproduce", "report", "export", "init",
+    "status", "show", "check",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_of_the_contract_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([command, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "Usage: mrpipe" in out
+    assert "--json" in out
+
+
+def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert [command for command in COMMANDS if f"  {command} " not in out] == []
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = "import sys\nfrom mrpipe.cli import run\nrun(['--help'])\nprint(sorted(sys.modules), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    heavy = {"numpy", "scipy", "h5py", "pandas", "sklearn", "numba", "matplotlib", "pint", "pydantic", "jinja2"}
+    assert heavy & set(eval_list(done.stderr)) == set()
+
+
+def eval_list(text: str) -> list[str]:
+    return [name.strip(" '[]\n") for name in text.split(",")]
+
+
+MISTAKES = {
+    "unknown command": (["trian"], "No such command"),
+    "unknown option": (["prepare", "--cofnig", "x"], "No such option"),
+    "missing config": (["run", "nowhere.yaml"], "nowhere.yaml: no such configuration"),
+    "unknown setting": (["prepare", "--set", "prepare.cutof_hz=3"], "did you mean cutoff_hz?"),
+    "unknown law": (["simulate", "--law", "vdn"], "did you mean vd"),
+    "law missing": (["simulate"], "Missing option"),
+    "until what is not there": (["run", "--until", "prepair"], "did you mean prepare?"),
+    "no campaign": (["prepare", "--campaign", "nowhere"], "nowhere"),
+    "no file to show": (["show", "nowhere.h5"], "nowhere.h5: no such file or directory"),
+    "no picture": (["show", "README.md", "--plot", "x.txt"], "end it in .png, .svg or .pdf"),
+    "no rig": (["record", "--rig", "table"], "--rig: table: is no rig; one of bench, frame, closed-loop"),
+    "nothing to export": (["export", "plant"], "export: plant: cannot be exported"),
+    "no run to report": (["report", "nowhere"], "no such run directory"),
+    "no run for status": (["status", "nowhere"], "no such run directory"),
+    "negative jobs": (["prepare", "--jobs", "0"], "--jobs"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistake_is_one_line_and_status_2(mistake: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    arguments, expected = MISTAKES[mistake]
+    if arguments[0] in {"prepare", "simulate", "run"}:
+        arguments = [*arguments, "--run", str(tmp_path / "run")]
+    assert run(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert expected in captured.err
+    assert len(captured.err.strip().splitlines()) == 1
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("mrpipe ")
+
+
+def test_check_prints_one_json_document(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "thesis", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["valid"] is True
+
+
+def test_explain_lists_settings_with_values(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "thesis", "--explain", "--set", "prepare.cutoff_hz=77"]) == 0
+    assert "prepare.cutoff_hz = 77" in capsys.readouterr().out
+
+
+def test_init_lays_out_a_project_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["init", str(tmp_path / "rig")]) == 0
+    assert (tmp_path / "rig" / "data" / "my-rig" / "campaign.yaml").is_file()
+    assert run(["init", str(tmp_path / "rig")]) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_interrupt_is_130(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    import mrpipe.cli.session as session
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(session, "load", interrupted)
+    assert run(["calibrate"]) == 130
+    assert "resumes at the first unfinished stage" in capsys.readouterr().err

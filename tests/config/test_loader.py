@@ -1,0 +1,93 @@
+"""Every fault of a configuration is one line with file, line and key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mrpipe.artifacts import config_directory
+from mrpipe.config.loader import load_config
+from mrpipe.errors import UserError
+
+FAULTS = {
+    "unknown section": ("prepair:\n  order: 2\n", "line 1, prepair: unknown key; did you mean prepare?"),
+    "unknown key": (
+        "name: x\nprepare:\n  cutof_hz: 100\n",
+        "line 3, prepare.cutof_hz: unknown key; did you mean cutoff_hz?",
+    ),
+    "key with no near one": ("zzzqqq: 1\n", "line 1, zzzqqq: unknown key; known: "),
+    "wrong type": ("seed: many\n", "line 1, seed: is 'many'; input should be a valid integer"),
+    "out of range": (
+        "execution:\n  jobs: -2\n",
+        "line 2, execution.jobs: is -2; input should be greater than or equal to 0",
+    ),
+    "key twice": ("seed: 1\nname: x\nseed: 2\n", "line 3, seed: stands already in line 1; keep one of the two"),
+    "no YAML": ("seed: [1\n", "not valid YAML"),
+    "no mapping": ("- a\n- b\n", "line 1: is no mapping; write `key: value` lines"),
+    "section is a number": ("prepare: 3\n", "line 1, prepare: is 3; input should be a valid dictionary"),
+    "code in YAML": (
+        "name: !!python/object/apply:os.system ['true']\n",
+        "not valid YAML (could not determine a constructor",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_one_line_with_place(fault: str, tmp_path: Path) -> None:
+    text, expected = FAULTS[fault]
+    path = tmp_path / "config.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError) as caught:
+        load_config(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert expected in message
+    assert "\n" not in message
+
+
+OVERRIDES = {
+    "prepare.cutof_hz=80": "--set: prepare.cutof_hz: unknown key; did you mean cutoff_hz?",
+    "prepare": "--set: prepare: is no assignment; write section.key=value",
+    "seed=many": "--set: seed: is 'many'; input should be a valid integer",
+    "seed=[1": "--set: seed=[1: value is not valid YAML; quote it",
+}
+
+
+@pytest.mark.parametrize("override", OVERRIDES)
+def test_fault_of_an_override_names_the_option(override: str, tmp_path: Path) -> None:
+    path = tmp_path / "config.yaml"
+    path.write_text("name: x\n", encoding="utf-8")
+    with pytest.raises(UserError) as caught:
+        load_config(path, [override])
+    assert OVERRIDES[override] in str(caught.value)
+
+
+def test_override_wins_over_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text("seed: 1\nprepare:\n  cutoff_hz: 90\n", encoding="utf-8")
+    config = load_config(path, ["prepare.cutoff_hz=80", "seed=7"]).config
+    assert (config.prepare.cutoff_hz, config.seed, config.name) == (80, 7, "rig")
+
+
+def test_missing_file_names_those_that_come_along(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such configuration; give a YAML file, or one of .*thesis"):
+        load_config(tmp_path / "none.yaml")
+
+
+def test_file_that_is_not_text(tmp_path: Path) -> None:
+    path = tmp_path / "config.yaml"
+    path.write_bytes(b"\xff\xfe\x00seed")
+    with pytest.raises(UserError, match="is not UTF-8 text; save it as UTF-8"):
+        load_config(path)
+
+
+def test_campaign_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "config.yaml"
+    path.write_text("campaigns:\n  bench: data/rig\n", encoding="utf-8")
+    assert load_config(path).config.campaigns.bench == str(tmp_path / "data/rig")
+
+
+@pytest.mark.parametrize("path", sorted(config_directory().glob("*.yaml")), ids=lambda path: path.stem)
+def test_shipped_configuration_is_valid(path: Path) -> None:
+    assert load_config(path).config.name == path.stem

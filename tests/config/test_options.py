@@ -1,0 +1,65 @@
+"""No setting without a description, a reader and a use."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mrpipe.config.model import Config, options
+from mrpipe.stages.registry import all_stages
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "mrpipe"
+LEAVES = [name for name, _, default in options() if not hasattr(default, "model_dump")]
+# read by the pipeline and the command line, not by a stage
+OF_THE_PROGRAM = {"name", "description", "seed", "stages"}
+SECTIONS_OF_THE_PROGRAM = {"campaigns", "execution", "report"}
+
+
+def _read_by(name: str) -> list[str]:
+    return [
+        stage.name
+        for stage in all_stages().values()
+        if any(name == item or name.startswith(f"{item}.") for item in stage.settings)
+    ]
+
+
+def test_every_option_is_described() -> None:
+    assert [name for name, text, _ in options() if len(text) < 10] == []
+
+
+@pytest.mark.parametrize("name", LEAVES)
+def test_every_option_is_read_and_used(name: str) -> None:
+    section, _, key = name.partition(".")
+    readers = [PACKAGE / "cli", PACKAGE / "pipeline", PACKAGE / "config"]
+    if name not in OF_THE_PROGRAM and section not in SECTIONS_OF_THE_PROGRAM:
+        assert _read_by(name), f"no stage declares that it reads {name}"
+        readers = [PACKAGE / "stages", PACKAGE / "laboratory"]
+    source = "\n".join(
+        path.read_text(encoding="utf-8")
+        for folder in readers
+        for path in folder.rglob("*.py")
+        if "sections" not in path.parts and path.name != "model.py"
+    )
+    word = (key or name).rpartition(".")[2]
+    assert re.search(rf"\.{word}\b|getattr\([^)]*\b{section}\b|model_dump", source) is not None
+    assert re.search(rf"\b{word}\b", source) or section == "campaigns", f"nothing uses {name}"
+
+
+def test_stages_declare_settings_that_exist() -> None:
+    known = {name for name, _, _ in options()}
+    unknown = {(stage.name, item) for stage in all_stages().values() for item in stage.settings if item not in known}
+    assert unknown == set()
+
+
+def test_documentation_lists_every_option() -> None:
+    """docs/configuration.md is written by `python -m mrpipe.config.document` and kept in the repository."""
+    from mrpipe.config.document import as_markdown
+
+    assert (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8") == as_markdown()
+
+
+def test_default_stages_exist() -> None:
+    assert set(Config().stages) - {"report"} <= set(all_stages())

@@ -1,0 +1,187 @@
+"""Reuse by content, reasons for staleness, skipping, and nothing half-written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+
+from mrpipe.artifacts import Artifact
+from mrpipe.errors import UserError
+from mrpipe.pipeline.fingerprint import code_version, digest_of_artifact
+from mrpipe.pipeline.lock import run_lock
+from mrpipe.pipeline.manifest import Manifest
+from mrpipe.pipeline.runner import plain, to_json
+from mrpipe.pipeline.stage import StageContext
+
+from .conftest import CALLS, MakePipeline, with_run
+
+
+def test_builds_what_is_missing_and_nothing_else(make_pipeline: MakePipeline) -> None:
+    assert make_pipeline().build("second").what == "built"
+    assert CALLS == ["first", "second"]
+    again = make_pipeline()
+    assert again.build("second").what == "reused"
+    assert CALLS == ["first", "second"]
+    assert again.outcomes["first"].manifest.warnings == ["the first is only a test"]
+
+
+def test_summary_survives_reuse_and_is_plain_json(make_pipeline: MakePipeline) -> None:
+    first = make_pipeline().build("first").manifest.summary
+    assert make_pipeline().build("first").manifest.summary == first == {"rms_m": 1.5, "not_finite": None}
+
+
+STALE = {
+    "setting": ({"prepare": {"cutoff_hz": 80.0}}, "setting prepare.cutoff_hz was 100.0, is 80.0"),
+    "seed": ({"seed": 5}, "seed was 2011, is 5"),
+}
+
+
+@pytest.mark.parametrize("cause", STALE)
+def test_change_is_named_and_built_again(cause: str, make_pipeline: MakePipeline) -> None:
+    changes, reason = STALE[cause]
+    make_pipeline().build("second")
+    changed = make_pipeline(**changes)
+    assert changed.status(["second"])["first"] == [reason]
+    assert changed.status(["second"])["second"][0] == "first before it is stale"
+    assert changed.build("second").what == "built"
+    assert changed.outcomes["first"].reasons == [reason]
+
+
+def test_setting_that_no_stage_reads_makes_nothing_stale(make_pipeline: MakePipeline) -> None:
+    make_pipeline().build("second")
+    assert make_pipeline(execution={"jobs": 3}, prepare={"order": 3}).build("second").what == "reused"
+
+
+def test_same_numbers_built_again_leave_the_next_stage_alone(make_pipeline: MakePipeline) -> None:
+    make_pipeline().build("second")
+    forced = make_pipeline()
+    forced.force = frozenset(["first"])
+    assert forced.build("second").what == "reused"
+    assert CALLS == ["first", "second", "first"]
+
+
+@pytest.mark.parametrize("harm", ["remove", "change"])
+def test_output_harmed_by_other_hands_is_built_again(harm: str, make_pipeline: MakePipeline) -> None:
+    pipeline = make_pipeline()
+    pipeline.build("first")
+    path = pipeline.run_directory / "first.h5"
+    if harm == "remove":
+        path.unlink()
+    else:
+        with h5py.File(path, "a") as handle:
+            handle["values"][0] = 9.0
+    expected = "output first.h5 is missing" if harm == "remove" else "output first.h5 was changed by other hands"
+    again = make_pipeline()
+    assert again.status(["first"])["first"] == [expected]
+    assert again.build("first").reasons == [expected]
+
+
+def test_code_change_is_named(make_pipeline: MakePipeline) -> None:
+    pipeline = make_pipeline()
+    pipeline.build("first")
+    path = pipeline.run_directory / "manifests" / "first.json"
+    content = json.loads(path.read_text())
+    content["key"]["code"]["mrpipe.signals"] = "0" * 16
+    path.write_text(json.dumps(content))
+    assert make_pipeline().status(["first"])["first"] == ["code of mrpipe.signals changed"]
+
+
+def test_code_version_follows_imports_but_not_the_runner() -> None:
+    version = code_version("mrpipe.structures.frame")
+    assert {"mrpipe.structures.frame", "mrpipe.artifacts.hdf5", "mrpipe.errors"} <= set(version)
+    assert not any(name.startswith(("mrpipe.pipeline", "mrpipe.cli", "mrpipe.config")) for name in version)
+
+
+def test_stage_without_campaign_is_skipped_with_all_after_it(make_pipeline: MakePipeline) -> None:
+    outcome = make_pipeline().build("after")
+    assert outcome.what == "skipped"
+    assert "there is no frame campaign" in outcome.manifest.skipped
+    assert CALLS == []
+
+
+def test_optional_input_is_used_where_it_is_there(make_pipeline: MakePipeline) -> None:
+    assert make_pipeline().build("third").what == "built"
+    assert CALLS == ["first", "second", "third"]
+
+
+def test_undeclared_setting_is_refused(make_pipeline: MakePipeline) -> None:
+    def run(context: StageContext) -> Mapping[str, Any]:
+        return {"order": context.settings.prepare.order}
+
+    with pytest.raises(LookupError, match=r"first reads prepare\.order but does not declare it"):
+        make_pipeline(with_run("first", run)).build("first")
+
+
+def test_failure_leaves_the_old_artifact_and_no_rubbish(make_pipeline: MakePipeline) -> None:
+    pipeline = make_pipeline()
+    pipeline.build("first")
+    before = digest_of_artifact(pipeline.run_directory / "first.h5")
+
+    def run(context: StageContext) -> Mapping[str, Any]:
+        with context.write("first.h5") as artifact:
+            artifact.put("values", [1.0], unit="m", dims=("time",))
+            raise KeyboardInterrupt
+
+    broken = make_pipeline(with_run("first", run), seed=3)
+    with pytest.raises(KeyboardInterrupt):
+        broken.build("first")
+    assert digest_of_artifact(pipeline.run_directory / "first.h5") == before
+    assert [path.name for path in pipeline.run_directory.iterdir() if path.name.endswith(".tmp")] == []
+    assert make_pipeline(seed=3).build("first").what == "built"
+
+
+def test_same_seed_gives_the_same_artifact_and_another_does_not(make_pipeline: MakePipeline, tmp_path: Path) -> None:
+    digests = []
+    for seed in (1, 1, 2):
+        pipeline = make_pipeline(seed=seed)
+        pipeline.force = frozenset(["first"])
+        pipeline.build("first")
+        digests.append(digest_of_artifact(tmp_path / "run" / "first.h5"))
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_artifact_carries_its_provenance(make_pipeline: MakePipeline) -> None:
+    pipeline = make_pipeline()
+    pipeline.build("second")
+    root = Artifact(pipeline.run_directory / "second.h5").root
+    assert {"schema", "stage", "mrpipe_version", "config", "inputs", "seed", "created_utc"} <= set(root)
+    assert {"numpy_version", "scipy_version", "scikit-learn_version"} <= set(root)
+    assert json.loads(root["inputs"])["first"] == digest_of_artifact(pipeline.run_directory / "first.h5")
+
+
+def test_second_run_in_the_same_directory_is_refused(tmp_path: Path) -> None:
+    import subprocess
+    import sys
+
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom mrpipe.pipeline.lock import run_lock\n"
+        "from mrpipe.errors import UserError\n"
+        "try:\n    with run_lock(Path(sys.argv[1])):\n        print('got it')\n"
+        "except UserError as error:\n    print(error)\n"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    with run_lock(tmp_path):
+        answer = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        assert "is in use by process" in answer
+        assert "--run" in answer
+    assert "got it" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_broken_manifest_counts_as_none(tmp_path: Path) -> None:
+    (tmp_path / "first.json").write_text('{"stage": "first"')
+    assert Manifest.load(tmp_path, "first") is None
+
+
+def test_json_is_strict() -> None:
+    assert json.loads(to_json({"a": float("inf"), "b": (1, 2)})) == {"a": None, "b": [1, 2]}
+    assert plain({"p": Path("x")}) == {"p": "x"}
+
+
+def test_missing_artifact_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such artifact; run the stage that writes it"):
+        Artifact(tmp_path / "none.h5")
