@@ -21,7 +21,7 @@ def show(
         Path | None, typer.Option(metavar="PNG", help="Also draw the channels (or datasets) into this picture.")
     ] = None,
 ) -> None:
-    """Show what is inside an artifact or a campaign."""
+    """Show what an artifact or a campaign holds."""
     from mrpipe.cli.output import print_json
     from mrpipe.reporting.contents import describe_file, plot_file, print_description
 
@@ -47,7 +47,7 @@ def check(
     ] = None,
     explain: Annotated[bool, typer.Option("--explain", help="List every setting with its meaning and value.")] = False,
 ) -> None:
-    """Check that a configuration is valid, and its campaigns readable."""
+    """Check a configuration and its campaigns."""
     from mrpipe.campaigns import load_campaign
     from mrpipe.cli.output import print_json
     from mrpipe.config.loader import default_config_path, load_config
@@ -100,7 +100,7 @@ def init(
     options: CommonOptions,
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory to lay out; made if missing.")],
 ) -> None:
-    """Lay out configs/, data/ and runs/ for a rig of one's own, with a campaign.yaml to fill in."""
+    """Lay out a project for a rig of one's own."""
     from mrpipe.cli.output import print_json
     from mrpipe.cli.project import lay_out
 
@@ -110,9 +110,8 @@ def init(
         return
     for path in written:
         print(path)
-    print(
-        f"next: fill in {directory / 'data' / 'my-rig' / 'campaign.yaml'}, then: cd {directory} && mrpipe run configs/my-rig.yaml"
-    )
+    print(f"next: fill in {directory / 'data' / 'my-rig' / 'campaign.yaml'},")
+    print(f"then: cd {directory} && mrpipe run configs/my-rig.yaml")
 
 
 def register(app: typer.Typer) -> None:

@@ -34,7 +34,8 @@ campaigns:
 """
 _README = """\
 # A damper project
-data/my-rig/campaign.yaml tells mrpipe what was measured; configs/my-rig.yaml what to do with it; runs/ holds the results.
+data/my-rig/campaign.yaml tells mrpipe what was measured, configs/my-rig.yaml
+what to do with it; runs/ holds the results.
 
     mrpipe check configs/my-rig.yaml
     mrpipe show data/my-rig

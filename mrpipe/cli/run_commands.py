@@ -132,7 +132,7 @@ def report(
         Path | None, typer.Argument(metavar="RUN", help="Run directory. Default: runs/<name of the config>.")
     ] = None,
 ) -> None:
-    """Write the report of a run from what its stages left there."""
+    """Write the report of a run (HTML and Markdown)."""
     from dataclasses import replace
 
     from mrpipe.cli.output import print_json
@@ -169,7 +169,7 @@ def status(
         Path | None, typer.Argument(metavar="RUN", help="Run directory. Default: runs/<name of the config>.")
     ] = None,
 ) -> None:
-    """Say which stages are stale in a run directory, and why."""
+    """Say which stages are stale, and why."""
     from dataclasses import replace
 
     from mrpipe.cli.output import print_json

@@ -11,15 +11,15 @@ from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
 
 _PLAIN = {
-    "prepare": "Filter, remove offset, differentiate and cut steady cycles of a bench campaign.",
-    "assemble": "Join, decimate and lag the prepared tests into training sets.",
+    "prepare": "Filter, remove offsets, differentiate, cut cycles.",
+    "assemble": "Build the training set from the prepared tests.",
     "sweep": "Compare network architectures.",
-    "train-forward": "Train the forward network: velocity and current to force.",
-    "train-inverse": "Train the inverse network: velocity and force to current.",
-    "identify-damper": "Fit the parametric damper model to the bench tests.",
-    "identify-frame": "Identify M, C, K and modes of the frame from sweep and decay tests.",
-    "calibrate": "Compute limiting frequencies and the gains of every control law.",
-    "close-loop": "Trace the residual between model and measurement to a missing effect and add it.",
+    "train-forward": "Train the forward network: current to force.",
+    "train-inverse": "Train the inverse network: force to current.",
+    "identify-damper": "Fit the parametric damper model.",
+    "identify-frame": "Identify the frame: M, C, K and modes.",
+    "calibrate": "Compute the gains of every control law.",
+    "close-loop": "Trace the residual to the effect the model lacks.",
     "reproduce": "Put every printed figure of the thesis beside ours.",
 }
 _RIGS = ("bench", "frame", "closed-loop")
@@ -70,7 +70,7 @@ def record(
         str | None, typer.Option(metavar="RIG", help="bench, frame or closed-loop. Default: all the config lists.")
     ] = None,
 ) -> None:
-    """Let the virtual laboratory record a campaign."""
+    """Record a campaign in the virtual laboratory."""
     from mrpipe.cli.session import load
 
     if rig is not None and rig not in _RIGS:
@@ -101,7 +101,7 @@ def export(
     options: CommonOptions,
     what: Annotated[str, typer.Argument(metavar="WHAT", help="controller")],
 ) -> None:
-    """Write the calibrated controller as C (and JSON) for a real-time target."""
+    """Write the calibrated controller as C and JSON."""
     if what != "controller":
         raise UserError("export", what, "cannot be exported", "one of controller")
     build_and_print(["export-controller"], options)

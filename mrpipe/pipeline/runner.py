@@ -296,7 +296,7 @@ class Pipeline:
 
 
 def seed_of(seed: int, name: str) -> list[int]:
-    """Return the entropy of a stage's generator: the run's seed and the stage's name, so that stages do not share draws."""
+    """Return the entropy of a stage's generator: run's seed and stage's name, so that stages do not share draws."""
     return [seed, int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")]
 
 

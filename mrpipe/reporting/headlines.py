@@ -54,8 +54,8 @@ def _frame(summary: Mapping[str, Any]) -> str:
 
 def _calibration(summary: Mapping[str, Any]) -> str:
     return (
-        f"omega_0 {_number(summary.get('omega_0'), digits=4)} rad/s, omega_inf {_number(summary.get('omega_inf'), digits=4)}"
-        f" rad/s, {len(summary.get('laws') or {})} laws"
+        f"omega_0 {_number(summary.get('omega_0'), digits=4)} rad/s, "
+        f"omega_inf {_number(summary.get('omega_inf'), digits=4)} rad/s, {len(summary.get('laws') or {})} laws"
     )
 
 
@@ -65,7 +65,8 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     found = ", ".join(effect["name"] for effect in summary.get("effects") or [])
     unexplained = (summary.get("unexplained") or {}).get("structured")
     verdict = found or ("no known effect explains the residual" if unexplained else "nothing is missing")
-    return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {_number(summary.get('noise_floor_nrmse'))})"
+    floor = _number(summary.get("noise_floor_nrmse"))
+    return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {floor})"
 
 
 def _plain(summary: Mapping[str, Any]) -> str:

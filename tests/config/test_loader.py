@@ -71,7 +71,7 @@ def test_override_wins_over_the_file(tmp_path: Path) -> None:
 
 
 def test_missing_file_names_those_that_come_along(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no such configuration; give a YAML file, or one of .*thesis"):
+    with pytest.raises(UserError, match=r"no such configuration; give a YAML file, or one of .*thesis"):
         load_config(tmp_path / "none.yaml")
 
 
