@@ -1,0 +1,66 @@
+"""The report: one file that opens offline, safe against what names and captions hold."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from mrpipe.pipeline.parts import PartWriter, read_part
+from mrpipe.reporting.page import ReportStage, write_report
+from mrpipe.reporting.style import figure_with_axes
+
+
+@pytest.fixture
+def stages(tmp_path: Path) -> list[ReportStage]:
+    part = PartWriter("prepare", tmp_path)
+    part.text("Filtered at `100 Hz`, **zero phase**, <script>alert(1)</script>.")
+    part.table("tests", pd.DataFrame({"test": ["1a|x"], "rms_n": [12.3456789]}), "RMS a test")
+    figure, axes = figure_with_axes()
+    axes[0, 0].plot([0, 1], [0, 1])
+    part.figure("loop", figure, "A loop & more")
+    part.save()
+    items = read_part(tmp_path, "prepare")
+    return [
+        ReportStage("prepare", "Filters.", items, {"validation_nrmse": 0.1}, ["clipped <b>"], "", 1.2),
+        ReportStage("identify-frame", "Frame.", [], {}, [], "there is no frame campaign", 0.0),
+    ]
+
+
+def test_html_is_one_offline_file(tmp_path: Path, stages: list[ReportStage]) -> None:
+    (path,) = write_report(tmp_path, title="T & x", description="", stages=stages, formats=["html"])
+    text = path.read_text(encoding="utf-8")
+    assert "data:image/png;base64," in text
+    assert re.findall(r"(?:src|href)=['\"]https?:", text) == []
+    assert "<script" not in text
+    assert "<code>100 Hz</code>" in text
+    assert "T &amp; x" in text
+    assert "clipped &lt;b&gt;" in text
+    assert "there is no frame campaign" in text
+    assert "12.35" in text
+
+
+def test_markdown_shows_tables_and_figures(tmp_path: Path, stages: list[ReportStage]) -> None:
+    (path,) = write_report(tmp_path, title="T", description="d", stages=stages, formats=["markdown"])
+    text = path.read_text(encoding="utf-8")
+    assert "![A loop & more](figures/prepare-loop.png)" in text
+    assert "| 1a\\|x | 12.35 |" in text
+    assert "Skipped: there is no frame campaign" in text
+
+
+def test_same_figure_is_the_same_file(tmp_path: Path) -> None:
+    contents = []
+    for name in ("a", "b"):
+        figure, axes = figure_with_axes()
+        axes[0, 0].plot([0, 1], [0, 1])
+        PartWriter(name, tmp_path).figure("f", figure, "")
+        contents.append((tmp_path / "figures" / f"{name}-f.png").read_bytes())
+    assert contents[0] == contents[1]
+
+
+def test_missing_figure_is_said(tmp_path: Path, stages: list[ReportStage]) -> None:
+    (tmp_path / "figures" / "prepare-loop.png").unlink()
+    (path,) = write_report(tmp_path, title="T", description="", stages=stages, formats=["html"])
+    assert "is gone: build the stage again" in path.read_text(encoding="utf-8")
