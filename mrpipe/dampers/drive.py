@@ -1,0 +1,105 @@
+"""From the command to the coefficients: the driver's lag (2.4) and the polynomials (2.3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numba import float64, int64, njit, void
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.plant import (
+    CURRENT,
+    DRIVE,
+    FIRST,
+    STEP_SIGNATURE,
+    VISCOSITY,
+    YIELD_FORCE,
+    Phase,
+    Step,
+)
+
+POLYNOMIAL_SIZE = 4
+"""Coefficients of each polynomial in the effective drive: up to the cube of (2.3)."""
+
+
+@njit(float64(float64, float64, float64, float64), cache=True)
+def advance_lag(lagged: float, previous: float, present: float, rate_dt: float) -> float:
+    """Return the exact answer of u' = -eta (u - I) to a command that runs straight from `previous` to `present`.
+
+    `rate_dt` is eta times the interval. A straight command between samples keeps the lag right to second order where
+    the command was recorded; a held one would come out half a sample late.
+    """
+    if rate_dt < 1e-8:
+        return lagged
+    decay = math.exp(-rate_dt)
+    slope = (present - previous) / rate_dt
+    return present - slope + (lagged - previous + slope) * decay
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def lag_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: eta [1/s]. State: effective drive, last command. It starts in equilibrium with the command."""
+    if wire[FIRST] > 0.5:
+        state[0] = wire[DRIVE]
+    else:
+        state[0] = advance_lag(state[0], state[1], wire[DRIVE], parameters[0] * dt)
+    state[1] = wire[DRIVE]
+    wire[CURRENT] = state[0]
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def polynomial_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: four coefficients of the yield force [N, N/A, ...], four of the viscosity [N s/m, ...]."""
+    u = wire[CURRENT]
+    wire[YIELD_FORCE] = parameters[0] + u * (parameters[1] + u * (parameters[2] + u * parameters[3]))
+    wire[VISCOSITY] = parameters[4] + u * (parameters[5] + u * (parameters[6] + u * parameters[7]))
+
+
+def driver_lag(eta: float) -> Step:
+    """Return the driver's lag (2.4), eta in 1/s."""
+    return Step("driver-lag", Phase.CURRENT, lag_step, np.array([float(eta)]), state_size=2)
+
+
+def polynomial_coefficients(yield_force: Sequence[float], viscosity: Sequence[float]) -> Step:
+    """Return (2.3): yield force and viscosity as polynomials of the effective drive, constant first."""
+    numbers = np.zeros(2 * POLYNOMIAL_SIZE)
+    numbers[: len(yield_force)] = yield_force
+    numbers[POLYNOMIAL_SIZE : POLYNOMIAL_SIZE + len(viscosity)] = viscosity
+    return Step("polynomial-coefficients", Phase.COEFFICIENTS, polynomial_step, numbers)
+
+
+@njit(void(float64[::1], int64[::1], float64[::1], float64, float64[::1]), cache=True)
+def _series(drive: FloatArray, starts: IntArray, dt: FloatArray, eta: float, result: FloatArray) -> None:
+    for test in range(starts.shape[0] - 1):
+        lagged = drive[starts[test]]
+        result[starts[test]] = lagged
+        for index in range(starts[test] + 1, starts[test + 1]):
+            lagged = advance_lag(lagged, drive[index - 1], drive[index], eta * dt[test])
+            result[index] = lagged
+
+
+def lag_series(drive: FloatArray, starts: IntArray, dt: FloatArray, eta: float) -> FloatArray:
+    """Return the effective drive, shape (n,), over recordings laid end to end.
+
+    Parameters
+    ----------
+    drive
+        Shape (n,) [A or V].
+    starts
+        Shape (tests + 1,), see :func:`mrpipe.dampers.hysteresis.hysteresis_series`.
+    dt
+        Shape (tests,) [s].
+    eta
+        Rate of the lag [1/s].
+    """
+    result = np.empty(len(drive))
+    _series(
+        np.ascontiguousarray(drive, dtype=np.float64),
+        np.ascontiguousarray(starts, dtype=np.int64),
+        np.ascontiguousarray(dt, dtype=np.float64),
+        float(eta),
+        result,
+    )
+    return result

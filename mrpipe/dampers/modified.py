@@ -1,0 +1,160 @@
+"""The modified Bouc-Wen model of Spencer et al. (P4 (1) to (5)): a dashpot c1 in series, springs k0 and k1.
+
+With w = x - y the inner equation reads (c0 + c1) w' = c1 x' - alpha z(w) - k0 w, and the force is
+alpha z + c0 w' + k0 w + k1 (x - x0), which is (1) again. z follows w without rate, in closed form, so a step solves one
+monotone scalar equation: the trapezoidal rule in w, stable however stiff the yield is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import float64, njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.hysteresis import advance_hysteresis
+from mrpipe.dampers.plant import (
+    CURRENT,
+    DISPLACEMENT,
+    EXTRA_FORCE,
+    FIRST,
+    FORCE,
+    HYSTERESIS,
+    RATE_YIELD,
+    STEP_SIGNATURE,
+    VELOCITY,
+    VISCOSITY,
+    YIELD_FORCE,
+    Phase,
+    Step,
+)
+
+# two places of the wire that no other step uses
+INNER_DISPLACEMENT = 22
+OUTER_VELOCITY = 23
+
+
+@njit(
+    float64(float64, float64, float64, float64, float64, float64, float64, float64, float64, float64, float64),
+    cache=True,
+)
+def inner_increment(
+    w: float,
+    zeta: float,
+    increment: float,
+    dt: float,
+    yield_force: float,
+    viscosity: float,
+    series_viscosity: float,
+    stiffness: float,
+    yield_displacement: float,
+    gamma_share: float,
+    exponent: float,
+) -> float:
+    """Return the change of w while the rod moves by `increment` [m] in `dt` [s].
+
+    The residual grows with the change at a rate of at least c0 + c1, so bracketed Newton steps always end.
+    """
+    total = viscosity + series_viscosity
+    impulse = series_viscosity * increment
+
+    low = impulse - dt * (yield_force * 0.5 * (1.0 + zeta) + stiffness * w)
+    high = impulse + dt * (yield_force * 0.5 * (1.0 - zeta) - stiffness * w)
+    low = low / (total + 0.5 * dt * stiffness)
+    high = high / (total + 0.5 * dt * stiffness)
+    change = min(max(increment, low), high)
+    for _ in range(80):
+        moved = advance_hysteresis(zeta, change, yield_displacement, gamma_share, exponent)
+        residual = total * change - impulse + dt * (yield_force * 0.5 * (zeta + moved) + stiffness * (w + 0.5 * change))
+        if residual > 0.0:
+            high = change
+        else:
+            low = change
+        direction = 1.0 if change >= 0.0 else -1.0
+        y = direction * moved
+        slope_zeta = (
+            1.0 - y**exponent if y >= 0.0 else 1.0 - (1.0 - 2.0 * gamma_share) * (-y) ** exponent
+        ) / yield_displacement
+        slope = total + 0.5 * dt * (yield_force * max(slope_zeta, 0.0) + stiffness)
+        trial = change - residual / slope
+        if trial <= low or trial >= high:
+            trial = 0.5 * (low + high)
+        if abs(trial - change) <= 1e-13 * (abs(increment) + yield_displacement):
+            return trial
+        change = trial
+    return change
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def series_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Put w' in the place of the velocity and zeta(w) on the wire.
+
+    Parameters: yield displacement, gamma share, exponent, c1_a, c1_b [N s/m, per A or V], k0 [N/m].
+    State: last displacement, w, zeta.
+    """
+    wire[OUTER_VELOCITY] = wire[VELOCITY]
+    if wire[FIRST] > 0.5:
+        state[0] = wire[DISPLACEMENT]
+        state[1] = 0.0
+        state[2] = 0.0
+    series_viscosity = max(parameters[3] + parameters[4] * wire[CURRENT], 0.0)
+    yield_force = max(wire[YIELD_FORCE] * wire[RATE_YIELD], 0.0)
+    viscosity = max(wire[VISCOSITY], 0.0)
+    change = inner_increment(
+        state[1],
+        state[2],
+        wire[DISPLACEMENT] - state[0],
+        dt,
+        yield_force,
+        viscosity,
+        series_viscosity,
+        parameters[5],
+        parameters[0],
+        parameters[1],
+        parameters[2],
+    )
+    state[0] = wire[DISPLACEMENT]
+    state[1] += change
+    state[2] = advance_hysteresis(state[2], change, parameters[0], parameters[1], parameters[2])
+    wire[HYSTERESIS] = state[2]
+    wire[INNER_DISPLACEMENT] = state[1]
+    inner = series_viscosity * wire[VELOCITY] - yield_force * state[2] - parameters[5] * state[1]
+    wire[VELOCITY] = inner / (viscosity + series_viscosity)
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: k0, k1 [N/m], x0 [m]. Gives the wire its outer velocity back."""
+    force = parameters[0] * wire[INNER_DISPLACEMENT] + parameters[1] * (wire[DISPLACEMENT] - parameters[2])
+    wire[EXTRA_FORCE] += force
+    wire[FORCE] += force
+    wire[VELOCITY] = wire[OUTER_VELOCITY]
+
+
+def series_dashpot(
+    yield_displacement: float,
+    gamma_share: float,
+    exponent: float,
+    series_viscosity: tuple[float, float],
+    inner_stiffness: float,
+    outer_stiffness: float = 0.0,
+    rest_displacement: float = 0.0,
+) -> tuple[Step, Step]:
+    """Return the two steps of the modified Bouc-Wen model (P4): hysteresis behind c1 and k0, and the springs' forces.
+
+    Parameters
+    ----------
+    yield_displacement, gamma_share, exponent
+        As in :func:`mrpipe.dampers.hysteresis.hysteresis`.
+    series_viscosity
+        c1_a [N s/m], c1_b [N s/m per A or V].
+    inner_stiffness, outer_stiffness
+        k0, k1 [N/m].
+    rest_displacement
+        x0 [m].
+    """
+    inner = np.array([yield_displacement, gamma_share, exponent, *series_viscosity, inner_stiffness])
+    outer = np.array([inner_stiffness, outer_stiffness, rest_displacement])
+    return (
+        Step("series-dashpot", Phase.HYSTERESIS, series_step, inner, state_size=3),
+        Step("springs", Phase.FORCE_EFFECT, spring_step, outer),
+    )

@@ -1,0 +1,166 @@
+"""Yield that depends on speed: Bingham's jump, and the forms in which the yield force rounds with velocity.
+
+Real recordings ask for these more than for any other refinement of the Bouc-Wen model: the force goes on rising with
+speed, steeply first, then ever less.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import float64, int64, njit, void
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.plant import (
+    CURRENT,
+    FIRST,
+    HYSTERESIS,
+    RATE_YIELD,
+    STEP_SIGNATURE,
+    VELOCITY,
+    VISCOSITY,
+    Phase,
+    Step,
+)
+
+_SDIRK = 1.0 - math.sqrt(0.5)
+
+
+@njit(float64(float64, float64), cache=True)
+def rounded_sign(velocity: float, scale: float) -> float:
+    """Return tanh(velocity/scale), and sign(velocity) for a scale of 0."""
+    if scale > 0.0:
+        return math.tanh(velocity / scale)
+    if velocity > 0.0:
+        return 1.0
+    if velocity < 0.0:
+        return -1.0
+    return 0.0
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def sign_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: transition velocity [m/s]."""
+    wire[HYSTERESIS] = rounded_sign(wire[VELOCITY], parameters[0])
+
+
+def velocity_sign(transition_velocity: float = 0.0) -> Step:
+    """Return (6.1)'s sign of the velocity; a transition velocity [m/s] above 0 rounds it to a tanh."""
+    return Step("velocity-sign", Phase.HYSTERESIS, sign_step, np.array([float(transition_velocity)]))
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def power_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: reference velocity [m/s], exponent."""
+    wire[RATE_YIELD] *= (abs(wire[VELOCITY]) / parameters[0]) ** parameters[1]
+
+
+def power_of_velocity(reference_velocity: float, exponent: float) -> Step:
+    """Return the factor (|v|/v_ref)^p on the yield force: 1 at the reference velocity [m/s]."""
+    numbers = np.array([reference_velocity, exponent], dtype=np.float64)
+    return Step("power-of-velocity", Phase.COEFFICIENT_EFFECT, power_step, numbers)
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def rounded_yield_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: velocity scale [m/s], four coefficients of the additional yield force [N, N/A, ...]."""
+    u = wire[CURRENT]
+    force = parameters[1] + u * (parameters[2] + u * (parameters[3] + u * parameters[4]))
+    ratio = wire[VELOCITY] / parameters[0]
+    # tanh(r)/r, so that the term enters as a viscosity that falls with speed
+    share = math.tanh(ratio) / ratio if abs(ratio) > 1e-6 else 1.0
+    wire[VISCOSITY] += force * share / parameters[0]
+
+
+def rounded_yield(velocity_scale: float, coefficients: FloatArray) -> Step:
+    """Return alpha_v(u) tanh(v/v0) beside the hysteresis; it is entered as the viscosity alpha_v tanh(v/v0)/v."""
+    numbers = np.zeros(5)
+    numbers[0] = velocity_scale
+    numbers[1 : 1 + len(coefficients)] = coefficients
+    return Step("rounded-yield", Phase.COEFFICIENT_EFFECT, rounded_yield_step, numbers)
+
+
+@njit(float64(float64, float64, float64), cache=True)
+def _solve_stage(weight: float, right: float, start: float) -> float:
+    """Return theta with tanh(theta) + weight theta = right; Newton from the side where it cannot overshoot."""
+    theta = start
+    for _ in range(60):
+        t = math.tanh(theta)
+        residual = t + weight * theta - right
+        slope = 1.0 - t * t + weight
+        change = residual / slope
+        limit = 1.0 + abs(theta)
+        change = min(max(change, -limit), limit)
+        theta -= change
+        if abs(change) < 1e-12 * (1.0 + abs(theta)):
+            break
+    return theta
+
+
+@njit(float64(float64, float64, float64, float64, float64, float64), cache=True)
+def advance_dashpot(
+    theta: float, previous: float, present: float, dt: float, stiffness: float, velocity_scale: float
+) -> float:
+    """Return atanh(z) after `dt` [s] of z' = q (v - v0 atanh z).
+
+    A spring of q [1/m] in series with a dashpot that saturates: z = tanh(v/v0) in the steady state. Two-stage
+    diagonally implicit Runge-Kutta (L-stable, second order), the velocity running straight from `previous` to `present`.
+    """
+    gain = stiffness * dt
+    weight = _SDIRK * gain * velocity_scale
+    first_velocity = previous + _SDIRK * (present - previous)
+    z0 = math.tanh(theta)
+    first = _solve_stage(weight, z0 + _SDIRK * gain * first_velocity, theta)
+    rate = gain * (first_velocity - velocity_scale * first)
+    return _solve_stage(weight, z0 + (1.0 - _SDIRK) * rate + _SDIRK * gain * present, first)
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def dashpot_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: q [1/m], velocity scale v0 [m/s]. State: atanh z, last velocity."""
+    if wire[FIRST] > 0.5:
+        state[0] = 0.0
+    else:
+        state[0] = advance_dashpot(state[0], state[1], wire[VELOCITY], dt, parameters[0], parameters[1])
+    state[1] = wire[VELOCITY]
+    wire[HYSTERESIS] = math.tanh(state[0])
+
+
+def saturating_dashpot(stiffness: float, velocity_scale: float) -> Step:
+    """Return the spring in series with a saturating dashpot, see :func:`advance_dashpot`."""
+    numbers = np.array([stiffness, velocity_scale], dtype=np.float64)
+    return Step("saturating-dashpot", Phase.HYSTERESIS, dashpot_step, numbers, state_size=2)
+
+
+@njit(void(float64[::1], int64[::1], float64[::1], float64, float64, float64[::1]), cache=True)
+def _series(
+    velocity: FloatArray,
+    starts: IntArray,
+    dt: FloatArray,
+    stiffness: float,
+    velocity_scale: float,
+    result: FloatArray,
+) -> None:
+    for test in range(starts.shape[0] - 1):
+        theta = 0.0
+        result[starts[test]] = 0.0
+        for index in range(starts[test] + 1, starts[test + 1]):
+            theta = advance_dashpot(theta, velocity[index - 1], velocity[index], dt[test], stiffness, velocity_scale)
+            result[index] = math.tanh(theta)
+
+
+def dashpot_series(
+    velocity: FloatArray, starts: IntArray, dt: FloatArray, stiffness: float, velocity_scale: float
+) -> FloatArray:
+    """Return z, shape (n,), of :func:`advance_dashpot` over recordings laid end to end (starts: see hysteresis_series)."""
+    result = np.empty(len(velocity))
+    _series(
+        np.ascontiguousarray(velocity, dtype=np.float64),
+        np.ascontiguousarray(starts, dtype=np.int64),
+        np.ascontiguousarray(dt, dtype=np.float64),
+        float(stiffness),
+        float(velocity_scale),
+        result,
+    )
+    return result
