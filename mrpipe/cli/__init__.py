@@ -8,6 +8,7 @@ import sys
 INTERRUPTED = 130
 WRONG_INPUT = 2
 CHECK_FAILED = 1
+_RESUME = "interrupted; the next call resumes at the first unfinished stage"
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -26,7 +27,7 @@ def run(arguments: list[str] | None = None) -> int:
         command = typer.main.get_command(app)
         status = command.main(args=arguments, prog_name="mrpipe", standalone_mode=False)
     except KeyboardInterrupt:
-        return _say("interrupted; the next call resumes at the first unfinished stage", INTERRUPTED)
+        return _say(_RESUME, INTERRUPTED)
     except CheckFailed as error:
         return _say(str(error), CHECK_FAILED)
     except MrpipeError as error:
@@ -36,12 +37,14 @@ def run(arguments: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CHECK_FAILED
     except typer.Abort:
-        return _say("interrupted", INTERRUPTED)
+        return _say(_RESUME, INTERRUPTED)
     except Exception as error:
         message = getattr(error, "format_message", None)
         if message is None:
             raise
         return _say(" ".join(str(message()).split()), WRONG_INPUT)
+    if status == INTERRUPTED:  # what typer makes of Ctrl-C
+        return _say(_RESUME, INTERRUPTED)
     return int(status) if isinstance(status, int) else 0
 
 
