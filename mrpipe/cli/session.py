@@ -34,7 +34,7 @@ def _absolute(path: Path) -> str:
 
 def rig_key(path: Path) -> str:
     """Return which entry of `campaigns` a campaign belongs to: bench, frame or closed_loop."""
-    from mrpipe.campaigns import read_header
+    from mrpipe.campaigns.header import read_header
 
     header = read_header(path)
     if header.rig == "damper-bench":

@@ -1,0 +1,42 @@
+"""What a campaign is, told by its campaign file alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mrpipe.campaigns.schema import CampaignEntry
+from mrpipe.campaigns.source import read_yaml
+from mrpipe.campaigns.writing import CAMPAIGN_FILE
+from mrpipe.errors import UserError
+
+
+@dataclass(frozen=True)
+class CampaignHeader:
+    """Name, rig and the kinds of its tests (empty on a bench)."""
+
+    campaign: str
+    rig: str
+    kinds: frozenset[str]
+
+
+def read_header(path: Path) -> CampaignHeader:
+    """Read the head of a campaign without its data.
+
+    Raises
+    ------
+    UserError
+        If there is no campaign at `path`, or its file is faulty.
+    """
+    path = Path(path)
+    file = path / CAMPAIGN_FILE if path.is_dir() else path
+    if not file.is_file():
+        raise UserError(file, "", "no such campaign", f"name a directory that holds {CAMPAIGN_FILE}, or such a file")
+    source = read_yaml(file)
+    entry = source.build(CampaignEntry, source.content, ())
+    kinds = {
+        str(test.get("kind") or ("closed-loop" if test.get("law") else ""))
+        for test in entry.tests
+        if isinstance(test, dict)
+    }
+    return CampaignHeader(entry.campaign, entry.rig, frozenset(kinds - {""}))
