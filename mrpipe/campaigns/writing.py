@@ -28,7 +28,7 @@ class TestFile:
     columns
         Name of the column in the file -> samples, shape (n,), in the unit that the campaign's channels name.
     details
-        Other keys of the test in campaign.yaml (`kind`, `mode`, `law`, `gains`, `segments_s`, `channels`, `about`, ...).
+        Other keys of the test (`kind`, `mode`, `law`, `gains`, `segments_s`, `channels`, `about`, ...).
     """
 
     __test__ = False  # the name is no test case, whatever a test runner makes of it
@@ -77,7 +77,7 @@ def write_campaign(
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
     (directory / CAMPAIGN_FILE).unlink(missing_ok=True)
-    units = {column: unit for column, unit in channels.values()}
+    units = dict(channels.values())
     entries: list[dict[str, Any]] = []
     files: set[str] = set()
     for test in tests:

@@ -1,0 +1,152 @@
+"""What can be wrong with measured samples, and what is worth telling."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.columns import DataFile
+from mrpipe.campaigns.model import Campaign, Recording
+from mrpipe.errors import UserError
+
+
+def require_finite(file: DataFile, values: FloatArray, first: int, channel: str, where: str) -> None:
+    """Refuse NaN and infinite samples; `first` is the index of the first one used.
+
+    Raises
+    ------
+    UserError
+        Naming the first bad row.
+    """
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        row = file.first_row + first + int(bad[0])
+        kind = "NaN (no number)" if np.isnan(values[bad[0]]) else "infinite"
+        raise UserError(
+            file.path,
+            f"{where}, {channel}, row {row}",
+            f"is {kind}, {bad.size} such samples in all",
+            "cut them off with segments_s or mend the file",
+        )
+
+
+def clipped_share(values: FloatArray) -> float:
+    """Return the share of samples that sit at an extreme as a clipped channel's do, 0 where none is clipped.
+
+    A peak that is only coarsely resolved dwells at its top level for at most a few times as long as at the level
+    below it, and a rig at rest creeps into its rest; a clipped channel has flat tops that it enters at speed, with
+    hardly a sample just below.
+    """
+    share = 0.0
+    span = float(np.ptp(values))
+    if values.size < 20 or span == 0.0:
+        return 0.0
+    speed = float(np.sqrt(np.mean(np.diff(values) ** 2)))
+    for signed in (values, -values):
+        at_top = signed >= float(signed.max()) - 1e-9 * span
+        edges = np.diff(np.concatenate(([0], at_top.astype(np.int8), [0])))
+        begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+        inside = (begins > 0) & (ends < values.size) & (ends - begins >= 4)
+        begins, ends = begins[inside], ends[inside]
+        entered = signed[begins] - signed[begins - 1] > 0.2 * speed
+        held = int(np.sum((ends - begins)[entered]))
+        if held < 8:
+            continue
+        below = signed[~at_top]
+        near = np.count_nonzero(below >= float(below.max()) - 1e-9 * span)
+        if near < 0.2 * at_top.sum():
+            share += held / values.size
+    return share
+
+
+def find_clipping(test: Recording) -> list[str]:
+    """Return a line for each measured channel that looks clipped; the drive may rest at its limit and is left out."""
+    lines = []
+    for channel, values in test.channels.items():
+        if "drive" in channel or "desired" in channel:
+            continue
+        share = clipped_share(values)
+        if share > 0.0:
+            lines.append(
+                f"{channel} looks clipped: {100 * share:.2g} % of the samples sit exactly at "
+                f"{values.min():.4g} or {values.max():.4g}"
+            )
+    return lines
+
+
+def force_sign(recordings: Sequence[Recording]) -> float:
+    """Return the mean correlation of force with velocity over tests: +1 where force opposes motion as it should.
+
+    A damper dissipates, so the force that is positive with elongation does positive work on the rod's displacement;
+    a negative figure means that compression was taken as positive. 0 where nothing moves.
+    """
+    figures = []
+    for test in recordings:
+        for begin, end in test.segments:
+            displacement = test.channels["displacement"][begin:end]
+            force = test.channels["force"][begin:end]
+            step = np.diff(displacement)
+            # velocity over a fiftieth of the record's cycles at least, so that noise does not drown it
+            width = max(1, int(0.01 * test.sampling_rate_hz))
+            if step.size <= 2 * width:
+                continue
+            velocity = displacement[width:] - displacement[:-width]
+            middle = force[width // 2 : width // 2 + velocity.size]
+            middle, velocity = middle - middle.mean(), velocity - velocity.mean()
+            scale = float(np.sqrt(np.sum(middle**2) * np.sum(velocity**2)))
+            if scale > 0.0:
+                figures.append(float(np.sum(middle * velocity)) / scale)
+    return float(np.mean(figures)) if figures else 0.0
+
+
+def require_varying_drive(campaign: Campaign) -> None:
+    """Refuse a campaign whose drive never changes, from which no inverse model can be learned.
+
+    Raises
+    ------
+    UserError
+        If the drive of all training tests is one constant.
+    """
+    drives = {test.name: test.channels["drive"] for test in campaign.with_role("training") if "drive" in test.channels}
+    require_varying(drives, str(campaign.directory))
+
+
+def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
+    """Refuse drives (test -> samples) that are all one constant; see :func:`require_varying_drive`.
+
+    Raises
+    ------
+    UserError
+        If the range over all tests is below 1 % of the largest drive (noise of a constant), or there is no drive.
+    """
+    if not drives:
+        raise UserError(source, "drive", "is not recorded in any training test", "an inverse model needs a drive")
+    # the mean over a twentieth of each record tells a level from the noise on it
+    levels = np.concatenate(
+        [[block.mean() for block in np.array_split(item, 20) if block.size] for item in drives.values()]
+    )
+    largest = float(np.abs(levels).max())
+    if float(np.ptp(levels)) <= 0.01 * largest or largest == 0.0:
+        raise UserError(
+            source,
+            "drive",
+            f"never changes in the training tests ({levels.mean():.4g})",
+            "an inverse model needs training tests at two drives at least",
+        )
+
+
+def require_roles(campaign: Campaign, source: str) -> None:
+    """Refuse a bench campaign without training or validation tests.
+
+    Raises
+    ------
+    UserError
+        Naming the role that is missing.
+    """
+    if campaign.rig != "damper-bench":
+        return
+    for role in ("training", "validation"):
+        if not campaign.with_role(role):
+            raise UserError(source, "tests", f"no {role} test", f"give one test at least the role {role}")

@@ -1,0 +1,133 @@
+"""The clock of a test: where it comes from, and whether it can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.columns import DataFile
+from mrpipe.errors import UserError
+
+RATE_TOLERANCE = 0.01
+"""Largest relative difference between a stated rate and the clock."""
+
+JITTER_TOLERANCE = 0.02
+"""Largest rms deviation of an interval from the median, over the median, that goes unmentioned."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Time of each sample, shape (n,), the nominal rate, and what was noticed."""
+
+    time_s: FloatArray
+    sampling_rate_hz: float
+    findings: tuple[str, ...] = ()
+
+
+def build_clock(
+    file: DataFile, time: FloatArray | None, stated_rate_hz: float | None, samples: int, where: str
+) -> Clock:
+    """Return the clock of a test from its time channel, the file's own clock, or the stated rate.
+
+    Parameters
+    ----------
+    time
+        Time channel [s], shape (n,), or None.
+    stated_rate_hz
+        Rate of campaign.yaml, or None.
+    samples
+        Number of samples n.
+    where
+        Names the test in messages.
+
+    Raises
+    ------
+    UserError
+        If the clock stands still or runs backwards, holds NaN, disagrees with the stated rate, or is nowhere told.
+    """
+    if time is None:
+        time = file.time_s
+    if time is None:
+        rate = stated_rate_hz or file.sampling_rate_hz
+        if rate is None:
+            raise UserError(file.path, where, "no clock", "name a time channel in channels: or give sampling_rate_hz:")
+        return Clock(np.arange(samples) / rate, rate)
+    if time.size != samples:
+        raise UserError(
+            file.path, where, f"time has {time.size} samples, the channels {samples}", "pick columns of one length"
+        )
+    _require_increasing(file, time, where)
+    rate = _measured_rate(file, time)
+    if stated_rate_hz is not None:
+        if abs(rate / stated_rate_hz - 1.0) > RATE_TOLERANCE:
+            raise UserError(
+                file.path,
+                where,
+                f"the clock runs at {rate:.6g} Hz, but sampling_rate_hz says {stated_rate_hz:.6g}",
+                "mend sampling_rate_hz or the unit of time",
+            )
+        rate = stated_rate_hz
+    time = _unrounded(time)
+    return Clock(time, rate, _irregularities(time, rate, file.parts))
+
+
+def _require_increasing(file: DataFile, time: FloatArray, where: str) -> None:
+    row = file.first_row
+    bad = np.flatnonzero(~np.isfinite(time))
+    if bad.size:
+        raise UserError(
+            file.path, f"{where}, row {row + int(bad[0])}", f"time is {time[bad[0]]}", "every sample needs its time"
+        )
+    steps = np.diff(time)
+    wrong = np.flatnonzero(~(steps > 0.0))
+    if wrong.size:
+        index = int(wrong[0]) + 1
+        raise UserError(
+            file.path,
+            f"{where}, row {row + index}",
+            f"time goes from {time[index - 1]:.9g} to {time[index]:.9g} s",
+            "a clock that increases with every sample expected",
+        )
+
+
+def _measured_rate(file: DataFile, time: FloatArray) -> float:
+    """Return the rate of the mean interval without the gaps, rounded where the clock's digits do not carry more."""
+    if file.sampling_rate_hz is not None and file.time_s is time:
+        return float(file.sampling_rate_hz)
+    steps = np.diff(time)
+    rate = 1.0 / float(np.mean(steps[steps <= 1.5 * np.median(steps)]))
+    rounded = float(f"{rate:.4g}")
+    return rounded if abs(rounded / rate - 1.0) < 2e-5 else rate
+
+
+def _unrounded(time: FloatArray) -> FloatArray:
+    """Return an even clock where the given one is even but for the rounding of its printed digits."""
+    # with a fixed number of significant digits, the end of the record is the coarsest
+    late = time[time.size // 2 :]
+    digits = next((count for count in range(10) if np.allclose(late, np.round(late, count), rtol=0, atol=1e-11)), 12)
+    index = np.arange(time.size)
+    slope, start = np.polyfit(index, time, 1)
+    even = np.asarray(start + slope * index)
+    return even if float(np.max(np.abs(time - even))) <= 0.75 * 10.0**-digits else time
+
+
+def _irregularities(time: FloatArray, rate: float, parts: tuple[tuple[int, int], ...]) -> tuple[str, ...]:
+    findings = []
+    steps = np.diff(time) * rate
+    pauses = np.zeros(steps.size, dtype=bool)
+    pauses[[start - 1 for start, _ in parts if start > 0]] = True
+    gaps = np.flatnonzero((steps > 1.5) & ~pauses)
+    if gaps.size:
+        missing = int(np.sum(np.round(steps[gaps]) - 1))
+        findings.append(
+            f"{gaps.size} dropouts of {missing} samples in all, the first at {time[gaps[0]]:.4g} s (the longest "
+            f"{steps[gaps].max() / rate:.3g} s)"
+        )
+    regular = steps[(steps <= 1.5) & ~pauses]
+    if regular.size:
+        jitter = float(np.sqrt(np.mean((regular - np.median(regular)) ** 2)))
+        if jitter > JITTER_TOLERANCE:
+            findings.append(f"clock jitter of {100 * jitter:.2g} % of the sampling interval (rms)")
+    return tuple(findings)

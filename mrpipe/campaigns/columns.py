@@ -1,0 +1,124 @@
+"""A data file as named columns, and how a column is picked out of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.source import nearest
+from mrpipe.errors import UserError
+
+_INDEXED = re.compile(r"^(?P<name>.*?)\s*\[(?P<index>[^\]]*)\]$")
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """What a reader found in a file.
+
+    Attributes
+    ----------
+    path
+        The file.
+    names
+        Names that can be asked for.
+    fetch
+        Name -> array of numbers (any shape); called only for columns that are used.
+    table
+        Whether an integer picks a column by position.
+    time_s, sampling_rate_hz
+        Clock that the file carries itself (data loggers, UFF), shape (n,); None where it has none.
+    parts
+        Half-open index ranges between the pauses of a logger; empty where there are none.
+    first_row
+        Line of the first sample in a text file, 0 where lines mean nothing.
+    aliases
+        Other spellings of a name.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    fetch: Callable[[str], Any]
+    table: bool = False
+    time_s: FloatArray | None = None
+    sampling_rate_hz: float | None = None
+    parts: tuple[tuple[int, int], ...] = ()
+    first_row: int = 0
+    aliases: Mapping[str, str] = field(default_factory=dict)
+
+    def column(self, column: str | int, where: str) -> FloatArray:
+        """Return one column, shape (n,).
+
+        `column` is a name, an index of a table (from 0), or a name with an index such as `x_F[:,2]`.
+
+        Raises
+        ------
+        UserError
+            If there is no such column, or it is no vector of numbers.
+        """
+        name, index = self._resolve(column, where)
+        values = self.fetch(name)
+        if isinstance(values, UserError):
+            raise values
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiub":
+            raise UserError(self.path, where, f"column {column!r} holds no numbers", "name a column of numbers")
+        array = array.astype(np.float64)
+        if index is not None:
+            array = self._pick(array, index, column, where)
+        array = np.squeeze(array)
+        if array.ndim != 1 or array.size < 2:
+            shape = " x ".join(map(str, array.shape)) or "one number"
+            raise UserError(
+                self.path, where, f"column {column!r} is no vector ({shape})", f"pick one column, as in {name}[:,0]"
+            )
+        return np.ascontiguousarray(array)
+
+    def _resolve(self, column: str | int, where: str) -> tuple[str, str | None]:
+        if isinstance(column, str) and not isinstance(column, bool):
+            if column in self.names:
+                return column, None
+            if column in self.aliases:
+                return self.aliases[column], None
+            match = _INDEXED.match(column)
+            if match and match["name"] in self.names:
+                return match["name"], match["index"]
+            if self.table and match and not match["name"]:
+                column = match["index"].split(",")[-1].strip()
+        if self.table and re.fullmatch(r"-?\d+", str(column)):
+            position = int(column)
+            if -len(self.names) <= position < len(self.names):
+                return self.names[position], None
+            raise UserError(
+                self.path,
+                where,
+                f"no column {position}, the table has {len(self.names)}",
+                f"count from 0 to {len(self.names) - 1}",
+            )
+        if self.path.suffix.lower() != ".csv" and len(self.names) == 1 and isinstance(column, int):
+            return self.names[0], f":,{column}"
+        asked = str(column).split("[")[0]
+        raise UserError(self.path, where, f"no column {column!r}", nearest(asked, self.names))
+
+    def _pick(self, array: FloatArray, index: str, column: str | int, where: str) -> FloatArray:
+        parts: list[Any] = []
+        for part in index.split(","):
+            text = part.strip()
+            if text == ":":
+                parts.append(slice(None))
+            elif re.fullmatch(r"-?\d+", text):
+                parts.append(int(text))
+            else:
+                raise UserError(self.path, where, f"index [{index}] is not understood", "write one such as [:,2]")
+        try:
+            return np.asarray(array[tuple(parts)])
+        except IndexError:
+            shape = " x ".join(map(str, array.shape))
+            raise UserError(
+                self.path, where, f"column {column!r} lies outside an array of {shape}", "count from 0"
+            ) from None

@@ -1,0 +1,369 @@
+"""Reading a campaign: campaign.yaml and the files it names, as recordings in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrpipe import units
+from mrpipe.artifacts import FloatArray, public_data_directory
+from mrpipe.campaigns.checks import find_clipping, force_sign, require_finite, require_roles
+from mrpipe.campaigns.clock import build_clock
+from mrpipe.campaigns.columns import DataFile
+from mrpipe.campaigns.files import open_data_file
+from mrpipe.campaigns.model import Campaign, Recording
+from mrpipe.campaigns.schema import (
+    CampaignEntry,
+    ChannelEntry,
+    DirectoryEntry,
+    TestEntry,
+    floor_of,
+    known_channels,
+    quantity_of,
+)
+from mrpipe.campaigns.source import Place, YamlSource, nearest, read_yaml
+from mrpipe.campaigns.writing import CAMPAIGN_FILE
+from mrpipe.errors import UserError
+
+_NEEDED_ON_BENCH = ("displacement", "force", "drive")
+_ONLY_CLOSED_LOOP = (
+    "damper_force",
+    "damper_displacement",
+    "damper_velocity",
+    "drive",
+    "desired_drive",
+    "desired_force",
+)
+
+
+@dataclass
+class _Reader:
+    """What is needed while the tests of one campaign are read."""
+
+    source: YamlSource
+    entry: CampaignEntry
+    folder: Path
+    files: dict[Path, DataFile] = field(default_factory=dict)
+    drive_units: dict[str, str] = field(default_factory=dict)
+    set_points: list[bool] = field(default_factory=list)
+    findings: list[str] = field(default_factory=list)
+
+    def open(self, name: str) -> DataFile:
+        path = self.folder / name
+        if path not in self.files:
+            self.files[path] = open_data_file(path, self.entry.text)
+        return self.files[path]
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Read a campaign.
+
+    Parameters
+    ----------
+    path
+        Directory with campaign.yaml, or a campaign file such as configs/campaigns/utfsm.yaml, whose `directory:` key
+        tells where the files lie (`{public_data: NAME}`: the folder of the public measurements).
+
+    Raises
+    ------
+    UserError
+        For every fault of the campaign file or of the data that the reader can see; one line each.
+    """
+    path = Path(path)
+    file = path / CAMPAIGN_FILE if path.is_dir() else path
+    if not file.is_file():
+        raise UserError(file, "", "no such campaign", f"name a directory that holds {CAMPAIGN_FILE}, or such a file")
+    source = read_yaml(file)
+    entry = source.build(CampaignEntry, source.content, ())
+    reader = _Reader(source, entry, _folder(source, entry))
+    shared = _channels(source, entry.channels, entry.rig, ("channels",))
+    if not entry.tests:
+        raise source.error(("tests",), "is empty", "list one test at least")
+    recordings = [_read_test(reader, shared, index) for index in range(len(entry.tests))]
+    _require_unique_names(source, recordings)
+    campaign = Campaign(
+        name=entry.campaign,
+        rig=entry.rig,
+        directory=file.parent,
+        recordings=tuple(recordings),
+        drive_unit=next(iter(reader.drive_units.values()), ""),
+        drive_is_set_point=bool(reader.set_points) and all(reader.set_points),
+        declared_effects=entry.declared_effects,
+        floor_masses_kg=entry.frame.floor_masses_kg,
+        declared=_declared(source.content),
+    )
+    require_roles(campaign, str(file))
+    _require_floors(source, campaign)
+    for test in campaign.recordings:
+        reader.findings += [f"test {test.name}: {line}" for line in find_clipping(test)]
+    if campaign.rig == "damper-bench":
+        campaign = _with_force_sign(campaign, reader.findings)
+    return replace(campaign, findings=tuple(reader.findings))
+
+
+def campaign_files(path: Path) -> tuple[Path, ...]:
+    """Return the files that a campaign is made of, campaign.yaml first, without reading the data.
+
+    Raises
+    ------
+    UserError
+        If the campaign file is faulty.
+    """
+    path = Path(path)
+    file = path / CAMPAIGN_FILE if path.is_dir() else path
+    source = read_yaml(file)
+    entry = source.build(CampaignEntry, source.content, ())
+    folder = _folder(source, entry)
+    names = [str(item.get("file", "")) for item in entry.tests if isinstance(item, dict)]
+    return (file, *(folder / name for name in dict.fromkeys(names)))
+
+
+def _declared(content: dict[str, Any]) -> dict[str, Any]:
+    own = {"campaign", "rig", "sampling_rate_hz", "channels", "tests", "directory", "text", "declared_effects"}
+    return {key: value for key, value in content.items() if key not in own}
+
+
+def _folder(source: YamlSource, entry: CampaignEntry) -> Path:
+    if entry.directory is None:
+        return source.path.parent
+    if isinstance(entry.directory, DirectoryEntry):
+        public = public_data_directory()
+        folder = None if public is None else public / entry.directory.public_data
+        if folder is None or not folder.is_dir():
+            raise source.error(
+                ("directory",),
+                f"the public measurements {entry.directory.public_data!r} are not on this machine",
+                "set MRPIPE_DATA to the folder that holds them (the documentation says where they are published)",
+            )
+        return folder
+    folder = source.path.parent / entry.directory
+    if not folder.is_dir():
+        raise source.error(("directory",), f"{entry.directory!r} is no directory", "name the folder of the files")
+    return folder
+
+
+def _channels(source: YamlSource, content: dict[str, Any], rig: str, place: Place) -> dict[str, ChannelEntry]:
+    channels = {}
+    for name, entry in content.items():
+        if quantity_of(name, rig) is None:
+            raise source.error((*place, name), "unknown channel", nearest(name, known_channels(rig)))
+        channels[name] = source.build(ChannelEntry, entry, (*place, name))
+    return channels
+
+
+def _merge(shared: ChannelEntry | None, own: ChannelEntry) -> ChannelEntry:
+    """Complete a test's channel by what the campaign says of it, as far as the test leaves it open."""
+    if shared is None:
+        return own
+    inherited = {key: getattr(shared, key) for key in ("unit", "floor")}
+    if own.value is None:
+        inherited |= {key: getattr(shared, key) for key in ("column", "value", "scale", "offset", "set_point")}
+        if own.column is not None:
+            inherited["value"] = None
+    given = {key: getattr(own, key) for key in own.model_fields_set}
+    return ChannelEntry(**{**inherited, **given})
+
+
+def _test_entry(reader: _Reader, shared: dict[str, ChannelEntry], index: int) -> tuple[TestEntry, dict[str, Any]]:
+    """Return a test's entry and its channels; a channel may also stand in the test itself (`drive: {value: ...}`)."""
+    source, rig = reader.source, reader.entry.rig
+    place: Place = ("tests", index)
+    content = reader.entry.tests[index]
+    if not isinstance(content, dict):
+        raise source.error(place, f"is {content!r}", "write {name: ..., file: ..., role: ...}")
+    direct = {key: value for key, value in content.items() if quantity_of(key, rig) and isinstance(value, dict)}
+    rest = {key: value for key, value in content.items() if key not in direct}
+    if "law" in rest:
+        gains = {key: value for key, value in rest.items() if key not in TestEntry.model_fields and _number(value)}
+        known = [key for key in gains if "did you mean" in nearest(key, TestEntry.model_fields)]
+        if gains and not known:
+            rest = {key: value for key, value in rest.items() if key not in gains}
+            rest["gains"] = {**gains, **rest.get("gains", {})}
+    entry = source.build(TestEntry, rest, place)
+    own = _channels(source, entry.channels, rig, (*place, "channels")) | _channels(source, direct, rig, place)
+    merged = dict(shared) | {name: _merge(shared.get(name), channel) for name, channel in own.items()}
+    if rig == "damper-bench":
+        missing = [name for name in _NEEDED_ON_BENCH if name not in merged]
+        if missing:
+            raise source.error(
+                ("channels",), f"no channel {missing[0]}", f"write {missing[0]}: {{column: ..., unit: ...}}"
+            )
+        if entry.role is None:
+            raise source.error((*place, "role"), "is missing", "write role: training, validation or repeat")
+    elif entry.kind is None:
+        guess = "closed-loop" if entry.law else "free-decay" if entry.mode else None
+        if guess is None:
+            raise source.error((*place, "kind"), "is missing", "write kind: sweep, free-decay, closed-loop or random")
+        entry = entry.model_copy(update={"kind": guess})
+    return entry, merged
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _read_test(reader: _Reader, shared: dict[str, ChannelEntry], index: int) -> Recording:
+    entry, channels = _test_entry(reader, shared, index)
+    where = f"test {entry.name}"
+    place: Place = ("tests", index)
+    file = reader.open(entry.file)
+    skipped = set() if entry.kind in (None, "closed-loop") else set(_ONLY_CLOSED_LOOP)
+    columns = {
+        name: _read_channel(reader, file, name, channel, place, where)
+        for name, channel in channels.items()
+        if channel.value is None and not (name in skipped and not _has(file, channel))
+    }
+    if not columns:
+        raise reader.source.error(place, "no channel is read from the file", "give one channel at least a column")
+    samples = _one_length(file, columns, where)
+    rate = entry.sampling_rate_hz or reader.entry.sampling_rate_hz
+    clock = build_clock(file, columns.pop("time", None), rate, samples, where)
+    reader.findings += [f"test {entry.name}: {line}" for line in clock.findings]
+    for name, channel in channels.items():
+        if channel.value is not None:
+            columns[name] = np.full(samples, _constant(reader, name, channel, place))
+    begin, end, segments = _segments(reader, file, entry, clock.time_s, clock.sampling_rate_hz, place)
+    values = {name: column[begin:end] for name, column in columns.items()}
+    for name, column in values.items():
+        require_finite(file, column, begin, name, where)
+    if "drive" in channels:
+        reader.set_points.append(channels["drive"].value is not None or channels["drive"].set_point)
+    details = entry.details()
+    if channels.get("input_force") and channels["input_force"].floor:
+        details["input_force_floor"] = channels["input_force"].floor
+    return Recording(
+        name=entry.name,
+        role=entry.role or "training",
+        sampling_rate_hz=clock.sampling_rate_hz,
+        time_s=clock.time_s[begin:end],
+        channels=values,
+        segments=segments,
+        kind=entry.kind or "",
+        details=details,
+    )
+
+
+def _has(file: DataFile, channel: ChannelEntry) -> bool:
+    if channel.column is None:
+        return False
+    try:
+        file.column(channel.column, "")
+    except UserError:
+        return False
+    return True
+
+
+def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tuple[str, str | None]:
+    """Return the unit of a channel and its quantity; the drive settles the campaign's drive unit."""
+    if channel.unit is None:
+        raise reader.source.error((*place, "channels", name, "unit"), "is missing", "write its unit, such as mm or N")
+    where = f"{reader.source.path}: {reader.source.where(('channels', name))}"
+    quantity = quantity_of(name, reader.entry.rig)
+    if quantity == "drive":
+        kind = "current" if units.same_dimension(channel.unit, "current") else "voltage"
+        known = reader.drive_units.setdefault("drive", units.SI_UNITS[kind])
+        if known != units.SI_UNITS[kind]:
+            raise reader.source.error((*place, name), "is in A in one test and in V in another", "use one of the two")
+        quantity = kind
+    units.conversion(channel.unit, where=where, quantity=quantity)
+    return channel.unit, quantity
+
+
+def _read_channel(
+    reader: _Reader, file: DataFile, name: str, channel: ChannelEntry, place: Place, where: str
+) -> FloatArray:
+    unit, quantity = _unit(reader, name, channel, place)
+    if channel.column is None:
+        raise reader.source.error((*place, "channels", name), "has neither column nor value", "write column: ...")
+    values = file.column(channel.column, f"{where}, {name}")
+    return np.asarray(units.to_si(channel.scale * values + channel.offset, unit, quantity=quantity))
+
+
+def _constant(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> float:
+    unit, quantity = _unit(reader, name, channel, place)
+    value = float(units.to_si(np.float64(channel.value or 0.0), unit, quantity=quantity))
+    if not np.isfinite(value):
+        raise reader.source.error((*place, name, "value"), f"is {channel.value}", "a finite number expected")
+    return value
+
+
+def _one_length(file: DataFile, columns: dict[str, FloatArray], where: str) -> int:
+    lengths = {name: values.size for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} {size}" for name, size in lengths.items())
+        raise UserError(file.path, where, f"channels differ in length ({told})", "pick columns of one length")
+    return next(iter(lengths.values()))
+
+
+def _segments(
+    reader: _Reader, file: DataFile, entry: TestEntry, time: FloatArray, rate: float, place: Place
+) -> tuple[int, int, tuple[tuple[int, int], ...]]:
+    """Return the range of samples to keep, and the segments within it."""
+    parts = file.parts or ((0, time.size),)
+    if entry.part is not None:
+        if entry.part > len(parts):
+            raise reader.source.error(
+                (*place, "part"), f"is {entry.part}, the file has {len(parts)}", f"write 1 to {len(parts)}"
+            )
+        parts = (parts[entry.part - 1],)
+    wanted = entry.segments_s or ((-np.inf, np.inf),)
+    tolerance = 1e-3 / rate
+    ranges = []
+    for begin_s, end_s in wanted:
+        first, last = np.searchsorted(time, [begin_s - tolerance, end_s - tolerance])
+        hits = [(max(int(first), begin), min(int(last), end)) for begin, end in parts]
+        hits = [(begin, end) for begin, end in hits if end > begin]
+        if not hits:
+            raise reader.source.error(
+                (*place, "segments_s"),
+                f"[{begin_s:g}, {end_s:g}] holds no sample",
+                f"the clock of {entry.file} runs from {time[0]:.6g} to {time[-1]:.6g} s",
+            )
+        ranges += hits
+    ranges.sort()
+    begin, end = ranges[0][0], ranges[-1][1]
+    return begin, end, tuple((first - begin, last - begin) for first, last in ranges)
+
+
+def _require_unique_names(source: YamlSource, recordings: list[Recording]) -> None:
+    seen: set[str] = set()
+    for index, test in enumerate(recordings):
+        if test.name in seen:
+            raise source.error(("tests", index, "name"), f"{test.name!r} stands twice", "give each test its own name")
+        seen.add(test.name)
+
+
+def _require_floors(source: YamlSource, campaign: Campaign) -> None:
+    if campaign.rig != "shear-frame":
+        return
+    masses = campaign.floor_masses_kg
+    for test in campaign.recordings:
+        floors = sorted(floor_of(name) or 0 for name in test.channels if name.startswith("floor_acceleration_"))
+        if floors and floors != list(range(1, floors[-1] + 1)):
+            absent = next(floor for floor in range(1, floors[-1]) if floor not in floors)
+            raise source.error(
+                ("channels",), f"floor_acceleration_{absent} is missing", "number the floors 1, 2, 3, ..."
+            )
+        if masses and floors and len(masses) != len(floors):
+            raise source.error(
+                ("frame", "floor_masses_kg"), f"has {len(masses)} masses", f"{len(floors)} floors are measured"
+            )
+
+
+def _with_force_sign(campaign: Campaign, findings: list[str]) -> Campaign:
+    """Turn the force round where compression was taken as positive; the work done on the rod tells."""
+    sign = force_sign(campaign.recordings)
+    if sign >= -0.1:
+        if sign < 0.1:
+            findings.append("force and velocity are hardly related: the sign of the force cannot be told")
+        return campaign
+    findings.append(
+        f"force is positive in compression (correlation with velocity {sign:.2f}): its sign was turned round"
+    )
+    turned = [
+        replace(test, channels={**test.channels, "force": -test.channels["force"]}) for test in campaign.recordings
+    ]
+    return replace(campaign, recordings=tuple(turned))

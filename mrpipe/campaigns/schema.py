@@ -1,0 +1,189 @@
+"""What campaign.yaml may hold, as typed models; unknown keys are refused."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+BENCH_QUANTITIES = {
+    "time": "time",
+    "displacement": "displacement",
+    "velocity": "velocity",
+    "acceleration": "acceleration",
+    "drive": "drive",
+    "force": "force",
+}
+"""Channel of a bench test -> physical quantity (`drive` is a current or a voltage)."""
+
+FRAME_QUANTITIES = {
+    "time": "time",
+    "ground_acceleration": "acceleration",
+    "ground_displacement": "displacement",
+    "input_force": "force",
+    "damper_force": "force",
+    "damper_displacement": "displacement",
+    "damper_velocity": "velocity",
+    "drive": "drive",
+    "desired_drive": "drive",
+    "desired_force": "force",
+}
+"""Channel of a frame test -> physical quantity, besides the numbered floor channels."""
+
+_FLOOR = re.compile(r"^floor_(acceleration|displacement|velocity)_([1-9][0-9]*)$")
+
+
+def quantity_of(channel: str, rig: str) -> str | None:
+    """Return the physical quantity of a channel, None where the rig has no such channel."""
+    if rig == "shear-frame":
+        match = _FLOOR.match(channel)
+        return match.group(1) if match else FRAME_QUANTITIES.get(channel)
+    return BENCH_QUANTITIES.get(channel)
+
+
+def known_channels(rig: str) -> list[str]:
+    """Return the names of channels that a rig may have."""
+    if rig == "shear-frame":
+        return [*FRAME_QUANTITIES, "floor_acceleration_1", "floor_displacement_1", "floor_velocity_1"]
+    return list(BENCH_QUANTITIES)
+
+
+def floor_of(channel: str) -> int | None:
+    """Return the floor number in the name of a floor channel, else None."""
+    match = _FLOOR.match(channel)
+    return int(match.group(2)) if match else None
+
+
+class Entry(BaseModel):
+    """Base of all entries: unknown keys refused, frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ChannelEntry(Entry):
+    """Where a quantity is in the files: value = scale * column + offset, in `unit`; or a constant `value`.
+
+    `set_point` tells that a recorded drive is the command and not a measurement; `floor` is where an input force acts.
+    """
+
+    column: str | int | None = None
+    value: float | None = None
+    unit: str | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    floor: int | None = Field(default=None, ge=1)
+    set_point: bool = False
+
+    @field_validator("unit", mode="before")
+    @classmethod
+    def _unit_is_text(cls, value: Any) -> Any:
+        return str(value) if isinstance(value, int) else value
+
+    @model_validator(mode="after")
+    def _one_source(self) -> ChannelEntry:
+        if self.column is not None and self.value is not None:
+            raise ValueError("either column or value expected, not both")
+        return self
+
+
+class TextEntry(Entry):
+    """How delimited text is laid out, where it does not tell by itself."""
+
+    skip_lines: int = Field(default=0, ge=0)
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: str | None = None
+
+
+class FrameEntry(Entry):
+    """What is known of a frame."""
+
+    floor_masses_kg: tuple[float, ...] = ()
+    about: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("floor_masses_kg")
+    @classmethod
+    def _positive(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if any(not mass > 0.0 for mass in value):
+            raise ValueError("masses above zero expected")
+        return value
+
+
+class DirectoryEntry(Entry):
+    """Folder of the public measurements (`public_data: utfsm`) in which the files lie."""
+
+    public_data: str
+
+
+class TestEntry(Entry):
+    """One test; `details` of the recording are the keys below the line of `about`."""
+
+    __test__ = False
+
+    name: str
+    file: str
+    role: Literal["training", "validation", "repeat"] | None = None
+    kind: Literal["sweep", "free-decay", "closed-loop", "random"] | None = None
+    channels: dict[str, Any] = Field(default_factory=dict)
+    segments_s: tuple[tuple[float, float], ...] | None = None
+    part: int | None = Field(default=None, ge=1)
+    sampling_rate_hz: float | None = Field(default=None, gt=0)
+    about: dict[str, Any] = Field(default_factory=dict)
+
+    mode: int | None = Field(default=None, ge=1)
+    law: str | None = None
+    gains: dict[str, float] | None = None
+    repeat_of: str | None = None
+    excitation: str | None = None
+    frequency_hz: float | None = None
+    amplitude_m: float | None = None
+    notes: str | None = None
+
+    @field_validator("name", mode="before")
+    @classmethod
+    def _name_is_text(cls, value: Any) -> Any:
+        return str(value) if isinstance(value, (int, float)) else value
+
+    @field_validator("name")
+    @classmethod
+    def _usable_name(cls, value: str) -> str:
+        if not value.strip() or "/" in value:
+            raise ValueError("a name without '/' expected")
+        return value
+
+    @field_validator("segments_s")
+    @classmethod
+    def _ordered(cls, value: tuple[tuple[float, float], ...] | None) -> tuple[tuple[float, float], ...] | None:
+        if value is not None and (not value or any(not end > begin for begin, end in value)):
+            raise ValueError("pairs [begin, end] with begin before end expected")
+        return value
+
+    def details(self) -> dict[str, Any]:
+        """Return what describes the test and steers nothing of its reading."""
+        named = ("mode", "law", "gains", "repeat_of", "excitation", "frequency_hz", "amplitude_m", "notes")
+        given = {key: getattr(self, key) for key in named if getattr(self, key) is not None}
+        return {**self.about, **given}
+
+
+class CampaignEntry(Entry):
+    """The whole of campaign.yaml; tests are validated one by one so that a fault tells its line."""
+
+    campaign: str
+    rig: Literal["damper-bench", "shear-frame"]
+    channels: dict[str, Any]
+    tests: list[Any]
+    sampling_rate_hz: float | None = Field(default=None, gt=0)
+    directory: str | DirectoryEntry | None = None
+    text: TextEntry = TextEntry()
+    frame: FrameEntry = FrameEntry()
+    declared_effects: tuple[str, ...] = ()
+    source: str | None = None
+    licence: str | None = None
+    notes: str | None = None
+    about: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("campaign", mode="before")
+    @classmethod
+    def _name_is_text(cls, value: Any) -> Any:
+        return str(value) if value is not None and not isinstance(value, (dict, list)) else value
