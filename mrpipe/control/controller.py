@@ -1,0 +1,311 @@
+"""A controller as plain arrays: built here, run by :func:`mrpipe.control.kernel.controller_step`.
+
+What the closed loop, the virtual laboratory, the tracing of effects and the C export all use::
+
+    controller = build_controller("fdns", Gains(alpha_n_m=3000.0), ControllerOptions(rate_hz=200.0), inverse=network)
+    state = controller.new_state()
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from scipy.signal import butter
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.control import kernel
+from mrpipe.control.inverse import InverseTable
+from mrpipe.control.kalman import kalman_gains
+from mrpipe.control.lqg import Observer
+from mrpipe.errors import UserError
+from mrpipe.networks.network import Network
+
+LAWS = ("vd", "vdps", "vdns", "fdns", "nnc", "lqg", "passive-off", "passive-on")
+"""Every control law, in the order of tables."""
+
+PASSIVE = ("passive-off", "passive-on")
+
+_LAW_CODES = {
+    "vd": kernel.LAW_LINEAR,
+    "vdps": kernel.LAW_LINEAR,
+    "vdns": kernel.LAW_LINEAR,
+    "fdns": kernel.LAW_FRICTION,
+    "nnc": kernel.LAW_NETWORK,
+    "lqg": kernel.LAW_OBSERVER,
+    "passive-off": kernel.LAW_CONSTANT,
+    "passive-on": kernel.LAW_CONSTANT,
+}
+_SOURCES = {
+    "kalman": kernel.VELOCITY_KALMAN,
+    "measured": kernel.VELOCITY_MEASURED,
+    "difference": kernel.VELOCITY_DIFFERENCE,
+}
+_CHANNELS = {"displacement": 0, "velocity": 1, "acceleration": 2, "force": 3}
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of a law: f = c v + k x (4.14), or f = sign(v) alpha X - alpha x (4.18) with (4.20)."""
+
+    c_n_s_m: float = 0.0
+    k_n_m: float = 0.0
+    alpha_n_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class ControllerOptions:
+    """How the controller runs.
+
+    Attributes
+    ----------
+    rate_hz
+        Its sampling rate (the thesis prints 200 and 500 Hz).
+    velocity
+        `kalman` (5.1 to 5.3), `measured` (a perfect velocity sensor) or `difference` (backward difference).
+    displacement_noise_m, acceleration_noise_m_s2
+        RMS noise the Kalman filter reckons with.
+    bias_drift_m_s2
+        Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.
+    residual_force_n
+        Switch P2 (24): below it the drive is 0; 0 leaves the switch out.
+    low_pass_hz
+        Second-order Butterworth low-pass on the drive; None leaves it out.
+    drive_limit
+        Largest drive; that of the inverse or the damper where None.
+    dead_band_m_s
+        Speed below which the direction of motion is taken to be unchanged.
+    extremum_step_m, extremum_share
+        How far the displacement must come back from an extremum to make it count: metres, or share of the amplitude.
+    """
+
+    rate_hz: float = 200.0
+    velocity: Literal["kalman", "measured", "difference"] = "kalman"
+    displacement_noise_m: float = 20e-6
+    acceleration_noise_m_s2: float = 0.1
+    bias_drift_m_s2: float = 0.0
+    residual_force_n: float = 18.0
+    low_pass_hz: float | None = 60.0
+    drive_limit: float | None = None
+    dead_band_m_s: float = 0.0
+    extremum_step_m: float = 1e-4
+    extremum_share: float = 0.02
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A controller ready to run.
+
+    Attributes
+    ----------
+    law
+        One of :data:`LAWS`.
+    numbers, layout
+        Arrays for :func:`~mrpipe.control.kernel.controller_step`.
+    gains, options
+        What it was built from.
+    floors
+        Floors whose accelerometers it reads (lqg), else 0.
+    details
+        More about how it was built, for tables and JSON.
+    """
+
+    law: str
+    numbers: FloatArray
+    layout: IntArray
+    gains: Gains
+    options: ControllerOptions
+    floors: int = 0
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def sample_time_s(self) -> float:
+        """Interval between calls."""
+        return 1.0 / self.options.rate_hz
+
+    @property
+    def state_size(self) -> int:
+        """Length of its memory."""
+        return int(self.layout[kernel.STATE_SIZE])
+
+    @property
+    def measured_size(self) -> int:
+        """Length that the array of measurements must have at least."""
+        return kernel.MEASURED_FLOORS + self.floors
+
+    def new_state(self) -> FloatArray:
+        """Return a fresh memory."""
+        return np.zeros(self.state_size)
+
+
+def build_controller(
+    law: str,
+    gains: Gains,
+    options: ControllerOptions,
+    *,
+    inverse: Network | InverseTable | None = None,
+    reference: Network | None = None,
+    observer: Observer | None = None,
+) -> Controller:
+    """Pack a controller.
+
+    Parameters
+    ----------
+    law
+        One of :data:`LAWS`.
+    gains
+        Of the law; not read for nnc, lqg and the passive ones.
+    options
+        How it runs.
+    inverse
+        From desired force to drive: a network as P2 (23) or a table; None for a damper that tracks perfectly.
+    reference
+        Network of law nnc: displacement and velocity to force (4.3.4).
+    observer
+        Of law lqg.
+
+    Raises
+    ------
+    UserError
+        If the law is unknown or lacks its gains, network or observer, or the low-pass lies above half the rate.
+    """
+    if law not in _LAW_CODES:
+        raise UserError("control law", law, "is no control law", f"one of {', '.join(LAWS)}")
+    if law == "nnc" and reference is None:
+        raise UserError("control law", law, "has no trained network", "calibrate it first")
+    if law == "lqg" and observer is None:
+        raise UserError("control law", law, "has no observer", "calibrate it first")
+    if _LAW_CODES[law] in (kernel.LAW_LINEAR, kernel.LAW_FRICTION) and gains == Gains():
+        raise UserError("control law", law, "has no gains", "calibrate it first or give them")
+    pack = _Pack(options)
+    pack.layout[kernel.LAW] = _LAW_CODES[law]
+    pack.numbers[0][kernel.GAIN_C : kernel.GAIN_ALPHA + 1] = [gains.c_n_s_m, gains.k_n_m, gains.alpha_n_m]
+    limit = options.drive_limit
+    history = 2
+    if isinstance(inverse, InverseTable):
+        pack.table(inverse)
+        limit = inverse.largest_drive if limit is None else limit
+    elif inverse is not None:
+        history = max(history, pack.network(inverse, kernel.NETWORK_INVERSE, kernel.INVERSE_SPACING))
+        pack.layout[kernel.INVERSE] = kernel.INVERSE_NETWORK
+    if reference is not None and law == "nnc":
+        history = max(history, pack.network(reference, kernel.NETWORK_LAW, kernel.LAW_SPACING))
+    floors = 0
+    if observer is not None and law == "lqg":
+        floors = pack.observer(observer)
+    head = pack.numbers[0]
+    head[kernel.DRIVE_LIMIT] = 1e300 if limit is None else limit
+    if law == "passive-on":
+        if limit is None:
+            raise UserError("control law", law, "has no drive limit", "give the largest drive of the damper")
+        head[kernel.CONSTANT_DRIVE] = limit
+    return pack.finish(law, gains, history, floors)
+
+
+class _Pack:
+    """Lays the parts of a controller end to end."""
+
+    def __init__(self, options: ControllerOptions) -> None:
+        self.options = options
+        head = np.zeros(kernel.HEAD)
+        dt = 1.0 / options.rate_hz
+        head[kernel.SAMPLE_TIME] = dt
+        head[kernel.RESIDUAL_FORCE] = options.residual_force_n
+        head[kernel.KALMAN : kernel.KALMAN + 3] = kalman_gains(
+            options.displacement_noise_m, options.acceleration_noise_m_s2, dt, options.bias_drift_m_s2
+        )
+        head[kernel.DEAD_BAND] = options.dead_band_m_s
+        head[kernel.EXTREMUM_STEP] = options.extremum_step_m
+        head[kernel.EXTREMUM_SHARE] = options.extremum_share
+        head[kernel.LOW_PASS : kernel.LOW_PASS + 5] = _low_pass(options)
+        self.numbers = [head]
+        self.layout = np.zeros(kernel.LAYOUT_SIZE, dtype=np.int64)
+        self.layout[kernel.VELOCITY_SOURCE] = _SOURCES[options.velocity]
+        self.networks: list[IntArray] = []
+
+    @property
+    def at(self) -> int:
+        """Where the next block of numbers begins."""
+        return sum(len(block) for block in self.numbers)
+
+    def table(self, table: InverseTable) -> None:
+        """Add an inverse table."""
+        self.layout[kernel.INVERSE] = kernel.INVERSE_TABLE
+        self.layout[kernel.AT_TABLE] = self.at
+        self.layout[kernel.TABLE_SPEEDS], self.layout[kernel.TABLE_DRIVES] = table.forces.shape
+        self.numbers[0][kernel.TABLE_SPEED] = table.largest_speed_m_s
+        self.numbers[0][kernel.TABLE_DRIVE] = table.largest_drive
+        self.numbers.append(np.ravel(table.forces))
+
+    def network(self, network: Network, slot: int, spacing_slot: int) -> int:
+        """Add a network; return how long the histories must be."""
+        spec = network.features
+        unknown = [name for name in spec.channels if name not in _CHANNELS]
+        if unknown or spec.past_target or len(spec.channels) > 4:
+            wrong = unknown[0] if unknown else "its own past output"
+            raise UserError("network", "inputs", f"{wrong} cannot be an input in the loop", "use motion and force")
+        if max(network.layers) > kernel.WIDEST:
+            raise UserError("network", "neurons", f"a layer has {max(network.layers)}", f"at most {kernel.WIDEST}")
+        if len(network.layers) > kernel.NET_SIZE - kernel.NET_NEURONS:
+            raise UserError("network", "layers", f"there are {len(network.layers)}", "at most 7 with input and output")
+        entry = np.zeros(kernel.NET_SIZE, dtype=np.int64)
+        entry[kernel.NET_AT] = self.at
+        entry[kernel.NET_LAYERS] = len(network.weights)
+        entry[kernel.NET_PAST] = spec.past_values
+        entry[kernel.NET_CHANNELS] = len(spec.channels)
+        entry[kernel.NET_ABSOLUTE] = int(spec.absolute)
+        for index, name in enumerate(spec.channels):
+            entry[kernel.NET_CODES + index] = _CHANNELS[name]
+        entry[kernel.NET_NEURONS : kernel.NET_NEURONS + len(network.layers)] = network.layers
+        self.layout[slot] = kernel.LAYOUT_SIZE + kernel.NET_SIZE * len(self.networks)
+        self.networks.append(entry)
+        spacing = self.options.rate_hz / spec.sampling_rate_hz
+        self.numbers[0][spacing_slot] = spacing
+        self.numbers.append(np.concatenate([network.input_scale, network.input_shift]))
+        self.numbers.append(np.array([network.output_scale, network.output_shift]))
+        for matrix, bias in zip(network.weights, network.biases, strict=True):
+            self.numbers.append(np.concatenate([np.ravel(matrix), bias]))
+        return int(np.ceil(spec.past_values * spacing)) + 2
+
+    def observer(self, observer: Observer) -> int:
+        """Add an observer; return the number of floors it reads."""
+        if abs(observer.sample_time_s * self.options.rate_hz - 1.0) > 1e-9:
+            raise UserError("control law", "lqg", "the observer was made for another rate", "calibrate at this rate")
+        self.layout[kernel.AT_OBSERVER] = self.at
+        self.layout[kernel.FLOORS] = observer.floors
+        for part in (observer.transition, observer.force_input, observer.innovation, observer.gain):
+            self.numbers.append(np.ravel(part))
+        return observer.floors
+
+    def finish(self, law: str, gains: Gains, history: int, floors: int) -> Controller:
+        """Return the controller."""
+        layout = self.layout
+        layout[kernel.STATE_HISTORY] = kernel.S_HEAD
+        layout[kernel.HISTORY] = history
+        layout[kernel.STATE_OBSERVER] = kernel.S_HEAD + 4 * history
+        layout[kernel.STATE_SIZE] = kernel.S_HEAD + 4 * history + 2 * floors
+        return Controller(
+            law=law,
+            numbers=np.ascontiguousarray(np.concatenate(self.numbers), dtype=np.float64),
+            layout=np.concatenate([layout, *self.networks]).astype(np.int64),
+            gains=gains,
+            options=self.options,
+            floors=floors,
+        )
+
+
+def _low_pass(options: ControllerOptions) -> FloatArray:
+    """Return b0, b1, b2, a1, a2 of the Butterworth low-pass at the controller's rate."""
+    if options.low_pass_hz is None:
+        return np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    if options.low_pass_hz >= 0.5 * options.rate_hz:
+        raise UserError(
+            "controller",
+            "low_pass_hz",
+            f"{options.low_pass_hz:g} Hz is not below half of {options.rate_hz:g} Hz",
+            "lower it or leave the filter out with null",
+        )
+    b, a = butter(2, options.low_pass_hz, fs=options.rate_hz)
+    return np.array([b[0], b[1], b[2], a[1], a[2]])

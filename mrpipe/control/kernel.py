@@ -1,0 +1,351 @@
+"""The controller of Figure 5.3 as one compiled function, called once a controller sample.
+
+Everything a controller knows is in two arrays, `numbers` (float) and `layout` (integers), its memory in a third; so that
+the same function runs in any plant integrator, and translates to C line by line (:mod:`mrpipe.control.export`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import float64, int64, njit, void
+
+from mrpipe.artifacts import FloatArray, IntArray
+
+# --- measured: what the sensors say at this instant --------------------------------------------------------------------
+MEASURED_DISPLACEMENT = 0  # of the damper [m]
+MEASURED_ACCELERATION = 1  # of the damper: floor less ground, both as accelerometers give them [m/s^2]
+MEASURED_VELOCITY = 2  # m/s; read only where the controller was built with velocity="measured"
+MEASURED_GROUND = 3  # ground acceleration [m/s^2]; read by lqg only
+MEASURED_FLOORS = 4  # from here: absolute acceleration of each floor [m/s^2]; read by lqg only
+
+# --- command: what the controller says ----------------------------------------------------------------------------------
+COMMAND_DRIVE = 0  # coil current [A] (or voltage [V]) to be held until the next sample
+COMMAND_FORCE = 1  # desired force after clipping (P2 (22)) [N]
+COMMAND_UNCLIPPED = 2  # desired force of the law [N]
+COMMAND_DISPLACEMENT = 3  # estimated damper displacement [m]
+COMMAND_VELOCITY = 4  # estimated damper velocity [m/s]
+COMMAND_AMPLITUDE = 5  # X of (4.18) [m]
+COMMAND_CLIPPED = 6  # 1 where clipping took the force away
+COMMAND_SWITCHED = 7  # 1 where the switch P2 (24) took the drive away
+COMMAND_INVERSE = 8  # drive of the inverse before switch, low-pass and limits [A]
+COMMAND_SIZE = 12
+
+# --- layout -------------------------------------------------------------------------------------------------------------
+LAW = 0
+INVERSE = 1
+VELOCITY_SOURCE = 2
+FLOORS = 3
+NETWORK_INVERSE = 4  # where in `layout` the inverse network is described
+NETWORK_LAW = 5  # where in `layout` the network of law nnc is described
+TABLE_SPEEDS = 6  # points of the inverse table in speed
+TABLE_DRIVES = 7  # points of the inverse table in drive
+AT_TABLE = 8  # where in `numbers` the table is
+AT_OBSERVER = 9  # where in `numbers` the observer is
+STATE_HISTORY = 10  # where in `state` the histories are: displacement, velocity, acceleration, force
+HISTORY = 11  # length of each
+STATE_OBSERVER = 12  # where in `state` the observer is
+STATE_SIZE = 13
+LAYOUT_SIZE = 16
+# a network in `layout`: layers, then neurons of each (input included), channels, past values, absolute, code of each channel
+NET_AT = 0  # where in `numbers`
+NET_LAYERS = 1
+NET_PAST = 2
+NET_CHANNELS = 3
+NET_ABSOLUTE = 4
+NET_CODES = 5  # four codes
+NET_NEURONS = 9  # neurons of each layer, input first
+NET_SIZE = 16
+
+LAW_CONSTANT, LAW_LINEAR, LAW_FRICTION, LAW_NETWORK, LAW_OBSERVER = 0, 1, 2, 3, 4
+INVERSE_NONE, INVERSE_TABLE, INVERSE_NETWORK = 0, 1, 2
+VELOCITY_KALMAN, VELOCITY_MEASURED, VELOCITY_DIFFERENCE = 0, 1, 2
+
+# --- numbers ------------------------------------------------------------------------------------------------------------
+SAMPLE_TIME = 0
+GAIN_C = 1
+GAIN_K = 2
+GAIN_ALPHA = 3
+RESIDUAL_FORCE = 4
+DRIVE_LIMIT = 5
+CONSTANT_DRIVE = 6
+KALMAN = 7  # three gains: displacement, velocity, bias
+DEAD_BAND = 10
+EXTREMUM_STEP = 11
+EXTREMUM_SHARE = 12
+LOW_PASS = 13  # b0, b1, b2, a1, a2
+INVERSE_SPACING = 18  # samples between past values of the inverse network
+LAW_SPACING = 19  # the same for the network of nnc
+TABLE_SPEED = 20  # largest speed of the inverse table [m/s]
+TABLE_DRIVE = 21  # largest drive of the inverse table
+HEAD = 24
+# a network in `numbers`: input scale, input shift, output scale, output shift, then weights row by row and biases of each layer
+
+# --- state --------------------------------------------------------------------------------------------------------------
+S_STARTED = 0
+S_X = 1
+S_V = 2
+S_BIAS = 3
+S_ACCELERATION = 4
+S_DIRECTION = 5  # of motion, with dead band
+S_SEEKING = 6  # +1 a maximum, -1 a minimum
+S_EXTREME = 7
+S_AMPLITUDE = 8
+S_FILTER = 9  # two
+S_FORCE = 11  # last desired force
+S_DISPLACEMENT = 12  # last measured displacement
+S_HEAD = 16
+
+WIDEST = 64
+
+
+@njit(void(float64[::1], float64[::1], float64[::1], int64), cache=True)
+def _estimate(numbers: FloatArray, state: FloatArray, measured: FloatArray, source: int) -> None:
+    """Kinematic Kalman filter (5.1) to (5.3) with acceleration input and bias, or what stands for it."""
+    x, a, dt = measured[MEASURED_DISPLACEMENT], measured[MEASURED_ACCELERATION], numbers[SAMPLE_TIME]
+    if state[S_STARTED] < 0.5:
+        state[S_X], state[S_V], state[S_BIAS], state[S_ACCELERATION] = x, 0.0, 0.0, a
+        if source == VELOCITY_MEASURED:
+            state[S_V] = measured[MEASURED_VELOCITY]
+        state[S_DISPLACEMENT] = x
+        return
+    if source == VELOCITY_MEASURED:
+        state[S_X], state[S_V] = x, measured[MEASURED_VELOCITY]
+    elif source == VELOCITY_DIFFERENCE:
+        state[S_X], state[S_V] = x, (x - state[S_DISPLACEMENT]) / dt
+    else:
+        mean = 0.5 * (a + state[S_ACCELERATION]) - state[S_BIAS]
+        predicted = state[S_X] + dt * state[S_V] + 0.5 * dt * dt * mean
+        innovation = x - predicted
+        state[S_X] = predicted + numbers[KALMAN] * innovation
+        state[S_V] = state[S_V] + dt * mean + numbers[KALMAN + 1] * innovation
+        state[S_BIAS] = state[S_BIAS] + numbers[KALMAN + 2] * innovation
+    state[S_ACCELERATION] = a
+    state[S_DISPLACEMENT] = x
+
+
+@njit(void(float64[::1], float64[::1]), cache=True)
+def _follow_motion(numbers: FloatArray, state: FloatArray) -> None:
+    """Direction of motion with a dead band, and the most recent extremum of displacement, robust to noise.
+
+    An extremum counts once the displacement has come back from it by a step well above the noise.
+    """
+    x, v = state[S_X], state[S_V]
+    if abs(v) > numbers[DEAD_BAND]:
+        state[S_DIRECTION] = 1.0 if v > 0.0 else -1.0
+    if state[S_STARTED] < 0.5:
+        state[S_SEEKING] = 1.0 if v >= 0.0 else -1.0
+        state[S_EXTREME] = x
+        state[S_AMPLITUDE] = abs(x)
+        return
+    seeking = state[S_SEEKING]
+    if seeking * x > seeking * state[S_EXTREME]:
+        state[S_EXTREME] = x
+    step = max(numbers[EXTREMUM_STEP], numbers[EXTREMUM_SHARE] * state[S_AMPLITUDE])
+    if seeking * (state[S_EXTREME] - x) > step:
+        state[S_AMPLITUDE] = abs(state[S_EXTREME])
+        state[S_SEEKING] = -seeking
+        state[S_EXTREME] = x
+
+
+@njit(void(int64[::1], float64[::1], float64, float64, float64, float64), cache=True)
+def _remember(layout: IntArray, state: FloatArray, x: float, v: float, a: float, force: float) -> None:
+    """Push the present values onto the histories (newest first); the first call fills them."""
+    length = layout[HISTORY]
+    for channel in range(4):
+        at = layout[STATE_HISTORY] + channel * length
+        value = x if channel == 0 else v if channel == 1 else a if channel == 2 else force
+        if state[S_STARTED] < 0.5:
+            for index in range(length):
+                state[at + index] = value
+        for index in range(length - 1, 0, -1):
+            state[at + index] = state[at + index - 1]
+        state[at] = value
+
+
+@njit(float64(float64[::1], int64[::1], float64[::1], int64, float64), cache=True)
+def _evaluate(numbers: FloatArray, layout: IntArray, state: FloatArray, where: int, spacing: float) -> float:
+    """Return the output of a network on the histories; past values lie `spacing` samples apart."""
+    signal = np.zeros(WIDEST)
+    result = np.zeros(WIDEST)
+    past = layout[where + NET_PAST]
+    width = layout[where + NET_NEURONS]
+    at = layout[where + NET_AT]
+    row = 0
+    for channel in range(layout[where + NET_CHANNELS]):
+        base = layout[STATE_HISTORY] + layout[where + NET_CODES + channel] * layout[HISTORY]
+        for lag in range(past + 1):
+            place = lag * spacing
+            left = int(place)
+            share = place - left
+            value = state[base + left]
+            if share > 1e-9:
+                value = (1.0 - share) * value + share * state[base + left + 1]
+            if layout[where + NET_ABSOLUTE] == 1:
+                value = abs(value)
+            signal[row] = (value - numbers[at + width + row]) / numbers[at + row]
+            row += 1
+    at += 2 * width
+    output_scale, output_shift = numbers[at], numbers[at + 1]
+    at += 2
+    layers = layout[where + NET_LAYERS]
+    for layer in range(layers):
+        inner, outer = layout[where + NET_NEURONS + layer], layout[where + NET_NEURONS + layer + 1]
+        for neuron in range(outer):
+            total = numbers[at + outer * inner + neuron]
+            for index in range(inner):
+                total += numbers[at + neuron * inner + index] * signal[index]
+            result[neuron] = math.tanh(total) if layer < layers - 1 else total
+        for neuron in range(outer):
+            signal[neuron] = result[neuron]
+        at += outer * (inner + 1)
+    return signal[0] * output_scale + output_shift
+
+
+@njit(float64(float64[::1], int64[::1], float64, float64), cache=True)
+def _look_up(numbers: FloatArray, layout: IntArray, speed: float, force: float) -> float:
+    """Return the drive at which the post-yield force at `speed` is `force`: inverse of a table, linear between points."""
+    drives = layout[TABLE_DRIVES]
+    last = layout[TABLE_SPEEDS] - 1
+    place = min(speed / numbers[TABLE_SPEED], 1.0) * last
+    row = min(int(place), last - 1)
+    share = place - row
+    at = layout[AT_TABLE] + row * drives
+    before = 0.0
+    for index in range(drives):
+        value = (1.0 - share) * numbers[at + index] + share * numbers[at + drives + index]
+        if value >= force:
+            if index == 0:
+                return 0.0
+            step = numbers[TABLE_DRIVE] / (drives - 1)
+            return step * (index - 1 + (force - before) / max(value - before, 1e-12))
+        before = value
+    return numbers[TABLE_DRIVE]
+
+
+@njit(float64(float64[::1], int64[::1], float64[::1], float64[::1]), cache=True)
+def _observe(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
+    """Advance the observer of law lqg and return its desired force: z+ = F z + g f + H y, f = -k z.
+
+    `y` is the damper displacement, the ground acceleration and the absolute acceleration of each floor.
+    """
+    floors = layout[FLOORS]
+    n = 2 * floors
+    outputs = floors + 2
+    at_f, at_g = layout[AT_OBSERVER], layout[AT_OBSERVER] + n * n
+    at_h = at_g + n
+    at_k = at_h + n * outputs
+    at = layout[STATE_OBSERVER]
+    new = np.zeros(WIDEST)
+    for row in range(n):
+        total = numbers[at_g + row] * state[S_FORCE] + numbers[at_h + row * outputs] * measured[MEASURED_DISPLACEMENT]
+        for column in range(n):
+            total += numbers[at_f + row * n + column] * state[at + column]
+        for column in range(floors + 1):
+            total += numbers[at_h + row * outputs + 1 + column] * measured[MEASURED_GROUND + column]
+        new[row] = total
+    force = 0.0
+    for row in range(n):
+        state[at + row] = new[row]
+        force -= numbers[at_k + row] * new[row]
+    return force
+
+
+@njit(float64(float64[::1], int64[::1], float64[::1], float64[::1]), cache=True)
+def _law(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
+    """Return the desired force of the law before clipping: (4.11), (4.14), (4.18), 4.3.4 or LQG."""
+    law = layout[LAW]
+    if law == LAW_LINEAR:
+        return numbers[GAIN_C] * state[S_V] + numbers[GAIN_K] * state[S_X]
+    if law == LAW_FRICTION:
+        # the pending extremum counts where it already exceeds the last one, so that a growing motion stays dissipative
+        amplitude = max(state[S_AMPLITUDE], abs(state[S_X]))
+        return numbers[GAIN_ALPHA] * (state[S_DIRECTION] * amplitude - state[S_X])
+    if law == LAW_NETWORK:
+        return _evaluate(numbers, layout, state, layout[NETWORK_LAW], numbers[LAW_SPACING])
+    if law == LAW_OBSERVER:
+        return _observe(numbers, layout, state, measured)
+    return 0.0
+
+
+@njit(float64(float64[::1], int64[::1], float64[::1], float64), cache=True)
+def _drive(numbers: FloatArray, layout: IntArray, state: FloatArray, force: float) -> float:
+    """Return the drive that the inverse asks for, before switch, low-pass and limits."""
+    if layout[LAW] == LAW_CONSTANT:
+        return numbers[CONSTANT_DRIVE]
+    if layout[INVERSE] == INVERSE_TABLE:
+        return _look_up(numbers, layout, abs(state[S_V]), abs(force))
+    if layout[INVERSE] == INVERSE_NETWORK:
+        return _evaluate(numbers, layout, state, layout[NETWORK_INVERSE], numbers[INVERSE_SPACING])
+    return 0.0
+
+
+@njit(void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1]), cache=True)
+def controller_step(
+    numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray, command: FloatArray
+) -> None:
+    """Run the controller for one of its samples.
+
+    Call it every `controller.sample_time_s` seconds of plant time with the sensors' readings and hold
+    `command[COMMAND_DRIVE]` until the next call (later by the controller's delay where there is one)::
+
+        controller = build_controller(...)
+        state = controller.new_state()
+        measured = np.zeros(controller.measured_size)
+        command = np.zeros(COMMAND_SIZE)
+        ...
+        controller_step(controller.numbers, controller.layout, state, measured, command)
+
+    Parameters
+    ----------
+    numbers, layout
+        Arrays of the :class:`~mrpipe.control.controller.Controller`.
+    state
+        Its memory: zeros before the first call (:meth:`Controller.new_state`).
+    measured
+        Shape (4 + floors,), filled by the caller; indices MEASURED_...: damper displacement [m], damper acceleration
+        (absolute floor acceleration less ground acceleration) [m/s^2], damper velocity [m/s] (only for
+        velocity="measured"), ground acceleration [m/s^2] and absolute floor accelerations [m/s^2] (only for lqg).
+    command
+        Shape (COMMAND_SIZE,), filled here; indices COMMAND_...
+
+    Source: Figure 5.3; law, clipping P2 (22), inverse P2 (23), switch P2 (24), low-pass, limits.
+    """
+    _estimate(numbers, state, measured, layout[VELOCITY_SOURCE])
+    _follow_motion(numbers, state)
+    # the histories of motion are needed by nnc before the force of this instant is known
+    _remember(layout, state, state[S_X], state[S_V], measured[MEASURED_ACCELERATION], 0.0)
+    wanted = _law(numbers, layout, state, measured)
+    force = wanted
+    clipped = wanted * state[S_DIRECTION] < 0.0
+    if clipped:
+        force = 0.0
+    at = layout[STATE_HISTORY] + 3 * layout[HISTORY]
+    state[at] = force
+    if state[S_STARTED] < 0.5:
+        for index in range(layout[HISTORY]):
+            state[at + index] = force
+    asked = _drive(numbers, layout, state, force)
+    drive = asked
+    switched = layout[LAW] != LAW_CONSTANT and abs(force) < numbers[RESIDUAL_FORCE]
+    if switched:
+        drive = 0.0
+    if state[S_STARTED] < 0.5 and layout[LAW] == LAW_CONSTANT:
+        # a passive damper has been at its drive for long: the low-pass starts in equilibrium
+        state[S_FILTER] = drive * (1.0 - numbers[LOW_PASS])
+        state[S_FILTER + 1] = drive * (numbers[LOW_PASS + 2] - numbers[LOW_PASS + 4])
+    filtered = numbers[LOW_PASS] * drive + state[S_FILTER]
+    state[S_FILTER] = numbers[LOW_PASS + 1] * drive - numbers[LOW_PASS + 3] * filtered + state[S_FILTER + 1]
+    state[S_FILTER + 1] = numbers[LOW_PASS + 2] * drive - numbers[LOW_PASS + 4] * filtered
+    state[S_FORCE] = force
+    state[S_STARTED] = 1.0
+    command[COMMAND_DRIVE] = min(max(filtered, 0.0), numbers[DRIVE_LIMIT])
+    command[COMMAND_FORCE] = force
+    command[COMMAND_UNCLIPPED] = wanted
+    command[COMMAND_DISPLACEMENT] = state[S_X]
+    command[COMMAND_VELOCITY] = state[S_V]
+    command[COMMAND_AMPLITUDE] = state[S_AMPLITUDE]
+    command[COMMAND_CLIPPED] = 1.0 if clipped else 0.0
+    command[COMMAND_SWITCHED] = 1.0 if switched else 0.0
+    command[COMMAND_INVERSE] = asked

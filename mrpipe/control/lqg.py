@@ -1,0 +1,141 @@
+"""Linear-quadratic control with a Kalman observer; the damper clips it (thesis appendix E, errata row 18)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError, solve_continuous_are, solve_discrete_are
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import UserError
+from mrpipe.structures import Frame, discretise_zero_order, state_space
+
+
+@dataclass(frozen=True)
+class Observer:
+    """z+ = F z + g f + H y, f_desired = -k z, with y = [damper displacement, ground and floor accelerations].
+
+    Attributes
+    ----------
+    transition, force_input, innovation, gain
+        F (2n, 2n), g (2n,), H (2n, n + 2), k (2n,).
+    sample_time_s
+        Interval that it was made for.
+    floors
+        Number of floors n.
+    """
+
+    transition: FloatArray
+    force_input: FloatArray
+    innovation: FloatArray
+    gain: FloatArray
+    sample_time_s: float
+    floors: int
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What LQG weighs and what noise it reckons with.
+
+    Attributes
+    ----------
+    energy
+        Weight of kinetic and strain energy [1/J].
+    top_displacement
+        Weight of the top floor's displacement squared [1/m^2].
+    force
+        Weight of the damper force squared [1/N^2].
+    ground_noise_m_s2
+        Noise of the measured ground acceleration, with model error, that drives the state.
+    displacement_noise_m, acceleration_noise_m_s2
+        Noise of the sensors.
+    """
+
+    energy: float = 1.0
+    top_displacement: float = 0.0
+    force: float = 1e-4
+    ground_noise_m_s2: float = 0.1
+    displacement_noise_m: float = 20e-6
+    acceleration_noise_m_s2: float = 0.1
+
+
+def state_weight(frame: Frame, weights: Weights) -> FloatArray:
+    """Return Q (2n, 2n) of z = [x, v]: energy and the top displacement."""
+    n = frame.floors
+    Q = np.zeros((2 * n, 2 * n))
+    Q[:n, :n] = 0.5 * weights.energy * (frame.stiffness + frame.stiffness.T)
+    Q[n:, n:] = weights.energy * frame.mass
+    Q[n - 1, n - 1] += weights.top_displacement
+    return Q
+
+
+def regulator_gain(frame: Frame, position: FloatArray, weights: Weights) -> FloatArray:
+    """Return k, shape (2n,), of the continuous regulator u = -k z with u the force on the structure along `position`.
+
+    u = -R^-1 B' P z with one minus sign (errata row 18).
+
+    Raises
+    ------
+    UserError
+        If the Riccati equation has no solution (singular mass, or weights that leave a mode free).
+    """
+    if np.linalg.matrix_rank(frame.mass) < frame.floors:
+        raise UserError(f"frame {frame.name}", "mass", "is singular", "every floor needs a positive mass")
+    space = state_space(frame, position)
+    B = space.B[:, 1:]
+    try:
+        P = solve_continuous_are(space.A, B, state_weight(frame, weights), np.array([[weights.force]]))
+    except (LinAlgError, ValueError) as error:
+        raise UserError("control law", "lqg", f"no regulator ({error})", "give positive weights") from error
+    return np.asarray((B.T @ P)[0] / weights.force)
+
+
+def observer_gain(frame: Frame, position: FloatArray, weights: Weights, dt: float) -> FloatArray:
+    """Return the steady gain L (2n, n + 1) of the discrete Kalman predictor on [damper displacement, accelerations].
+
+    The noise of the ground's accelerometer drives the state and the floors' accelerometers have their own.
+    """
+    Ad, Bd, C, _ = _sampled(frame, position, dt)
+    W = weights.ground_noise_m_s2**2 * np.outer(Bd[:, 0], Bd[:, 0])
+    # a little noise on every velocity keeps the observer awake in modes that the ground hardly drives
+    n = frame.floors
+    W[n:, n:] += (0.05 * weights.ground_noise_m_s2 * dt) ** 2 * np.eye(n)
+    V = np.diag([weights.displacement_noise_m**2] + [weights.acceleration_noise_m_s2**2] * n)
+    P = solve_discrete_are(Ad.T, C.T, W, V)
+    return np.asarray(Ad @ P @ C.T @ np.linalg.inv(C @ P @ C.T + V))
+
+
+def _sampled(frame: Frame, position: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return Ad, Bd (inputs: ground acceleration, damper force), C, D of the sampled plant."""
+    space = state_space(frame, -np.asarray(position))
+    Ad, Bd = discretise_zero_order(space.A, space.B, dt)
+    acceleration_C, acceleration_D = space.absolute_acceleration()
+    n = frame.floors
+    C = np.vstack([np.concatenate([position, np.zeros(n)]), acceleration_C])
+    D = np.vstack([np.zeros(space.B.shape[1]), acceleration_D])
+    return Ad, Bd, C, D
+
+
+def lqg_observer(frame: Frame, position: FloatArray, weights: Weights, dt: float) -> Observer:
+    """Return the sampled observer and its regulator for :func:`~mrpipe.control.controller.build_controller`.
+
+    The observer predicts from the measured ground acceleration and the force it asked for, and corrects with the
+    damper displacement and the floors' absolute accelerations. The desired damper force, positive where it resists as
+    in (4.1), is minus the force on the structure that the regulator asks for.
+    """
+    Ad, Bd, C, D = _sampled(frame, position, dt)
+    L = observer_gain(frame, position, weights, dt)
+    n = frame.floors
+    H = np.zeros((2 * n, n + 2))
+    H[:, 0] = L[:, 0]
+    H[:, 1] = Bd[:, 0] - L @ D[:, 0]
+    H[:, 2:] = L[:, 1:]
+    return Observer(
+        transition=Ad - L @ C,
+        force_input=Bd[:, 1] - L @ D[:, 1],
+        innovation=H,
+        gain=-regulator_gain(frame, position, weights),
+        sample_time_s=dt,
+        floors=n,
+    )
