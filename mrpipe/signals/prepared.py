@@ -30,6 +30,8 @@ class PreparedTest:
         `periodic` or `random`.
     drive_is_set_point
         The drive is a set point and no record.
+    displacement_offset_m, force_offset_n
+        What was taken out of the channels as static offset (add it to have the records as measured).
     """
 
     name: str
@@ -47,6 +49,8 @@ class PreparedTest:
     drive_unit: str = "A"
     excitation: str = "periodic"
     drive_is_set_point: bool = False
+    displacement_offset_m: float = 0.0
+    force_offset_n: float = 0.0
 
     @property
     def dt(self) -> float:
@@ -81,6 +85,8 @@ def write_prepared(artifact: ArtifactWriter, tests: list[PreparedTest]) -> None:
             drive_unit=test.drive_unit,
             excitation=test.excitation,
             drive_is_set_point=test.drive_is_set_point,
+            displacement_offset_m=test.displacement_offset_m,
+            force_offset_n=test.force_offset_n,
         )
 
 
@@ -100,6 +106,8 @@ def read_prepared(artifact: Artifact) -> list[PreparedTest]:
                 drive_unit=str(notes["drive_unit"]),
                 excitation=str(notes["excitation"]),
                 drive_is_set_point=bool(notes["drive_is_set_point"]),
+                displacement_offset_m=float(notes["displacement_offset_m"]),
+                force_offset_n=float(notes["force_offset_n"]),
                 **channels,
             )
         )

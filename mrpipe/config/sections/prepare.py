@@ -1,0 +1,59 @@
+"""Settings of the stage `prepare`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from mrpipe.config.section import Section
+
+
+class PrepareSettings(Section):
+    """How measured tests are filtered, freed of offsets and differentiated."""
+
+    working_rate_hz: float = Field(
+        0.0,
+        ge=0.0,
+        description="Sampling rate to which all tests are brought; 0 keeps the highest rate of the campaign.",
+    )
+    cutoff_hz: float = Field(
+        100.0,
+        gt=0.0,
+        description="Cut-off of the low-pass on displacement, acceleration, drive and force (thesis 2.3.1).",
+    )
+    velocity_cutoff_hz: float = Field(
+        20.0, gt=0.0, description="Cut-off of the second low-pass, on the differentiated velocity (thesis 2.3.1)."
+    )
+    order: int = Field(2, ge=1, le=8, description="Order of the Butterworth filters.")
+    phase: Literal["zero", "causal"] = Field(
+        "zero",
+        description="zero: forwards and backwards, no channel is late; causal: as on the rig, velocity is 11 ms late.",
+    )
+    cutoff_choice: Literal["fixed", "criterion"] = Field(
+        "fixed",
+        description="fixed: the cut-offs above; criterion: for each test and channel the frequency at which it sinks "
+        "into its noise (right for random motion).",
+    )
+    differentiation: Literal["backward", "central", "savitzky-golay", "kalman"] = Field(
+        "backward",
+        description="Velocity from displacement: backward difference (2.5; centred where phase is zero), central "
+        "difference, Savitzky-Golay, or the kinematic Kalman filter (5.1 to 5.3), which needs an acceleration.",
+    )
+    savitzky_golay_window_s: float = Field(0.03, gt=0.0, description="Window of the Savitzky-Golay differentiation.")
+    kalman_displacement_noise_m: float = Field(
+        20e-6, gt=0.0, description="Noise of the displacement sensor (standard deviation) for the Kalman filter."
+    )
+    kalman_acceleration_noise_m_s2: float = Field(
+        0.1, gt=0.0, description="Noise of the accelerometer (standard deviation) for the Kalman filter."
+    )
+    kalman_bias_drift_m_s3: float = Field(
+        0.0, ge=0.0, description="How fast the accelerometer's bias wanders; 0 leaves the bias state out."
+    )
+    offset: Literal["test", "campaign", "off"] = Field(
+        "test",
+        description="Sensor offsets taken out: of each test by itself, one for the whole campaign (median over the "
+        "tests), or none.",
+    )
+    cycles: int = Field(10, ge=0, description="Steady cycles kept of each periodic test; 0 keeps all.")
+    settle_cycles: int = Field(1, ge=0, description="Steady cycles left out at the beginning, where there are enough.")

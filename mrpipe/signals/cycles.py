@@ -1,0 +1,128 @@
+"""Steady cycles: found in the displacement, not assumed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, IntArray
+
+PERIOD_TOLERANCE = 0.05
+AMPLITUDE_TOLERANCE = 0.05
+
+
+@dataclass(frozen=True)
+class SteadyCycles:
+    """Steady part of a test.
+
+    Attributes
+    ----------
+    starts
+        Index of the first sample at or above the mean level in each steady cycle, and of the end of the last one,
+        shape (cycles + 1,); empty where the motion is not periodic.
+    frequency_hz
+        Of the steady cycles, 0 where there are none.
+    amplitude
+        Half of peak to peak, in the unit of the displacement.
+    """
+
+    starts: IntArray
+    frequency_hz: float = 0.0
+    amplitude: float = 0.0
+
+    @property
+    def periodic(self) -> bool:
+        """Whether steady cycles were found."""
+        return self.starts.size > 1
+
+    @property
+    def span(self) -> slice:
+        """Samples from the first steady cycle to the end of the last; everything where there are none."""
+        return slice(int(self.starts[0]), int(self.starts[-1])) if self.periodic else slice(None)
+
+
+def upward_crossings(values: FloatArray, level: float, hysteresis: float) -> IntArray:
+    """Return the first sample at or above `level` after each time that `values` was below `level - hysteresis`.
+
+    The crossing counts once `values` has reached `level + hysteresis`, so that noise near the level does not.
+    """
+    high = values >= level + hysteresis
+    low = values < level - hysteresis
+    marks = np.flatnonzero(high | low)
+    if marks.size < 2:
+        return np.zeros(0, dtype=np.int64)
+    rises = np.flatnonzero(low[marks[:-1]] & high[marks[1:]])
+    crossings = np.zeros(rises.size, dtype=np.int64)
+    for count, rise in enumerate(rises):
+        begin, end = int(marks[rise]), int(marks[rise + 1])
+        below = np.flatnonzero(values[begin:end] < level)
+        crossings[count] = begin + (int(below[-1]) if below.size else 0) + 1
+    return crossings
+
+
+def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, fewest: int = 3) -> SteadyCycles:
+    """Find the longest run of cycles that agree in period and amplitude within 5 %.
+
+    Parameters
+    ----------
+    displacement
+        Shape (n,), low-passed; an offset does no harm.
+    sampling_rate_hz
+        Rate.
+    fewest
+        Shorter runs do not make a motion periodic.
+    """
+    none = SteadyCycles(np.zeros(0, dtype=np.int64))
+    low, high = np.percentile(displacement, [2.0, 98.0])
+    level, half = 0.5 * (low + high), 0.5 * (high - low)
+    if not half > 0.0:
+        return none
+    crossings = upward_crossings(displacement, float(level), 0.3 * float(half))
+    if crossings.size < fewest + 1:
+        return none
+    periods = np.diff(crossings).astype(np.float64)
+    heights = np.array([0.5 * np.ptp(displacement[begin:end]) for begin, end in pairwise(crossings)])
+    begin, end = _longest_steady_run(periods, heights)
+    if end - begin < fewest:
+        return none
+    starts = crossings[begin : end + 1].astype(np.int64)
+    span = float(starts[-1] - starts[0])
+    return SteadyCycles(starts, (end - begin) * sampling_rate_hz / span, float(np.median(heights[begin:end])))
+
+
+def _longest_steady_run(periods: FloatArray, heights: FloatArray) -> tuple[int, int]:
+    """Return the half-open range of the longest run whose cycles lie within the tolerances of their own median."""
+    best = (0, 0)
+    # one sample of period is always allowed: fast tests have few samples a cycle
+    allowed = np.maximum(PERIOD_TOLERANCE * periods, 1.0)
+    for seed in range(periods.size):
+        if best[0] <= seed < best[1]:
+            continue
+        good = (np.abs(periods - periods[seed]) <= allowed) & (
+            np.abs(heights - heights[seed]) <= AMPLITUDE_TOLERANCE * heights[seed]
+        )
+        begin = seed
+        while begin > 0 and good[begin - 1]:
+            begin -= 1
+        end = seed
+        while end < periods.size and good[end]:
+            end += 1
+        if end - begin > best[1] - best[0]:
+            best = (begin, end)
+    return best
+
+
+def choose_cycles(cycles: SteadyCycles, count: int, settle: int) -> IntArray:
+    """Return the starts of `count` cycles (0: all) after leaving out `settle` cycles at the beginning.
+
+    Where there are too few cycles for both, fewer are left out, so that as many as asked for remain if they exist.
+    """
+    starts = cycles.starts
+    if starts.size < 2:
+        return starts
+    available = starts.size - 1
+    wanted = available if count == 0 else min(count, available)
+    skip = min(settle, available - wanted) if count else min(settle, available - 1)
+    return starts[skip : skip + (available - skip if count == 0 else wanted) + 1]

@@ -1,0 +1,38 @@
+"""Velocity and acceleration from displacement by differences."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray
+
+
+def backward_difference(values: FloatArray, dt: float) -> FloatArray:
+    """Return (x(k) - x(k-1)) / dt with 0 at the first sample (thesis 2.5, 2.6): half a sample late."""
+    return np.concatenate(([0.0], np.diff(values) / dt))
+
+
+def central_difference(values: FloatArray, dt: float) -> FloatArray:
+    """Return (x(k+1) - x(k-1)) / 2 dt, one-sided of second order at the ends; no delay."""
+    if values.size < 3:
+        return backward_difference(values, dt)
+    return np.asarray(np.gradient(values, dt, edge_order=2))
+
+
+def savitzky_golay(
+    values: FloatArray, dt: float, *, window_s: float, degree: int = 3, derivative: int = 1
+) -> FloatArray:
+    """Return the derivative of the polynomial fitted in a sliding window; no delay.
+
+    Parameters
+    ----------
+    window_s
+        Length of the window [s]; widened to degree + 2 samples where shorter, and cut to the record.
+    derivative
+        1 for velocity, 2 for acceleration.
+    """
+    longest = values.size - 1 + values.size % 2
+    length = min(max(round(window_s / dt) | 1, (degree + 2) | 1), longest)
+    degree = min(degree, length - 1)
+    return np.asarray(signal.savgol_filter(values, length, degree, deriv=derivative, delta=dt, mode="interp"))

@@ -1,0 +1,283 @@
+"""From a measured recording to a prepared test: even clock, working rate, filters, offsets, velocity, cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.campaigns import Campaign, Recording
+from mrpipe.errors import UserError
+from mrpipe.signals.cycles import SteadyCycles, choose_cycles, find_steady_cycles
+from mrpipe.signals.differentiation import backward_difference, central_difference, savitzky_golay
+from mrpipe.signals.filters import (
+    Phase,
+    butterworth_lowpass,
+    even_clock,
+    resample,
+    samples_needed,
+    usable_cutoff,
+)
+from mrpipe.signals.kalman import KalmanGains, kalman_gains, kinematic_kalman, kinematic_smoother
+from mrpipe.signals.offsets import balanced_extremes, force_intercept, mean_over_cycles
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.signals.spectra import cutoff_by_criterion
+
+
+@dataclass(frozen=True)
+class PreparationOptions:
+    """How tests are prepared; the fields are those of the stage's settings, see there."""
+
+    working_rate_hz: float = 0.0
+    cutoff_hz: float = 100.0
+    velocity_cutoff_hz: float = 20.0
+    order: int = 2
+    phase: Phase = "zero"
+    cutoff_choice: Literal["fixed", "criterion"] = "fixed"
+    differentiation: Literal["backward", "central", "savitzky-golay", "kalman"] = "backward"
+    savitzky_golay_window_s: float = 0.03
+    kalman_displacement_noise_m: float = 20e-6
+    kalman_acceleration_noise_m_s2: float = 0.1
+    kalman_bias_drift_m_s3: float = 0.0
+    offset: Literal["test", "campaign", "off"] = "test"
+    cycles: int = 10
+    settle_cycles: int = 1
+
+    def gains(self) -> KalmanGains:
+        """Return the gains of the kinematic Kalman filter."""
+        return kalman_gains(
+            self.kalman_displacement_noise_m, self.kalman_acceleration_noise_m_s2, self.kalman_bias_drift_m_s3
+        )
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """A prepared test and what was done to it.
+
+    Attributes
+    ----------
+    test
+        The prepared test.
+    cutoffs_hz
+        Channel -> cut-off used; a channel that was not filtered is missing.
+    frequency_hz, amplitude_m
+        Of the steady cycles; 0 where the motion is random.
+    before
+        Channels on the working rate before filters and offsets, shape (n,) each, for spectra.
+    findings
+        What the user should know, one line each.
+    """
+
+    test: PreparedTest
+    cutoffs_hz: Mapping[str, float]
+    frequency_hz: float
+    amplitude_m: float
+    before: Mapping[str, FloatArray]
+    findings: tuple[str, ...] = ()
+
+
+@dataclass
+class _Work:
+    """One segment while it is prepared."""
+
+    name: str
+    role: str
+    rate: float
+    time: FloatArray
+    channels: dict[str, FloatArray]
+    filtered: dict[str, FloatArray] = field(default_factory=dict)
+    cutoffs: dict[str, float] = field(default_factory=dict)
+    cycles: SteadyCycles = field(default_factory=lambda: SteadyCycles(np.zeros(0, dtype=np.int64)))
+    offsets: dict[str, float] = field(default_factory=dict)
+    findings: list[str] = field(default_factory=list)
+
+
+def prepare_campaign(
+    campaign: Campaign, options: PreparationOptions, progress: Progress = no_progress
+) -> list[Preparation]:
+    """Prepare every test of a bench campaign; a test with several segments becomes several prepared tests.
+
+    Raises
+    ------
+    UserError
+        If the campaign is none of a damper bench, or a test is shorter than the filters need.
+    """
+    source = str(campaign.directory)
+    if campaign.rig != "damper-bench":
+        raise UserError(source, "rig", f"is {campaign.rig}", "prepare works on a damper-bench campaign")
+    rate = options.working_rate_hz or max(test.sampling_rate_hz for test in campaign.recordings)
+    works = []
+    for count, recording in enumerate(campaign.recordings):
+        progress(0.7 * count / len(campaign.recordings), recording.name)
+        for index, (begin, end) in enumerate(recording.segments):
+            name = recording.name if len(recording.segments) == 1 else f"{recording.name}-{index + 1}"
+            work = _on_working_rate(recording, begin, end, name, rate)
+            _require_length(work, options, source)
+            _filter(work, options)
+            _measure_offsets(work)
+            works.append(work)
+    if options.offset == "campaign":
+        _share_offsets(works)
+    results = []
+    for count, work in enumerate(works):
+        progress(0.7 + 0.3 * count / len(works), work.name)
+        results.append(_finish(work, options, campaign))
+    return results
+
+
+def _on_working_rate(recording: Recording, begin: int, end: int, name: str, rate: float) -> _Work:
+    time = recording.time_s[begin:end]
+    native = recording.sampling_rate_hz
+    even = time[0] + np.arange(int(np.floor((time[-1] - time[0]) * native + 1e-3)) + 1) / native
+    channels = {
+        key: resample(even_clock(time, values[begin:end], native, even), native, rate)
+        for key, values in recording.channels.items()
+    }
+    # an anti-aliasing filter overshoots at steps; a drive stays within what was recorded
+    channels["drive"] = np.clip(
+        channels["drive"], recording.channels["drive"][begin:end].min(), recording.channels["drive"][begin:end].max()
+    )
+    samples = channels["displacement"].size
+    return _Work(name, recording.role, rate, time[0] + np.arange(samples) / rate, channels)
+
+
+def _require_length(work: _Work, options: PreparationOptions, source: str) -> None:
+    lowest = min(options.cutoff_hz, options.velocity_cutoff_hz)
+    needed = max(samples_needed(lowest, work.rate), 20)
+    if work.time.size < needed:
+        raise UserError(
+            source,
+            f"test {work.name}",
+            f"has {work.time.size} samples at {work.rate:g} Hz, its filters need {needed}",
+            f"give a test of {needed / work.rate:.3g} s at least",
+        )
+
+
+def _filter(work: _Work, options: PreparationOptions) -> None:
+    """Low-pass every channel; the drive keeps its range."""
+    for name, values in work.channels.items():
+        if np.ptp(values) == 0.0:
+            work.filtered[name] = values
+            continue
+        cutoff = options.cutoff_hz
+        if options.cutoff_choice == "criterion":
+            cutoff = cutoff_by_criterion(values, work.rate)
+        if usable_cutoff(cutoff, work.rate) is None:
+            work.filtered[name] = values
+            continue
+        work.cutoffs[name] = cutoff
+        smooth = butterworth_lowpass(values, cutoff, work.rate, order=options.order, phase=options.phase)
+        work.filtered[name] = np.clip(smooth, values.min(), values.max()) if name == "drive" else smooth
+    if options.cutoff_choice == "fixed" and usable_cutoff(options.cutoff_hz, work.rate) is None:
+        work.findings.append(
+            f"no low-pass at {options.cutoff_hz:g} Hz: the sampling rate of {work.rate:g} Hz is too low for it"
+        )
+    work.cycles = find_steady_cycles(work.filtered["displacement"], work.rate)
+
+
+def _measure_offsets(work: _Work) -> None:
+    signals = work.filtered
+    if work.cycles.periodic:
+        starts = work.cycles.starts
+        work.offsets = {name: balanced_extremes(signals[name], starts) for name in ("displacement", "force")}
+        if "acceleration" in signals:
+            work.offsets["acceleration"] = mean_over_cycles(signals["acceleration"], starts)
+        return
+    displacement = signals["displacement"]
+    # a motion of 0.2 s at least, so that noise does not set the scale of the velocity
+    velocity = central_difference(butterworth_lowpass(displacement, 50.0, work.rate), 1.0 / work.rate)
+    work.offsets = {
+        "displacement": float(np.mean(displacement)),
+        "force": force_intercept(displacement, velocity, signals["drive"], signals["force"]),
+    }
+    if "acceleration" in signals:
+        work.offsets["acceleration"] = float(np.mean(signals["acceleration"]))
+
+
+def _share_offsets(works: Sequence[_Work]) -> None:
+    for name in ("displacement", "force", "acceleration"):
+        values = [work.offsets[name] for work in works if name in work.offsets]
+        for work in works:
+            if name in work.offsets:
+                work.offsets[name] = float(np.median(values))
+
+
+def _finish(work: _Work, options: PreparationOptions, campaign: Campaign) -> Preparation:
+    if options.offset == "off":
+        work.offsets = dict.fromkeys(work.offsets, 0.0)
+    displacement, velocity, acceleration = _motion(work, options)
+    cycles = choose_cycles(work.cycles, options.cycles, options.settle_cycles)
+    force_offset, displacement_offset = work.offsets["force"], work.offsets["displacement"]
+    test = PreparedTest(
+        name=work.name,
+        role=work.role,
+        sampling_rate_hz=work.rate,
+        time_s=work.time,
+        displacement_m=displacement,
+        velocity_m_s=velocity,
+        acceleration_m_s2=acceleration,
+        drive=work.filtered["drive"],
+        force_n=work.filtered["force"] - force_offset,
+        displacement_raw_m=work.channels["displacement"] - displacement_offset,
+        force_raw_n=work.channels["force"] - force_offset,
+        cycles=cycles,
+        drive_unit=campaign.drive_unit,
+        excitation="periodic" if work.cycles.periodic else "random",
+        drive_is_set_point=campaign.drive_is_set_point,
+        displacement_offset_m=displacement_offset,
+        force_offset_n=force_offset,
+    )
+    return Preparation(
+        test=test,
+        cutoffs_hz=work.cutoffs,
+        frequency_hz=work.cycles.frequency_hz,
+        amplitude_m=work.cycles.amplitude,
+        before=work.channels,
+        findings=tuple(work.findings),
+    )
+
+
+def _motion(work: _Work, options: PreparationOptions) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return displacement, velocity and acceleration, offset-free."""
+    dt = 1.0 / work.rate
+    displacement = work.filtered["displacement"] - work.offsets["displacement"]
+    measured = None
+    if "acceleration" in work.filtered:
+        measured = work.filtered["acceleration"] - work.offsets["acceleration"]
+    method = options.differentiation
+    if method == "kalman" and measured is None:
+        work.findings.append("no acceleration for the Kalman filter: the velocity is a central difference")
+        method = "central"
+    if method == "kalman" and measured is not None:
+        # the filter weighs the noise itself, so it is given what was measured
+        raw = work.channels["displacement"] - work.offsets["displacement"]
+        raw_acceleration = work.channels["acceleration"] - work.offsets["acceleration"]
+        estimate = kinematic_smoother if options.phase == "zero" else kinematic_kalman
+        _, velocity, _ = estimate(raw, raw_acceleration, dt, options.gains())
+        return displacement, velocity, measured
+    velocity = _differentiate(displacement, dt, options, method)
+    cutoff = options.velocity_cutoff_hz
+    if options.cutoff_choice == "criterion":
+        cutoff = work.cutoffs.get("displacement", work.rate)
+    if usable_cutoff(cutoff, work.rate) is not None and options.cutoff_choice == "fixed":
+        work.cutoffs["velocity"] = cutoff
+        velocity = butterworth_lowpass(velocity, cutoff, work.rate, order=options.order, phase=options.phase)
+    if measured is None:
+        measured = _differentiate(velocity, dt, options, "central")
+    return displacement, velocity, measured
+
+
+def _differentiate(values: FloatArray, dt: float, options: PreparationOptions, method: str) -> FloatArray:
+    if method == "savitzky-golay":
+        return savitzky_golay(values, dt, window_s=options.savitzky_golay_window_s)
+    if method == "central":
+        return central_difference(values, dt)
+    velocity = backward_difference(values, dt)
+    if options.phase == "causal":
+        return velocity
+    # (2.5) stands for the middle between two samples: bring it back on the clock of the other channels
+    velocity[0] = velocity[1]
+    return np.concatenate((0.5 * (velocity[:-1] + velocity[1:]), velocity[-1:]))

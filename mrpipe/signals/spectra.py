@@ -1,0 +1,83 @@
+"""Power spectra, noise floors, and the cut-off at which a signal sinks into its noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray
+
+
+def power_spectrum(values: FloatArray, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies [Hz] and one-sided power density [unit^2/Hz] by Welch's method (Hann, mean removed)."""
+    length = min(values.size, max(256, min(4096, values.size // 8)))
+    frequencies, density = signal.welch(
+        values - np.mean(values), fs=sampling_rate_hz, nperseg=length, window="hann", detrend="linear"
+    )
+    return np.asarray(frequencies), np.asarray(density)
+
+
+def noise_floor(frequencies: FloatArray, density: FloatArray) -> float:
+    """Return the power density of the noise, taken as white: the median over the upper quarter of the band.
+
+    The last twentieth below half the sampling rate is left out, where anti-aliasing filters act.
+    """
+    top = frequencies[-1]
+    band = (frequencies >= 0.7 * top) & (frequencies <= 0.95 * top)
+    return float(np.median(density[band])) if band.any() else 0.0
+
+
+def noise_level(values: FloatArray, sampling_rate_hz: float) -> float:
+    """Return the standard deviation of the white noise on a channel, in its unit."""
+    frequencies, density = power_spectrum(values, sampling_rate_hz)
+    return float(np.sqrt(noise_floor(frequencies, density) * sampling_rate_hz / 2.0))
+
+
+def cutoff_by_criterion(
+    values: FloatArray, sampling_rate_hz: float, *, lowest_hz: float = 5.0, margin: float = 1.25
+) -> float:
+    """Return the frequency above which noise outweighs the signal.
+
+    Above it the power density, smoothed over a sixth of an octave, stays below twice the noise floor, so what a
+    low-pass there removes is noise as far as a spectrum tells. Because differentiation weights signal and noise alike, it is the
+    right place for displacement, velocity and acceleration.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    sampling_rate_hz
+        Rate.
+    lowest_hz
+        No cut-off below this.
+    margin
+        The cut-off is put this much above the frequency found.
+
+    Returns
+    -------
+    float
+        Cut-off [Hz], at most half the sampling rate (then no filter is needed).
+    """
+    frequencies, density = power_spectrum(values, sampling_rate_hz)
+    floor = noise_floor(frequencies, density)
+    highest = sampling_rate_hz / 2.0
+    spread = max(1e-30, float(np.max(density)) * 1e-16)
+    smooth = _smooth_over_octave(frequencies, density)
+    above = np.flatnonzero(smooth > 2.0 * max(floor, spread))
+    above = above[frequencies[above] <= 0.7 * highest]
+    if above.size == 0:
+        return lowest_hz
+    knee = float(frequencies[above[-1]])
+    if knee >= 0.69 * highest:
+        return highest
+    return float(min(highest, max(lowest_hz, margin * knee)))
+
+
+def _smooth_over_octave(frequencies: FloatArray, density: FloatArray) -> FloatArray:
+    total = np.concatenate(([0.0], np.cumsum(density)))
+    step = frequencies[1] - frequencies[0]
+    half = np.maximum((frequencies * 0.06 / step).astype(np.int64), 1)
+    index = np.arange(density.size)
+    low = np.maximum(index - half, 0)
+    high = np.minimum(index + half + 1, density.size)
+    return np.asarray((total[high] - total[low]) / (high - low))
