@@ -1,0 +1,133 @@
+"""Checks of a mode matrix: orthogonality with respect to the mass, and signs that break it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mrpipe.artifacts import FloatArray
+
+LARGEST_COUPLING = 0.1
+_FLIPS = 3
+
+
+@dataclass(frozen=True)
+class ModeMatrixFinding:
+    """Something wrong with a mode matrix.
+
+    Attributes
+    ----------
+    kind
+        `not-orthogonal`, `wrong-sign`, `singular` or `sign-changes`.
+    message
+        One line.
+    elements
+        (floor, mode) concerned, from 1.
+    """
+
+    kind: str
+    message: str
+    elements: tuple[tuple[int, int], ...] = ()
+
+
+def modal_coupling(mode_shapes: ArrayLike, mass: ArrayLike) -> FloatArray:
+    """Return U'MU (3.14) scaled to a unit diagonal, shape (r, r): its off-diagonals should vanish."""
+    U = np.asarray(mode_shapes, dtype=np.float64)
+    gram = U.T @ np.asarray(mass, dtype=np.float64) @ U
+    size = np.sqrt(np.diag(gram))
+    return np.asarray(gram / np.outer(size, size))
+
+
+def _off_diagonal(coupling: FloatArray) -> float:
+    return float(np.sum(np.triu(coupling, 1) ** 2))
+
+
+def sign_changes(mode_shape: ArrayLike, negligible: float = 0.03) -> int:
+    """Return how often a shape of shape (n,) changes sign from the ground up; elements near zero are passed over."""
+    shape = np.asarray(mode_shape, dtype=np.float64)
+    signs = np.sign(shape[np.abs(shape) > negligible * np.abs(shape).max()])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))
+
+
+def wrong_signs(mode_shapes: ArrayLike, mass: ArrayLike) -> tuple[tuple[int, int], ...]:
+    """Return the fewest elements (floor, mode), from 1, whose sign must turn to make the columns orthogonal.
+
+    All sets of up to three elements are tried; empty where none takes the coupling off the diagonal below a quarter.
+    """
+    U = np.asarray(mode_shapes, dtype=np.float64)
+    M = np.asarray(mass, dtype=np.float64)
+    weight = np.diag(M)
+    size = np.sqrt(np.einsum("f,fm->m", weight, U**2))
+    scaled = np.sqrt(weight)[:, None] * U / size
+    gram = scaled.T @ scaled
+    before = _off_diagonal(gram)
+    places = [(i, j) for i in range(U.shape[0]) for j in range(U.shape[1]) if abs(U[i, j]) > 0.02 * abs(U[:, j]).max()]
+    best: tuple[float, tuple[tuple[int, int], ...]] = (before, ())
+    for number in range(1, _FLIPS + 1):
+        if number == _FLIPS and best[0] < 0.05 * before:
+            break
+        for chosen in combinations(places, number):
+            turned = _turned_cost(scaled, gram, chosen)
+            # another element must be worth its place
+            if turned < best[0] * (0.5 if number > len(best[1]) else 1.0):
+                best = (turned, chosen)
+    if best[0] > 0.25 * before:
+        return ()
+    return tuple((i + 1, j + 1) for i, j in best[1])
+
+
+def _turned_cost(scaled: FloatArray, gram: FloatArray, chosen: tuple[tuple[int, int], ...]) -> float:
+    columns = sorted({j for _, j in chosen})
+    changed = scaled[:, columns].copy()
+    for i, j in chosen:
+        changed[i, columns.index(j)] *= -1.0
+    result = gram.copy()
+    rows = changed.T @ scaled
+    result[columns, :] = rows
+    result[:, columns] = rows.T
+    result[np.ix_(columns, columns)] = changed.T @ changed
+    return _off_diagonal(result)
+
+
+def check_mode_matrix(
+    mode_shapes: ArrayLike, mass: ArrayLike, *, largest_coupling: float = LARGEST_COUPLING
+) -> list[ModeMatrixFinding]:
+    """Return what is wrong with a mode matrix (empty where nothing is).
+
+    Parameters
+    ----------
+    mode_shapes
+        Shape (n, r), a row a floor, a column a mode.
+    mass
+        Shape (n, n), diagonal [kg].
+    largest_coupling
+        Largest element off the diagonal of the scaled U'MU that counts as orthogonal.
+    """
+    U = np.asarray(mode_shapes, dtype=np.float64)
+    findings: list[ModeMatrixFinding] = []
+    singular = np.linalg.svd(U / np.linalg.norm(U, axis=0), compute_uv=False)
+    if singular[-1] < 1e-8 * singular[0]:
+        findings.append(ModeMatrixFinding("singular", "two modes have the same shape"))
+        return findings
+    coupling = modal_coupling(U, mass)
+    pairs = [
+        (i, j) for i in range(U.shape[1]) for j in range(i + 1, U.shape[1]) if abs(coupling[i, j]) > largest_coupling
+    ]
+    if not pairs:
+        return findings
+    i, j = max(pairs, key=lambda p: abs(coupling[p]))
+    message = f"modes {i + 1} and {j + 1} are not orthogonal: scaled U'MU is {coupling[i, j]:+.2f}"
+    findings.append(ModeMatrixFinding("not-orthogonal", message))
+    elements = wrong_signs(U, mass)
+    if elements:
+        names = " and ".join(f"U{floor}{mode} = {U[floor - 1, mode - 1]:+.3f}" for floor, mode in elements)
+        corrected = U.copy()
+        for floor, mode in elements:
+            corrected[floor - 1, mode - 1] *= -1.0
+        left = np.abs(np.triu(modal_coupling(corrected, mass), 1)).max()
+        message = f"the sign of {names} is wrong: turned, the largest coupling is {left:.3f}"
+        findings.append(ModeMatrixFinding("wrong-sign", message, elements))
+    return findings

@@ -1,0 +1,271 @@
+"""Damping from free decays: logarithmic decrement, exponential fit, peak to peak (section 3.2.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+from scipy.optimize import least_squares
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.records import FrameTest
+
+HALF_BAND_RAD_S = np.pi
+FILTER_ORDER = 5
+LARGEST_FILTERED_DAMPING = 0.02
+"""Beyond it the band-pass rings longer than the mode (errata section D)."""
+_NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @staticmethod
+    def of(value: float, standard_error: float) -> Estimate:
+        """Return value +- 1.96 standard errors."""
+        return Estimate(value, value - _NORMAL_95 * standard_error, value + _NORMAL_95 * standard_error)
+
+    @property
+    def half_width(self) -> float:
+        """Half of the interval's width."""
+        return 0.5 * (self.high - self.low)
+
+    def as_dict(self) -> dict[str, float]:
+        """Return plain numbers."""
+        return {"value": self.value, "low": self.low, "high": self.high}
+
+
+@dataclass(frozen=True)
+class DecayResult:
+    """What one decay test says of its mode.
+
+    Attributes
+    ----------
+    test, mode
+        Name of the test, and the mode (from 1).
+    logarithmic_decrement, exponential_fit, point_to_point
+        Damping ratio [1] by each method.
+    angular_frequency
+        Of the exponential fit [rad/s].
+    peak_time_s, peak
+        Peaks of the band-passed modal coordinate in its decay, shape (k,); [s], [m/s2].
+    point_to_point_series
+        Damping ratio from each peak to the next of the same sign, shape (k - 2,) [1].
+    time_s, coordinate, fitted
+        Modal coordinate over the decay and the exponential fit, shape (m,).
+    filtered
+        Whether the band-pass was used (damping up to 0.02).
+    """
+
+    test: str
+    mode: int
+    logarithmic_decrement: Estimate
+    exponential_fit: Estimate
+    point_to_point: Estimate
+    angular_frequency: float
+    peak_time_s: FloatArray
+    peak: FloatArray
+    point_to_point_series: FloatArray
+    time_s: FloatArray
+    coordinate: FloatArray
+    fitted: FloatArray
+    filtered: bool
+
+
+def damping_from_decrement(decrement: float) -> float:
+    """Return the damping ratio of a logarithmic decrement over one period (3.1)."""
+    return float(decrement / np.sqrt(4.0 * np.pi**2 + decrement**2))
+
+
+def modal_coordinates(test: FrameTest, mode_shapes: FloatArray, angular_frequencies: FloatArray) -> FloatArray:
+    """Return the relative accelerations of the modes, shape (m, r): the inverse of the mode matrix tells them apart.
+
+    A floor that has only a displacement enters with -omega2 of the mode in question.
+    """
+    responses = test.responses - test.responses.mean(axis=0)
+    inverse = np.linalg.pinv(mode_shapes)
+    flags = np.asarray(test.is_displacement)
+    relative = responses.copy()
+    if test.excitation is not None and test.shaker_floor == 0:
+        relative[:, ~flags] -= (test.excitation - test.excitation.mean())[:, None]
+    result = np.empty((relative.shape[0], angular_frequencies.size))
+    for index, omega in enumerate(angular_frequencies):
+        factor = np.where(flags, -(omega**2), 1.0)
+        result[:, index] = (relative * factor) @ inverse[index]
+    return result
+
+
+def decay_start(test: FrameTest) -> int:
+    """Return the sample at which the excitation has stopped; 0 where it never acted or was not recorded."""
+    if test.excitation is None:
+        return 0
+    width = max(3, int(0.25 * test.sampling_rate_hz))
+    centred = test.excitation - np.median(test.excitation)
+    level = np.sqrt(np.convolve(centred**2, np.full(width, 1.0 / width), mode="same"))
+    quiet = float(np.quantile(level, 0.05))
+    top = float(level.max())
+    if top < 4.0 * quiet:
+        return 0
+    # the moving window reaches half its width beyond the stop
+    return int(np.flatnonzero(level > max(0.1 * top, 2.0 * quiet))[-1]) + 1
+
+
+def _band_pass(coordinate: FloatArray, omega: float, rate: float) -> FloatArray:
+    low = max(omega - HALF_BAND_RAD_S, 0.2 * omega)
+    edges = np.array([low, omega + HALF_BAND_RAD_S]) / (2.0 * np.pi)
+    sections = signal.butter(FILTER_ORDER, edges, btype="bandpass", fs=rate, output="sos")
+    return np.asarray(signal.sosfiltfilt(sections, coordinate))
+
+
+def _edge_s(period: float, duration: float, filtered: bool) -> float:
+    """Return the time [s] after the stop, and before the end, in which the band-pass still rings.
+
+    The slowest pole of the Butterworth band-pass decays with half the bandwidth times sin(pi/2/order).
+    """
+    if not filtered:
+        return period
+    slowest = HALF_BAND_RAD_S * np.sin(0.5 * np.pi / FILTER_ORDER)
+    return float(min(max(period, 4.0 / slowest), 0.2 * duration))
+
+
+def _peaks(values: FloatArray, rate: float, omega: float) -> tuple[FloatArray, FloatArray]:
+    """Return times [s] and heights of the extrema of either sign, refined by a parabola."""
+    magnitude = np.abs(values)
+    distance = max(1, int(0.6 * np.pi / omega * rate))
+    index = signal.find_peaks(magnitude, distance=distance)[0]
+    index = index[(index > 0) & (index < magnitude.size - 1)]
+    left, centre, right = magnitude[index - 1], magnitude[index], magnitude[index + 1]
+    curvature = left - 2.0 * centre + right
+    shift = np.where(curvature < 0.0, 0.5 * (left - right) / np.where(curvature < 0.0, curvature, -1.0), 0.0)
+    return (index + shift) / rate, centre - 0.25 * (left - right) * shift
+
+
+def _useful(peak: FloatArray, noise: float) -> int:
+    """Number of leading peaks down to a fifth of the first and well above the noise (six where there are so many)."""
+    above = peak > max(0.2 * peak[: min(4, peak.size)].max(), 8.0 * noise)
+    below = np.flatnonzero(~above)
+    return int(max(below[0] if below.size else peak.size, min(6, peak.size)))
+
+
+def _decrement(time: FloatArray, peak: FloatArray) -> tuple[Estimate, Estimate, FloatArray]:
+    """Return damping by the decrement over all peaks, the mean from peak to peak, and the series."""
+    logs = np.log(peak)
+    slope, intercept = np.polyfit(time, logs, 1, w=peak)
+    scatter = logs - (slope * time + intercept)
+    # neighbouring peaks of a filtered signal carry nearly the same noise: one of four counts
+    spread = float(np.sqrt(np.average(scatter**2, weights=peak**2)) * 2.0)
+    cycles = 0.5 * (peak.size - 1)
+    count = max(1, peak.size // 8)
+    first, last = logs[:count].mean(), logs[-count:].mean()
+    decrement = (first - last) / (0.5 * (peak.size - count))
+    zeta = damping_from_decrement(decrement)
+    error = spread * np.sqrt(2.0 / count) / cycles / (2.0 * np.pi)
+    series = np.array([damping_from_decrement(d) for d in logs[:-2] - logs[2:]])
+    weights = peak[:-2] ** 2
+    mean = float(np.average(series, weights=weights))
+    mean_error = float(np.sqrt(np.average((series - mean) ** 2, weights=weights) / max(series.size / 4.0, 1.0)))
+    return Estimate.of(zeta, float(error)), Estimate.of(mean, mean_error), series
+
+
+def _sinusoids(time: FloatArray, poles: list[complex]) -> FloatArray:
+    columns = [np.ones_like(time)]
+    for pole in poles:
+        wave = np.exp(pole * time)
+        columns += [wave.real, wave.imag]
+    return np.column_stack(columns)
+
+
+def _exponential_fit(
+    time: FloatArray, coordinate: FloatArray, mode: int, omegas: FloatArray, zetas: FloatArray
+) -> tuple[float, Estimate, FloatArray]:
+    """Fit damped sinusoids of all modes, this mode's pole free: frequency [rad/s], damping, fitted curve."""
+    poles = -zetas * omegas + 1j * omegas * np.sqrt(1.0 - zetas**2)
+    others = [complex(pole) for index, pole in enumerate(poles) if index != mode]
+
+    def solve(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        omega, zeta = np.exp(theta)
+        own = complex(-zeta * omega, omega * np.sqrt(max(1 - zeta**2, 1e-12)))
+        basis = _sinusoids(time, [own, *others])
+        fitted = basis @ np.linalg.lstsq(basis, coordinate, rcond=None)[0]
+        return coordinate - fitted, fitted
+
+    start = np.log([omegas[mode], np.clip(zetas[mode], 1e-5, 0.3)])
+    scale = float(np.std(coordinate)) or 1.0
+    result = least_squares(lambda t: solve(t)[0] / scale, start, x_scale="jac", diff_step=1e-5, xtol=1e-10)
+    omega, zeta = np.exp(result.x)
+    inverse = np.linalg.pinv(result.jac.T @ result.jac)
+    block = max(2, round(2.0 * np.pi / omega / float(time[1] - time[0])))
+    usable = block * (time.size // block)
+    scores = (result.jac * result.fun[:, None])[:usable].reshape(-1, block, 2).sum(axis=1)
+    error = float(np.sqrt((inverse @ (scores.T @ scores) @ inverse)[1, 1])) * zeta
+    return float(omega), Estimate.of(float(zeta), error), solve(result.x)[1]
+
+
+def analyse_decay(
+    test: FrameTest, mode_shapes: FloatArray, angular_frequencies: FloatArray, damping_ratios: FloatArray
+) -> DecayResult | None:
+    """Return the damping that a decay test shows, or None where no decay stands out of the noise.
+
+    Parameters
+    ----------
+    test
+        A free-decay test; the part after the last excitation is used.
+    mode_shapes
+        Shape (n, r), real.
+    angular_frequencies, damping_ratios
+        Of all modes, shape (r,), from the forced tests; start of the fit.
+    """
+    rate = test.sampling_rate_hz
+    start = decay_start(test)
+    coordinates = modal_coordinates(test, mode_shapes, angular_frequencies)
+    tail = coordinates[start:]
+    sizes = np.linalg.norm(mode_shapes, axis=0) * tail.std(axis=0)
+    mode = test.mode - 1 if 1 <= test.mode <= angular_frequencies.size else int(np.argmax(sizes))
+    omega, zeta = float(angular_frequencies[mode]), float(damping_ratios[mode])
+    period = 2.0 * np.pi / omega
+    if tail.shape[0] / rate < 6.0 * period:
+        return None
+    own = coordinates[:, mode] - tail[:, mode].mean()
+    filtered = zeta <= LARGEST_FILTERED_DAMPING
+    shown = _band_pass(own, omega, rate) if filtered else own
+    edge = int(_edge_s(period, tail.shape[0] / rate, filtered) * rate)
+    first, last = start + edge, own.size - (edge if filtered else 0)
+    time, peak = _peaks(shown[first:last], rate, omega)
+    high = own[start:] - signal.savgol_filter(own[start:], 2 * max(2, int(0.05 * period * rate)) + 1, 3)
+    share = min(1.0, 2.0 * HALF_BAND_RAD_S / (np.pi * rate)) if filtered else 1.0
+    noise = float(np.std(high)) * np.sqrt(share)
+    if peak.size < 6 or peak[0] < 5.0 * noise:
+        return None
+    keep = _useful(peak, noise)
+    time, peak = time[:keep], peak[:keep]
+    decrement, mean, series = _decrement(time, peak)
+    step = max(1, int(rate * 2.0 * np.pi / float(angular_frequencies.max()) / 24.0))
+    begin, end = start + int(0.25 * period * rate), min(own.size, first + int((time[-1] + period) * rate))
+    piece = (
+        signal.sosfiltfilt(signal.butter(4, 0.8 / step, output="sos"), own)[begin:end:step]
+        if step > 1
+        else own[begin:end]
+    )
+    clock = np.arange(piece.size) * step / rate
+    fitted_omega, exponential, fitted = _exponential_fit(clock, piece, mode, angular_frequencies, damping_ratios)
+    return DecayResult(
+        test=test.name,
+        mode=mode + 1,
+        logarithmic_decrement=decrement,
+        exponential_fit=exponential,
+        point_to_point=mean,
+        angular_frequency=fitted_omega,
+        peak_time_s=time + first / rate,
+        peak=peak,
+        point_to_point_series=series,
+        time_s=clock + begin / rate,
+        coordinate=piece,
+        fitted=fitted,
+        filtered=filtered,
+    )

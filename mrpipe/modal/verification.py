@@ -1,0 +1,112 @@
+"""How well the identified frame returns what was measured, in time and in frequency (section 3.3.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.multimode import MultiModeFit
+from mrpipe.modal.records import FrameTest
+from mrpipe.modal.spectra import ComplexArray
+from mrpipe.structures import Frame, frequency_response
+from mrpipe.structures.response import linear_response
+
+_FILTER_ORDER = 3
+
+
+@dataclass(frozen=True)
+class TimeVerification:
+    """Measured and simulated response of one test inside the band.
+
+    Attributes
+    ----------
+    test
+        Name.
+    time_s
+        Shape (m,).
+    measured, simulated
+        Shape (m, n), absolute acceleration [m/s2] (displacement [m] where a floor has no accelerometer).
+    nrmse
+        Shape (n,): RMS error over RMS of the measured response.
+    fit_percent
+        Shape (n,): 100 (1 - |y - y_hat|/|y - mean y|).
+    """
+
+    test: str
+    time_s: FloatArray
+    measured: FloatArray
+    simulated: FloatArray
+    nrmse: FloatArray
+    fit_percent: FloatArray
+
+
+def verify_in_time(frame: Frame, test: FrameTest, band_hz: tuple[float, float]) -> TimeVerification:
+    """Simulate a forced test with its measured excitation from rest; compare inside the band (order 3, zero phase)."""
+    if test.excitation is None:
+        raise ValueError("a simulation needs the excitation")
+    rate = test.sampling_rate_hz
+    nyquist = 0.5 * rate
+    sections = signal.butter(
+        _FILTER_ORDER, [band_hz[0], min(band_hz[1], 0.9 * nyquist)], btype="bandpass", fs=rate, output="sos"
+    )
+    excitation = test.excitation - test.excitation.mean()
+    response = linear_response(frame, excitation, 1.0 / rate, shaker_floor=test.shaker_floor)
+    flags = np.asarray(test.is_displacement)
+    simulated = np.where(flags, response.displacement, response.absolute_acceleration)
+    measured = test.responses - test.responses.mean(axis=0)
+    measured = np.asarray(signal.sosfiltfilt(sections, measured, axis=0))
+    simulated = np.asarray(signal.sosfiltfilt(sections, simulated, axis=0))
+    error = measured - simulated
+    size = np.maximum(np.sqrt(np.mean(measured**2, axis=0)), 1e-300)
+    spread = np.maximum(np.linalg.norm(measured - measured.mean(axis=0), axis=0), 1e-300)
+    return TimeVerification(
+        test=test.name,
+        time_s=np.arange(measured.shape[0]) / rate,
+        measured=measured,
+        simulated=simulated,
+        nrmse=np.sqrt(np.mean(error**2, axis=0)) / size,
+        fit_percent=100.0 * (1.0 - np.linalg.norm(error, axis=0) / spread),
+    )
+
+
+@dataclass(frozen=True)
+class FrequencyVerification:
+    """Frequency responses of the first forced test and of the frame.
+
+    Attributes
+    ----------
+    frequency_hz
+        Shape (m,).
+    measured, synthesised
+        Shape (m, n): leakage taken out, and of M, C, K.
+    error
+        Shape (n,): |measured - synthesised|/|measured| over the band, lines weighted by the excitation.
+    """
+
+    frequency_hz: FloatArray
+    measured: ComplexArray
+    synthesised: ComplexArray
+    error: FloatArray
+
+
+def verify_in_frequency(
+    frame: Frame, fit: MultiModeFit, is_displacement: tuple[bool, ...], shaker_floor: int
+) -> FrequencyVerification:
+    """Compare the measured frequency response, its transients taken out, with that of M, C and K."""
+    omega, excitation = fit.omega[0], fit.excitation[0]
+    accelerations = frequency_response(frame, omega, shaker_floor=shaker_floor)
+    displacements = frequency_response(frame, omega, shaker_floor=shaker_floor, absolute_acceleration=False)
+    synthesised = np.where(np.asarray(is_displacement), displacements, accelerations)
+    steady = synthesised * excitation[:, None]
+    error = np.linalg.norm(fit.measured[0] - steady, axis=0) / np.linalg.norm(fit.measured[0], axis=0)
+    # lines without excitation have no frequency response
+    useful = np.abs(excitation) > 0.05 * np.median(np.abs(excitation))
+    return FrequencyVerification(
+        frequency_hz=omega[useful] / (2.0 * np.pi),
+        measured=fit.measured[0][useful] / excitation[useful, None],
+        synthesised=synthesised[useful],
+        error=error,
+    )

@@ -1,0 +1,115 @@
+"""Tables and figures of the frame's identification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.decay import DecayResult
+from mrpipe.modal.spectra import FrequencyResponses
+from mrpipe.modal.verification import FrequencyVerification, TimeVerification
+from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
+
+_MOST_POINTS = 4000
+
+
+def mode_rows(values: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return a row a mode from the stage's summary."""
+    rows = []
+    for index, frequency in enumerate(values["frequencies_hz"]):
+        low, high = values["damping_ratio_intervals"][index]
+        rows.append(
+            {
+                "mode": index + 1,
+                "frequency [Hz]": frequency,
+                "± [Hz]": 0.5 * float(np.diff(values["frequency_intervals_hz"][index])[0]),
+                "omega [rad/s]": 2.0 * np.pi * frequency,
+                "damping ratio": values["damping_ratios"][index],
+                "low": low,
+                "high": high,
+                "from": values["damping_source"][index],
+                "by the sweep": values["second_method_damping_ratios"][index],
+                "MAC": values["mac"][index],
+                "coherence": values["coherence_at_peaks"][index],
+            }
+        )
+    return rows
+
+
+def frequency_responses(
+    result: FrequencyVerification, averaged: FrequencyResponses, band_hz: tuple[float, float]
+) -> Figure:
+    """Draw magnitude of every floor, measured and of the model, and the coherence of averaged spectra."""
+    floors = result.measured.shape[1]
+    figure, axes = figure_with_axes(2, 1, height=3.2)
+    step = max(1, result.frequency_hz.size // _MOST_POINTS)
+    for floor in range(floors):
+        colour = COLOURS[floor % len(COLOURS)]
+        axes[0, 0].semilogy(
+            result.frequency_hz[::step],
+            np.abs(result.measured[::step, floor]),
+            color=colour,
+            linewidth=0.6,
+            alpha=0.55,
+            label=f"floor {floor + 1}",
+        )
+        axes[0, 0].semilogy(
+            result.frequency_hz[::step], np.abs(result.synthesised[::step, floor]), color=colour, linewidth=1.1
+        )
+        inside = (averaged.frequency_hz >= band_hz[0]) & (averaged.frequency_hz <= band_hz[1])
+        axes[1, 0].plot(averaged.frequency_hz[inside], averaged.coherence[inside, floor], color=colour, linewidth=0.8)
+    label(axes[0, 0], "frequency [Hz]", "response over excitation", "thin: measured, thick: M, C, K")
+    label(axes[1, 0], "frequency [Hz]", "coherence", "averaged spectra (leakage lowers it at sharp peaks)")
+    axes[1, 0].set_ylim(0.0, 1.02)
+    axes[0, 0].legend(fontsize=7, frameon=False, ncols=min(floors, 5))
+    return figure
+
+
+def mode_shapes(shapes: FloatArray, frequencies_hz: Sequence[float]) -> Figure:
+    """Draw the shapes (a row a floor, a column a mode) beside each other."""
+    floors, modes = shapes.shape
+    figure, axes = figure_with_axes(1, modes, width=1.5 * modes + 0.8, height=3.6)
+    height = np.arange(floors + 1)
+    for mode in range(modes):
+        axis = axes[0, mode]
+        axis.plot(np.concatenate([[0.0], shapes[:, mode]]), height, "o-", color=COLOURS[0], linewidth=1.4, markersize=4)
+        axis.axvline(0.0, color=MEASURED, linewidth=0.6)
+        axis.set_xlim(-1.15, 1.15)
+        label(axis, "", "floor" if mode == 0 else "", f"{mode + 1}: {frequencies_hz[mode]:.3g} Hz")
+    return figure
+
+
+def decays(results: Sequence[DecayResult]) -> Figure:
+    """Draw the modal coordinate with its exponential fit, and damping from peak to peak over amplitude."""
+    figure, axes = figure_with_axes(len(results), 2, height=2.1)
+    for row, result in zip(axes, results, strict=True):
+        step = max(1, result.time_s.size // _MOST_POINTS)
+        row[0].plot(result.time_s[::step], result.coordinate[::step], color=MEASURED, linewidth=0.5)
+        row[0].plot(result.peak_time_s, result.peak, ".", color=MODEL, markersize=3)
+        label(row[0], "time [s]", "m/s²", f"mode {result.mode}, {result.test}")
+        row[1].plot(result.peak[:-2], result.point_to_point_series, ".", color=COLOURS[0], markersize=3)
+        row[1].axhline(result.exponential_fit.value, color=MODEL, linewidth=1.0)
+        scale = max(result.exponential_fit.value, 1e-6)
+        row[1].set_ylim(0.0, 2.5 * scale)
+        label(row[1], "peak [m/s²]", "damping ratio", "peak to peak; line: exponential fit")
+    return figure
+
+
+def verification(result: TimeVerification) -> Figure:
+    """Draw the top and the first floor of a forced test, measured and simulated, around the largest response."""
+    figure, axes = figure_with_axes(2, 1, height=2.4)
+    top = result.measured.shape[1] - 1
+    rate = 1.0 / float(result.time_s[1] - result.time_s[0])
+    half = int(4.0 * rate)
+    for axis, floor in zip(axes[:, 0], (top, 0), strict=True):
+        centre = int(np.argmax(np.abs(result.measured[:, floor])))
+        part = slice(max(0, centre - half), centre + half)
+        axis.plot(result.time_s[part], result.measured[part, floor], color=MEASURED, linewidth=0.9, label="measured")
+        axis.plot(result.time_s[part], result.simulated[part, floor], color=MODEL, linewidth=0.9, label="simulated")
+        label(axis, "time [s]", "response", f"floor {floor + 1}: fit {result.fit_percent[floor]:.1f} %")
+        axis.legend(fontsize=7, frameon=False)
+    return figure
