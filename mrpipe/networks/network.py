@@ -2,7 +2,7 @@
 
 Layout, for those who evaluate the arrays in a kernel of their own
 -------------------------------------------------------------------
-A feature row holds, channel after channel in the order of `FeatureSpec.channels`, the present value and then the
+A feature row holds, channel after channel in the order of `FeatureSpec.channels`, the present value, then the
 past values of k-1, k-2 .. k-p, as in (2.8) and (2.9):
 
     [c1(k), c1(k-1), .. c1(k-p), c2(k), c2(k-1), .. c2(k-p), ...]
@@ -18,8 +18,8 @@ of samples `1 / sampling_rate_hz` apart, each made absolute where `FeatureSpec.a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ import numpy as np
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 
 CHANNEL_UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
-"""SI unit of each channel that can be input or target; the unit of `drive` is that of the campaign (A or V)."""
+"""SI unit of each channel that can be input or target; `drive` has the unit of the campaign (A or V)."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,21 @@ class FeatureSpec:
     def labels(self) -> tuple[str, ...]:
         """Return the name of each feature: velocity(k), velocity(k-1), ..."""
         names = [
-            f"{name}(k-{lag})" if lag else f"{name}(k)"
-            for name in self.channels
-            for lag in range(self.past_values + 1)
+            f"{name}(k-{lag})" if lag else f"{name}(k)" for name in self.channels for lag in range(self.past_values + 1)
         ]
         if self.past_target:
             names += [f"{self.target}(k-{lag})" for lag in range(1, self.past_values + 1)]
         return tuple(names)
+
+
+def spec_to_json(spec: FeatureSpec) -> dict[str, Any]:
+    """Return a specification as plain values."""
+    return {**asdict(spec), "channels": list(spec.channels)}
+
+
+def spec_from_json(content: Mapping[str, Any]) -> FeatureSpec:
+    """Return what :func:`spec_to_json` gave back as a specification."""
+    return FeatureSpec(**{**content, "channels": tuple(content["channels"])})
 
 
 def lagged(channels: Sequence[FloatArray], past_values: int, *, absolute: bool = False) -> FloatArray:
@@ -184,18 +192,7 @@ def write_network(artifact: ArtifactWriter, group: str, network: Network) -> Non
         artifact.put(f"{group}/{name}", getattr(network, name), unit="SI of each feature", dims=("feature",))
     for name in ("output_scale", "output_shift"):
         artifact.put(f"{group}/{name}", getattr(network, name), unit="SI of the target")
-    spec = network.features
-    artifact.put_json(
-        f"{group}/features",
-        {
-            "channels": list(spec.channels),
-            "past_values": spec.past_values,
-            "absolute": spec.absolute,
-            "sampling_rate_hz": spec.sampling_rate_hz,
-            "target": spec.target,
-            "past_target": spec.past_target,
-        },
-    )
+    artifact.put_json(f"{group}/features", spec_to_json(network.features))
     artifact.attributes(
         group, architecture=network.architecture, layers=len(network.weights), has_biases=network.has_biases
     )
@@ -205,7 +202,6 @@ def read_network(artifact: Artifact, group: str) -> Network:
     """Read what :func:`write_network` wrote."""
     notes = artifact.attributes(group)
     layers = range(int(notes["layers"]))
-    spec: dict[str, Any] = artifact.json(f"{group}/features")
     return Network(
         weights=tuple(artifact.array(f"{group}/weights_{index}") for index in layers),
         biases=tuple(artifact.array(f"{group}/biases_{index}") for index in layers),
@@ -213,7 +209,7 @@ def read_network(artifact: Artifact, group: str) -> Network:
         input_shift=artifact.array(f"{group}/input_shift"),
         output_scale=artifact.scalar(f"{group}/output_scale"),
         output_shift=artifact.scalar(f"{group}/output_shift"),
-        features=FeatureSpec(**{**spec, "channels": tuple(spec["channels"])}),
+        features=spec_from_json(artifact.json(f"{group}/features")),
         feature_minimum=artifact.array(f"{group}/feature_minimum"),
         feature_maximum=artifact.array(f"{group}/feature_maximum"),
         has_biases=bool(notes["has_biases"]),

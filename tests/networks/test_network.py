@@ -54,9 +54,7 @@ def test_predict_is_the_formula_of_the_thesis_written_out() -> None:
 @pytest.mark.property
 @given(st.integers(0, 5), st.integers(1, 3), st.integers(6, 40), st.booleans())
 @settings(deadline=None, max_examples=40)
-def test_lagged_rows_hold_present_then_past_values(
-    past: int, count: int, length: int, absolute: bool
-) -> None:
+def test_lagged_rows_hold_present_then_past_values(past: int, count: int, length: int, absolute: bool) -> None:
     channels = [1000.0 * index - np.arange(length) for index in range(count)]
     rows = lagged(channels, past, absolute=absolute)
     assert rows.shape == (length - past, count * (past + 1))

@@ -1,0 +1,105 @@
+"""What an architecture sweep tries: input states x past values x layers x neurons (thesis Figure 2.13)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+from mrpipe.networks.network import FeatureSpec
+
+SHORT = {"displacement": "x", "velocity": "v", "acceleration": "a", "drive": "i", "force": "f"}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One architecture.
+
+    Attributes
+    ----------
+    states
+        Motion channels among the inputs; the drive is an input of every candidate.
+    past_values
+        Past values of each input.
+    hidden
+        Neurons of each hidden layer.
+    biases
+        Whether biases are trained.
+    """
+
+    states: tuple[str, ...]
+    past_values: int
+    hidden: tuple[int, ...]
+    biases: bool
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Return all inputs."""
+        return (*self.states, "drive")
+
+    def spec(self, sampling_rate_hz: float) -> FeatureSpec:
+        """Return the features of the forward network."""
+        return FeatureSpec(self.channels, self.past_values, False, sampling_rate_hz, "force")
+
+    @property
+    def layers(self) -> tuple[int, ...]:
+        """Neurons of every layer, input and output included."""
+        return (len(self.channels) * (self.past_values + 1), *self.hidden, 1)
+
+    @property
+    def parameters(self) -> int:
+        """Number of trained numbers."""
+        weights = sum(inner * outer for inner, outer in pairwise(self.layers))
+        return weights + (sum(self.layers[1:]) if self.biases else 0)
+
+    @property
+    def label(self) -> str:
+        """Short name: `v,i | 3 past | 8-6-6-1`, with `+b` where biases are trained."""
+        inputs = ",".join(SHORT[name] for name in self.channels)
+        shape = "-".join(str(count) for count in self.layers)
+        return f"{inputs} | {self.past_values} past | {shape}{'+b' if self.biases else ''}"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The axes of a sweep and the point where they cross.
+
+    Attributes
+    ----------
+    states, past_values, layers, neurons
+        What is tried on each axis; all hidden layers of a network have the same number of neurons.
+    biases
+        Both are tried where it holds both.
+    centre
+        The thesis' choice: velocity, three past values, two layers of six neurons.
+    """
+
+    states: tuple[tuple[str, ...], ...]
+    past_values: tuple[int, ...]
+    layers: tuple[int, ...]
+    neurons: tuple[int, ...]
+    biases: tuple[bool, ...]
+    centre: Candidate
+
+    def candidates(self, design: str) -> list[Candidate]:
+        """Return what is tried: `star` varies one axis at a time (layers with neurons), `full` everything."""
+        shapes = [(neurons,) * layers for layers, neurons in product(self.layers, self.neurons)]
+        if design == "full":
+            every: Iterable[Candidate] = (
+                Candidate(*point) for point in product(self.states, self.past_values, shapes, self.biases)
+            )
+            return _once([self.centre, *every])
+        at = self.centre
+        return _once(
+            [
+                at,
+                *(Candidate(states, at.past_values, at.hidden, at.biases) for states in self.states),
+                *(Candidate(at.states, past, at.hidden, at.biases) for past in self.past_values),
+                *(Candidate(at.states, at.past_values, shape, at.biases) for shape in shapes),
+                *(Candidate(at.states, at.past_values, at.hidden, biases) for biases in self.biases),
+            ]
+        )
+
+
+def _once(candidates: Sequence[Candidate]) -> list[Candidate]:
+    return list(dict.fromkeys(candidates))

@@ -1,0 +1,256 @@
+"""How good a network is: errors pooled, per test and per regime, beside a linear baseline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.networks.assembly import History, Samples, samples
+from mrpipe.networks.network import Network
+
+REGIMES = ("pre_yield", "reversal", "post_yield")
+"""The regimes of :func:`regimes_of`, in the order of their numbers."""
+
+
+@dataclass(frozen=True)
+class ErrorFigures:
+    """Error of an estimate of a signal.
+
+    Attributes
+    ----------
+    nrmse
+        RMS of the error over RMS of the signal, pooled.
+    fit_percent
+        100 (1 - |e| / |signal - mean|).
+    r2
+        Coefficient of determination.
+    rms
+        RMS of the error in the unit of the signal.
+    samples
+        Number of samples.
+    """
+
+    nrmse: float
+    fit_percent: float
+    r2: float
+    rms: float
+    samples: int
+
+
+def error_figures(measured: FloatArray, estimated: FloatArray) -> ErrorFigures:
+    """Return the error figures of an estimate, both arrays of shape (n,); NaN where they are not defined."""
+    nan = float("nan")
+    if not len(measured):
+        return ErrorFigures(nan, nan, nan, nan, 0)
+    error = estimated - measured
+    square = float(error @ error)
+    size = float(measured @ measured)
+    spread = float(np.sum((measured - measured.mean()) ** 2))
+    # a constant signal has no spread beyond rounding
+    moves = spread > 1e-12 * max(size, 1e-300)
+    return ErrorFigures(
+        nrmse=float(np.sqrt(square / size)) if size > 0.0 else nan,
+        fit_percent=100.0 * (1.0 - float(np.sqrt(square / spread))) if moves else nan,
+        r2=1.0 - square / spread if moves else nan,
+        rms=float(np.sqrt(square / len(measured))),
+        samples=len(measured),
+    )
+
+
+def travel_since_reversal(displacement: FloatArray, velocity: FloatArray, starts: IntArray) -> FloatArray:
+    """Return the distance [m] moved since the velocity last changed sign, shape (n,), starting anew at each test.
+
+    The first travel of a test is unknown and taken as long (infinite).
+    """
+    travel = np.empty(len(displacement))
+    for first, last in pairwise(starts):
+        sign = velocity[first:last] > 0.0
+        turns = np.flatnonzero(sign[1:] != sign[:-1]) + 1
+        place = np.searchsorted(turns, np.arange(last - first), side="right")
+        origin = displacement[first:last][np.concatenate([[0], turns])[place]]
+        travel[first:last] = np.where(place > 0, np.abs(displacement[first:last] - origin), np.inf)
+    return travel
+
+
+def yield_travel(history: History) -> float:
+    """Return the travel after reversal [m] at which the force has on average reached nine tenths of its level.
+
+    The force in the direction of motion, over the 95th percentile of each test, is averaged in bins of travel; its
+    level is the median over the bins beyond a fifth of the largest travel. The pre-yield region ends there.
+    """
+    travel = travel_since_reversal(history.channels["displacement"], history.channels["velocity"], history.starts)
+    scale = np.ones(history.samples)
+    for index in range(len(history.names)):
+        part = slice(int(history.starts[index]), int(history.starts[index + 1]))
+        size = float(np.percentile(np.abs(history.channels["force"][part]), 95)) if part.stop > part.start else 0.0
+        scale[part] = size if size > 0.0 else 1.0
+    along = history.channels["force"] * np.sign(history.channels["velocity"]) / scale
+    steady = ~np.repeat(np.array(history.drive_varies, dtype=bool), np.diff(history.starts))
+    usable = np.isfinite(travel) & (steady if steady.any() else True)
+    if not usable.any():
+        return 0.0
+    longest = float(np.percentile(travel[usable], 99))
+    edges = np.linspace(0.0, longest, 201)
+    bins = np.digitize(travel[usable], edges) - 1
+    count = np.bincount(bins, minlength=201)[:200]
+    total = np.bincount(bins, along[usable], minlength=201)[:200]
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    level = float(np.nanmedian(mean[40:]))
+    reached = np.flatnonzero(mean >= 0.9 * level)
+    return float(edges[reached[0] + 1]) if len(reached) else longest
+
+
+def regimes_of(history: History, yield_travel_m: float) -> IntArray:
+    """Return the regime of each sample, a number into :data:`REGIMES`.
+
+    Reversal: the force still acts against the motion that has just turned. Pre-yield: it acts with it, but the travel
+    since the reversal is below `yield_travel_m`. Post-yield: the rest.
+    """
+    travel = travel_since_reversal(history.channels["displacement"], history.channels["velocity"], history.starts)
+    against = history.channels["force"] * history.channels["velocity"] < 0.0
+    early = travel < yield_travel_m
+    regime = np.full(history.samples, 2, dtype=np.int64)
+    regime[early] = 0
+    regime[early & against] = 1
+    return regime
+
+
+def by_regime(measured: FloatArray, estimated: FloatArray, regime: IntArray) -> dict[str, ErrorFigures]:
+    """Return the error figures of each regime."""
+    return {
+        name: error_figures(measured[regime == number], estimated[regime == number])
+        for number, name in enumerate(REGIMES)
+    }
+
+
+def by_test(history: History, rows: Samples, estimated: FloatArray) -> list[tuple[str, ErrorFigures]]:
+    """Return the error figures of each test."""
+    return [
+        (name, error_figures(rows.target[rows.test == index], estimated[rows.test == index]))
+        for index, name in enumerate(history.names)
+    ]
+
+
+def linear_baseline(training: Samples, judged: Samples) -> FloatArray:
+    """Return what an affine model of the same features, fitted by least squares, estimates on other rows."""
+    design = np.column_stack([training.features, np.ones(len(training.target))])
+    scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
+    coefficients = np.linalg.lstsq(design / scale, training.target, rcond=1e-10)[0] / scale
+    return np.asarray(judged.features @ coefficients[:-1] + coefficients[-1])
+
+
+def free_run(network: Network, history: History) -> FloatArray:
+    """Return the estimate where the network's own past outputs stand for the measured ones, shape (n,).
+
+    All tests step side by side. The first `past_values` samples of each test are the measured ones.
+    """
+    spec = network.features
+    past = spec.past_values
+    lengths = np.diff(history.starts)
+    longest = int(lengths.max())
+    steps = np.minimum(np.arange(longest)[None, :], lengths[:, None] - 1) + history.starts[:-1, None]
+    channels = np.stack([history.channels[name][steps] for name in spec.channels])
+    output = history.channels[spec.target][steps].copy()
+    if spec.absolute:
+        channels, output = np.abs(channels), np.abs(output)
+    for step in range(past, longest):
+        window = slice(step, step - past - 1 if step > past else None, -1)
+        features = [channel[:, window] for channel in channels]
+        if spec.past_target and past:
+            features.append(output[:, window][:, 1:])
+        output[:, step] = network.predict(np.concatenate(features, axis=1))
+    return np.concatenate([output[index, :length] for index, length in enumerate(lengths)])
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A network judged on validation tests.
+
+    Attributes
+    ----------
+    samples, estimated
+        The validation rows and the estimates of their targets, shape (n,).
+    training, pooled, linear
+        Error figures on the training tests, on the validation tests, and of a linear model of the same inputs there.
+    constant, varying
+        On validation tests of constant and of varying drive.
+    regimes, varying_regimes
+        By regime, of all validation tests and of those with varying drive.
+    tests
+        Of each validation test.
+    yield_travel_m
+        Where the pre-yield regime ends, found from the training tests.
+    negative_share
+        Share of estimates below zero (by more than a hundredth of the largest target).
+    outside_training_range
+        Share of validation rows beyond the range of the training set.
+    """
+
+    samples: Samples
+    estimated: FloatArray
+    training: ErrorFigures
+    pooled: ErrorFigures
+    linear: ErrorFigures
+    constant: ErrorFigures
+    varying: ErrorFigures
+    regimes: dict[str, ErrorFigures]
+    varying_regimes: dict[str, ErrorFigures]
+    tests: list[tuple[str, ErrorFigures]]
+    yield_travel_m: float
+    negative_share: float
+    outside_training_range: float
+
+    def rows(self, unit: str) -> list[dict[str, str | float | int]]:
+        """Return the table of errors, a row a group of samples; `unit` is that of the target."""
+        groups = [
+            ("all", self.pooled),
+            ("linear model, all", self.linear),
+            ("constant drive", self.constant),
+            ("varying drive", self.varying),
+            *((name.replace("_", "-"), figures) for name, figures in self.regimes.items()),
+            *((f"varying drive, {name.replace('_', '-')}", figures) for name, figures in self.varying_regimes.items()),
+        ]
+        return [{"samples of": name, **_row(figures, unit)} for name, figures in groups if figures.samples]
+
+    def test_rows(self, unit: str) -> list[dict[str, str | float | int]]:
+        """Return the table of errors of each test."""
+        return [{"test": name, **_row(figures, unit)} for name, figures in self.tests]
+
+
+def _row(figures: ErrorFigures, unit: str) -> dict[str, str | float | int]:
+    return {
+        "NRMSE": figures.nrmse,
+        "fit [%]": figures.fit_percent,
+        "R2": figures.r2,
+        f"RMS error [{unit}]": figures.rms,
+        "n": figures.samples,
+    }
+
+
+def judge(network: Network, training: History, validation: History) -> Judgement:
+    """Judge a network on the validation history; the training history gives the baseline and the yield travel."""
+    spec = network.features
+    fitted, rows = samples(training, spec), samples(validation, spec)
+    estimated = network.predict(rows.features)
+    travel = yield_travel(training)
+    regime = regimes_of(validation, travel)[rows.sample]
+    varies = np.array(validation.drive_varies, dtype=bool)[rows.test]
+    floor = 0.01 * float(np.max(np.abs(fitted.target))) if len(fitted.target) else 0.0
+    return Judgement(
+        samples=rows,
+        estimated=estimated,
+        training=error_figures(fitted.target, network.predict(fitted.features)),
+        pooled=error_figures(rows.target, estimated),
+        linear=error_figures(rows.target, linear_baseline(fitted, rows)),
+        constant=error_figures(rows.target[~varies], estimated[~varies]),
+        varying=error_figures(rows.target[varies], estimated[varies]),
+        regimes=by_regime(rows.target, estimated, regime),
+        varying_regimes=by_regime(rows.target[varies], estimated[varies], regime[varies]),
+        tests=by_test(validation, rows, estimated),
+        yield_travel_m=travel,
+        negative_share=float(np.mean(estimated < -floor)) if len(estimated) else 0.0,
+        outside_training_range=network.outside_training_range(rows.features),
+    )

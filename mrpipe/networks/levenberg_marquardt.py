@@ -1,0 +1,208 @@
+"""Levenberg-Marquardt with the stopping rules of MATLAB's trainlm.
+
+Three methods share the rules: scipy's `least_squares` on the exactly compressed problem, and a loop of our own with the
+damping mu I of trainlm or mu diag(J'J) of Marquardt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.optimize import least_squares
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.networks.problem import Problem
+
+Method = Literal["least-squares", "mu-identity", "mu-diagonal"]
+
+
+@dataclass(frozen=True)
+class StoppingRules:
+    """When training ends; the defaults are those of trainlm.
+
+    Attributes
+    ----------
+    iterations
+        Accepted steps (epochs).
+    held_out_failures
+        Consecutive steps without a new best on the held-out rows; the best parameters are returned.
+    gradient
+        Largest |gradient| of the mean squared normalised error at which training ends.
+    improvement
+        Relative gain of the last ten steps below which training ends (trainlm has no such rule: 0).
+    mu, mu_increase, mu_decrease, mu_maximum
+        Damping of the loop of our own: first value, factors after a failed and a good step, limit.
+    """
+
+    iterations: int = 1000
+    held_out_failures: int = 6
+    gradient: float = 1e-7
+    improvement: float = 0.0
+    mu: float = 1e-3
+    mu_increase: float = 10.0
+    mu_decrease: float = 0.1
+    mu_maximum: float = 1e10
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What a training run gave.
+
+    Attributes
+    ----------
+    parameters
+        The best on the held-out rows (the last where there are none).
+    mean_square, held_out_mean_square
+        Mean squared normalised error on the training rows and on the held-out rows (NaN where none), at `parameters`.
+    iterations
+        Accepted steps.
+    reason
+        Why it ended.
+    path
+        Mean squared error after each step, the start first.
+    """
+
+    parameters: FloatArray
+    mean_square: float
+    held_out_mean_square: float
+    iterations: int
+    reason: str
+    path: tuple[float, ...]
+
+
+class _Stop(Exception):
+    """Ends scipy's loop from within; carries the reason."""
+
+
+class _Watch:
+    """Keeps the path and the best parameters and says when to stop."""
+
+    def __init__(self, held_out: Problem | None, rules: StoppingRules) -> None:
+        self.held_out = held_out
+        self.rules = rules
+        self.path: list[float] = []
+        self.best_error = np.inf
+        self.best: tuple[FloatArray, float] | None = None
+        self.failures = 0
+
+    def accepted(self, parameters: FloatArray, mean_square: float, gradient: FloatArray) -> str:
+        """Note an accepted step; return the reason to stop, or an empty text."""
+        self.path.append(mean_square)
+        error = self.held_out.mean_square(parameters) if self.held_out is not None else mean_square
+        if error < self.best_error or self.best is None:
+            self.best_error, self.best, self.failures = error, (parameters.copy(), mean_square), 0
+        else:
+            self.failures += 1
+        rules = self.rules
+        if self.held_out is not None and self.failures >= rules.held_out_failures:
+            return "held-out failures"
+        if float(np.max(np.abs(gradient))) < rules.gradient:
+            return "gradient"
+        if len(self.path) > 10 and self.path[-11] - mean_square < rules.improvement * self.path[-11]:
+            return "improvement"
+        return "iterations" if len(self.path) > rules.iterations else ""
+
+    def result(self, reason: str) -> FitResult:
+        """Return the best of the run."""
+        assert self.best is not None
+        parameters, mean_square = self.best
+        held_out = self.best_error if self.held_out is not None else float("nan")
+        return FitResult(parameters, mean_square, held_out, len(self.path) - 1, reason, tuple(self.path))
+
+
+def fit(
+    problem: Problem,
+    start: FloatArray,
+    *,
+    method: Method = "least-squares",
+    rules: StoppingRules | None = None,
+    held_out: Problem | None = None,
+) -> FitResult:
+    """Minimise the mean squared error of a network.
+
+    Parameters
+    ----------
+    problem
+        Training rows.
+    start
+        Initial parameters, shape (P,).
+    method
+        `least-squares` (scipy, trust region, scaled by the Jacobian), `mu-identity` (trainlm) or `mu-diagonal`.
+    rules
+        When to stop.
+    held_out
+        Rows of other records for early stopping; never those that the model is judged on in the end.
+    """
+    watch = _Watch(held_out, rules or StoppingRules())
+    if method == "least-squares":
+        return watch.result(_scipy_loop(problem, start, watch))
+    return watch.result(_own_loop(problem, start, watch, identity=method == "mu-identity"))
+
+
+def _scipy_loop(problem: Problem, start: FloatArray, watch: _Watch) -> str:
+    latest: dict[bytes, tuple[FloatArray, FloatArray]] = {}
+
+    def compressed(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        key = parameters.tobytes()
+        if key not in latest:
+            latest.clear()
+            latest[key] = problem.compressed(parameters)
+        return latest[key]
+
+    def jacobian(parameters: FloatArray) -> FloatArray:
+        # least_squares asks for the Jacobian once a step, after accepting it
+        residual, matrix = compressed(parameters)
+        reason = watch.accepted(parameters, float(residual @ residual), 2.0 * matrix.T @ residual)
+        if reason:
+            raise _Stop(reason)
+        return matrix
+
+    try:
+        outcome = least_squares(
+            lambda parameters: compressed(parameters)[0],
+            start,
+            jac=jacobian,
+            method="trf",
+            x_scale="jac",
+            ftol=1e-12,
+            xtol=1e-10,
+            gtol=None,
+            max_nfev=20 * watch.rules.iterations,
+        )
+    except _Stop as stop:
+        return str(stop)
+    return "step" if outcome.status in {2, 3, 4} else "evaluations"
+
+
+def _own_loop(problem: Problem, start: FloatArray, watch: _Watch, *, identity: bool) -> str:
+    rules = watch.rules
+    parameters = np.array(start, dtype=np.float64)
+    mu = rules.mu
+    while True:
+        gram = problem.gram(parameters)
+        curvature, gradient, mean_square = gram[:-1, :-1], gram[:-1, -1], float(gram[-1, -1])
+        reason = watch.accepted(parameters, mean_square, 2.0 * gradient)
+        if reason:
+            return reason
+        diagonal = np.diag(curvature)
+        # a parameter without effect still needs some damping
+        scale = np.ones(len(diagonal)) if identity else np.maximum(diagonal, 1e-12 * diagonal.max())
+        while True:
+            trial = parameters + _step(curvature, gradient, mu * scale)
+            if problem.mean_square(trial) < mean_square:
+                parameters, mu = trial, max(mu * rules.mu_decrease, 1e-20)
+                break
+            mu *= rules.mu_increase
+            if mu > rules.mu_maximum:
+                return "mu"
+
+
+def _step(curvature: FloatArray, gradient: FloatArray, damping: FloatArray) -> FloatArray:
+    damped = curvature + np.diag(damping)
+    try:
+        return -np.asarray(cho_solve(cho_factor(damped, check_finite=False), gradient, check_finite=False))
+    except LinAlgError:
+        return -np.asarray(np.linalg.lstsq(damped, gradient, rcond=None)[0])

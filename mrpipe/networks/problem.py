@@ -1,0 +1,161 @@
+"""The least-squares problem of a network: residuals, analytic Jacobian and its exact compression.
+
+A problem of n rows and P parameters needs no n x P Jacobian. With the Gram matrix of [J e], accumulated over chunks
+of rows, and any square root of it, the last column is a residual and the others a Jacobian of P + 1 rows that have the
+norm, the gradient J'e and the matrix J'J of the full problem: a Gauss-Newton or Levenberg-Marquardt method takes the
+same path. The condition number is squared on the way, which double precision allows for the networks of this program.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+
+CHUNK_ROWS = 4096
+"""Rows of the Jacobian held at a time: fits the second-level cache for some hundred parameters."""
+
+
+def layer_slices(layers: tuple[int, ...], biases: bool) -> list[tuple[slice, slice]]:
+    """Return where weights and biases of each layer lie in the parameter vector (empty slices without biases)."""
+    slices = []
+    start = 0
+    for inner, outer in pairwise(layers):
+        middle = start + inner * outer
+        end = middle + (outer if biases else 0)
+        slices.append((slice(start, middle), slice(middle, end)))
+        start = end
+    return slices
+
+
+def unpack(parameters: FloatArray, layers: tuple[int, ...], biases: bool) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return weights (out, in) and biases (out,) of each layer; zeros where there are no biases."""
+    weights = []
+    offsets = []
+    for (at, beside), (inner, outer) in zip(layer_slices(layers, biases), pairwise(layers), strict=True):
+        weights.append(parameters[at].reshape(outer, inner))
+        offsets.append(parameters[beside] if biases else np.zeros(outer))
+    return weights, offsets
+
+
+def pack(weights: list[FloatArray], biases: list[FloatArray], has_biases: bool) -> FloatArray:
+    """Return the parameter vector: for each layer the weights row by row, then the biases if there are any."""
+    parts = [
+        part
+        for matrix, bias in zip(weights, biases, strict=True)
+        for part in ((matrix.ravel(), bias) if has_biases else (matrix.ravel(),))
+    ]
+    return np.concatenate(parts)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Fit a network to rows of normalised data.
+
+    Attributes
+    ----------
+    inputs
+        Normalised features, feature-major: shape (R, n), contiguous.
+    target
+        Normalised target, shape (n,).
+    layers
+        Neurons of each layer, input and output included: (8, 6, 6, 1).
+    biases
+        Whether biases are parameters.
+    """
+
+    inputs: FloatArray
+    target: FloatArray
+    layers: tuple[int, ...]
+    biases: bool
+
+    @cached_property
+    def size(self) -> int:
+        """Number of parameters."""
+        return layer_slices(self.layers, self.biases)[-1][1].stop
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.target)
+
+    def output(self, parameters: FloatArray, inputs: FloatArray | None = None) -> FloatArray:
+        """Return the network's output, shape (n,), normalised."""
+        signal = self.inputs if inputs is None else inputs
+        weights, biases = unpack(parameters, self.layers, self.biases)
+        for matrix, bias in zip(weights[:-1], biases[:-1], strict=True):
+            signal = matrix @ signal
+            if self.biases:
+                signal += bias[:, None]
+            np.tanh(signal, out=signal)
+        return (weights[-1] @ signal)[0] + biases[-1][0]
+
+    def residual(self, parameters: FloatArray) -> FloatArray:
+        """Return output minus target, shape (n,)."""
+        return self.output(parameters) - self.target
+
+    def mean_square(self, parameters: FloatArray) -> float:
+        """Return the mean squared residual."""
+        total = 0.0
+        for start in range(0, self.rows, 4 * CHUNK_ROWS):
+            part = slice(start, start + 4 * CHUNK_ROWS)
+            error = self.output(parameters, self.inputs[:, part]) - self.target[part]
+            total += float(error @ error)
+        return total / self.rows
+
+    def jacobian(self, parameters: FloatArray) -> FloatArray:
+        """Return the Jacobian of the residual, shape (n, P)."""
+        stacked = np.empty((self.size + 1, self.rows))
+        self._fill(parameters, self.inputs, self.target, stacked)
+        return np.ascontiguousarray(stacked[:-1].T)
+
+    def gram(self, parameters: FloatArray) -> FloatArray:
+        """Return [J e]'[J e] / n, shape (P + 1, P + 1), from chunks of rows."""
+        total = np.zeros((self.size + 1, self.size + 1))
+        buffer = np.empty((self.size + 1) * min(CHUNK_ROWS, self.rows))
+        for start in range(0, self.rows, CHUNK_ROWS):
+            part = slice(start, min(start + CHUNK_ROWS, self.rows))
+            width = part.stop - part.start
+            stacked = buffer[: (self.size + 1) * width].reshape(self.size + 1, width)
+            self._fill(parameters, self.inputs[:, part], self.target[part], stacked)
+            # numpy calls the symmetric product (half the work) where both factors are one array
+            total += stacked @ stacked.T
+        return total / self.rows
+
+    def compressed(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return residual (P + 1,) and Jacobian (P + 1, P) with the norm, gradient and J'J of the problem over n."""
+        gram = self.gram(parameters)
+        try:
+            root = np.linalg.cholesky(gram).T
+        except np.linalg.LinAlgError:
+            # a neuron without effect makes J'J singular: the symmetric square root serves as well
+            values, vectors = np.linalg.eigh(gram)
+            root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+        return np.array(root[:, -1]), np.array(root[:, :-1], order="C")
+
+    def _fill(self, parameters: FloatArray, inputs: FloatArray, target: FloatArray, stacked: FloatArray) -> None:
+        """Write the transposed Jacobian, and below it the residual, into `stacked`, shape (P + 1, columns)."""
+        weights, biases = unpack(parameters, self.layers, self.biases)
+        signals = [inputs]
+        for matrix, bias in zip(weights[:-1], biases[:-1], strict=True):
+            signal = matrix @ signals[-1]
+            if self.biases:
+                signal += bias[:, None]
+            signals.append(np.tanh(signal, out=signal))
+        np.subtract((weights[-1] @ signals[-1])[0] + biases[-1][0], target, out=stacked[-1])
+        slices = layer_slices(self.layers, self.biases)
+        slope = np.ones((1, inputs.shape[1]))
+        for layer in range(len(weights) - 1, -1, -1):
+            at, beside = slices[layer]
+            inner = signals[layer]
+            block = stacked[at].reshape(len(slope), len(inner), -1)
+            np.multiply(slope[:, None, :], inner[None, :, :], out=block)
+            if self.biases:
+                stacked[beside] = slope
+            if layer:
+                slope = weights[layer].T @ slope
+                slope *= 1.0 - inner * inner

@@ -1,0 +1,278 @@
+"""Runs an architecture sweep: screened on few rows, the better ones refined; resumable, its cost known beforehand."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from mrpipe.artifacts import FloatArray, IntArray, Progress, atomic_path, no_progress
+from mrpipe.networks.assembly import History, rows_at, window_starts
+from mrpipe.networks.candidates import Candidate
+from mrpipe.networks.levenberg_marquardt import Method, StoppingRules, fit
+from mrpipe.networks.problem import Problem
+from mrpipe.networks.scaling import Normalisation, scaling_of
+from mrpipe.networks.training import hold_out, in_parallel, initial_parameters
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """How candidates are compared.
+
+    Attributes
+    ----------
+    starts
+        Random starts of every candidate.
+    screen_rows, screen_iterations
+        Of the screening fit.
+    refined
+        How many candidates, the best of the screening, go on.
+    refine_rows, refine_iterations
+        Of the fit that continues each of their starts.
+    held_out_rows
+        Rows of the held-out records on which all are judged.
+    held_out_share, method, whitened, normalisation, initial, rules
+        As for training.
+    """
+
+    starts: int = 4
+    screen_rows: int = 3000
+    screen_iterations: int = 60
+    refined: int = 12
+    refine_rows: int = 8000
+    refine_iterations: int = 60
+    held_out_rows: int = 8000
+    held_out_share: float = 0.25
+    method: Method = "mu-identity"
+    whitened: bool = True
+    normalisation: Normalisation = "maximum"
+    initial: Literal["random", "perceptron"] = "random"
+    rules: StoppingRules = field(default_factory=StoppingRules)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one candidate fared: RMS error over RMS of the held-out force, a number a start (NaN: not refined)."""
+
+    candidate: Candidate
+    screened: FloatArray
+    refined: FloatArray
+
+    @property
+    def is_refined(self) -> bool:
+        """Whether it went on after the screening."""
+        return bool(np.isfinite(self.refined).all())
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """All outcomes in the order of the candidates; predicted and spent wall time [s]."""
+
+    outcomes: tuple[Outcome, ...]
+    held_out: tuple[str, ...]
+    predicted_seconds: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class _Data:
+    """The same rows for every candidate: places in the histories for the two fits and for judging."""
+
+    fit: History
+    held: History
+    screen: IntArray
+    refine: IntArray
+    judged: IntArray
+
+
+def sweep(
+    history: History,
+    candidates: Sequence[Candidate],
+    options: SweepOptions,
+    seed: int,
+    *,
+    jobs: int = 1,
+    cache: Path | None = None,
+    progress: Progress = no_progress,
+    tell: Callable[[str], None] = lambda _: None,
+) -> SweepRun:
+    """Compare candidates on training records, of which some are held out.
+
+    Parameters
+    ----------
+    history
+        Training tests.
+    candidates
+        What to compare.
+    options
+        How.
+    seed
+        Of the split and the starts. A candidate's starts depend on the candidate and the seed alone.
+    jobs
+        Threads; no result depends on it.
+    cache
+        Folder in which each fit is kept as soon as it is done, under a name made of everything it depends on; a sweep
+        that was interrupted, or is widened, takes them from there.
+    progress, tell
+        Told how far it is; told the predicted cost before it starts.
+    """
+    began = time.perf_counter()
+    data = _places(history, candidates, options, seed)
+    digest = _digest_of(data, options, seed)
+    with threadpool_limits(1):
+        costs = predicted_costs(data.fit, candidates, options)
+    share = min(1.0, options.refined / max(1, len(candidates)))
+    predicted = float(costs[0].sum() + share * costs[1].sum()) / max(1, jobs)
+    tell(f"{len(candidates)} candidates x {options.starts} starts: about {predicted:.0f} s on {jobs} cores")
+
+    def screen(index: int) -> tuple[FloatArray, FloatArray]:
+        return _kept(
+            cache, f"screen-{digest}", candidates[index], lambda: _fit_all(data, candidates[index], options, seed)
+        )
+
+    middle = float(costs[0].sum() / (costs[0].sum() + share * costs[1].sum()))
+    screened = _pass(screen, len(candidates), jobs, _part(progress, 0.0, middle), "screened")
+    order = np.argsort([float(np.mean(np.log(errors))) for errors, _ in screened], kind="stable")
+    chosen = sorted({0, *(int(index) for index in order[: options.refined])})
+
+    def refine(place: int) -> tuple[FloatArray, FloatArray]:
+        candidate, starts = candidates[chosen[place]], screened[chosen[place]][1]
+        return _kept(cache, f"refine-{digest}", candidate, lambda: _fit_all(data, candidate, options, seed, starts))
+
+    refined = _pass(refine, len(chosen), jobs, _part(progress, middle, 1.0), "refined")
+    after = {index: errors for index, (errors, _) in zip(chosen, refined, strict=True)}
+    absent = np.full(options.starts, np.nan)
+    outcomes = tuple(
+        Outcome(candidate, screened[index][0], after.get(index, absent)) for index, candidate in enumerate(candidates)
+    )
+    return SweepRun(outcomes, data.held.names, predicted, time.perf_counter() - began)
+
+
+def _pass(
+    work: Callable[[int], tuple[FloatArray, FloatArray]], count: int, jobs: int, progress: Progress, text: str
+) -> list[tuple[FloatArray, FloatArray]]:
+    began = time.perf_counter()
+
+    def timed(fraction: float, message: str = "") -> None:
+        left = (time.perf_counter() - began) * (1.0 - fraction) / max(fraction, 1e-9)
+        progress(fraction, f"{message}, {left:.0f} s left")
+
+    return list(in_parallel(work, count, jobs, timed, text))  # type: ignore[arg-type]
+
+
+def _part(progress: Progress, first: float, last: float) -> Progress:
+    return lambda fraction, text="": progress(first + (last - first) * fraction, text)
+
+
+def _places(history: History, candidates: Sequence[Candidate], options: SweepOptions, seed: int) -> _Data:
+    rng = np.random.default_rng([seed, 1])
+    fit_history, held = hold_out(history, options.held_out_share, rng)
+    longest = max(candidate.past_values for candidate in candidates)
+    available, judged = window_starts(fit_history, longest), window_starts(held, longest)
+    shuffled = rng.permutation(available)
+    return _Data(
+        fit=fit_history,
+        held=held,
+        screen=np.sort(shuffled[: options.screen_rows]),
+        refine=np.sort(shuffled[: options.refine_rows]),
+        judged=np.sort(rng.permutation(judged)[: options.held_out_rows]),
+    )
+
+
+def _fit_all(
+    data: _Data, candidate: Candidate, options: SweepOptions, seed: int, starts: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Fit every start of a candidate; return held-out errors (starts,) and parameters (starts, P)."""
+    spec = candidate.spec(data.fit.sampling_rate_hz)
+    features, target = rows_at(data.fit, spec, data.screen if starts is None else data.refine)
+    scaling = scaling_of(features, target, spec, options.normalisation, whitened=options.whitened)
+    if starts is not None:
+        # the parameters of the screening live in the basis of its rows
+        small = rows_at(data.fit, spec, data.screen)
+        scaling = scaling_of(*small, spec, options.normalisation, whitened=options.whitened)
+    held_features, held_target = rows_at(data.held, spec, data.judged)
+    problem = Problem(scaling.inputs(features), scaling.target(target), candidate.layers, candidate.biases)
+    held = Problem(scaling.inputs(held_features), scaling.target(held_target), candidate.layers, candidate.biases)
+    rules = replace(
+        options.rules, iterations=options.screen_iterations if starts is None else options.refine_iterations
+    )
+    rngs = np.random.default_rng([seed, 2, _number(_key(candidate))]).spawn(options.starts)
+    size = float(np.sqrt(np.mean(held_target**2)))
+    errors, parameters = [], []
+    for index in range(options.starts):
+        guess = initial_parameters(problem, rngs[index], options.initial) if starts is None else starts[index]
+        outcome = fit(problem, guess, method=options.method, rules=rules, held_out=held)
+        errors.append(np.sqrt(outcome.held_out_mean_square) * scaling.output_scale / size)
+        parameters.append(outcome.parameters)
+    return np.array(errors), np.array(parameters)
+
+
+def predicted_costs(
+    history: History, candidates: Sequence[Candidate], options: SweepOptions
+) -> tuple[FloatArray, FloatArray]:
+    """Return the seconds on one core that screening and refining each candidate will take, shapes (candidates,).
+
+    A few iterations of three candidates (the smallest, a middle and the largest) are timed; the others are
+    interpolated by their number of parameters.
+    """
+    sizes = np.array([candidate.parameters for candidate in candidates])
+    order = np.argsort(sizes, kind="stable")
+    probes = sorted({int(order[place]) for place in (0, len(order) // 2, len(order) - 1)}, key=lambda item: sizes[item])
+    rng = np.random.default_rng(0)
+    times = []
+    for probe in probes:
+        candidate = candidates[probe]
+        rows = min(options.screen_rows, history.samples)
+        inputs = rng.normal(size=(candidate.layers[0], rows))
+        problem = Problem(inputs, np.tanh(inputs[0]), candidate.layers, candidate.biases)
+        start = rng.uniform(-0.5, 0.5, problem.size)
+        began = time.perf_counter()
+        outcome = fit(problem, start, method=options.method, rules=StoppingRules(iterations=3))
+        times.append((time.perf_counter() - began) / max(1, outcome.iterations))
+    # early stopping ends about a third of the runs halfway
+    each = np.interp(sizes, sizes[probes], times) * options.starts * 0.8
+    ratio = options.refine_rows / options.screen_rows
+    return each * options.screen_iterations, each * options.refine_iterations * ratio
+
+
+def _key(candidate: Candidate) -> str:
+    return hashlib.sha256(json.dumps(asdict(candidate), sort_keys=True).encode()).hexdigest()[:24]
+
+
+def _number(key: str) -> int:
+    return int(key, 16) % 2**63
+
+
+def _digest_of(data: _Data, options: SweepOptions, seed: int) -> str:
+    """Return a digest of all that a fit depends on besides its candidate."""
+    digest = hashlib.sha256()
+    kept = {name: value for name, value in asdict(options).items() if name != "refined"}
+    digest.update(json.dumps([kept, seed], sort_keys=True).encode())
+    for history, places in ((data.fit, data.refine), (data.held, data.judged)):
+        digest.update(places.tobytes())
+        for name in sorted(history.channels):
+            digest.update(np.ascontiguousarray(history.channels[name]).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _kept(
+    cache: Path | None, name: str, candidate: Candidate, work: Callable[[], tuple[FloatArray, FloatArray]]
+) -> tuple[FloatArray, FloatArray]:
+    """Return what an earlier run kept, else do the work and keep it."""
+    if cache is None:
+        return work()
+    path = cache / f"{name}-{_key(candidate)}.npz"
+    if path.is_file():
+        with np.load(path, allow_pickle=False) as kept:
+            return kept["errors"], kept["parameters"]
+    errors, parameters = work()
+    with atomic_path(path) as temporary, temporary.open("wb") as handle:
+        np.savez(handle, errors=errors, parameters=parameters)
+    return errors, parameters

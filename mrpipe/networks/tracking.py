@@ -1,0 +1,160 @@
+"""What an inverse network is for: the round trip force to current to force, and viscous damping emulated (2.4.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.networks.assembly import History, samples
+from mrpipe.networks.evaluation import ErrorFigures, error_figures
+from mrpipe.networks.network import Network
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """A desired force, the drive that the inverse network asks for and the force that comes of it.
+
+    Attributes
+    ----------
+    sample
+        Index into the history of each entry, shape (n,).
+    desired_n, drive, drive_raw, force_n
+        Shape (n,); the drive within its limits and as the network gave it, A or V.
+    """
+
+    sample: IntArray
+    desired_n: FloatArray
+    drive: FloatArray
+    drive_raw: FloatArray
+    force_n: FloatArray
+
+
+def round_trip(inverse: Network, forward: Network, history: History, drive_limit: float) -> Tracking:
+    """Feed measured force and motion to the inverse network and its drive to the forward network.
+
+    Parameters
+    ----------
+    inverse, forward
+        Networks of one sampling rate.
+    history
+        Where `force` is the desired force; `drive` is not looked at.
+    drive_limit
+        Largest drive [A or V]; the estimate is kept within 0 and this.
+    """
+    rows = samples(history, inverse.features)
+    estimate = inverse.predict(rows.features)
+    limited = np.clip(estimate, 0.0, drive_limit)
+    kept = [int(np.sum(rows.test == index)) for index in range(len(history.names))]
+    driven = replace(
+        history,
+        channels={name: values[rows.sample] for name, values in history.channels.items()} | {"drive": limited},
+        starts=np.cumsum([0, *kept], dtype=np.int64),
+    )
+    answer = samples(driven, forward.features)
+    return Tracking(
+        sample=rows.sample[answer.sample],
+        desired_n=driven.channels["force"][answer.sample],
+        drive=limited[answer.sample],
+        drive_raw=estimate[answer.sample],
+        force_n=forward.predict(answer.features),
+    )
+
+
+def sinusoidal_motion(
+    amplitude_m: float, frequency_hz: float, damping_n_s_m: float, sampling_rate_hz: float, periods: int = 4
+) -> History:
+    """Return sinusoidal motion with the force c v of a viscous damper as the desired one (2.4.3)."""
+    time = np.arange(round(periods / frequency_hz * sampling_rate_hz) + 1) / sampling_rate_hz
+    rate = 2.0 * np.pi * frequency_hz
+    velocity = amplitude_m * rate * np.cos(rate * time)
+    channels = {
+        "displacement": amplitude_m * np.sin(rate * time),
+        "velocity": velocity,
+        "acceleration": -amplitude_m * rate**2 * np.sin(rate * time),
+        "drive": np.zeros(len(time)),
+        "force": damping_n_s_m * velocity,
+    }
+    starts = np.array([0, len(time)], dtype=np.int64)
+    return History(("viscous",), channels, starts, (True,), sampling_rate_hz)
+
+
+@dataclass(frozen=True)
+class ViscousEmulation:
+    """A viscous damper played by the inverse and the forward network.
+
+    Attributes
+    ----------
+    time_s, displacement_m, velocity_m_s
+        Shape (n,).
+    tracking
+        Desired and obtained force, drive.
+    damping_n_s_m, frequency_hz, amplitude_m
+        What was asked for.
+    figures, fast
+        Error of the force, over all and at more than half the peak velocity.
+    negative_share
+        Share of time in which the inverse network asks for a negative drive.
+    outside_training_range
+        Share of its inputs beyond the training range.
+    """
+
+    time_s: FloatArray
+    displacement_m: FloatArray
+    velocity_m_s: FloatArray
+    tracking: Tracking
+    damping_n_s_m: float
+    frequency_hz: float
+    amplitude_m: float
+    figures: ErrorFigures
+    fast: ErrorFigures
+    negative_share: float
+    outside_training_range: float
+
+
+def emulate_viscous(
+    inverse: Network,
+    forward: Network,
+    training: History,
+    drive_limit: float,
+    frequency_hz: float,
+    amplitude_m: float | None = None,
+    damping_n_s_m: float | None = None,
+) -> ViscousEmulation:
+    """Emulate pure viscous damping in sinusoidal motion (thesis 2.4.3).
+
+    Parameters
+    ----------
+    inverse, forward
+        The networks.
+    training
+        The training history, for the defaults.
+    drive_limit
+        Largest drive, A or V.
+    frequency_hz, amplitude_m
+        Of the motion; the amplitude is by default the 95th percentile of the training displacement.
+    damping_n_s_m
+        By default the coefficient whose peak force is half the 99th percentile of the training force.
+    """
+    amplitude = amplitude_m or float(np.percentile(np.abs(training.channels["displacement"]), 95))
+    peak = amplitude * 2.0 * np.pi * frequency_hz
+    damping = damping_n_s_m or 0.5 * float(np.percentile(np.abs(training.channels["force"]), 99)) / peak
+    motion = sinusoidal_motion(amplitude, frequency_hz, damping, inverse.features.sampling_rate_hz)
+    tracking = round_trip(inverse, forward, motion, drive_limit)
+    place = tracking.sample
+    velocity = motion.channels["velocity"][place]
+    fast = np.abs(velocity) > 0.5 * peak
+    return ViscousEmulation(
+        time_s=place / inverse.features.sampling_rate_hz,
+        displacement_m=motion.channels["displacement"][place],
+        velocity_m_s=velocity,
+        tracking=tracking,
+        damping_n_s_m=damping,
+        frequency_hz=frequency_hz,
+        amplitude_m=amplitude,
+        figures=error_figures(tracking.desired_n, tracking.force_n),
+        fast=error_figures(tracking.desired_n[fast], tracking.force_n[fast]),
+        negative_share=float(np.mean(tracking.drive_raw < -0.01 * drive_limit)),
+        outside_training_range=inverse.outside_training_range(samples(motion, inverse.features).features),
+    )

@@ -1,0 +1,136 @@
+"""Jacobian, exact compression and stopping rules."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from mrpipe.networks.levenberg_marquardt import StoppingRules, fit
+from mrpipe.networks.problem import CHUNK_ROWS, Problem, pack, unpack
+
+
+def common_problem(rows: int = 300, *, biases: bool = True, layers: tuple[int, ...] = (4, 5, 3, 1)) -> Problem:
+    rng = np.random.default_rng(5)
+    inputs = rng.normal(size=(layers[0], rows))
+    target = np.tanh(1.5 * inputs[0] - inputs[1]) + 0.3 * inputs[2] * inputs[3] + 0.01 * rng.normal(size=rows)
+    return Problem(inputs, target, layers, biases)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("biases", [False, True])
+@pytest.mark.parametrize("layers", [(4, 1), (4, 3, 1), (4, 5, 3, 1), (4, 3, 3, 3, 1)])
+def test_jacobian_agrees_with_differences(layers: tuple[int, ...], biases: bool) -> None:
+    problem = common_problem(40, biases=biases, layers=layers)
+    parameters = np.random.default_rng(1).uniform(-0.7, 0.7, problem.size)
+    exact = problem.jacobian(parameters)
+    for index in range(problem.size):
+        step = np.zeros(problem.size)
+        step[index] = 1e-6
+        slope = (problem.residual(parameters + step) - problem.residual(parameters - step)) / 2e-6
+        np.testing.assert_allclose(exact[:, index], slope, atol=1e-8)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("biases", [False, True])
+def test_packing_is_undone_by_unpacking(biases: bool) -> None:
+    parameters = np.arange(float(common_problem(biases=biases).size))
+    weights, offsets = unpack(parameters, (4, 5, 3, 1), biases)
+    np.testing.assert_array_equal(pack(weights, offsets, biases), parameters)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("rows", [7, 300, CHUNK_ROWS, 2 * CHUNK_ROWS + 13])
+def test_compression_keeps_norm_gradient_and_curvature(rows: int) -> None:
+    problem = common_problem(rows)
+    parameters = np.random.default_rng(2).uniform(-1.0, 1.0, problem.size)
+    residual, jacobian = problem.residual(parameters), problem.jacobian(parameters)
+    small, matrix = problem.compressed(parameters)
+    assert matrix.shape == (problem.size + 1, problem.size)
+    assert small @ small == pytest.approx(residual @ residual / rows, rel=1e-12)
+    np.testing.assert_allclose(matrix.T @ small, jacobian.T @ residual / rows, atol=1e-13)
+    np.testing.assert_allclose(matrix.T @ matrix, jacobian.T @ jacobian / rows, atol=1e-12)
+    assert problem.mean_square(parameters) == pytest.approx(small @ small, rel=1e-12)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("method", ["trf", "lm"])
+def test_compressed_least_squares_takes_the_path_of_the_plain_one(method: str) -> None:
+    """Issue: the exactly compressed problem is proven equal to the plain one on a common problem."""
+    problem = common_problem()
+    start = np.random.default_rng(3).uniform(-0.5, 0.5, problem.size)
+    scale = np.sqrt(problem.rows)
+    paths: dict[str, list[np.ndarray]] = {"plain": [], "compressed": []}
+
+    def plain_jacobian(parameters: np.ndarray) -> np.ndarray:
+        paths["plain"].append(parameters.copy())
+        return problem.jacobian(parameters) / scale
+
+    def compressed_jacobian(parameters: np.ndarray) -> np.ndarray:
+        paths["compressed"].append(parameters.copy())
+        return problem.compressed(parameters)[1]
+
+    options = {"method": method, "x_scale": "jac", "max_nfev": 25}
+    plain = least_squares(lambda p: problem.residual(p) / scale, start, jac=plain_jacobian, **options)
+    compressed = least_squares(lambda p: problem.compressed(p)[0], start, jac=compressed_jacobian, **options)
+    assert plain.nfev == compressed.nfev
+    assert len(paths["plain"]) == len(paths["compressed"]) > 8
+    # rounding grows along the path (the condition number is squared), so the tight bound is for its first ten steps
+    for one, other in zip(paths["plain"][:10], paths["compressed"][:10], strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(compressed.x, plain.x, rtol=1e-3, atol=1e-3)
+    assert compressed.cost == pytest.approx(plain.cost, rel=1e-6)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("method", ["least-squares", "mu-identity", "mu-diagonal"])
+def test_all_methods_solve_a_linear_problem_as_the_normal_equations_do(method: str) -> None:
+    problem = common_problem(layers=(4, 1))
+    outcome = fit(problem, np.zeros(problem.size), method=method, rules=StoppingRules(iterations=60))  # type: ignore[arg-type]
+    design = np.vstack([problem.inputs, np.ones(problem.rows)]).T
+    exact = np.linalg.lstsq(design, problem.target, rcond=None)[0]
+    np.testing.assert_allclose(outcome.parameters, exact, atol=1e-5)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("method", ["least-squares", "mu-identity", "mu-diagonal"])
+def test_the_error_never_rises_along_the_path(method: str) -> None:
+    problem = common_problem()
+    start = np.random.default_rng(4).uniform(-0.5, 0.5, problem.size)
+    outcome = fit(problem, start, method=method, rules=StoppingRules(iterations=40))  # type: ignore[arg-type]
+    assert np.all(np.diff(outcome.path) < 0.0)
+    assert outcome.mean_square == outcome.path[-1] == pytest.approx(problem.mean_square(outcome.parameters), rel=1e-9)
+    assert outcome.path[-1] < 0.2 * outcome.path[0]
+
+
+@pytest.mark.property
+def test_six_held_out_failures_end_training_with_the_best_parameters() -> None:
+    problem = common_problem(30, layers=(4, 8, 1))
+    held_out = common_problem(200, layers=(4, 8, 1))
+    start = np.random.default_rng(6).uniform(-0.5, 0.5, problem.size)
+    outcome = fit(problem, start, method="mu-diagonal", held_out=held_out)
+    assert outcome.reason == "held-out failures"
+    assert outcome.held_out_mean_square == pytest.approx(held_out.mean_square(outcome.parameters), rel=1e-9)
+    longer = fit(
+        problem, start, method="mu-diagonal", held_out=held_out, rules=StoppingRules(iterations=outcome.iterations - 6)
+    )
+    np.testing.assert_array_equal(longer.parameters, outcome.parameters)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    ("rules", "reason"),
+    [
+        (StoppingRules(iterations=3), "iterations"),
+        (StoppingRules(gradient=1e3), "gradient"),
+        (StoppingRules(improvement=0.9999), "improvement"),
+        (StoppingRules(gradient=0.0, mu_maximum=1e4), "mu"),
+    ],
+)
+def test_every_rule_can_end_training(rules: StoppingRules, reason: str) -> None:
+    problem = common_problem(layers=(4, 1) if reason == "mu" else (4, 5, 3, 1))
+    start = np.random.default_rng(7).uniform(-0.5, 0.5, problem.size)
+    if reason == "mu":
+        # at the optimum no step is better, so the damping grows to its limit
+        start = fit(problem, start, method="mu-identity").parameters
+    assert fit(problem, start, method="mu-identity", rules=rules).reason == reason
