@@ -38,7 +38,7 @@ class Estimate:
 
     def as_dict(self) -> dict[str, float]:
         """Return plain numbers."""
-        return {"value": self.value, "low": self.low, "high": self.high}
+        return {"value": float(self.value), "low": float(self.low), "high": float(self.high)}
 
 
 @dataclass(frozen=True)

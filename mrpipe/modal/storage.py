@@ -15,14 +15,14 @@ _TWO_PI = 2.0 * np.pi
 
 
 def _interval(estimate: Estimate, scale: float = 1.0) -> list[float]:
-    return [estimate.low / scale, estimate.high / scale]
+    return [float(estimate.low / scale), float(estimate.high / scale)]
 
 
 def _decay_row(result: DecayResult) -> dict[str, Any]:
     return {
         "test": result.test,
         "mode": result.mode,
-        "frequency_hz": result.angular_frequency / _TWO_PI,
+        "frequency_hz": float(result.angular_frequency / _TWO_PI),
         "logarithmic_decrement": result.logarithmic_decrement.as_dict(),
         "exponential_fit": result.exponential_fit.as_dict(),
         "point_to_point": result.point_to_point.as_dict(),
@@ -38,8 +38,8 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
     """
     modes = natural_modes(result.frame)
     return {
-        "frequencies_hz": [item.value / _TWO_PI for item in result.frequencies],
-        "damping_ratios": [item.value for item in result.damping],
+        "frequencies_hz": [float(item.value / _TWO_PI) for item in result.frequencies],
+        "damping_ratios": [float(item.value) for item in result.damping],
         "mode_shapes": result.mode_shapes.tolist(),
         "mass": result.frame.mass.tolist(),
         "damping": result.frame.damping.tolist(),
@@ -49,7 +49,7 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
         "frequency_intervals_hz": [_interval(item, _TWO_PI) for item in result.frequencies],
         "damping_ratio_intervals": [_interval(item) for item in result.damping],
         "damping_source": list(result.damping_source),
-        "second_method_damping_ratios": [item.value for item in result.sweep_damping],
+        "second_method_damping_ratios": [float(item.value) for item in result.sweep_damping],
         "second_method_damping_ratio_intervals": [_interval(item) for item in result.sweep_damping],
         "decays": [_decay_row(result.decays[mode]) for mode in sorted(result.decays)],
         "coherence_at_peaks": result.fit.mode_coherence().tolist(),
