@@ -1,5 +1,6 @@
 """From the command to the coefficients: the driver's lag (2.4) and the polynomials (2.3)."""
 
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import math
@@ -62,7 +63,7 @@ def driver_lag(eta: float) -> Step:
     return Step("driver-lag", Phase.CURRENT, lag_step, np.array([float(eta)]), state_size=2)
 
 
-def polynomial_coefficients(yield_force: Sequence[float], viscosity: Sequence[float]) -> Step:
+def polynomial_coefficients(yield_force: Sequence[float] | FloatArray, viscosity: Sequence[float] | FloatArray) -> Step:
     """Return (2.3): yield force and viscosity as polynomials of the effective drive, constant first."""
     numbers = np.zeros(2 * POLYNOMIAL_SIZE)
     numbers[: len(yield_force)] = yield_force

@@ -1,7 +1,8 @@
 """Bouc-Wen hysteresis in displacement increments: closed between samples for n = 1 and n = 2.
 
-(2.2) divided by the velocity is an equation in displacement alone. With zeta = z/z_max, z_max = (A/(gamma + beta))^(1/n),
-the yield displacement x_y = z_max/A, the share of gamma g = gamma/(gamma + beta) and y = sign(dx) zeta,
+(2.2) divided by the velocity is an equation in displacement alone. With zeta = z/z_max, where z_max =
+(A/(gamma + beta))^(1/n), the yield displacement x_y = z_max/A, the share of gamma g = gamma/(gamma + beta) and
+y = sign(dx) zeta,
 
     dy/d(|x|/x_y) = 1 - |y|^n                  for y >= 0 (loading),
                     1 - (1 - 2 g) |y|^n         for y < 0  (unloading).
@@ -11,6 +12,7 @@ any length of step in which the motion does not turn. Other exponents are integr
 The Dahl model is n = 1, g = 1.
 """
 
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import math
@@ -25,8 +27,8 @@ SUB_STEP = 0.05
 """Longest sub-step of other exponents, in yield displacements; the update is then accurate to about 1e-7."""
 
 
-@njit(float64(float64, float64, float64, float64), cache=True)
-def _slope(y: float, exponent: float, unloading: float, _path: float) -> float:
+@njit(float64(float64, float64, float64), cache=True)
+def _slope(y: float, exponent: float, unloading: float) -> float:
     if y >= 0.0:
         return 1.0 - y**exponent
     return 1.0 - unloading * (-y) ** exponent
@@ -34,14 +36,16 @@ def _slope(y: float, exponent: float, unloading: float, _path: float) -> float:
 
 @njit(float64(float64, float64, float64, float64), cache=True)
 def _advance_general(y: float, path: float, exponent: float, unloading: float) -> float:
-    count = int(math.ceil(min(path, 40.0) / SUB_STEP))
-    step = min(path, 40.0) / max(count, 1)
+    count = math.ceil(path / SUB_STEP)
+    step = path / max(count, 1)
     for _ in range(count):
-        k1 = _slope(y, exponent, unloading, 0.0)
-        k2 = _slope(y + 0.5 * step * k1, exponent, unloading, 0.0)
-        k3 = _slope(y + 0.5 * step * k2, exponent, unloading, 0.0)
-        k4 = _slope(y + step * k3, exponent, unloading, 0.0)
+        k1 = _slope(y, exponent, unloading)
+        k2 = _slope(y + 0.5 * step * k1, exponent, unloading)
+        k3 = _slope(y + 0.5 * step * k2, exponent, unloading)
+        k4 = _slope(y + step * k3, exponent, unloading)
         y = min(y + step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0, 1.0)
+        if y > 1.0 - 1e-9:
+            break
     return y
 
 
@@ -73,12 +77,10 @@ def _advance_square(y: float, path: float, unloading: float) -> float:
 def _advance_linear(y: float, path: float, unloading: float) -> float:
     if y < 0.0:
         # dy/ds = 1 + unloading y
-        if abs(unloading) < 1e-9:
-            to_zero = -y
-        else:
-            to_zero = -math.log(max(1.0 + unloading * y, 1e-15)) / unloading
+        flat = abs(unloading) < 1e-9
+        to_zero = -y if flat else -math.log(max(1.0 + unloading * y, 1e-15)) / unloading
         if path < to_zero:
-            if abs(unloading) < 1e-9:
+            if flat:
                 return y + path
             return ((1.0 + unloading * y) * math.exp(unloading * path) - 1.0) / unloading
         path -= to_zero

@@ -1,16 +1,16 @@
 """A parametric damper: a form, its numbers, and the chain of steps they make.
 
-The hysteretic variable is normalised to its limit, so that the numbers are those which measurements determine: the yield
-force F_y(u) = alpha(u) z_max [N], the yield displacement x_y = z_max/A [m] and the share g = gamma/(gamma + beta). With
-z_max = (A/(gamma + beta))^(1/n) the thesis' alpha, A, gamma, beta of (2.1) to (2.3) follow from these once one of them is
-chosen (only three of the four can be told from measurements), see :func:`thesis_parameters`.
+The hysteretic variable is normalised to its limit, so that the numbers are those which measurements determine: the
+yield force F_y(u) = alpha(u) z_max [N], the yield displacement x_y = z_max/A [m], the share g = gamma/(gamma + beta).
+With z_max = (A/(gamma + beta))^(1/n) the thesis' alpha, A, gamma, beta of (2.1) to (2.3) follow from these once one of
+them is chosen (only three of the four can be told from measurements), see :func:`thesis_parameters`.
 
-Parameters by form (SI; `u` is the drive in A or V; polynomial coefficients from the constant `_a` up to the cube `_d`, those
-left out are 0):
+Parameters by form (SI; `u` is the drive in A or V; polynomial coefficients from the constant `_a` up to the cube `_d`,
+those left out are 0):
 
 | form | parameters |
 | --- | --- |
-| all | `c0_a`..`c0_d` (N s/m, N s/m/u, ...), `yield_force_a`..`yield_force_d` (N, N/u, ...), `eta` (1/s; infinite: no lag) |
+| all | `c0_a`..`_d` (N s/m, N s/m/u, ...), `yield_force_a`..`_d` (N, N/u, ...), `eta` (1/s; left out: no lag) |
 | `bouc-wen`, `dahl` | `yield_displacement` (m), `gamma_share`, `exponent` |
 | `bingham` | `transition_velocity` (m/s; 0: a jump) |
 | `modified-bouc-wen` | as bouc-wen, and `c1_a`, `c1_b`, `k0`, `k1` (N/m), `x0` (m) |
@@ -35,7 +35,7 @@ from mrpipe.dampers import viscoplastic as _viscoplastic
 from mrpipe.dampers.plant import FORCE, Chain, Step, build_chain, run_chain
 from mrpipe.errors import UserError
 
-FORMS = (
+KNOWN_FORMS = (
     "bouc-wen",
     "modified-bouc-wen",
     "bingham",
@@ -57,7 +57,7 @@ class DamperModel:
     Attributes
     ----------
     form
-        One of :data:`FORMS`.
+        One of :data:`KNOWN_FORMS`.
     parameters
         Name -> value, SI, named as in the table of this module.
     drive_unit
@@ -77,11 +77,11 @@ class DamperModel:
 
     def yield_force(self, drive: FloatArray | float) -> FloatArray:
         """Return F_y(u) [N] at rest of all lags, of the shape of `drive`."""
-        return np.polynomial.polynomial.polyval(np.asarray(drive, dtype=np.float64), self.polynomial("yield_force"))
+        return _polynomial(drive, self.polynomial("yield_force"))
 
     def viscosity(self, drive: FloatArray | float) -> FloatArray:
         """Return c0(u) [N s/m], of the shape of `drive`."""
-        return np.polynomial.polynomial.polyval(np.asarray(drive, dtype=np.float64), self.polynomial("c0"))
+        return _polynomial(drive, self.polynomial("c0"))
 
     def steps(self) -> list[Step]:
         """Return the steps of the model, to be put in a chain with those of effects."""
@@ -123,7 +123,15 @@ class DamperModel:
         drive: FloatArray,
         dt: float,
     ) -> FloatArray:
-        """Return the force [N], shape (n,), for a recorded motion of the same shape (m, m/s, m/s^2, A or V; dt in s)."""
+        """Return the force [N], shape (n,), for a recorded motion.
+
+        Parameters
+        ----------
+        displacement, velocity, acceleration, drive
+            Shape (n,); m, m/s, m/s^2, A or V.
+        dt
+            Sampling interval [s].
+        """
         return run_chain(self.chain(), displacement, velocity, acceleration, drive, dt)[:, FORCE]
 
     def quasi_static_force(self, velocity: FloatArray | float, drive: FloatArray | float) -> FloatArray:
@@ -143,7 +151,7 @@ class DamperModel:
         elif self.form == "bingham" and numbers.get("transition_velocity", 0.0) > 0.0:
             force = force * np.tanh(speed / numbers["transition_velocity"])
         elif self.form == "rounded-yield":
-            rounded = np.polynomial.polynomial.polyval(np.asarray(drive), self.polynomial("rounded_force"))
+            rounded = _polynomial(drive, self.polynomial("rounded_force"))
             force = force + rounded * np.tanh(speed / numbers["velocity_scale"])
         total = force + viscous
         if self.form == "modified-bouc-wen":
@@ -157,6 +165,11 @@ class DamperModel:
         if self.form == "dahl":
             return numbers["yield_displacement"], 1.0, 1.0
         return numbers["yield_displacement"], numbers.get("gamma_share", 0.5), numbers.get("exponent", 2.0)
+
+
+def _polynomial(drive: FloatArray | float, coefficients: FloatArray) -> FloatArray:
+    values = np.polynomial.polynomial.polyval(np.asarray(drive, dtype=np.float64), coefficients)
+    return np.asarray(values, dtype=np.float64)
 
 
 def parameter_unit(name: str, drive_unit: str) -> str:
@@ -219,8 +232,8 @@ def damper_from_parameter_set(parameters: ParameterSet) -> DamperModel:
     """
     source = f"configs/dampers/{parameters.name}"
     given = {name: float(value) for name, value in parameters.values.items()}
-    if parameters.model not in FORMS:
-        raise UserError(source, "model", f"{parameters.model!r} is no damper form", f"known: {', '.join(FORMS)}")
+    if parameters.model not in KNOWN_FORMS:
+        raise UserError(source, "model", f"{parameters.model!r} is no damper form", f"known: {', '.join(KNOWN_FORMS)}")
     if "drive_limit" not in given:
         raise UserError(source, "parameters", "no drive_limit", "write {value: 4, unit: A}")
     drive_limit = given.pop("drive_limit")

@@ -5,13 +5,15 @@ alpha z + c0 w' + k0 w + k1 (x - x0), which is (1) again. z follows w without ra
 monotone scalar equation: the trapezoidal rule in w, stable however stiff the yield is.
 """
 
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, njit
+from numba import float64, int64, njit, void
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.hysteresis import advance_hysteresis
+from mrpipe.dampers.motion import Motion
 from mrpipe.dampers.plant import (
     CURRENT,
     DISPLACEMENT,
@@ -158,3 +160,84 @@ def series_dashpot(
         Step("series-dashpot", Phase.HYSTERESIS, series_step, inner, state_size=3),
         Step("springs", Phase.FORCE_EFFECT, spring_step, outer),
     )
+
+
+@njit(
+    void(
+        float64[::1],
+        float64[::1],
+        int64[::1],
+        float64[::1],
+        float64[::1],
+        float64[::1],
+        float64[::1],
+        float64[::1],
+        float64[::1],
+    ),
+    cache=True,
+)
+def _series(
+    displacement: FloatArray,
+    velocity: FloatArray,
+    starts: IntArray,
+    dt: FloatArray,
+    yield_force: FloatArray,
+    viscosity: FloatArray,
+    series_viscosity: FloatArray,
+    numbers: FloatArray,
+    result: FloatArray,
+) -> None:
+    stiffness, yield_displacement, gamma_share, exponent = numbers[0], numbers[1], numbers[2], numbers[3]
+    for test in range(starts.shape[0] - 1):
+        w = 0.0
+        zeta = 0.0
+        for index in range(starts[test], starts[test + 1]):
+            c0 = max(viscosity[index], 0.0)
+            c1 = max(series_viscosity[index], 0.0)
+            strength = max(yield_force[index], 0.0)
+            if index > starts[test]:
+                increment = displacement[index] - displacement[index - 1]
+                change = inner_increment(
+                    w, zeta, increment, dt[test], strength, c0, c1, stiffness, yield_displacement, gamma_share, exponent
+                )
+                w += change
+                zeta = advance_hysteresis(zeta, change, yield_displacement, gamma_share, exponent)
+            inner = (c1 * velocity[index] - strength * zeta - stiffness * w) / (c0 + c1)
+            result[index] = strength * zeta + c0 * inner + stiffness * w
+
+
+def force_series(
+    motion: Motion,
+    yield_force: FloatArray,
+    viscosity: FloatArray,
+    series_viscosity: FloatArray,
+    inner_stiffness: float,
+    hysteresis: tuple[float, float, float],
+) -> FloatArray:
+    """Return the force [N] without k1's, shape (n,), over recordings laid end to end.
+
+    Parameters
+    ----------
+    motion
+        The recordings.
+    yield_force, viscosity, series_viscosity
+        alpha z_max [N], c0 and c1 [N s/m] at each sample, shape (n,).
+    inner_stiffness
+        k0 [N/m].
+    hysteresis
+        Yield displacement [m], gamma share, exponent.
+    """
+    result = np.empty(len(motion.displacement))
+    numbers = np.array([inner_stiffness, *hysteresis])
+    _series(
+        motion.displacement,
+        motion.velocity,
+        motion.starts,
+        motion.dt,
+        yield_force,
+        viscosity,
+        series_viscosity,
+        numbers,
+        result,
+    )
+    return result

@@ -4,6 +4,7 @@ Real recordings ask for these more than for any other refinement of the Bouc-Wen
 speed, steeply first, then ever less.
 """
 
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import math
@@ -105,7 +106,7 @@ def advance_dashpot(
     """Return atanh(z) after `dt` [s] of z' = q (v - v0 atanh z).
 
     A spring of q [1/m] in series with a dashpot that saturates: z = tanh(v/v0) in the steady state. Two-stage
-    diagonally implicit Runge-Kutta (L-stable, second order), the velocity running straight from `previous` to `present`.
+    diagonally implicit Runge-Kutta (L-stable, second order); the velocity runs straight from `previous` to `present`.
     """
     gain = stiffness * dt
     weight = _SDIRK * gain * velocity_scale
@@ -153,7 +154,10 @@ def _series(
 def dashpot_series(
     velocity: FloatArray, starts: IntArray, dt: FloatArray, stiffness: float, velocity_scale: float
 ) -> FloatArray:
-    """Return z, shape (n,), of :func:`advance_dashpot` over recordings laid end to end (starts: see hysteresis_series)."""
+    """Return z, shape (n,), of :func:`advance_dashpot` over recordings laid end to end.
+
+    `starts` and `dt` as in :func:`mrpipe.dampers.drive.lag_series`; velocity in m/s.
+    """
     result = np.empty(len(velocity))
     _series(
         np.ascontiguousarray(velocity, dtype=np.float64),

@@ -1,0 +1,141 @@
+"""Several forms fitted to the same tests and judged on tests that no fit has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrpipe.artifacts import Progress, no_progress
+from mrpipe.dampers.fit import FormFit, Projection, fit_form
+from mrpipe.dampers.form import Form, Scales
+from mrpipe.dampers.samples import FitData, fit_data
+from mrpipe.dampers.scoring import PooledScore, TestScore, pool, score_tests
+from mrpipe.signals.prepared import PreparedTest
+
+COSTLY_MOTION = 15_000
+"""Samples of motion that a costly form is fitted on."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How forms are fitted, see :func:`mrpipe.dampers.fit.fit_form` and :func:`mrpipe.dampers.samples.fit_data`."""
+
+    method: str = "least-squares"
+    starts: int = 2
+    cycles: int = 3
+    maximum_samples: int = 60_000
+    raw_force: bool = False
+    offsets: bool = True
+    equal_tests: bool = False
+
+
+@dataclass(frozen=True)
+class JudgedFit:
+    """A fitted form with its errors.
+
+    Attributes
+    ----------
+    fit
+        The form and its numbers.
+    tests
+        Score of every test, in the order given.
+    training, validation
+        Pooled figures; not a number where there are no tests of the role.
+    cross_validated_nrmse
+        NRMSE over training tests left out in turn; None where that was not asked for.
+    """
+
+    fit: FormFit
+    tests: tuple[TestScore, ...]
+    training: PooledScore
+    validation: PooledScore
+    cross_validated_nrmse: float | None = None
+
+
+def compare_forms(
+    forms: Sequence[Form],
+    tests: Sequence[PreparedTest],
+    scales: Scales,
+    options: FitOptions,
+    *,
+    folds: int = 0,
+    progress: Progress = no_progress,
+) -> list[JudgedFit]:
+    """Fit every form to the training tests and score it on all; `folds` above 1 adds cross-validation."""
+    training = [test for test in tests if test.role == "training"]
+    data = fit_data(
+        training,
+        cycles=options.cycles,
+        maximum_samples=options.maximum_samples,
+        raw_force=options.raw_force,
+    )
+    judged = []
+    for place, form in enumerate(forms):
+        progress(place / len(forms), f"fit {form.name}")
+        fit = _fit(form, data, scales, options)
+        left_out = cross_validate(fit, data, options, folds) if folds > 1 else None
+        judged.append(judge(fit, tests, raw_force=options.raw_force, cross_validated_nrmse=left_out))
+    progress(1.0, "fitted")
+    return judged
+
+
+def judge(
+    fit: FormFit,
+    tests: Sequence[PreparedTest],
+    *,
+    raw_force: bool = False,
+    cross_validated_nrmse: float | None = None,
+) -> JudgedFit:
+    """Score a fit on all tests."""
+    scores = score_tests(fit.model, tests, raw_force=raw_force)
+    return JudgedFit(
+        fit=fit,
+        tests=scores,
+        training=pool([score for score in scores if score.role == "training"]),
+        validation=pool([score for score in scores if score.role == "validation"]),
+        cross_validated_nrmse=cross_validated_nrmse,
+    )
+
+
+def cross_validate(fit: FormFit, data: FitData, options: FitOptions, folds: int) -> float:
+    """Return the NRMSE on stretches left out in turn: whole tests where there are enough, else parts of them.
+
+    The model runs over all of the motion each time; the forces left out are not compared in the fit.
+    """
+    group = data.test if data.motion.tests >= 2 * folds else data.block
+    _, group = np.unique(group, return_inverse=True)
+    error = force = 0.0
+    for fold in range(folds):
+        out = group % folds == fold
+        if not out.any() or out.all():
+            continue
+        again = _fit(fit.form, data.subset(~out), fit.scales, options, warm=fit.values)
+        missed = Projection(fit.form, fit.scales, data.subset(out), offsets=False, weights=None)
+        columns, target = missed.columns(again.values)
+        error += float(np.sum((target - again.linear @ columns) ** 2))
+        force += float(np.sum(missed.data.force**2))
+    return float(np.sqrt(error / force)) if force > 0.0 else float("nan")
+
+
+def _fit(
+    form: Form, data: FitData, scales: Scales, options: FitOptions, warm: dict[str, float] | None = None
+) -> FormFit:
+    chosen = data.thinned(COSTLY_MOTION) if form.costly else data
+    weights = None
+    if options.equal_tests:
+        _, owner = np.unique(chosen.test, return_inverse=True)
+        power = np.bincount(owner, weights=chosen.force**2) / np.bincount(owner)
+        weights = 1.0 / np.sqrt(power)[owner]
+        weights = weights / np.sqrt(np.mean(weights**2))
+    return fit_form(
+        form,
+        chosen,
+        scales,
+        method=options.method,
+        starts=1 if form.costly else options.starts,
+        offsets=options.offsets,
+        weights=weights,
+        warm=warm,
+    )
