@@ -1,0 +1,107 @@
+"""Settings of the virtual rig (`record`)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from mrpipe.config.section import Section
+
+
+class PlantedEffect(Section):
+    """An effect of the true damper."""
+
+    name: str = Field(
+        description="Name of the effect, as the contract lists them; `unfamiliar` for shapes of no family."
+    )
+    form: str = Field("", description="Which functional form; empty for the first one.")
+    strength_share: float | None = Field(
+        None, gt=0.0, lt=2.0, description="RMS of the effect over RMS of the force; scales the form's first number."
+    )
+    parameters: dict[str, float] = Field(
+        default_factory=dict, description="Numbers of the form in SI; those left out take the form's own."
+    )
+
+
+class CustomTest(Section):
+    """One test of a plan of one's own."""
+
+    name: str = Field(description="Name of the test.")
+    role: Literal["training", "validation", "repeat"] = Field("training", description="What it is for.")
+    motion: Literal["sine", "triangle", "random", "earthquake", "dwell", "hold"] = Field(
+        "sine", description="Motion; `dwell` visits several positions, `hold` pauses in the middle."
+    )
+    amplitude_m: float = Field(0.010, gt=0.0, description="Amplitude or largest excursion [m].")
+    frequency_hz: float = Field(1.0, gt=0.0, description="Frequency, or upper end of the band of random motion [Hz].")
+    current: Literal["constant", "half-sine", "steps", "random"] = Field("constant", description="Kind of current.")
+    current_a: float = Field(0.0, ge=0.0, description="Level, amplitude or largest value of the current [A].")
+    duration_s: float = Field(10.0, gt=0.0, description="Duration [s].")
+    repeat_of: str = Field("", description="Test whose command is repeated.")
+    pause_s: float = Field(0.4, gt=0.0, description="Pause of `hold`, or time between steps of current [s].")
+
+
+class BenchSensorSettings(Section):
+    """Noise and constant offsets, as standard deviations."""
+
+    displacement_noise_m: float = Field(10e-6, ge=0.0, description="Noise of the displacement sensor [m].")
+    acceleration_noise_m_s2: float = Field(0.1, ge=0.0, description="Noise of the accelerometer [m/s2].")
+    force_noise_n: float = Field(0.5, ge=0.0, description="Noise of the load cell [N].")
+    current_noise_a: float = Field(5e-3, ge=0.0, description="Noise of the current measurement [A].")
+    displacement_offset_m: float = Field(2e-4, ge=0.0, description="Offset of the displacement sensor [m].")
+    acceleration_offset_m_s2: float = Field(0.05, ge=0.0, description="Offset of the accelerometer [m/s2].")
+    force_offset_n: float = Field(2.0, ge=0.0, description="Offset of the load cell [N].")
+    current_offset_a: float = Field(2e-3, ge=0.0, description="Offset of the current measurement [A].")
+    colour: Literal["white", "coloured"] = Field("white", description="Spectrum of the noise.")
+
+
+class ServoSettings(Section):
+    """How the testing machine departs from its command."""
+
+    amplitude_error: float = Field(0.005, ge=0.0, description="Standard deviation of the amplitude error [1].")
+    harmonic_share: float = Field(
+        0.004, ge=0.0, description="Standard deviation of second and third harmonic over the amplitude [1]."
+    )
+    smoothing_s: float = Field(0.004, gt=0.0, description="Width of the machine's own smoothing [s].")
+
+
+class BenchSettings(Section):
+    """The bench campaign."""
+
+    plan: str = Field(
+        "table-2.1",
+        description="`table-2.1`, `compact` (44 short tests of unlike motions), `discriminating` (tests that tell alike "
+        "effects apart), several joined by +, or `custom` (the tests listed alone).",
+    )
+    tests: tuple[CustomTest, ...] = Field((), description="Tests in addition to the plan.")
+    cycles: int = Field(10, ge=2, description="Steady cycles of each test of Table 2.1.")
+    short_test_s: float = Field(5.0, gt=1.0, description="Duration of a test of the compact plan [s].")
+    sampling_rate_hz: float = Field(1000.0, ge=100.0, description="Rate of the recorder [Hz].")
+    fine_steps: int = Field(4, ge=1, le=32, description="Integration steps a sample of the true damper.")
+    current_phase_spread_rad: float = Field(
+        1.5707963, ge=0.0, description="Half width of the draw of the half-sine current's phase about the velocity's."
+    )
+    sensors: BenchSensorSettings = Field(BenchSensorSettings(), description="Noise and offsets.")
+    servo: ServoSettings = Field(ServoSettings(), description="The testing machine.")
+    data_format: Literal["h5", "csv"] = Field("h5", description="Format of the data files.")
+
+
+class LaboratorySettings(Section):
+    """The virtual rig: one damper, its bench, the frame, the shaking table."""
+
+    damper: str = Field("set-c", description="Parameter set of the true damper (configs/dampers, or a YAML file).")
+    declared_effects: tuple[PlantedEffect, ...] = Field(
+        (PlantedEffect(name="backlash", form="held", parameters={"gap": 15e-6}),),
+        description="Effects of the true damper that campaign.yaml names.",
+    )
+    hidden_effects: tuple[PlantedEffect, ...] = Field(
+        (PlantedEffect(name="remanence", form="relaxing"),),
+        description="Effects of the true damper that campaign.yaml keeps back; the truth lies sealed beside it.",
+    )
+    draw_hidden_share: float | None = Field(
+        None, gt=0.0, lt=1.0, description="Draw one more hidden effect from the seed, of this share of the force RMS."
+    )
+    vary_damper: float = Field(
+        0.0, ge=0.0, le=0.5, description="Log-normal spread by which the damper departs from its set (0: as printed)."
+    )
+    bench: BenchSettings = Field(BenchSettings(), description="The bench campaign.")

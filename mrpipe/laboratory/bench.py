@@ -1,0 +1,236 @@
+"""The bench of the virtual rig: servo, damper, sensors; one campaign from a plan."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.campaigns import TestFile
+from mrpipe.laboratory.damper import (
+    FineMotion,
+    FineResponse,
+    TrueDamper,
+    calibrate_strength,
+    effect_share,
+    respond,
+)
+from mrpipe.laboratory.motion import BenchTest, Servo, current_of, displacement_of
+
+CHANNELS = {
+    "displacement": ("x", "mm"),
+    "acceleration": ("a", "m/s^2"),
+    "drive": ("i", "A"),
+    "force": ("F", "N"),
+}
+_KNOCK_FREQUENCY_HZ, _KNOCK_DECAY_S, _KNOCK_SHARE = 145.0, 0.008, 0.05
+_CALIBRATION_TESTS = 24
+
+
+@dataclass(frozen=True)
+class BenchSensors:
+    """Noise (standard deviation) and constant offset (standard deviation of its draw) of each channel, SI.
+
+    Attributes
+    ----------
+    colour
+        `white`, or `coloured`: a first-order spectrum with its corner at 8 Hz, same standard deviation.
+    """
+
+    displacement_noise_m: float = 10e-6
+    acceleration_noise_m_s2: float = 0.1
+    force_noise_n: float = 0.5
+    current_noise_a: float = 5e-3
+    displacement_offset_m: float = 2e-4
+    acceleration_offset_m_s2: float = 0.05
+    force_offset_n: float = 2.0
+    current_offset_a: float = 2e-3
+    colour: Literal["white", "coloured"] = "white"
+
+
+@dataclass(frozen=True)
+class BenchRig:
+    """The machine around the damper.
+
+    Attributes
+    ----------
+    sampling_rate_hz
+        Of the recorder.
+    fine_steps
+        Integration steps a sample.
+    current_phase_spread_rad
+        Half width of the draw of the half-sine current's phase about that of the velocity.
+    """
+
+    servo: Servo = field(default_factory=Servo)
+    sensors: BenchSensors = field(default_factory=BenchSensors)
+    sampling_rate_hz: float = 1000.0
+    fine_steps: int = 4
+    current_phase_spread_rad: float = float(np.pi / 2)
+
+
+@dataclass(frozen=True)
+class BenchRecord:
+    """A campaign ready to be written, and its truth."""
+
+    tests: list[TestFile]
+    truth: dict[str, Any]
+    damper: TrueDamper
+
+
+def fine_motion(test: BenchTest, rig: BenchRig, seed: int) -> FineMotion:
+    """Return what the machine does in a test; a test and its repeat have the same command."""
+    key = zlib.crc32((test.repeat_of or test.name).encode())
+    rng = np.random.default_rng([seed, key])
+    step = 1.0 / (rig.sampling_rate_hz * rig.fine_steps)
+    samples = round(test.duration_s * rig.sampling_rate_hz)
+    time = np.arange(samples * rig.fine_steps) * step
+    x = displacement_of(test, rig.servo, time, rng)
+    v = np.gradient(x, step)
+    current = current_of(test, time, v, rig.current_phase_spread_rad, rng)
+    own = np.random.default_rng([seed, zlib.crc32(test.name.encode()), 7])
+    return FineMotion(test.name, test.role, step, x, v, np.gradient(v, step), current, float(own.standard_normal()))
+
+
+def noise(size: int, deviation: float, colour: str, rate_hz: float, rng: np.random.Generator) -> FloatArray:
+    """Return noise of a standard deviation, shape (size,)."""
+    white = rng.standard_normal(size)
+    if colour == "white":
+        return deviation * white
+    keep = float(np.exp(-2.0 * np.pi * 8.0 / rate_hz))
+    start = rng.standard_normal() * keep
+    shaped, _ = signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], white, zi=np.array([start]))
+    return np.asarray(deviation * shaped)
+
+
+def _knocks(response: FineResponse, step: float) -> FloatArray:
+    """Return the acceleration that closing of the play rings up [m/s2] on the fine clock."""
+    if not np.any(response.knock):
+        return np.zeros(response.force.size)
+    time = np.arange(0.0, 6.0 * _KNOCK_DECAY_S, step)
+    ring = np.exp(-time / _KNOCK_DECAY_S) * np.sin(2.0 * np.pi * _KNOCK_FREQUENCY_HZ * time)
+    pulses = response.knock * _KNOCK_SHARE * 2.0 * np.pi * _KNOCK_FREQUENCY_HZ
+    return np.asarray(signal.fftconvolve(pulses, ring)[: pulses.size])
+
+
+def _recorded(
+    test: BenchTest,
+    motion: FineMotion,
+    response: FineResponse,
+    rig: BenchRig,
+    offsets: FloatArray,
+    rng: np.random.Generator,
+) -> tuple[TestFile, float]:
+    sensors, every = rig.sensors, rig.fine_steps
+    truth = {
+        "displacement": motion.displacement[::every],
+        "acceleration": (motion.acceleration + _knocks(response, motion.step_s))[::every],
+        "drive": motion.current[::every],
+        "force": response.force[::every],
+    }
+    deviations = (
+        sensors.displacement_noise_m,
+        sensors.acceleration_noise_m_s2,
+        sensors.current_noise_a,
+        sensors.force_noise_n,
+    )
+    columns, disturbed = {}, 0.0
+    for (quantity, exact), deviation, offset in zip(truth.items(), deviations, offsets, strict=True):
+        error = noise(exact.size, deviation, sensors.colour, rig.sampling_rate_hz, rng)
+        if quantity == "force":
+            disturbed = float(np.sum(error**2))
+        scale = 1e3 if quantity == "displacement" else 1.0
+        columns[CHANNELS[quantity][0]] = scale * (exact + offset + error)
+    about = {"excitation": test.motion, "current": test.current, "current_a": test.current_a}
+    details: dict[str, Any] = {"frequency_hz": test.frequency_hz, "amplitude_m": test.amplitude_m, "about": about}
+    if test.repeat_of:
+        details["repeat_of"] = test.repeat_of
+    return TestFile(test.name, test.role, columns, details), disturbed
+
+
+def _spread(motions: Sequence[FineMotion], count: int) -> list[FineMotion]:
+    training = [motion for motion in motions if motion.role != "validation"] or list(motions)
+    # a stride that shares no factor with the five frequencies of Table 2.1
+    places = np.unique(np.linspace(0, len(training) - 1, min(count, len(training))).round().astype(int))
+    return [training[place] for place in places]
+
+
+def record_bench(
+    damper: TrueDamper,
+    tests: Sequence[BenchTest],
+    rig: BenchRig,
+    rng: np.random.Generator,
+    progress: Progress = no_progress,
+) -> BenchRecord:
+    """Record a campaign.
+
+    Parameters
+    ----------
+    damper
+        Effects with a `strength_share` get the strength that reaches it on the training tests.
+    tests
+        The plan.
+    rig
+        Servo, sensors, clock.
+    rng
+        Generator: one number is drawn, from which each test has its own.
+    progress
+        Told how far it is.
+
+    Raises
+    ------
+    UserError
+        If a share is out of reach.
+    """
+    seed = int(rng.integers(2**62))
+    motions = [fine_motion(test, rig, seed) for test in tests]
+    damper = calibrated(damper, motions)
+    sensors = rig.sensors
+    draw = np.random.default_rng([seed, 1]).standard_normal(4)
+    offsets = draw * np.array(
+        [
+            sensors.displacement_offset_m,
+            sensors.acceleration_offset_m_s2,
+            sensors.current_offset_a,
+            sensors.force_offset_n,
+        ]
+    )
+    files, disturbed, total = [], 0.0, 0.0
+    for number, (test, motion) in enumerate(zip(tests, motions, strict=True)):
+        response = respond(damper, motion)
+        file, error = _recorded(test, motion, response, rig, offsets, np.random.default_rng([seed, 2, number]))
+        files.append(file)
+        if test.role == "validation":
+            disturbed += error
+            total += float(np.sum(response.force[:: rig.fine_steps] ** 2))
+        progress((number + 1) / len(tests), test.name)
+    shares = {
+        item.name: effect_share(damper, index, _spread(motions, _CALIBRATION_TESTS))
+        for index, item in enumerate(damper.effects)
+    }
+    truth = {
+        "damper": damper.name,
+        "parameters": dict(zip(BASE_NAMES, damper.base.tolist(), strict=True)),
+        "effects": [{**item.described(), "share_of_force_rms": shares[item.name]} for item in damper.effects],
+        "offsets": dict(zip(CHANNELS, offsets.tolist(), strict=True)),
+        "noise_floor_nrmse": float(np.sqrt(disturbed / total)) if total > 0.0 else None,
+        "seed": seed,
+    }
+    return BenchRecord(files, truth, damper)
+
+
+def calibrated(damper: TrueDamper, motions: Sequence[FineMotion]) -> TrueDamper:
+    """Return the damper with all strengths that are given as shares solved for, in order."""
+    some = _spread(motions, _CALIBRATION_TESTS)
+    for index, effect in enumerate(damper.effects):
+        if effect.strength_share is not None:
+            damper = calibrate_strength(damper, index, some)
+    return damper
+
+
+BASE_NAMES = ("alpha_a", "alpha_b", "alpha_c", "alpha_d", "c0_a", "c0_b", "A", "gamma", "beta", "n", "eta")

@@ -1,0 +1,218 @@
+"""The true damper: base numbers, planted effects, and the strength that gives an effect its share of the force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray, load_parameter_set
+from mrpipe.errors import UserError
+from mrpipe.laboratory.effects import CHANNEL_SKEW_CONSTANT, SENSOR_CODES, Planted, packed
+from mrpipe.laboratory.kernel import BASE, run_damper
+
+
+@dataclass(frozen=True)
+class TrueDamper:
+    """A damper with what nobody declared.
+
+    Attributes
+    ----------
+    base
+        Shape (11,), the numbers of :data:`~mrpipe.laboratory.kernel.BASE`, SI.
+    effects
+        Planted effects.
+    name
+        Of the base set.
+    """
+
+    base: FloatArray
+    effects: tuple[Planted, ...] = ()
+    name: str = "set-c"
+
+    def with_effects(self, effects: Sequence[Planted]) -> TrueDamper:
+        """Return the damper with other effects."""
+        return replace(self, effects=tuple(effects))
+
+
+@dataclass(frozen=True)
+class FineMotion:
+    """Motion and current of one test on the fine clock, shape (n,), SI; `offset_draw` is this test's own number."""
+
+    name: str
+    role: str
+    step_s: float
+    displacement: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    current: FloatArray
+    offset_draw: float = 0.0
+
+
+@dataclass(frozen=True)
+class FineResponse:
+    """Force at the load cell and closures of the play, shape (n,)."""
+
+    force: FloatArray
+    knock: FloatArray
+
+
+def damper_from_set(name: str) -> TrueDamper:
+    """Return the damper of a parameter set in configs/dampers (or a YAML file), without effects.
+
+    Raises
+    ------
+    UserError
+        If the set is missing or is no simplified Bouc-Wen set.
+    """
+    values = load_parameter_set("dampers", name)
+    missing = [key for key in BASE if key not in values.values]
+    if missing:
+        raise UserError(f"damper {name}", f"parameters.{missing[0]}", "is missing", "a set of (2.1) to (2.4) expected")
+    return TrueDamper(np.array([values.scalar(key) for key in BASE]), (), values.name)
+
+
+def draw_damper(rng: np.random.Generator, around: TrueDamper, spread: float = 0.2) -> TrueDamper:
+    """Return a damper whose numbers differ from another's by log-normal factors (n stays, alpha scales as a whole)."""
+    base = around.base.copy()
+    base[:4] *= np.exp(spread * rng.standard_normal())
+    base[4:6] *= np.exp(spread * rng.standard_normal(2))
+    yielding = np.exp(0.5 * spread * rng.standard_normal())
+    base[6:9] *= yielding
+    tilt = 1.0 + 0.3 * spread * rng.standard_normal()
+    base[7], base[8] = base[7] * tilt, base[8] * (2.0 - tilt)
+    base[10] *= np.exp(spread * rng.standard_normal())
+    return TrueDamper(base, around.effects, f"{around.name}, varied")
+
+
+def respond(damper: TrueDamper, motion: FineMotion) -> FineResponse:
+    """Return what the damper answers to a motion, without noise."""
+    effects = [
+        Planted(item.form, {**item.values, item.form.numbers[0].name: item.strength * motion.offset_draw})
+        if item.form.form == "per-test"
+        else item
+        for item in damper.effects
+    ]
+    codes, values = packed(tuple(effects))
+    for row, item in enumerate(entry for entry in effects if entry.form.code not in SENSOR_CODES):
+        if item.form.form == "per-test":
+            values[row, 1] = 1.0
+        if item.form.form == "driver" or item.form.form == "knee":
+            values[row, 0] = max(values[row, 0], 1e-6)
+    force, knock, _ = run_damper(
+        damper.base,
+        codes,
+        values,
+        motion.displacement,
+        motion.velocity,
+        motion.acceleration,
+        motion.current,
+        motion.step_s,
+    )
+    for item in effects:
+        if item.form.code in SENSOR_CODES:
+            force = _skewed(force, item, motion.step_s)
+    return FineResponse(force, knock)
+
+
+def _skewed(force: FloatArray, effect: Planted, step_s: float) -> FloatArray:
+    """Return the force as a channel that lags gives it: a pure shift, or the filter of another amplifier."""
+    if effect.strength <= 0.0:
+        return force
+    if effect.form.code == CHANNEL_SKEW_CONSTANT:
+        time = np.arange(force.size) * step_s
+        return np.interp(time - effect.strength, time, force)
+    # a Bessel filter of order two delays low frequencies by norm / (2 pi f)
+    b, a = signal.bessel(2, 1.0 / effect.strength, norm="delay", fs=1.0 / step_s)
+    start = signal.lfilter_zi(b, a) * force[0]
+    return np.asarray(signal.lfilter(b, a, force, zi=start)[0])
+
+
+def effect_share(damper: TrueDamper, index: int, motions: Sequence[FineMotion]) -> float:
+    """Return the RMS of one effect's part of the force over the RMS of the force without it, pooled over tests."""
+    without = damper.with_effects([item for place, item in enumerate(damper.effects) if place != index])
+    return _share(damper, motions, [respond(without, motion).force for motion in motions])
+
+
+def _share(damper: TrueDamper, motions: Sequence[FineMotion], reference: Sequence[FloatArray]) -> float:
+    change = sum(
+        float(np.sum((respond(damper, motion).force - force) ** 2))
+        for motion, force in zip(motions, reference, strict=True)
+    )
+    return float(np.sqrt(change / sum(float(np.sum(force**2)) for force in reference)))
+
+
+def calibrate_strength(
+    damper: TrueDamper, index: int, motions: Sequence[FineMotion], *, tolerance: float = 0.01
+) -> TrueDamper:
+    """Return the damper with the strength of one effect such that it reaches its share of the force RMS.
+
+    Parameters
+    ----------
+    damper
+        With the effect in place; its `strength_share` is what is wanted.
+    index
+        Which effect.
+    motions
+        Tests to pool.
+    tolerance
+        Of the share, relative.
+
+    Raises
+    ------
+    UserError
+        If the share is out of reach on these tests.
+    """
+    effect = damper.effects[index]
+    wanted = effect.strength_share
+    if wanted is None:
+        return damper
+    others = list(damper.effects)
+    without = damper.with_effects(others[:index] + others[index + 1 :])
+    reference = [respond(without, motion).force for motion in motions]
+
+    def share_at(strength: float) -> float:
+        changed = damper.with_effects([*others[:index], effect.with_strength(strength), *others[index + 1 :]])
+        return _share(changed, motions, reference)
+
+    strength = _solve(share_at, wanted, abs(effect.strength), effect.form.strongest, tolerance)
+    if strength is None:
+        raise UserError(
+            f"effect {effect.name} ({effect.form.form})",
+            "strength_share",
+            f"{wanted:g} is out of reach on these tests",
+            "ask for less, or for tests that excite it",
+        )
+    return damper.with_effects([*others[:index], effect.with_strength(strength), *others[index + 1 :]])
+
+
+def _solve(share_at: object, wanted: float, guess: float, strongest: float, tolerance: float) -> float | None:
+    """Return the strength by bracketing and regula falsi on logarithms; None where it is out of reach."""
+    assert callable(share_at)
+    low, high = 0.0, 0.0
+    low_share, high_share = 0.0, 0.0
+    strength = min(guess, strongest) or 1e-6
+    for _ in range(40):
+        share = float(share_at(strength))
+        if abs(share / wanted - 1.0) < tolerance:
+            return strength
+        if share < wanted:
+            low, low_share = strength, share
+        else:
+            high, high_share = strength, share
+        if high == 0.0:
+            if strength >= strongest:
+                return None
+            grow = np.clip(1.2 * wanted / max(share, 1e-12), 1.3, 30.0)
+            strength = min(strength * float(grow), strongest)
+        elif low == 0.0:
+            shrink = np.clip(0.9 * wanted / share, 1e-3, 0.8)
+            strength *= float(shrink)
+        elif low_share > 0.0:
+            part = np.log(wanted / low_share) / np.log(high_share / low_share)
+            strength = float(low * (high / low) ** np.clip(part, 0.05, 0.95))
+        else:
+            strength = 0.5 * (low + high)
+    return strength

@@ -1,0 +1,57 @@
+"""Putting a recorded campaign and its sealed truth in place."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mrpipe.artifacts import atomic_write_text
+
+SEALED = "sealed.json"
+
+
+@contextmanager
+def campaign_directory(final: Path) -> Iterator[Path]:
+    """Yield an empty directory beside `final` that takes its place when the block ends without an exception."""
+    final = Path(final)
+    final.parent.mkdir(parents=True, exist_ok=True)
+    for left in final.parent.glob(f".{final.name}.*.tmp"):
+        shutil.rmtree(left, ignore_errors=True)
+    temporary = final.with_name(f".{final.name}.{os.getpid()}.tmp")
+    temporary.mkdir()
+    try:
+        yield temporary
+        if final.exists():
+            # two renames: a kill between them leaves no campaign, which the next call records again
+            aside = final.with_name(f".{final.name}.{os.getpid()}.old.tmp")
+            final.rename(aside)
+            temporary.rename(final)
+            shutil.rmtree(aside)
+        else:
+            temporary.rename(final)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def sealed_path(campaign: Path) -> Path:
+    """Return where the truth of a campaign lies: beside the campaign, never within it."""
+    campaign = Path(campaign)
+    return campaign.with_name(f"{campaign.name}.truth") / SEALED
+
+
+def write_sealed(campaign: Path, truth: Mapping[str, Any]) -> Path:
+    """Write the truth of a campaign and return the file."""
+    path = sealed_path(campaign)
+    atomic_write_text(path, json.dumps(truth, indent=1))
+    return path
+
+
+def open_sealed(campaign: Path) -> dict[str, Any]:
+    """Read the truth of a campaign; for tests and benchmarks, after the verdict."""
+    content: dict[str, Any] = json.loads(sealed_path(campaign).read_text(encoding="utf-8"))
+    return content

@@ -1,0 +1,117 @@
+"""`record-bench`, `record-frame`, `record-closed-loop`: the virtual laboratory writes campaigns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.pipeline.stage import Stage, StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.laboratory.damper import TrueDamper
+
+_DAMPER = (
+    "laboratory.damper",
+    "laboratory.declared_effects",
+    "laboratory.hidden_effects",
+    "laboratory.draw_hidden_share",
+    "laboratory.vary_damper",
+)
+
+
+def _true_damper(context: StageContext) -> TrueDamper:
+    """Return the damper of the settings: one rig has one damper, whatever stage records it."""
+    import numpy as np
+
+    from mrpipe.laboratory.damper import damper_from_set, draw_damper
+    from mrpipe.laboratory.effects import Planted, draw_effect, find_form
+
+    settings = context.settings.laboratory
+    rng = np.random.default_rng([context.seed, 41])
+    damper = damper_from_set(settings.damper)
+    if settings.vary_damper > 0.0:
+        damper = draw_damper(rng, damper, settings.vary_damper)
+    effects = [
+        Planted(find_form(item.name, item.form), item.parameters, item.strength_share, declared)
+        for declared, items in ((True, settings.declared_effects), (False, settings.hidden_effects))
+        for item in items
+    ]
+    if settings.draw_hidden_share is not None:
+        effects.append(draw_effect(rng, share=settings.draw_hidden_share))
+    return damper.with_effects(effects)
+
+
+def _record_bench(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.campaigns import write_campaign
+    from mrpipe.laboratory.bench import CHANNELS, BenchRig, BenchSensors, record_bench
+    from mrpipe.laboratory.motion import BenchTest, Servo
+    from mrpipe.laboratory.plans import tests_of
+    from mrpipe.laboratory.sealing import campaign_directory, write_sealed
+
+    bench = context.settings.laboratory.bench
+    damper = _true_damper(context)
+    rig = BenchRig(
+        servo=Servo(**bench.servo.model_dump()),
+        sensors=BenchSensors(**bench.sensors.model_dump()),
+        sampling_rate_hz=bench.sampling_rate_hz,
+        fine_steps=bench.fine_steps,
+        current_phase_spread_rad=bench.current_phase_spread_rad,
+    )
+    listed = [] if bench.plan == "custom" else tests_of(bench.plan, cycles=bench.cycles, duration_s=bench.short_test_s)
+    tests = [*listed, *(BenchTest(**item.model_dump()) for item in bench.tests)]
+    record = record_bench(damper, tests, rig, context.rng, context.progress)
+    declared = [item.name for item in damper.effects if item.declared]
+    final = context.run_directory / "campaigns" / "bench"
+    with campaign_directory(final) as folder:
+        write_campaign(
+            folder,
+            campaign="virtual-bench",
+            rig="damper-bench",
+            sampling_rate_hz=rig.sampling_rate_hz,
+            channels=CHANNELS,
+            tests=record.tests,
+            extra={"declared_effects": declared, "about": {"plan": bench.plan}},
+            data_format=bench.data_format,
+        )
+        write_sealed(final, record.truth)
+    return _summary(context, "campaigns/bench", record.tests, declared, rig.sampling_rate_hz)
+
+
+def _summary(
+    context: StageContext, campaign: str, tests: list[Any], declared: list[str], rate: float
+) -> dict[str, Any]:
+    """Return what is said of a recorded campaign; never its truth."""
+    import pandas as pd
+
+    samples = sum(len(next(iter(test.columns.values()))) for test in tests)
+    roles = [test.role for test in tests]
+    context.report.text(
+        f"The virtual laboratory recorded {len(tests)} tests ({samples / rate:.0f} s at {rate:g} Hz); declared effects: "
+        f"{', '.join(declared) or 'none'}. What else the rig has lies sealed beside the campaign."
+    )
+    table = pd.DataFrame(
+        [
+            {"test": test.name, "role": test.role, "seconds": len(next(iter(test.columns.values()))) / rate}
+            for test in tests
+        ]
+    )
+    context.report.table("tests", table, f"Tests of {campaign}.")
+    return {
+        "campaign": campaign,
+        "tests": len(tests),
+        "roles": {role: roles.count(role) for role in dict.fromkeys(roles)},
+        "samples": samples,
+        "duration_s": samples / rate,
+        "sampling_rate_hz": rate,
+        "declared_effects": declared,
+    }
+
+
+RECORD_BENCH = Stage(
+    name="record-bench",
+    summary="The virtual bench records a damper campaign.",
+    run=_record_bench,
+    settings=(*_DAMPER, "laboratory.bench"),
+    outputs=("campaigns/bench",),
+)
+STAGES = (RECORD_BENCH,)
