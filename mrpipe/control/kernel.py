@@ -1,7 +1,7 @@
 """The controller of Figure 5.3 as one compiled function, called once a controller sample.
 
-Everything a controller knows is in two arrays, `numbers` (float) and `layout` (integers), its memory in a third; so that
-the same function runs in any plant integrator, and translates to C line by line (:mod:`mrpipe.control.export`).
+Everything a controller knows is in two arrays, `numbers` (float) and `layout` (integers), its memory in a third, so
+that the same function runs in any plant integrator, and translates to C line by line (:mod:`mrpipe.control.export`).
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
 
-# --- measured: what the sensors say at this instant --------------------------------------------------------------------
+# --- measured: what the sensors say at this instant ---
 MEASURED_DISPLACEMENT = 0  # of the damper [m]
 MEASURED_ACCELERATION = 1  # of the damper: floor less ground, both as accelerometers give them [m/s^2]
 MEASURED_VELOCITY = 2  # m/s; read only where the controller was built with velocity="measured"
 MEASURED_GROUND = 3  # ground acceleration [m/s^2]; read by lqg only
 MEASURED_FLOORS = 4  # from here: absolute acceleration of each floor [m/s^2]; read by lqg only
 
-# --- command: what the controller says ----------------------------------------------------------------------------------
+# --- command: what the controller says ---
 COMMAND_DRIVE = 0  # coil current [A] (or voltage [V]) to be held until the next sample
 COMMAND_FORCE = 1  # desired force after clipping (P2 (22)) [N]
 COMMAND_UNCLIPPED = 2  # desired force of the law [N]
@@ -32,7 +32,7 @@ COMMAND_SWITCHED = 7  # 1 where the switch P2 (24) took the drive away
 COMMAND_INVERSE = 8  # drive of the inverse before switch, low-pass and limits [A]
 COMMAND_SIZE = 12
 
-# --- layout -------------------------------------------------------------------------------------------------------------
+# --- layout ---
 LAW = 0
 INVERSE = 1
 VELOCITY_SOURCE = 2
@@ -48,7 +48,7 @@ HISTORY = 11  # length of each
 STATE_OBSERVER = 12  # where in `state` the observer is
 STATE_SIZE = 13
 LAYOUT_SIZE = 16
-# a network in `layout`: layers, then neurons of each (input included), channels, past values, absolute, code of each channel
+# a network in `layout`: layers, then neurons of each (input included), channels, past values, absolute, channel codes
 NET_AT = 0  # where in `numbers`
 NET_LAYERS = 1
 NET_PAST = 2
@@ -62,7 +62,7 @@ LAW_CONSTANT, LAW_LINEAR, LAW_FRICTION, LAW_NETWORK, LAW_OBSERVER = 0, 1, 2, 3, 
 INVERSE_NONE, INVERSE_TABLE, INVERSE_NETWORK = 0, 1, 2
 VELOCITY_KALMAN, VELOCITY_MEASURED, VELOCITY_DIFFERENCE = 0, 1, 2
 
-# --- numbers ------------------------------------------------------------------------------------------------------------
+# --- numbers ---
 SAMPLE_TIME = 0
 GAIN_C = 1
 GAIN_K = 2
@@ -80,9 +80,9 @@ LAW_SPACING = 19  # the same for the network of nnc
 TABLE_SPEED = 20  # largest speed of the inverse table [m/s]
 TABLE_DRIVE = 21  # largest drive of the inverse table
 HEAD = 24
-# a network in `numbers`: input scale, input shift, output scale, output shift, then weights row by row and biases of each layer
+# a network in `numbers`: input scale, input shift, output scale, output shift, then weights by row and biases of each layer
 
-# --- state --------------------------------------------------------------------------------------------------------------
+# --- state ---
 S_STARTED = 0
 S_X = 1
 S_V = 2
@@ -205,7 +205,7 @@ def _evaluate(numbers: FloatArray, layout: IntArray, state: FloatArray, where: i
 
 @njit(float64(float64[::1], int64[::1], float64, float64), cache=True)
 def _look_up(numbers: FloatArray, layout: IntArray, speed: float, force: float) -> float:
-    """Return the drive at which the post-yield force at `speed` is `force`: inverse of a table, linear between points."""
+    """Return the drive at which the post-yield force at `speed` is `force`: inverse table, linear between."""
     drives = layout[TABLE_DRIVES]
     last = layout[TABLE_SPEEDS] - 1
     place = min(speed / numbers[TABLE_SPEED], 1.0) * last

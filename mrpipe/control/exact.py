@@ -1,0 +1,148 @@
+"""The exact complex eigenvalue of frame and linear device: damping, its optimum, maps over the gains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control.limits import FRICTION_RATIO, LimitingModes
+from mrpipe.structures import Frame, state_space
+
+CONTINUATION_STEPS = 24
+"""Steps in which the device is faded in to follow the target's eigenvalue."""
+
+
+@dataclass(frozen=True)
+class ExactDamping:
+    """The target mode of frame and device.
+
+    Attributes
+    ----------
+    pole
+        s [rad/s].
+    unstable_pole
+        Largest real part of all poles [rad/s].
+    """
+
+    pole: complex
+    unstable_pole: float
+
+    @property
+    def stable(self) -> bool:
+        """No pole grows."""
+        return self.unstable_pole < 1e-9
+
+    @property
+    def damping_ratio(self) -> float:
+        """-Re s/|s| of the target; of the worst pole (negative) where the structure folds."""
+        if not self.stable and abs(self.pole.imag) < 1e-9:
+            return -1.0
+        return float(-self.pole.real / max(abs(self.pole), 1e-300))
+
+
+def _poles(frame: Frame, position: FloatArray, c: float, k: float) -> NDArray[np.complex128]:
+    device = np.outer(position, position)
+    changed = Frame(frame.mass, frame.damping + c * device, frame.stiffness + k * device)
+    return np.asarray(np.linalg.eigvals(state_space(changed).A), dtype=np.complex128)
+
+
+def exact_damping(frame: Frame, position: FloatArray, modes: LimitingModes, c: float, k: float) -> ExactDamping:
+    """Follow the target's eigenvalue while the linear device f = c v + k x is faded in.
+
+    Parameters
+    ----------
+    frame, position
+        Structure and connectivity vector w, shape (n,).
+    modes
+        The target.
+    c, k
+        Of the device [N s/m], [N/m].
+    """
+    pole = complex(0.0, modes.omega_0)
+    poles = np.zeros(0, dtype=np.complex128)
+    for share in np.linspace(0.0, 1.0, CONTINUATION_STEPS + 1):
+        poles = _poles(frame, position, share * c, share * k)
+        upper = poles[poles.imag >= -1e-9]
+        pole = complex(upper[np.argmin(np.abs(upper - pole))])
+    worst = complex(poles[np.argmax(poles.real)])
+    if worst.real > 1e-9:
+        pole = worst
+    return ExactDamping(pole, worst.real)
+
+
+def exact_equivalent(frame: Frame, position: FloatArray, modes: LimitingModes, H: complex) -> ExactDamping:
+    """Follow the target's eigenvalue with a device of constant complex stiffness f = H x.
+
+    This is the equivalent of a law whose loop does not depend on frequency, such as FDNS (4.24); the eigenvalues are
+    those of (K + H w w' + i omega C - omega^2 M) u = 0 with Re omega > 0, so that s = i omega.
+
+    Parameters
+    ----------
+    frame, position, modes
+        As in :func:`exact_damping`.
+    H
+        Of the device [N/m].
+    """
+    n = frame.floors
+    inverse = np.linalg.inv(frame.mass)
+    A = np.zeros((2 * n, 2 * n), dtype=np.complex128)
+    A[:n, n:] = np.eye(n)
+    A[n:, n:] = -inverse @ frame.damping
+    pole = complex(0.0, modes.omega_0)
+    # the equivalent holds for the upper half plane only: poles below belong to its complex conjugate
+    for share in np.linspace(0.0, 1.0, CONTINUATION_STEPS + 1):
+        A[n:, :n] = -inverse @ (frame.stiffness + share * H * np.outer(position, position))
+        poles = np.linalg.eigvals(A)
+        upper = poles[poles.imag > 0.0]
+        pole = complex(upper[np.argmin(np.abs(upper - pole))])
+    return ExactDamping(pole, float(np.max(upper.real)))
+
+
+def exact_friction(frame: Frame, position: FloatArray, modes: LimitingModes, alpha: float) -> ExactDamping:
+    """Return the target's eigenvalue with the equivalent of FDNS, H = alpha (i 4/pi - 1) (4.24)."""
+    return exact_equivalent(frame, position, modes, alpha * complex(-1.0, FRICTION_RATIO))
+
+
+def undamped(frame: Frame) -> Frame:
+    """Return the frame without its own damping: what the closed forms and the printed figures are about."""
+    return Frame(frame.mass, np.zeros_like(frame.damping), frame.stiffness, frame.name)
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Gain of largest exact damping and that damping ratio."""
+
+    gain: float
+    damping_ratio: float
+
+
+def best_gain(damping_ratio: Callable[[float], float], largest: float) -> Optimum:
+    """Return the gain within (0, largest) of largest damping ratio: a scan, then Brent's method around its best."""
+    scan = np.linspace(largest / 40.0, largest, 40)
+    values = [damping_ratio(float(gain)) for gain in scan]
+    best = int(np.argmax(values))
+    low, high = scan[max(best - 1, 0)], scan[min(best + 1, len(scan) - 1)]
+    found = minimize_scalar(lambda gain: -damping_ratio(float(gain)), bounds=(low, high), method="bounded")
+    return Optimum(float(found.x), float(-found.fun))
+
+
+def damping_map(frame: Frame, position: FloatArray, modes: LimitingModes, c: FloatArray, k: FloatArray) -> FloatArray:
+    """Return exact damping ratios, shape (len(k), len(c)), of f = c v + k x; NaN where the structure folds."""
+    result = np.full((len(k), len(c)), np.nan)
+    for row, stiffness in enumerate(k):
+        for column, viscosity in enumerate(c):
+            answer = exact_damping(frame, position, modes, float(viscosity), float(stiffness))
+            if answer.stable:
+                result[row, column] = answer.damping_ratio
+    return result
+
+
+def friction_map(frame: Frame, position: FloatArray, modes: LimitingModes, alpha: FloatArray) -> FloatArray:
+    """Return exact damping ratios of the equivalent of FDNS over alpha, shape (len(alpha),); NaN where unstable."""
+    answers = [exact_friction(frame, position, modes, float(value)) for value in alpha]
+    return np.array([answer.damping_ratio if answer.stable else np.nan for answer in answers])

@@ -1,0 +1,155 @@
+"""The two limiting eigenproblems and the closed forms that follow from them (thesis 4.2, 4.3; P2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh, null_space
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import UserError
+from mrpipe.structures import Frame
+
+FRICTION_RATIO = 4.0 / math.pi
+"""Equivalent viscous over stiffness part of (4.24)."""
+
+
+@dataclass(frozen=True)
+class LimitingModes:
+    """Free and locked mode of the target, and what the reduction makes of them.
+
+    Attributes
+    ----------
+    mode
+        Number of the target mode, from 1.
+    omega_0, omega_inf
+        Angular frequency with the damper free (4.4) and locked [rad/s].
+    shape_0, shape_inf
+        Shapes of unit modal mass (4.5), shape (n,) [1/sqrt(kg)]; the locked one has no damper motion.
+    u_0
+        Amplitude of the free mode at the damper [1/sqrt(kg)].
+    kappa
+        Coupling of the two, shape_inf' M shape_0 [1]; the closed forms take it for 1.
+    """
+
+    mode: int
+    omega_0: float
+    omega_inf: float
+    shape_0: FloatArray
+    shape_inf: FloatArray
+    u_0: float
+    kappa: float
+
+    @property
+    def nu(self) -> float:
+        """Modal flexibility of P2 (8), mu of (4.9): u_0^2/(omega_inf^2 - omega_0^2) [m/N]."""
+        return self.u_0**2 / (self.omega_inf**2 - self.omega_0**2)
+
+    @property
+    def share_p2(self) -> float:
+        """(omega_inf - omega_0)/(omega_inf + omega_0) of P2 (7) [1]."""
+        return (self.omega_inf - self.omega_0) / (self.omega_inf + self.omega_0)
+
+    @property
+    def share_thesis(self) -> float:
+        """(omega_inf - omega_0)/omega_0 of (4.10) [1]."""
+        return (self.omega_inf - self.omega_0) / self.omega_0
+
+
+def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> LimitingModes:
+    """Solve the free (4.4) and the locked eigenproblem; (4.5), (4.6), P2 (6).
+
+    The locked problem is that on the subspace w'x = 0. The locked mode that belongs to the target is the one of the
+    same number: locking raises each frequency to at most the next one.
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    position
+        Connectivity vector w, shape (n,).
+    mode
+        Target, from 1.
+
+    Raises
+    ------
+    UserError
+        If the mass is singular or indefinite, the mode has no locked partner, or the damper sits in a node of the mode.
+    """
+    n = frame.floors
+    w = np.asarray(position, dtype=np.float64)
+    if w.shape != (n,) or not np.any(w):
+        raise UserError("calibrate", "position", f"has {w.size} entries", f"{n} floors need {n}, not all zero")
+    if not 1 <= mode <= n - 1:
+        raise UserError("calibrate", "mode", f"is {mode}", f"with {n} floors and a locked damper it is 1 to {n - 1}")
+    M = 0.5 * (frame.mass + frame.mass.T)
+    K = 0.5 * (frame.stiffness + frame.stiffness.T)
+    if not np.all(np.linalg.eigvalsh(M) > 0.0):
+        raise UserError(f"frame {frame.name}", "mass", "is singular or negative", "every floor needs a positive mass")
+    squared, shapes = eigh(K, M)
+    if squared[mode - 1] <= 0.0:
+        raise UserError(f"frame {frame.name}", "stiffness", f"mode {mode} is unstable", "identify the frame again")
+    basis = null_space(w[None, :])
+    locked_squared, locked = eigh(basis.T @ K @ basis, basis.T @ M @ basis)
+    shape_0 = shapes[:, mode - 1] * (1.0 if shapes[-1, mode - 1] >= 0.0 else -1.0)
+    shape_inf = basis @ locked[:, mode - 1]
+    kappa = float(shape_inf @ M @ shape_0)
+    if kappa < 0.0:
+        shape_inf, kappa = -shape_inf, -kappa
+    u_0 = float(w @ shape_0)
+    omega_0, omega_inf = math.sqrt(squared[mode - 1]), math.sqrt(locked_squared[mode - 1])
+    if omega_inf - omega_0 < 1e-6 * omega_0:
+        raise UserError("calibrate", "position", f"mode {mode} does not move the damper", "choose another floor")
+    return LimitingModes(mode, omega_0, omega_inf, shape_0, shape_inf, u_0, kappa)
+
+
+def static_stiffness(frame: Frame, position: FloatArray) -> float:
+    """Return 1/(w' K^-1 w) [N/m]: a device stiffness below minus this makes the structure fold (errata row 8)."""
+    return float(1.0 / (position @ np.linalg.solve(frame.stiffness, position)))
+
+
+# --- closed forms ---
+
+
+def damping_estimate(modes: LimitingModes, stiffness: float, loss: float) -> float:
+    """Return zeta of P2 (7) for a device with Re H = `stiffness`, Im H = `loss` [N/m]."""
+    real, imaginary = modes.nu * stiffness, modes.nu * loss
+    return modes.share_p2 * 2.0 * imaginary / ((1.0 + real) ** 2 + imaginary**2)
+
+
+def damping_estimate_thesis(modes: LimitingModes, stiffness: float, loss: float) -> float:
+    """Return zeta of (4.10) for a device with Re H = `stiffness`, Im H = `loss` [N/m]."""
+    real, imaginary = modes.nu * stiffness, modes.nu * loss
+    return modes.share_thesis * imaginary / ((1.0 + real) ** 2 + imaginary**2)
+
+
+def optimal_viscosity(modes: LimitingModes, stiffness: float = 0.0) -> float:
+    """Return c [N s/m] of P2 (13), the missing 1/omega_0 put in (errata row 12)."""
+    return 1.0 / (modes.nu * modes.omega_0) + stiffness / modes.omega_0
+
+
+def optimal_viscosity_thesis(modes: LimitingModes, stiffness: float = 0.0) -> float:
+    """Return c [N s/m] of (4.13) and (4.16), in which omega_inf + omega_0 stands for 2 omega_0."""
+    return 2.0 * (modes.omega_inf - modes.omega_0) / modes.u_0**2 + stiffness / modes.omega_0
+
+
+def attainable_damping(modes: LimitingModes, stiffness: float = 0.0) -> float:
+    """Return zeta_max of P2 (14)."""
+    return modes.share_p2 / (1.0 + modes.nu * stiffness)
+
+
+def optimal_friction(modes: LimitingModes) -> float:
+    """Return alpha [N/m] of (4.25), P2 (20)."""
+    return 1.0 / (modes.nu * math.hypot(1.0, FRICTION_RATIO))
+
+
+def attainable_damping_friction(modes: LimitingModes) -> float:
+    """Return zeta_max of P2 (21)."""
+    return modes.share_p2 * FRICTION_RATIO / (math.hypot(1.0, FRICTION_RATIO) - 1.0)
+
+
+def optimal_force_ratio(modes: LimitingModes) -> float:
+    """Return f_m/X [N/m] of (4.30): twice alpha, with 1.24 written out as 2/sqrt(1 + (4/pi)^2)."""
+    return 2.0 * optimal_friction(modes)

@@ -1,0 +1,126 @@
+"""What shakes the base: harmonic motion that may stop, a sweep, or a recorded acceleration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.structures import Frame, frequency_response
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Base acceleration over time.
+
+    Attributes
+    ----------
+    duration_s
+        Length of the run.
+    at
+        From times (m,) [s] to base accelerations (m,) [m/s^2].
+    steady_s
+        From when to when the response is steady and its indices are taken.
+    decay_from_s
+        When a free decay begins; NaN where there is none.
+    frequency_rad_s
+        Of a harmonic, else NaN.
+    details
+        For tables and JSON.
+    """
+
+    duration_s: float
+    at: Callable[[FloatArray], FloatArray]
+    steady_s: tuple[float, float]
+    decay_from_s: float = math.nan
+    frequency_rad_s: float = math.nan
+    details: dict[str, Any] = field(default_factory=dict)
+
+
+def harmonic(
+    amplitude_m_s2: float,
+    omega: float,
+    *,
+    cycles: int = 40,
+    settling_cycles: int = 20,
+    ramp_cycles: float = 2.0,
+    decay_s: float = 0.0,
+) -> Excitation:
+    """Return a_g = -A sin(omega t), eased in over `ramp_cycles`, stopped after whole cycles for a free decay.
+
+    Parameters
+    ----------
+    amplitude_m_s2, omega
+        Of the base acceleration [m/s^2], [rad/s].
+    cycles, settling_cycles
+        Of the excitation; the indices are taken over the cycles after the settling ones.
+    ramp_cycles
+        Length of the raised-cosine start.
+    decay_s
+        How long the run goes on at rest of the base.
+    """
+    period = 2.0 * math.pi / omega
+    stop = cycles * period
+    ramp = max(ramp_cycles * period, 1e-12)
+
+    def at(t: FloatArray) -> FloatArray:
+        rise = 0.5 - 0.5 * np.cos(np.pi * np.clip(t / ramp, 0.0, 1.0))
+        return np.where(t < stop, -amplitude_m_s2 * rise * np.sin(omega * t), 0.0)
+
+    return Excitation(
+        stop + decay_s,
+        at,
+        (settling_cycles * period, stop),
+        stop if decay_s > 0.0 else math.nan,
+        omega,
+        {"kind": "harmonic", "base_amplitude_m_s2": amplitude_m_s2, "frequency_rad_s": omega},
+    )
+
+
+def sweep(amplitude_m_s2: float, first_hz: float, last_hz: float, duration_s: float) -> Excitation:
+    """Return a linear sine sweep of the base acceleration."""
+
+    def at(t: FloatArray) -> FloatArray:
+        phase = 2.0 * np.pi * (first_hz * t + 0.5 * (last_hz - first_hz) * t**2 / duration_s)
+        return np.asarray(amplitude_m_s2 * np.sin(phase))
+
+    return Excitation(
+        duration_s, at, (0.0, duration_s), details={"kind": "sweep", "base_amplitude_m_s2": amplitude_m_s2}
+    )
+
+
+def recorded(time_s: FloatArray, acceleration_m_s2: FloatArray, *, scale: float = 1.0) -> Excitation:
+    """Return a recorded base acceleration, straight between samples.
+
+    Parameters
+    ----------
+    time_s, acceleration_m_s2
+        Shape (m,), clock strictly rising.
+    scale
+        Factor on the record.
+    """
+    t = np.asarray(time_s, dtype=np.float64) - float(time_s[0])
+    a = scale * np.asarray(acceleration_m_s2, dtype=np.float64)
+    duration = float(t[-1])
+    details = {"kind": "recorded", "peak_m_s2": float(np.max(np.abs(a)))}
+    return Excitation(duration, lambda at: np.interp(at, t, a), (0.0, duration), details=details)
+
+
+def at_rest(duration_s: float) -> Excitation:
+    """Return no excitation: a free decay from an initial state."""
+    return Excitation(duration_s, np.zeros_like, (0.0, duration_s), 0.0, details={"kind": "rest"})
+
+
+def amplitude_for(frame: Frame, position: FloatArray, c: float, omega: float, rms_top_m: float) -> float:
+    """Return the base amplitude [m/s^2] at which a perfect viscous damper c gives that rms displacement on top.
+
+    This is how the thesis chose its excitation: VD with c = 650 N s/m and 24.3 mm.
+    """
+    device = c * np.outer(position, position)
+    damped = Frame(frame.mass, frame.damping + device, frame.stiffness)
+    gain = frequency_response(damped, [omega], absolute_acceleration=False)[0, -1]
+    return float(math.sqrt(2.0) * rms_top_m / abs(gain))

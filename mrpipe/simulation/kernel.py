@@ -1,0 +1,370 @@
+"""The compiled loop of Figure 5.3: frame, damper, sensors and controller.
+
+One plant step: the frame's linear part is exact for inputs that run straight between the ends of the step
+(`discretise_first_order`), and the force at its end is found together with the motion there, by fixed point and, where a
+law jumps, by bisection. See docs/numerics.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import float64, int64, njit, types, void
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.control.kernel import (
+    COMMAND_DRIVE,
+    COMMAND_FORCE,
+    MEASURED_ACCELERATION,
+    MEASURED_DISPLACEMENT,
+    MEASURED_FLOORS,
+    MEASURED_GROUND,
+    MEASURED_VELOCITY,
+    controller_step,
+)
+from mrpipe.dampers.plant import (
+    ACCELERATION,
+    CHAIN_LENGTH,
+    DISPLACEMENT,
+    DRIVE,
+    FIRST,
+    FORCE,
+    STEP_SIGNATURE,
+    TIME,
+    VELOCITY,
+    WIRE_SIZE,
+    advance,
+)
+
+# --- how the desired force becomes a force ---
+TRACK_DAMPER, TRACK_LAW, TRACK_HELD = 0, 1, 2
+
+# --- numbers of the run ---
+R_DT = 0
+R_LAG = 1  # share of the way to the command that the driver goes in a step, 1 without lag
+R_C = 2
+R_K = 3
+R_ALPHA = 4
+R_EXTREMUM_STEP = 5
+R_EXTREMUM_SHARE = 6
+R_INITIAL_AMPLITUDE = 7
+R_SIZE = 8
+
+# --- integers of the run ---
+I_STEPS = 0
+I_PER_SAMPLE = 1
+I_DELAY = 2
+I_TRACK = 3
+I_RECORD = 4  # plant steps between records
+I_SIZE = 5
+
+# --- columns of the record after the 2n of the state and the n absolute accelerations ---
+T_FORCE = 0
+T_DRIVE = 1
+T_DESIRED = 2
+T_GROUND = 3
+T_WORK_IN = 4
+T_WORK_DAMPER = 5
+T_WORK_FRAME = 6
+T_ENERGY = 7
+T_SIZE = 8
+
+PLAIN_ITERATIONS = 12
+TOLERANCE_N = 1e-5
+
+_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
+
+
+@njit(float64(float64[::1], float64, float64, float64), cache=True)
+def ideal_force(run: FloatArray, amplitude: float, x: float, v: float) -> float:
+    """Return the force of a perfect damper: law (4.14) or (4.18), clipped by P2 (22). It never falls with v."""
+    direction = 1.0 if v > 0.0 else -1.0
+    if run[R_ALPHA] > 0.0:
+        largest = max(amplitude, abs(x))
+        return run[R_ALPHA] * (direction * largest - x)
+    force = run[R_C] * v + run[R_K] * x
+    return force if force * v >= 0.0 else 0.0
+
+
+@njit(
+    float64(
+        _FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64[::1], float64, float64,
+        float64, float64, float64, float64,
+    ),
+    cache=True,
+)  # fmt: skip
+def _damper_force(
+    functions: Any, parameters: FloatArray, parameter_offsets: IntArray, state_offsets: IntArray, before: FloatArray,
+    state: FloatArray, wire: FloatArray, time: float, x: float, v: float, a: float, drive: float, dt: float,
+) -> float:  # fmt: skip
+    """Advance a copy of the damper's state over one step and return the force at its end."""
+    for index in range(before.shape[0]):
+        state[index] = before[index]
+    wire[TIME] = time
+    wire[DISPLACEMENT] = x
+    wire[VELOCITY] = v
+    wire[ACCELERATION] = a
+    wire[DRIVE] = drive
+    advance(functions, parameters, parameter_offsets, state_offsets, state, wire, dt)
+    return wire[FORCE]
+
+
+@njit(void(float64[:, ::1], float64[::1], float64[::1]), cache=True)
+def _multiply(transposed: FloatArray, z: FloatArray, result: FloatArray) -> None:
+    """Write A z; by columns of A, so that the inner loop runs along memory without a sum."""
+    for row in range(result.shape[0]):
+        result[row] = 0.0
+    for column in range(z.shape[0]):
+        value = z[column]
+        for row in range(result.shape[0]):
+            result[row] += transposed[column, row] * value
+
+
+@njit(float64(float64[:, ::1], float64[::1], int64), cache=True)
+def _quadratic(A: FloatArray, z: FloatArray, offset: int) -> float:
+    total = 0.0
+    for row in range(A.shape[0]):
+        part = 0.0
+        for column in range(A.shape[1]):
+            part += A[row, column] * z[offset + column]
+        total += part * z[offset + row]
+    return total
+
+
+@njit(void(float64[::1], float64[::1], float64[::1]), cache=True)
+def _amplitude(run: FloatArray, motion: FloatArray, tracker: FloatArray) -> None:
+    """Keep the most recent extremum of a perfect sensor; tracker: seeking, extreme, amplitude."""
+    x = motion[0]
+    if tracker[0] == 0.0:
+        tracker[0] = 1.0 if motion[1] >= 0.0 else -1.0
+        tracker[1] = x
+        tracker[2] = max(abs(x), run[R_INITIAL_AMPLITUDE])
+    if tracker[0] * x > tracker[0] * tracker[1]:
+        tracker[1] = x
+    step = max(run[R_EXTREMUM_STEP], run[R_EXTREMUM_SHARE] * tracker[2])
+    if tracker[0] * (tracker[1] - x) > step:
+        tracker[2] = abs(tracker[1])
+        tracker[0] = -tracker[0]
+        tracker[1] = x
+
+
+@njit(
+    void(
+        int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1],
+        float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1],
+        _FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1],
+        float64[::1], int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1],
+    ),
+    cache=True,
+)  # fmt: skip
+def run_loop(
+    counts: IntArray, run: FloatArray, At: FloatArray, B0: FloatArray, B1: FloatArray, A: FloatArray, B: FloatArray,
+    M: FloatArray, C: FloatArray, K: FloatArray, w: FloatArray, ground: FloatArray, z: FloatArray,
+    functions: Any, parameters: FloatArray, parameter_offsets: IntArray, state_offsets: IntArray, damper: FloatArray,
+    numbers: FloatArray, layout: IntArray, memory: FloatArray, noise: FloatArray, commands: FloatArray,
+    record: FloatArray,
+) -> None:  # fmt: skip
+    """Run the loop.
+
+    Parameters
+    ----------
+    counts, run
+        Integers and numbers of the run, indices I_... and R_...
+    At, B0, B1
+        Exact step of the frame, shapes (2n, 2n) transposed, (2n, 2), (2n, 2); inputs: ground acceleration, damper force.
+    A, B
+        Continuous state space, shapes (2n, 2n), (2n, 2).
+    M, C, K, w
+        Of the frame; connectivity vector, shape (n,).
+    ground
+        Ground acceleration at every plant step, shape (steps + 1,) [m/s^2].
+    z
+        Initial state, shape (2n,); holds the final one in the end.
+    functions, parameters, parameter_offsets, state_offsets, damper
+        Chain and its state.
+    numbers, layout, memory
+        Controller and its state.
+    noise
+        Sensor noise a controller sample, shape (samples, 4 + n).
+    commands
+        Filled, shape (samples, COMMAND_SIZE).
+    record
+        Filled, shape (records, 3n + T_SIZE).
+    """
+    n = w.shape[0]
+    track, per_sample, every = counts[I_TRACK], counts[I_PER_SAMPLE], counts[I_RECORD]
+    dt = run[R_DT]
+    mass_of_ground = np.zeros(n)
+    step_b1_x = 0.0
+    step_b1_v = 0.0
+    gain_a = 0.0
+    row_a = np.zeros(2 * n)
+    row_g = 0.0
+    for floor in range(n):
+        step_b1_x += w[floor] * B1[floor, 1]
+        step_b1_v += w[floor] * B1[n + floor, 1]
+        gain_a += w[floor] * B[n + floor, 1]
+        row_g += w[floor] * B[n + floor, 0]
+        for column in range(2 * n):
+            row_a[column] += w[floor] * A[n + floor, column]
+        for column in range(n):
+            mass_of_ground[floor] += M[column, floor]
+    wire = np.zeros(WIRE_SIZE)
+    measured = np.zeros(MEASURED_FLOORS + n)
+    trial = np.zeros(damper.shape[0])
+    free = np.zeros(2 * n)
+    motion = np.zeros(2)
+    tracker = np.zeros(3)
+    drive = 0.0
+    force, force_before, slope = 0.0, 0.0, 0.0
+    work_in, work_damper, work_frame = 0.0, 0.0, 0.0
+    loss = _quadratic(C, z, n)
+    for step in range(counts[I_STEPS] + 1):
+        x, v = 0.0, 0.0
+        for floor in range(n):
+            x += w[floor] * z[floor]
+            v += w[floor] * z[n + floor]
+        if step == 0:
+            motion[0], motion[1] = x, v
+            _amplitude(run, motion, tracker)
+        # --- sensors and controller
+        if step % per_sample == 0:
+            sample = step // per_sample
+            for floor in range(n):
+                total = 0.0
+                for column in range(2 * n):
+                    total += A[n + floor, column] * z[column]
+                measured[MEASURED_FLOORS + floor] = (
+                    total + B[n + floor, 1] * force + noise[sample, MEASURED_FLOORS + floor]
+                )
+            measured[MEASURED_GROUND] = ground[step] + noise[sample, MEASURED_GROUND]
+            measured[MEASURED_DISPLACEMENT] = x + noise[sample, MEASURED_DISPLACEMENT]
+            measured[MEASURED_VELOCITY] = v
+            # the difference of two accelerometers; the ground's share of `measured` cancels in it
+            relative = gain_a * force + row_g * ground[step]
+            for column in range(2 * n):
+                relative += row_a[column] * z[column]
+            measured[MEASURED_ACCELERATION] = relative + noise[sample, MEASURED_ACCELERATION]
+            controller_step(numbers, layout, memory, measured, commands[sample])
+        active = max((step - counts[I_DELAY]) // per_sample, 0)
+        wanted = commands[active, COMMAND_FORCE] if step >= counts[I_DELAY] else 0.0
+        asked = commands[active, COMMAND_DRIVE]
+        if step == 0:
+            # all lags start in equilibrium with the first command
+            drive = asked
+            wire[FIRST] = 1.0
+            if track == TRACK_DAMPER:
+                relative = row_g * ground[0]
+                for column in range(2 * n):
+                    relative += row_a[column] * z[column]
+                force = _damper_force(
+                    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, v,
+                    relative, drive, dt,
+                )  # fmt: skip
+                for index in range(damper.shape[0]):
+                    damper[index] = trial[index]
+            elif track == TRACK_LAW:
+                force = ideal_force(run, tracker[2], x, v)
+            force_before = force
+            wire[FIRST] = 0.0
+        if step % every == 0:
+            row = step // every
+            for index in range(2 * n):
+                record[row, index] = z[index]
+            for floor in range(n):
+                total = B[n + floor, 1] * force
+                for column in range(2 * n):
+                    total += A[n + floor, column] * z[column]
+                record[row, 2 * n + floor] = total
+            record[row, 3 * n + T_FORCE] = force
+            record[row, 3 * n + T_DRIVE] = drive
+            record[row, 3 * n + T_DESIRED] = wanted if track != TRACK_LAW else force
+            record[row, 3 * n + T_GROUND] = ground[step]
+            record[row, 3 * n + T_WORK_IN] = work_in
+            record[row, 3 * n + T_WORK_DAMPER] = work_damper
+            record[row, 3 * n + T_WORK_FRAME] = work_frame
+            record[row, 3 * n + T_ENERGY] = 0.5 * (_quadratic(M, z, n) + _quadratic(K, z, 0))
+        if step == counts[I_STEPS]:
+            break
+        # --- plant: all but the force at the end of the step
+        drive += run[R_LAG] * (asked - drive)
+        _multiply(At, z, free)
+        x_free, v_free, a_free = 0.0, 0.0, row_g * ground[step + 1]
+        for row in range(2 * n):
+            free[row] += B0[row, 0] * ground[step] + B1[row, 0] * ground[step + 1] + B0[row, 1] * force
+        for floor in range(n):
+            x_free += w[floor] * free[floor]
+            v_free += w[floor] * free[n + floor]
+        for column in range(2 * n):
+            a_free += row_a[column] * free[column]
+        # what the force at the end adds to the acceleration there, directly and through the motion
+        gain_end = gain_a
+        for column in range(2 * n):
+            gain_end += row_a[column] * B1[column, 1]
+        # --- the force at the end of the step, with the motion there
+        time = (step + 1) * dt
+        guess = 2.0 * force - force_before if track == TRACK_DAMPER else force
+        found = guess
+        last_guess, last_found = 0.0, 0.0
+        converged = False
+        low, high = -math.inf, math.inf
+        for iteration in range(60):
+            x_end = x_free + step_b1_x * guess
+            v_end = v_free + step_b1_v * guess
+            if track == TRACK_DAMPER:
+                found = _damper_force(
+                    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, time, x_end, v_end,
+                    a_free + gain_end * guess, drive, dt,
+                )  # fmt: skip
+            elif track == TRACK_LAW:
+                found = ideal_force(run, tracker[2], x_end, v_end)
+            else:
+                found = wanted if wanted * v_end >= 0.0 else 0.0
+            difference = found - guess
+            if abs(difference) <= TOLERANCE_N + 1e-9 * abs(found):
+                converged = True
+                break
+            # the answer grows with the motion and the motion shrinks with the force: the root is bracketed
+            if difference > 0.0:
+                low = max(low, guess)
+                high = min(high, found)
+            else:
+                high = min(high, guess)
+                low = max(low, found)
+            if iteration < PLAIN_ITERATIONS:
+                # the slope of the answer hardly changes from step to step: a secant that remembers it
+                if iteration > 0 and guess != last_guess:
+                    slope = min(max((found - last_found) / (guess - last_guess), -0.9), 0.9)
+                last_guess, last_found = guess, found
+                guess += difference / (1.0 - slope)
+            elif low < high:
+                guess = 0.5 * (low + high)
+            else:
+                break
+        if not converged:
+            # a jump: within the bracket any force is an answer of the law, and the one found lets the damper stick
+            found = guess
+        for row in range(2 * n):
+            free[row] += B1[row, 1] * found
+        # --- energy
+        moved, pushed = 0.0, 0.0
+        for floor in range(n):
+            moved += w[floor] * (free[floor] - z[floor])
+            pushed += mass_of_ground[floor] * (free[floor] - z[floor])
+        loss_end = _quadratic(C, free, n)
+        work_damper += 0.5 * (force + found) * moved
+        work_in -= 0.5 * (ground[step] + ground[step + 1]) * pushed
+        work_frame += 0.5 * (loss + loss_end) * dt
+        loss = loss_end
+        force_before = force
+        force = found
+        for index in range(2 * n):
+            z[index] = free[index]
+        if track == TRACK_DAMPER:
+            for index in range(damper.shape[0]):
+                damper[index] = trial[index]
+        elif track == TRACK_LAW:
+            motion[0], motion[1] = x_free + step_b1_x * found, v_free + step_b1_v * found
+            _amplitude(run, motion, tracker)

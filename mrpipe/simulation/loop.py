@@ -1,0 +1,286 @@
+"""The closed loop as one plain function: frame, damper, controller and excitation in, response out."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control.controller import Controller
+from mrpipe.control.kernel import COMMAND_SIZE, MEASURED_ACCELERATION, MEASURED_DISPLACEMENT, MEASURED_GROUND
+from mrpipe.dampers.plant import Chain, build_chain, new_state
+from mrpipe.errors import DivergedError, UserError
+from mrpipe.simulation import kernel
+from mrpipe.simulation.excitation import Excitation
+from mrpipe.structures import Frame, discretise_first_order, state_space
+
+Tracking = Literal["damper", "ideal"]
+
+_LINEAR_OR_FRICTION = ("vd", "vdps", "vdns", "fdns")
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """RMS noise of a sample of each sensor; the accelerometers' constant bias.
+
+    Attributes
+    ----------
+    displacement_m
+        Of the laser at the damper.
+    acceleration_m_s2
+        Of each accelerometer.
+    acceleration_bias_m_s2
+        Of the difference of the two accelerometers that give the damper's acceleration.
+    """
+
+    displacement_m: float = 0.0
+    acceleration_m_s2: float = 0.0
+    acceleration_bias_m_s2: float = 0.0
+
+
+@dataclass(frozen=True)
+class LoopOptions:
+    """How the loop is run.
+
+    Attributes
+    ----------
+    plant_rate_hz
+        Steps of the plant a second; raised to the next multiple of the controller's rate.
+    tracking
+        `damper`: the chain gives the force. `ideal`: the damper gives the clipped desired force; laws with gains are
+        then evaluated at every plant step with the true motion, nnc and lqg hold the controller's force.
+    delay_s
+        From sampling to output of the controller.
+    driver_time_constant_s
+        Lag of the current driver besides what the damper's model has; 0: none.
+    noise
+        Of the sensors.
+    record_rate_hz
+        Rate of the histories in the response.
+    """
+
+    plant_rate_hz: float = 1000.0
+    tracking: Tracking = "damper"
+    delay_s: float = 0.0
+    driver_time_constant_s: float = 0.0
+    noise: SensorNoise = field(default_factory=SensorNoise)
+    record_rate_hz: float = 1000.0
+
+
+@dataclass(frozen=True)
+class Response:
+    """What the loop did; every history has shape (m,) or (m, n), SI, on the clock `time_s`.
+
+    Attributes
+    ----------
+    time_s
+        Clock of the histories.
+    displacement, velocity, acceleration
+        Of the floors relative to the ground, shape (m, n).
+    absolute_acceleration
+        Of the floors, shape (m, n).
+    damper_displacement, damper_velocity
+        Across the damper.
+    force, drive, desired_force
+        Damper force [N], drive at the damper [A or V], force the controller asked for [N].
+    ground_acceleration
+        Of the base.
+    work_in, work_damper, work_frame, energy
+        Work of the base, dissipated by damper and frame, and energy stored in the frame [J] since the start.
+    commands
+        Of the controller, shape (samples, COMMAND_SIZE); see :mod:`mrpipe.control.kernel`.
+    command_time_s
+        Clock of the controller.
+    seconds
+        Wall time of the compiled loop.
+    """
+
+    time_s: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    absolute_acceleration: FloatArray
+    damper_displacement: FloatArray
+    damper_velocity: FloatArray
+    force: FloatArray
+    drive: FloatArray
+    desired_force: FloatArray
+    ground_acceleration: FloatArray
+    work_in: FloatArray
+    work_damper: FloatArray
+    work_frame: FloatArray
+    energy: FloatArray
+    commands: FloatArray
+    command_time_s: FloatArray
+    seconds: float
+
+    @property
+    def energy_balance_error(self) -> float:
+        """What the balance of energies misses in the end over all that was stored or dissipated on the way [1]."""
+        missing = self.energy[0] + self.work_in - self.work_damper - self.work_frame - self.energy
+        turned_over = float(np.max(self.energy) + np.max(np.abs(self.work_damper)) + self.work_frame[-1])
+        return float(np.max(np.abs(missing))) / turned_over if turned_over > 0.0 else 0.0
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated over wall time."""
+        return float(self.time_s[-1]) / max(self.seconds, 1e-9)
+
+
+def no_damper() -> Chain:
+    """Return a chain whose force is zero."""
+    return build_chain([])
+
+
+def simulate_law(
+    frame: Frame,
+    chain: Chain | None,
+    controller: Controller,
+    excitation: Excitation,
+    options: LoopOptions | None = None,
+    *,
+    position: FloatArray | None = None,
+    rng: np.random.Generator | None = None,
+    initial_state: FloatArray | None = None,
+) -> Response:
+    """Run the loop of Figure 5.3.
+
+    Parameters
+    ----------
+    frame
+        Structure.
+    chain
+        Damper, with its effects; None with `tracking="ideal"`.
+    controller
+        From :func:`~mrpipe.control.controller.build_controller`.
+    excitation
+        Base acceleration; its duration is that of the run.
+    options
+        How the loop is run.
+    position
+        Connectivity vector w, shape (n,); floor 1 to ground if left out.
+    rng
+        For sensor noise; needed where there is some.
+    initial_state
+        [x, v] of the floors at the start, shape (2n,); rest if left out.
+
+    Raises
+    ------
+    UserError
+        If the mass is singular, the delay negative, or there is neither a damper nor perfect tracking.
+    DivergedError
+        If the response grows without bound.
+    """
+    options = options or LoopOptions()
+    n = frame.floors
+    w = _position(frame, position)
+    if chain is None and options.tracking == "damper":
+        raise UserError("simulate", "damper", "there is none", "give a damper or tracking: ideal")
+    chain = chain or no_damper()
+    rate = controller.options.rate_hz
+    per_sample = max(1, math.ceil(options.plant_rate_hz / rate - 1e-9))
+    dt = 1.0 / (rate * per_sample)
+    steps = max(1, round(excitation.duration_s / dt))
+    ground = np.ascontiguousarray(excitation.at(np.arange(steps + 1) * dt))
+    every = max(1, round(1.0 / (dt * options.record_rate_hz)))
+    counts, run = _run_numbers(controller, options, steps, per_sample, every, dt)
+    space = state_space(frame, -w)
+    Ad, B0, B1 = discretise_first_order(space.A, space.B, dt)
+    samples = steps // per_sample + 1
+    commands = np.zeros((samples, COMMAND_SIZE))
+    record = np.zeros((steps // every + 1, 3 * n + kernel.T_SIZE))
+    z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
+    noise = _noise(options.noise, samples, n, rng)
+    contiguous = [np.ascontiguousarray(item) for item in (Ad.T, B0, B1, space.A, space.B)]
+    matrices = [np.ascontiguousarray(item) for item in (frame.mass, frame.damping, frame.stiffness, w)]
+    began = time.perf_counter()
+    kernel.run_loop(
+        counts, run, *contiguous, *matrices, ground, z, *chain.arguments, new_state(chain),
+        controller.numbers, controller.layout, controller.new_state(), noise, commands, record,
+    )  # fmt: skip
+    seconds = time.perf_counter() - began
+    if not np.all(np.isfinite(record)):
+        raise DivergedError(f"law {controller.law}: the response grows without bound; lower the negative stiffness")
+    return _response(record, commands, w, dt * every, dt * per_sample, seconds)
+
+
+def _position(frame: Frame, position: FloatArray | None) -> FloatArray:
+    n = frame.floors
+    if position is None:
+        position = np.eye(n)[0]
+    w = np.asarray(position, dtype=np.float64)
+    if w.shape != (n,):
+        raise UserError("simulate", "position", f"has {w.size} entries", f"the frame has {n} floors")
+    if np.linalg.matrix_rank(frame.mass) < n:
+        raise UserError(f"frame {frame.name}", "mass", "is singular", "every floor needs a positive mass")
+    return w
+
+
+def _run_numbers(
+    controller: Controller, options: LoopOptions, steps: int, per_sample: int, every: int, dt: float
+) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int64]], FloatArray]:
+    if options.delay_s < 0.0 or options.driver_time_constant_s < 0.0:
+        raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
+    track = kernel.TRACK_DAMPER
+    if options.tracking == "ideal":
+        track = kernel.TRACK_LAW if controller.law in _LINEAR_OR_FRICTION else kernel.TRACK_HELD
+    counts = np.zeros(kernel.I_SIZE, dtype=np.int64)
+    counts[kernel.I_STEPS], counts[kernel.I_PER_SAMPLE], counts[kernel.I_RECORD] = steps, per_sample, every
+    counts[kernel.I_DELAY] = round(options.delay_s / dt)
+    counts[kernel.I_TRACK] = track
+    run = np.zeros(kernel.R_SIZE)
+    run[kernel.R_DT] = dt
+    lag = options.driver_time_constant_s
+    run[kernel.R_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
+    run[kernel.R_C], run[kernel.R_K] = controller.gains.c_n_s_m, controller.gains.k_n_m
+    run[kernel.R_ALPHA] = controller.gains.alpha_n_m
+    # the perfect damper's tracker needs no room for noise
+    run[kernel.R_EXTREMUM_STEP] = 1e-6
+    run[kernel.R_EXTREMUM_SHARE] = controller.options.extremum_share
+    return counts, run
+
+
+def _noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generator | None) -> FloatArray:
+    """Return sensor noise, shape (samples, 4 + n); the damper's acceleration is a difference of two sensors."""
+    result = np.zeros((samples, kernel.MEASURED_FLOORS + floors))
+    if noise.displacement_m > 0.0 or noise.acceleration_m_s2 > 0.0:
+        if rng is None:
+            raise ValueError("sensor noise needs a generator")
+        result[:, MEASURED_DISPLACEMENT] = noise.displacement_m * rng.standard_normal(samples)
+        result[:, MEASURED_GROUND:] = noise.acceleration_m_s2 * rng.standard_normal((samples, 1 + floors))
+        result[:, MEASURED_ACCELERATION] = noise.acceleration_m_s2 * rng.standard_normal(samples)
+    result[:, MEASURED_ACCELERATION] += noise.acceleration_bias_m_s2
+    return result
+
+
+def _response(
+    record: FloatArray, commands: FloatArray, w: FloatArray, dt: float, command_dt: float, seconds: float
+) -> Response:
+    n = len(w)
+    tail = record[:, 3 * n :]
+    ground = tail[:, kernel.T_GROUND]
+    absolute = record[:, 2 * n : 3 * n]
+    return Response(
+        time_s=np.arange(len(record)) * dt,
+        displacement=record[:, :n],
+        velocity=record[:, n : 2 * n],
+        acceleration=absolute - ground[:, None],
+        absolute_acceleration=absolute,
+        damper_displacement=record[:, :n] @ w,
+        damper_velocity=record[:, n : 2 * n] @ w,
+        force=tail[:, kernel.T_FORCE],
+        drive=tail[:, kernel.T_DRIVE],
+        desired_force=tail[:, kernel.T_DESIRED],
+        ground_acceleration=ground,
+        work_in=tail[:, kernel.T_WORK_IN],
+        work_damper=tail[:, kernel.T_WORK_DAMPER],
+        work_frame=tail[:, kernel.T_WORK_FRAME],
+        energy=tail[:, kernel.T_ENERGY],
+        commands=commands,
+        command_time_s=np.arange(len(commands)) * command_dt,
+        seconds=seconds,
+    )
