@@ -43,6 +43,8 @@ class Scales:
         Degrees of the polynomials in the drive.
     lag_known
         The drive varies within tests, so that its lag can be told.
+    assumed_eta
+        Lag of the drive [1/s] where it cannot be told; measurements at constant drive say nothing of it.
     """
 
     stroke: float
@@ -53,6 +55,7 @@ class Scales:
     yield_order: int = 3
     viscosity_order: int = 1
     lag_known: bool = True
+    assumed_eta: float = 100.0
 
 
 @dataclass(frozen=True)
@@ -153,7 +156,9 @@ class Form:
         searched = [values[parameter.name] for parameter in self.parameters(scales)]
         numbers = matrix @ np.concatenate([searched, linear])
         found = dict(zip(names, (float(number) for number in numbers), strict=True))
-        return DamperModel(self.model_form, {**self.fixed(scales), **found}, scales.drive_unit, scales.drive_limit)
+        assumed = {} if scales.lag_known else {"eta": scales.assumed_eta}
+        numbers_by_name = {**self.fixed(scales), **assumed, **found}
+        return DamperModel(self.model_form, numbers_by_name, scales.drive_unit, scales.drive_limit)
 
     def transform(self, scales: Scales) -> tuple[tuple[str, ...], FloatArray]:
         """Return the model's parameter names and the matrix that yields them from searched and linear numbers.

@@ -144,7 +144,9 @@ def drive_varies(tests: Sequence[PreparedTest]) -> bool:
     return any(float(np.ptp(test.drive)) > 0.05 * largest for test in tests) and largest > 0.0
 
 
-def scales_of(tests: Sequence[PreparedTest], *, yield_order: int = 3, viscosity_order: int = 1) -> Scales:
+def scales_of(
+    tests: Sequence[PreparedTest], *, yield_order: int = 3, viscosity_order: int = 1, assumed_eta: float = 100.0
+) -> Scales:
     """Return the scales of a set of tests; orders are lowered to what the levels of drive can tell."""
     levels = distinct_levels(tests)
     limit = max(float(np.abs(test.drive).max()) for test in tests)
@@ -157,4 +159,5 @@ def scales_of(tests: Sequence[PreparedTest], *, yield_order: int = 3, viscosity_
         yield_order=min(yield_order, levels - 1),
         viscosity_order=min(viscosity_order, levels - 1),
         lag_known=drive_varies(tests),
+        assumed_eta=assumed_eta,
     )

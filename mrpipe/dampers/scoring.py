@@ -85,3 +85,45 @@ def pool(scores: Sequence[TestScore]) -> PooledScore:
     varied = force - sum(item.force_sum for item in scores) ** 2 / count
     share = error / varied
     return PooledScore(float(np.sqrt(error / force)), float(100.0 * (1.0 - np.sqrt(share))), float(1.0 - share))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One test to be drawn: name, displacement [m], velocity [m/s], measured and modelled force [N], shape (n,)."""
+
+    name: str
+    displacement: FloatArray
+    velocity: FloatArray
+    measured: FloatArray
+    modelled: FloatArray
+
+
+def shown_loops(model: DamperModel, tests: Sequence[PreparedTest], count: int = 4) -> list[Loop]:
+    """Return a few validation tests (all tests where there are none), spread over the drive, the last part of each."""
+    held_out = [test for test in tests if test.role == "validation"] or list(tests)
+    held_out.sort(key=lambda test: float(np.mean(np.abs(test.drive))))
+    places = np.unique(np.linspace(0, len(held_out) - 1, count).round().astype(int))
+    loops = []
+    for test in (held_out[place] for place in places):
+        force = model.force(test.displacement_m, test.velocity_m_s, test.acceleration_m_s2, test.drive, test.dt)
+        last = _last_part(test)
+        loops.append(
+            Loop(test.name, test.displacement_m[last], test.velocity_m_s[last], test.force_n[last], force[last])
+        )
+    return loops
+
+
+def _last_part(test: PreparedTest) -> slice:
+    """Return the last two cycles, or the last second of random motion."""
+    if len(test.cycles) >= 3:
+        return slice(int(test.cycles[-3]), int(test.cycles[-1]))
+    return slice(max(0, len(test.force_n) - round(test.sampling_rate_hz)), None)
+
+
+def yield_curves(
+    models: Sequence[tuple[str, DamperModel]], tests: Sequence[PreparedTest]
+) -> tuple[FloatArray, list[tuple[str, FloatArray]]]:
+    """Return drives, shape (60,), and for each model its post-yield force [N] there at half the largest speed."""
+    speed = 0.5 * max(float(np.abs(test.velocity_m_s).max()) for test in tests)
+    drive = np.linspace(0.0, models[0][1].drive_limit, 60)
+    return drive, [(name, model.quasi_static_force(speed, drive)) for name, model in models]

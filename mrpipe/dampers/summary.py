@@ -1,0 +1,118 @@
+"""What a fit found, as tables and plain numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mrpipe.dampers.comparison import JudgedFit
+from mrpipe.dampers.fit import FormFit
+from mrpipe.dampers.model import HYSTERETIC_FORMS, DamperModel, parameter_unit, thesis_parameters
+
+
+def parameter_table(fit: FormFit) -> dict[str, dict[str, Any]]:
+    """Return name -> value, unit, standard error (None for what was not fitted) and whether it ended at a bound."""
+    unit = fit.model.drive_unit
+    rows: dict[str, dict[str, Any]] = {}
+    for name, value in fit.model.parameters.items():
+        error = fit.standard_error(name)
+        rows[name] = {
+            "value": float(value),
+            "unit": parameter_unit(name, unit),
+            "standard_error": error if np.isfinite(error) else None,
+            "at_bound": name in fit.at_bound,
+        }
+    return rows
+
+
+def thesis_table(fit: FormFit, A: float) -> dict[str, dict[str, Any]]:
+    """Return alpha, gamma, beta and eta as Table 2.2 names them, for a chosen A, errors by linear propagation.
+
+    Empty for forms without a Bouc-Wen hysteresis.
+    """
+    if fit.model.form not in HYSTERETIC_FORMS:
+        return {}
+    model = fit.model
+    values = thesis_parameters(model, A)
+    slopes = np.zeros((len(values), len(fit.names)))
+    for column, name in enumerate(fit.names):
+        value = model.parameters[name]
+        step = 1e-6 * (abs(value) or 1.0)
+        moved = DamperModel(model.form, {**model.parameters, name: value + step}, model.drive_unit, model.drive_limit)
+        changed = thesis_parameters(moved, A)
+        slopes[:, column] = [(changed[key] - values[key]) / step for key in values]
+    errors = np.sqrt(np.maximum(np.diag(slopes @ fit.covariance @ slopes.T), 0.0))
+    table: dict[str, dict[str, Any]] = {}
+    for (name, value), error in zip(values.items(), errors, strict=True):
+        known = name not in ("A", "n")
+        table[name] = {
+            "value": float(value),
+            "unit": parameter_unit(name, model.drive_unit),
+            "standard_error": float(error) if known else None,
+        }
+    return table
+
+
+def comparison_rows(judged: Sequence[JudgedFit]) -> list[dict[str, Any]]:
+    """Return a row a form, the one with the smallest validation error first."""
+    rows = [
+        {
+            "form": item.fit.form.name,
+            "training_nrmse": item.training.nrmse,
+            "validation_nrmse": item.validation.nrmse,
+            "validation_fit_percent": item.validation.fit_percent,
+            "validation_r2": item.validation.r2,
+            "cross_validated_nrmse": item.cross_validated_nrmse,
+            "parameter_count": len(item.fit.names),
+            "spread_over_starts": float(np.ptp(item.fit.start_nrmse)),
+            "evaluations": item.fit.evaluations,
+            "at_bound": list(item.fit.at_bound),
+        }
+        for item in judged
+    ]
+    return sorted(rows, key=lambda row: (np.isnan(row["validation_nrmse"]), row["validation_nrmse"]))
+
+
+def correlation_rows(fit: FormFit, limit: float = 0.95) -> list[dict[str, Any]]:
+    """Return pairs of parameters that the data hardly tell apart (correlation above `limit`)."""
+    return [
+        {"parameters": [first, second], "correlation": correlation}
+        for first, second, correlation in fit.correlated(limit)
+    ]
+
+
+def test_rows(judged: JudgedFit) -> list[dict[str, Any]]:
+    """Return a row a test: name, role, NRMSE and RMS error."""
+    return [
+        {
+            "name": score.name,
+            "role": score.role,
+            "nrmse": score.nrmse,
+            "rms_error_n": float(np.sqrt(score.squared_error / max(score.samples, 1))),
+            "rms_force_n": float(np.sqrt(score.squared_force / max(score.samples, 1))),
+        }
+        for score in judged.tests
+    ]
+
+
+def findings(fit: FormFit) -> list[str]:
+    """Return what the user should know of a fit, a line each."""
+    lines = []
+    scales = fit.scales
+    if not scales.lag_known:
+        lines.append(
+            "the drive is constant in every test, so its lag cannot be told: "
+            f"eta = {scales.assumed_eta:g} 1/s is assumed"
+        )
+    lines += [f"{fit.form.name}: {name} ended at its bound, the data do not determine it" for name in fit.at_bound]
+    if scales.yield_order < 3:
+        lines.append(
+            f"{scales.yield_order + 1} level(s) of drive: the yield force is of degree {scales.yield_order} in it"
+        )
+    drive = np.linspace(0.0, scales.drive_limit, 50)
+    strength = fit.model.yield_force(drive)
+    if np.any(np.diff(strength) < -0.02 * np.max(np.abs(strength))):
+        lines.append("the yield force falls with the drive somewhere on its range: an inverse is not unique there")
+    return lines

@@ -1,0 +1,173 @@
+"""`identify-damper`: a parametric damper from bench tests, its rivals, and how well each does on unseen tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.errors import StageSkipped
+from mrpipe.pipeline.stage import Stage, StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.dampers.comparison import JudgedFit
+    from mrpipe.signals.prepared import PreparedTest
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.dampers.comparison import FitOptions, compare_forms
+    from mrpipe.dampers.forms import FORMS
+    from mrpipe.dampers.samples import scales_of
+    from mrpipe.dampers.summary import findings
+    from mrpipe.signals.prepared import read_prepared
+
+    settings = context.settings.identify_damper
+    tests = read_prepared(context.artifact("prepare"))
+    training = [test for test in tests if test.role == "training"]
+    if not training:
+        raise StageSkipped("identify-damper: the campaign has no training test")
+    scales = scales_of(
+        training,
+        yield_order=settings.yield_order,
+        viscosity_order=settings.viscosity_order,
+        assumed_eta=settings.assumed_eta_per_s,
+    )
+    options = FitOptions(
+        method=settings.method,
+        starts=settings.starts,
+        cycles=settings.cycles,
+        maximum_samples=settings.maximum_samples,
+        raw_force=settings.force == "raw",
+        offsets=settings.offset_per_test,
+        equal_tests=settings.equal_tests,
+    )
+    by_choice = settings.form == "best"
+    names = list(dict.fromkeys([*settings.compare, *([] if by_choice else [settings.form])]))
+    judged = compare_forms(
+        [FORMS[name] for name in names],
+        tests,
+        scales,
+        options,
+        folds=settings.folds if by_choice else 0,
+        progress=context.progress,
+    )
+    chosen = _chosen(judged, settings.form)
+    for line in findings(chosen.fit):
+        context.warn(line)
+    summary = _summary(judged, chosen, settings.reference_A)
+    _write(context, judged, chosen, summary)
+    _report(context, tests, judged, chosen, summary)
+    return summary
+
+
+def _chosen(judged: Sequence[JudgedFit], form: str) -> JudgedFit:
+    if form == "best":
+        return min(judged, key=lambda item: item.cross_validated_nrmse or float("inf"))
+    return next(item for item in judged if item.fit.form.name == form)
+
+
+def _summary(judged: Sequence[JudgedFit], chosen: JudgedFit, reference: float) -> dict[str, Any]:
+    from mrpipe.dampers.summary import comparison_rows, correlation_rows, parameter_table, test_rows, thesis_table
+
+    model = chosen.fit.model
+    return {
+        "form": chosen.fit.form.name,
+        "drive_unit": model.drive_unit,
+        "drive_limit": model.drive_limit,
+        "parameters": parameter_table(chosen.fit),
+        "thesis_parameters": thesis_table(chosen.fit, reference),
+        "training_nrmse": chosen.training.nrmse,
+        "validation_nrmse": chosen.validation.nrmse,
+        "validation_fit_percent": chosen.validation.fit_percent,
+        "validation_r2": chosen.validation.r2,
+        "comparison": comparison_rows(judged),
+        "correlated": correlation_rows(chosen.fit),
+        "start_nrmse": list(chosen.fit.start_nrmse),
+        "tests": test_rows(chosen),
+    }
+
+
+def _write(context: StageContext, judged: Sequence[JudgedFit], chosen: JudgedFit, summary: Mapping[str, Any]) -> None:
+    from mrpipe.dampers.model import write_damper
+
+    fit = chosen.fit
+    with context.write("damper.h5") as artifact:
+        write_damper(artifact, fit.model)
+        for item in judged:
+            write_damper(artifact, item.fit.model, f"forms/{item.fit.form.name}")
+        dims = ("parameter", "parameter_of_column")
+        artifact.put("covariance", fit.covariance, unit="1", dims=dims, description="units: those of the parameters")
+        artifact.put("correlation", fit.correlation, unit="1", dims=dims)
+        artifact.put_json("parameter_names", list(fit.names))
+        artifact.put_json("parameters", summary["parameters"])
+        artifact.put_json("thesis_parameters", summary["thesis_parameters"])
+        artifact.put_json("comparison", summary["comparison"])
+        artifact.put_json("tests", summary["tests"])
+
+
+def _report(
+    context: StageContext,
+    tests: Sequence[PreparedTest],
+    judged: Sequence[JudgedFit],
+    chosen: JudgedFit,
+    summary: Mapping[str, Any],
+) -> None:
+    import pandas as pd
+
+    from mrpipe.dampers.scoring import shown_loops, yield_curves
+    from mrpipe.reporting.dampers import comparison_bars, damper_loops, yield_force_curves
+
+    context.report.text(
+        f"Damper model {chosen.fit.form.name} ({chosen.fit.form.summary}): NRMSE {chosen.training.nrmse:.3f} on the "
+        f"training tests, {chosen.validation.nrmse:.3f} on the validation tests."
+    )
+    for warning in context.warnings:
+        context.report.text(f"Noticed: {warning}.")
+    tables = {
+        "parameters": (pd.DataFrame(summary["parameters"]).T.rename_axis("name").reset_index(), "Parameters (SI)."),
+        "thesis-parameters": (
+            pd.DataFrame(summary["thesis_parameters"]).T.rename_axis("name").reset_index(),
+            "The same in the notation of thesis Table 2.2, for a chosen A.",
+        ),
+        "comparison": (
+            pd.DataFrame(summary["comparison"]),
+            "Model forms by their error on the validation tests, which no fit has seen.",
+        ),
+        "tests": (pd.DataFrame(summary["tests"]), "Error of each test."),
+    }
+    for name, (frame, caption) in tables.items():
+        if len(frame):
+            context.report.table(name, frame, caption)
+    unit = chosen.fit.model.drive_unit
+    context.report.figure(
+        "loops",
+        damper_loops(shown_loops(chosen.fit.model, tests)),
+        "Measured loops and those of the model (thesis Figures 2.7 to 2.9).",
+    )
+    context.report.figure(
+        "comparison",
+        comparison_bars(
+            [(row["form"], row["training_nrmse"], row["validation_nrmse"]) for row in summary["comparison"]]
+        ),
+        "Error of the model forms.",
+    )
+    drive, curves = yield_curves([(item.fit.form.name, item.fit.model) for item in judged], tests)
+    context.report.figure(
+        "yield-force", yield_force_curves(drive, curves, unit), "Post-yield force at half the largest speed."
+    )
+
+
+STAGE = Stage(
+    name="identify-damper",
+    summary="parametric damper model from bench tests",
+    run=_run,
+    inputs=("prepare",),
+    settings=("identify_damper",),
+    outputs=("damper.h5",),
+    modules=(
+        "mrpipe.stages.identify_damper",
+        "mrpipe.dampers.comparison",
+        "mrpipe.dampers.forms",
+        "mrpipe.dampers.summary",
+        "mrpipe.reporting.dampers",
+    ),
+)
