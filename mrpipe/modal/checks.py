@@ -12,6 +12,7 @@ from mrpipe.artifacts import FloatArray
 
 LARGEST_COUPLING = 0.1
 _FLIPS = 3
+_SUSPECT_COUPLING = 0.05
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ def modal_coupling(mode_shapes: ArrayLike, mass: ArrayLike) -> FloatArray:
 
 
 def _off_diagonal(coupling: FloatArray) -> float:
-    return float(np.sum(np.triu(coupling, 1) ** 2))
+    return 0.5 * float(np.sum(coupling**2) - np.sum(np.diag(coupling) ** 2))
 
 
 def sign_changes(mode_shape: ArrayLike, negligible: float = 0.03) -> int:
@@ -64,7 +65,8 @@ def wrong_signs(mode_shapes: ArrayLike, mass: ArrayLike) -> tuple[tuple[int, int
     scaled = np.sqrt(weight)[:, None] * U / size
     gram = scaled.T @ scaled
     before = _off_diagonal(gram)
-    places = [(i, j) for i in range(U.shape[0]) for j in range(U.shape[1]) if abs(U[i, j]) > 0.02 * abs(U[:, j]).max()]
+    suspect = np.flatnonzero((np.abs(gram - np.diag(np.diag(gram))) > _SUSPECT_COUPLING).any(axis=0))
+    places = [(i, int(j)) for i in range(U.shape[0]) for j in suspect if abs(U[i, j]) > 0.02 * abs(U[:, j]).max()]
     best: tuple[float, tuple[tuple[int, int], ...]] = (before, ())
     for number in range(1, _FLIPS + 1):
         if number == _FLIPS and best[0] < 0.05 * before:
@@ -131,3 +133,46 @@ def check_mode_matrix(
         message = f"the sign of {names} is wrong: turned, the largest coupling is {left:.3f}"
         findings.append(ModeMatrixFinding("wrong-sign", message, elements))
     return findings
+
+
+def possible_sign_changes(mode_shape: ArrayLike, error: ArrayLike) -> tuple[int, int]:
+    """Return the fewest and the most sign changes that a shape (n,) can have, given standard errors (n,).
+
+    The sign of an element smaller than twice its error is open.
+    """
+    shape = np.asarray(mode_shape, dtype=np.float64)
+    known = np.abs(shape) > np.maximum(2.0 * np.asarray(error, dtype=np.float64), 1e-12)
+    fewest = {1: 0, -1: 0}
+    most = {1: 0, -1: 0}
+    for index, (value, sure) in enumerate(zip(shape, known, strict=True)):
+        signs = [int(np.sign(value))] if sure else [1, -1]
+        if index == 0:
+            fewest = dict.fromkeys(signs, 0)
+            most = dict(fewest)
+            continue
+        fewest = {s: min(count + (s != before) for before, count in fewest.items()) for s in signs}
+        most = {s: max(count + (s != before) for before, count in most.items()) for s in signs}
+    return min(fewest.values()), max(most.values())
+
+
+def orthogonal_shapes(mode_shapes: ArrayLike, mass: ArrayLike, relative_errors: ArrayLike) -> FloatArray:
+    """Return the shapes nearest to the measured ones that are orthogonal to the mass, each by its certainty.
+
+    The weighted Procrustes problem: with L = M^(1/2), the polar factor of L U W, W = 1/error2. A mode that the sweep
+    hardly shows is then fixed by being orthogonal to those that it shows well.
+
+    Parameters
+    ----------
+    mode_shapes
+        Shape (n, n).
+    mass
+        Shape (n, n), diagonal [kg].
+    relative_errors
+        Shape (n,): error of each shape over its norm.
+    """
+    root = np.sqrt(np.diag(np.asarray(mass, dtype=np.float64)))[:, None]
+    scaled = root * np.asarray(mode_shapes, dtype=np.float64)
+    size = np.linalg.norm(scaled, axis=0)
+    weight = 1.0 / np.maximum(np.asarray(relative_errors, dtype=np.float64), 1e-5) ** 2
+    left, _, right = np.linalg.svd(scaled / size * (weight / weight.max()))
+    return np.asarray(left @ right / root * size)

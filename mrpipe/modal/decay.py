@@ -196,8 +196,11 @@ def _exponential_fit(
         return coordinate - fitted, fitted
 
     start = np.log([omegas[mode], np.clip(zetas[mode], 1e-5, 0.3)])
+    bounds = ([start[0] - 0.1, np.log(1e-6)], [start[0] + 0.1, np.log(0.6)])
     scale = float(np.std(coordinate)) or 1.0
-    result = least_squares(lambda t: solve(t)[0] / scale, start, x_scale="jac", diff_step=1e-5, xtol=1e-10)
+    result = least_squares(
+        lambda t: solve(t)[0] / scale, start, bounds=bounds, x_scale="jac", diff_step=1e-5, xtol=1e-10
+    )
     omega, zeta = np.exp(result.x)
     inverse = np.linalg.pinv(result.jac.T @ result.jac)
     block = max(2, round(2.0 * np.pi / omega / float(time[1] - time[0])))

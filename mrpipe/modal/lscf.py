@@ -85,7 +85,7 @@ def stable_poles(
     band_rad_s: tuple[float, float],
     *,
     largest_damping_ratio: float = 0.2,
-    frequency_tolerance: float = 0.01,
+    frequency_tolerance: float = 0.003,
 ) -> list[PoleCandidate]:
     """Return the poles that appear at several orders (the stabilisation diagram, as a list), lowest first.
 

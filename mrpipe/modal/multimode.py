@@ -34,6 +34,9 @@ class MultiModeFit:
     residues
         Shape (n, r) complex: amplitude of mode r on floor i in acceleration over excitation, its phase referred to
         that of a proportionally damped frame (0 or pi).
+    residue_errors
+        Shape (n, r): standard error of the residues by the responses' noise; noise of the excitation scales a mode's
+        residues alike and leaves its shape.
     coherence
         Shape (n, r): share of the response near the peak that the excitation and the record's ends explain.
     steady, measured
@@ -50,6 +53,7 @@ class MultiModeFit:
     damping_ratios: FloatArray
     covariance: FloatArray
     residues: ComplexArray
+    residue_errors: FloatArray
     coherence: FloatArray
     steady: tuple[ComplexArray, ...]
     measured: tuple[ComplexArray, ...]
@@ -73,6 +77,7 @@ class MultiModeFit:
             damping_ratios=self.damping_ratios[index],
             covariance=self.covariance[np.ix_(both, both)],
             residues=self.residues[:, index],
+            residue_errors=self.residue_errors[:, index],
             coherence=self.coherence[:, index],
         )
 
@@ -237,6 +242,14 @@ class _Fit:
         """Residual of a group in the unit of its spectra."""
         return self.targets[index] - state.basis @ (state.coefficients * self.sigma[index])
 
+    def coefficient_errors(self, index: int, state: _State) -> FloatArray:
+        """Standard errors of a group's coefficients for responses of unit noise, shape (columns,)."""
+        weight = np.concatenate([self.weight[index], self.weight[index]])
+        weighted = _stack(state.basis) * weight[:, None]
+        norms = np.linalg.norm(weighted, axis=0)
+        inverse = np.linalg.pinv(np.linalg.qr(weighted / norms, mode="r"))
+        return np.asarray(np.linalg.norm(inverse, axis=1) / norms)
+
     def steady(self, index: int, state: _State) -> ComplexArray:
         """H U of a group."""
         problem = self.groups[index][0]
@@ -336,12 +349,15 @@ def _collect(fit: _Fit, spectra: Sequence[RecordSpectrum], theta: FloatArray) ->
     residues = np.empty((outputs, modes), dtype=np.complex128)
     steady, measured = (np.empty((total, outputs), dtype=np.complex128) for _ in range(2))
     noise = np.empty(outputs)
+    errors = np.empty((outputs, modes))
     for index, ((problem, own), state) in enumerate(zip(fit.groups, fit.states(theta), strict=True)):
         width = 2 + 2 * problem.tests
         raw = state.coefficients * fit.sigma[index]
         for mode in range(modes):
             # at the peak i omega/omega_r is i: the second coefficient turns the phase
             residues[own, mode] = raw[mode * width] + 1j * raw[mode * width + 1]
+        unit = fit.coefficient_errors(index, state)[[mode * width for mode in range(modes)]]
+        errors[own] = np.outer(fit.sigma[index], unit)
         steady[:, own] = fit.steady(index, state)
         measured[:, own] = steady[:, own] + fit.complex_residual(index, state)
         noise[own] = 2.0 * fit.sigma[index] ** 2
@@ -354,6 +370,7 @@ def _collect(fit: _Fit, spectra: Sequence[RecordSpectrum], theta: FloatArray) ->
         damping_ratios=zeta[order],
         covariance=_covariance(fit, theta)[np.ix_(both, both)],
         residues=residues[:, order],
+        residue_errors=errors[:, order],
         coherence=_coherence(line, steady, measured, omega[order], zeta[order]),
         steady=tuple(np.split(steady, edges)),
         measured=tuple(np.split(measured, edges)),

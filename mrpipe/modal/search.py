@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
-from mrpipe.modal.checks import sign_changes
-from mrpipe.modal.lscf import stable_poles
+from mrpipe.modal.checks import possible_sign_changes
+from mrpipe.modal.lscf import PoleCandidate, stable_poles
 from mrpipe.modal.multimode import MultiModeFit, fit_modes
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.spectra import RecordSpectrum, excited_band, record_spectrum
 
 _USUAL_HIGH_HZ = 30.0
-_LARGEST_SURPLUS = 6
+_SURPLUS = 4
+_LEAST_COHERENCE = 0.5
+_DIVERGED_DAMPING = 0.25
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A fit with poles to spare, and which of them are the frame's (empty where that could not be told)."""
+
+    fit: MultiModeFit
+    keep: tuple[int, ...]
+    spectra: tuple[RecordSpectrum, ...]
+    band_hz: tuple[float, float]
 
 
 def bands_to_try(tests: Sequence[FrameTest], low_hz: float, high_hz: float) -> list[tuple[float, float]]:
@@ -47,53 +60,102 @@ def _strength(fit: MultiModeFit) -> FloatArray:
     return np.asarray((peak / np.sqrt(fit.noise_variance)[:, None]).max(axis=0))
 
 
-def _structural(fit: MultiModeFit, floors: int) -> list[int]:
-    """Return the modes to keep: mode r of a shear frame changes sign r - 1 times, peaks of a support do not fit in."""
-    strength = _strength(fit)
-    changes = [sign_changes(shape.real) for shape in fit.residues.T]
-    chosen: list[int] = []
+def _structural(fit: MultiModeFit, floors: int) -> tuple[int, ...]:
+    """Return the modes of the frame: mode r of a shear frame changes sign r - 1 times, a support's peak does not.
+
+    Of all rising choices whose shapes can have these sign changes, the one with the strongest peaks; empty where there
+    is none.
+    """
+    score = np.log(np.maximum(_strength(fit), 1e-300))
+    score[(fit.damping_ratios > _DIVERGED_DAMPING) | (fit.mode_coherence() < _LEAST_COHERENCE)] = -np.inf
+    ranges = [
+        possible_sign_changes(shape.real, np.maximum(error, 0.01 * np.abs(shape).max()))
+        for shape, error in zip(fit.residues.T, fit.residue_errors.T, strict=True)
+    ]
+    poles = score.size
+    best = np.full((floors + 1, poles + 1), -np.inf)
+    best[0] = 0.0
+    taken = np.zeros((floors + 1, poles + 1), dtype=bool)
     for wanted in range(floors):
-        above = chosen[-1] if chosen else -1
-        fitting = [index for index in range(above + 1, strength.size) if changes[index] == wanted]
-        if not fitting:
-            return []
-        chosen.append(max(fitting, key=lambda index: strength[index]))
-    return chosen
+        for pole in range(poles):
+            skip = best[wanted + 1, pole]
+            take = -np.inf
+            if ranges[pole][0] <= wanted <= ranges[pole][1]:
+                take = best[wanted, pole] + score[pole]
+            taken[wanted + 1, pole + 1] = take > skip
+            best[wanted + 1, pole + 1] = max(skip, take)
+    if not np.isfinite(best[floors, poles]):
+        return ()
+    chosen, pole = [], poles
+    for wanted in range(floors, 0, -1):
+        while not taken[wanted, pole]:
+            pole -= 1
+        pole -= 1
+        chosen.append(pole)
+    return tuple(reversed(chosen))
 
 
-def _next_peak(fit: MultiModeFit) -> float:
-    """Return the frequency [rad/s] at which the residual stands out most, far from the modes found."""
+def _next_peaks(fit: MultiModeFit, number: int) -> list[float]:
+    """Return where [rad/s] the residual stands out most, away from the modes found and from each other."""
     residual = fit.residual() / np.sqrt(fit.noise_variance)
     omega = np.concatenate(fit.omega)
     power = np.sum(np.abs(residual) ** 2, axis=1)
+    line = float(np.median(np.diff(fit.omega[0])))
     for found, zeta in zip(fit.angular_frequencies, fit.damping_ratios, strict=True):
-        power[np.abs(omega - found) < max(0.01 * found, 6.0 * zeta * found)] = 0.0
-    window = 5
-    smooth = np.convolve(power, np.full(window, 1.0 / window), mode="same")
-    return float(omega[int(np.argmax(smooth))])
+        power[np.abs(omega - found) < max(2.0 * zeta * found, 0.002 * found, 3.0 * line)] = 0.0
+    smooth = np.convolve(power, np.full(5, 0.2), mode="same")
+    peaks = []
+    for _ in range(number):
+        place = float(omega[int(np.argmax(smooth))])
+        peaks.append(place)
+        smooth[np.abs(omega - place) < 0.02 * place] = 0.0
+    return peaks
 
 
-def _complete(fit: MultiModeFit, spectra: Sequence[RecordSpectrum], floors: int) -> MultiModeFit:
-    """Add modes at the largest peaks of the residual until there are as many as floors."""
-    while fit.angular_frequencies.size < floors:
-        omega = np.append(fit.angular_frequencies, _next_peak(fit))
-        zeta = np.append(fit.damping_ratios, 0.004)
-        fit = fit_modes(spectra, omega, zeta)
-    return fit
+def _sound(fit: MultiModeFit) -> list[int]:
+    """Return the poles that neither ran off nor fell on a stronger one."""
+    strength = _strength(fit)
+    sound: list[int] = []
+    for index in np.argsort(-strength):
+        omega = fit.angular_frequencies[index]
+        apart = [abs(omega - fit.angular_frequencies[other]) > 1e-3 * omega for other in sound]
+        if fit.damping_ratios[index] < _DIVERGED_DAMPING and all(apart):
+            sound.append(int(index))
+    return sorted(sound)
 
 
-def _first_fit(spectra: Sequence[RecordSpectrum], floors: int, band_hz: tuple[float, float]) -> MultiModeFit | None:
-    band = (2.0 * np.pi * band_hz[0], 2.0 * np.pi * band_hz[1])
+def _look(spectra: tuple[RecordSpectrum, ...], floors: int, band_hz: tuple[float, float]) -> _Found | None:
+    """Fit stable poles; then, while the frame's modes are not complete, doubtful ones and peaks of the residual."""
+    band = (2.0 * np.pi * band_hz[0] * 1.05, 2.0 * np.pi * band_hz[1] * 0.99)
     orders = range(2 * floors + 2, 2 * floors + 20, 2)
-    candidates = [item for item in stable_poles(spectra, orders, band) if item.occurrences >= len(orders) // 2]
+    candidates = stable_poles(spectra, orders, (0.0, 2.0 * np.pi * band_hz[1]))
+    candidates = [item for item in candidates if band[0] <= item.angular_frequency <= band[1]]
     # the end of the band draws poles that are none: fewer occurrences, more damping
     candidates.sort(key=lambda item: (-item.occurrences, item.damping_ratio))
-    candidates = candidates[: floors + _LARGEST_SURPLUS]
-    if not candidates:
+    firm = [item for item in candidates if item.occurrences >= len(orders) // 2][: floors + _SURPLUS]
+    if not firm:
         return None
+    doubtful = [item for item in candidates if item not in firm and item.occurrences >= 2 and item.damping_ratio < 0.05]
+    fit = _fit_candidates(spectra, firm)
+    found = _Found(fit, _structural(fit, floors), spectra, band_hz)
+    if not found.keep and doubtful:
+        fit = _fit_candidates(spectra, [*firm, *doubtful[: max(_SURPLUS, floors + _SURPLUS - len(firm))]])
+        found = _Found(fit, _structural(fit, floors), spectra, band_hz)
+    if not found.keep:
+        sound = _sound(fit)
+        fit = fit.only(sound)
+        extra = _next_peaks(fit, max(2, floors + 2 - len(sound)))
+        omega = np.concatenate([fit.angular_frequencies, extra])
+        zeta = np.concatenate([fit.damping_ratios, np.full(len(extra), 0.004)])
+        fit = fit_modes(spectra, omega, zeta, evaluations=15)
+        found = _Found(fit, _structural(fit, floors), spectra, band_hz)
+    return found
+
+
+def _fit_candidates(spectra: Sequence[RecordSpectrum], candidates: Sequence[PoleCandidate]) -> MultiModeFit:
     omega = np.array([item.angular_frequency for item in candidates])
     zeta = np.array([item.damping_ratio for item in candidates])
-    return fit_modes(spectra, omega, zeta)
+    return fit_modes(spectra, omega, zeta, passes=2, evaluations=12)
 
 
 def find_modes(
@@ -108,50 +170,44 @@ def find_modes(
     """
     floors = tests[0].floors
     bands = bands_to_try(tests, low_hz, high_hz)
-    best: tuple[MultiModeFit, tuple[float, float], list[RecordSpectrum]] | None = None
-    for band in bands:
-        spectra = [record_spectrum(test, band) for test in tests]
-        fit = _first_fit(spectra, floors, band)
-        if fit is None:
-            continue
-        keep = _structural(fit, floors)
-        if not keep and fit.angular_frequencies.size < floors:
-            fit = _complete(fit, spectra, floors)
-            keep = _structural(fit, floors)
-        best = (fit, band, spectra)
-        if keep:
-            return _only(fit, spectra, keep), band
     span = f"between {bands[-1][0]:g} and {bands[-1][1]:.3g} Hz"
+    best: _Found | None = None
+    for band in bands:
+        found = _look(tuple(record_spectrum(test, band) for test in tests), floors, band)
+        best = found or best
+        if found is not None and found.keep:
+            return _only(found, found.keep), band
     if best is None:
         raise UserError(source, "forced tests", f"no peak {span}", "check channels, or set identify_frame.band_high_hz")
-    return _lowest(best[0], best[2], floors, source, span), best[1]
+    return _only(best, _strongest(best, floors, source, span)), best.band_hz
 
 
-def _only(fit: MultiModeFit, spectra: Sequence[RecordSpectrum], keep: Sequence[int]) -> MultiModeFit:
-    index = list(keep)
-    if len(index) == fit.angular_frequencies.size:
-        return fit
-    # a pole beyond the frame's own stays in the fit where it is a real peak inside the band: without it
-    # its response would be blamed on the frame
+def _only(found: _Found, keep: Sequence[int]) -> MultiModeFit:
+    """Fit once more with the frame's poles and those beyond them that are real peaks.
+
+    Without a support's peak its response would be blamed on the frame.
+    """
+    fit = found.fit
     strength = _strength(fit)
-    level = 0.02 * min(strength[index])
-    others = [i for i in range(strength.size) if i not in index and strength[i] > level]
-    both = sorted([*index, *others])
-    refined = fit_modes(spectra, fit.angular_frequencies[both], fit.damping_ratios[both])
-    place = [both.index(i) for i in index]
+    level = 0.02 * min(strength[list(keep)])
+    others = [i for i in _sound(fit) if i not in keep and strength[i] > level and fit.damping_ratios[i] < 0.1]
+    both = sorted([*keep, *others])
+    refined = fit_modes(found.spectra, fit.angular_frequencies[both], fit.damping_ratios[both])
+    place = [int(np.argmin(np.abs(refined.angular_frequencies - fit.angular_frequencies[i]))) for i in keep]
     return refined.only(place)
 
 
-def _lowest(fit: MultiModeFit, spectra: Sequence[RecordSpectrum], floors: int, source: Path, span: str) -> MultiModeFit:
-    """Where the signs of shapes do not tell (a noisy node): the strongest poles; too few is the user's to mend."""
+def _strongest(found: _Found, floors: int, source: Path, span: str) -> tuple[int, ...]:
+    """Where signs of shapes do not tell: the strongest coherent poles; too few of them is the user's to mend."""
+    fit = found.fit
     strength = _strength(fit)
-    coherent = [i for i in range(strength.size) if fit.mode_coherence()[i] >= 0.5]
+    coherent = [i for i in _sound(fit) if fit.mode_coherence()[i] >= _LEAST_COHERENCE]
+    # a floor has at most as many modes; one that is drowned is told, not guessed
+    coherent = [i for i in coherent if strength[i] > 1e-4 * strength.max() and fit.damping_ratios[i] < 0.1]
     if len(coherent) < floors:
-        number = len(coherent) + 1
         present = fit.angular_frequencies[coherent] / (2.0 * np.pi)
         peaks = ", ".join(f"{value:.3g}" for value in present) or "none"
-        problem = f"mode {number} of {floors} has no peak {span} (peaks at {peaks} Hz)"
+        problem = f"mode {len(coherent) + 1} of {floors} has no peak {span} (peaks at {peaks} Hz)"
         remedy = "excite it, or set identify_frame.band_low_hz and band_high_hz"
         raise UserError(source, "forced tests", problem, remedy)
-    strongest = sorted(sorted(coherent, key=lambda i: -strength[i])[:floors])
-    return _only(fit, spectra, strongest)
+    return tuple(sorted(sorted(coherent, key=lambda i: -strength[i])[:floors]))

@@ -93,20 +93,25 @@ class FrequencyVerification:
 
 
 def verify_in_frequency(
-    frame: Frame, fit: MultiModeFit, is_displacement: tuple[bool, ...], shaker_floor: int
+    frame: Frame,
+    fit: MultiModeFit,
+    band_hz: tuple[float, float],
+    is_displacement: tuple[bool, ...],
+    shaker_floor: int,
 ) -> FrequencyVerification:
     """Compare the measured frequency response, its transients taken out, with that of M, C and K."""
-    omega, excitation = fit.omega[0], fit.excitation[0]
+    inside = (fit.omega[0] >= 2.0 * np.pi * band_hz[0]) & (fit.omega[0] <= 2.0 * np.pi * band_hz[1])
+    omega, excitation, measured = fit.omega[0][inside], fit.excitation[0][inside], fit.measured[0][inside]
     accelerations = frequency_response(frame, omega, shaker_floor=shaker_floor)
     displacements = frequency_response(frame, omega, shaker_floor=shaker_floor, absolute_acceleration=False)
     synthesised = np.where(np.asarray(is_displacement), displacements, accelerations)
     steady = synthesised * excitation[:, None]
-    error = np.linalg.norm(fit.measured[0] - steady, axis=0) / np.linalg.norm(fit.measured[0], axis=0)
+    error = np.linalg.norm(measured - steady, axis=0) / np.linalg.norm(measured, axis=0)
     # lines without excitation have no frequency response
     useful = np.abs(excitation) > 0.05 * np.median(np.abs(excitation))
     return FrequencyVerification(
         frequency_hz=omega[useful] / (2.0 * np.pi),
-        measured=fit.measured[0][useful] / excitation[useful, None],
+        measured=measured[useful] / excitation[useful, None],
         synthesised=synthesised[useful],
         error=error,
     )

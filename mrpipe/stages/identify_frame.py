@@ -49,6 +49,7 @@ def _options(context: StageContext) -> IdentificationOptions:
         band_high_hz=settings.band_high_hz,
         damping_from=settings.damping_from,
         stiffness_form=settings.stiffness_form,
+        orthogonal=settings.orthogonal_shapes,
         mode_matrix=shapes,
         mode_matrix_name=settings.mode_matrix,
     )

@@ -27,6 +27,11 @@ class IdentifyFrameSettings(Section):
     stiffness_form: Literal["modal", "tridiagonal"] = Field(
         "modal", description="K from the modes, (3.14) to (3.16), or the tri-diagonal shear frame nearest to them."
     )
+    orthogonal_shapes: bool = Field(
+        True,
+        description="Take the measured shapes to the nearest ones orthogonal to the mass, each by its certainty; "
+        "not done where they contradict it or are given.",
+    )
     mode_matrix: str = Field(
         "",
         description="Mode shapes to use in place of the measured ones: a set in configs/frames or a YAML file; "
