@@ -110,9 +110,16 @@ def _is_artifact(path: Path) -> bool:
         return False
 
 
-def plain_settings(settings: Any) -> Any:
-    """Return settings as JSON-able plain values."""
-    return settings.model_dump(mode="json") if hasattr(settings, "model_dump") else json.loads(json.dumps(settings))
+def plain_settings(config: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Return dotted name -> JSON-able value of the named settings of a pydantic configuration."""
+    content = config.model_dump(mode="json")
+    chosen = {}
+    for name in names:
+        value = content
+        for part in name.split("."):
+            value = value[part]
+        chosen[name] = value
+    return chosen
 
 
 def flatten(value: Any, prefix: str = "") -> dict[str, Any]:

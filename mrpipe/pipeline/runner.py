@@ -23,7 +23,7 @@ from mrpipe.pipeline.fingerprint import FileHashes, code_version, plain_settings
 from mrpipe.pipeline.manifest import Manifest, StageKey, reasons_stale
 from mrpipe.pipeline.parts import PartWriter
 from mrpipe.pipeline.progress import stage_progress
-from mrpipe.pipeline.settings_view import SettingsView, setting_named
+from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import Stage, StageContext
 
 CAMPAIGN_RECORDERS = {"bench": "record-bench", "frame": "record-frame", "closed-loop": "record-closed-loop"}
@@ -186,7 +186,7 @@ class Pipeline:
         }
         for name in stage.optional_inputs:
             digests.setdefault(name, ABSENT)
-        settings = {name: plain_settings(setting_named(self.loaded.config, name)) for name in stage.settings}
+        settings = plain_settings(self.loaded.config, stage.settings)
         code = code_version(stage.run.__module__, stage.modules)
         return StageKey(digests, settings, code, self.loaded.config.seed)
 

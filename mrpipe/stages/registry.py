@@ -28,19 +28,14 @@ _MODULES = (
 @cache
 def all_stages() -> dict[str, Stage]:
     """Return name -> stage in the order of the pipeline."""
-    stages: dict[str, Stage] = {}
+    stages: list[Stage] = []
     for name in _MODULES:
         module = importlib.import_module(f"mrpipe.stages.{name}")
-        for stage in getattr(module, "STAGES", None) or (module.STAGE,):
-            stages[stage.name] = stage
+        stages.extend(getattr(module, "STAGES", None) or (module.STAGE,))
     # the closed loop is recorded with a calibrated controller, so it comes after it though its file comes first
-    recorded = stages.pop("record-closed-loop")
-    ordered: dict[str, Stage] = {}
-    for name, stage in stages.items():
-        if name == "close-loop":
-            ordered[recorded.name] = recorded
-        ordered[name] = stage
-    return ordered
+    names = [stage.name for stage in stages if stage.name != "record-closed-loop"]
+    names.insert(names.index("close-loop"), "record-closed-loop")
+    return {stage.name: stage for stage in sorted(stages, key=lambda item: names.index(item.name))}
 
 
 def stage_named(name: str) -> Stage:
