@@ -64,9 +64,10 @@ def clipped_share(values: FloatArray) -> float:
 def find_clipping(test: Recording) -> list[str]:
     """Return a line for each measured channel that looks clipped; the drive may rest at its limit and is left out."""
     lines = []
-    for channel, values in test.channels.items():
+    for channel in test.channels:
         if "drive" in channel or "desired" in channel:
             continue
+        values = test.used(channel)
         share = clipped_share(values)
         if share > 0.0:
             lines.append(
@@ -109,7 +110,7 @@ def require_varying_drive(campaign: Campaign) -> None:
     UserError
         If the drive of all training tests is one constant.
     """
-    drives = {test.name: test.channels["drive"] for test in campaign.with_role("training") if "drive" in test.channels}
+    drives = {test.name: test.used("drive") for test in campaign.with_role("training") if "drive" in test.channels}
     require_varying(drives, str(campaign.directory))
 
 

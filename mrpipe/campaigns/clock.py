@@ -109,7 +109,7 @@ def _unrounded(time: FloatArray) -> FloatArray:
     digits = next((count for count in range(10) if np.allclose(late, np.round(late, count), rtol=0, atol=1e-11)), 12)
     index = np.arange(time.size)
     slope, start = np.polyfit(index, time, 1)
-    even = np.asarray(start + slope * index)
+    even = np.asarray(round(float(start), 12) + slope * index)
     return even if float(np.max(np.abs(time - even))) <= 0.75 * 10.0**-digits else time
 
 

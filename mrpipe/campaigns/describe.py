@@ -45,8 +45,12 @@ def _describe_test(campaign: Campaign, test: Recording) -> dict[str, Any]:
     if len(test.segments) > 1:
         row["segments"] = len(test.segments)
     row["channels"] = {
-        name: {"unit": _unit(campaign, name), "minimum": float(values.min()), "maximum": float(values.max())}
-        for name, values in test.channels.items()
+        name: {
+            "unit": _unit(campaign, name),
+            "minimum": float(test.used(name).min()),
+            "maximum": float(test.used(name).max()),
+        }
+        for name in test.channels
     }
     if test.details:
         row["details"] = dict(test.details)

@@ -228,7 +228,8 @@ def _read_test(reader: _Reader, shared: dict[str, ChannelEntry], index: int) -> 
     begin, end, segments = _segments(reader, file, entry, clock.time_s, clock.sampling_rate_hz, place)
     values = {name: column[begin:end] for name, column in columns.items()}
     for name, column in values.items():
-        require_finite(file, column, begin, name, where)
+        for first, last in segments:
+            require_finite(file, column[first:last], begin + first, name, where)
     if "drive" in channels:
         reader.set_points.append(channels["drive"].value is not None or channels["drive"].set_point)
     details = entry.details()

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mrpipe.artifacts import FloatArray
 
 
@@ -27,7 +29,8 @@ class Recording:
     channels
         Quantity (`displacement`, `drive`, `force`, `floor_acceleration_1`, ...) -> shape (n,), SI.
     segments
-        Half-open index ranges to use; the whole test where none were given.
+        Half-open index ranges to use; the whole test where none were given. Channels hold what lies between the first
+        and the last; samples between two segments are not checked and may be NaN.
     details
         What else campaign.yaml says of the test (mode, law, gains, shaker floor, ...).
     """
@@ -40,6 +43,13 @@ class Recording:
     segments: tuple[tuple[int, int], ...]
     kind: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
+
+    def used(self, channel: str) -> FloatArray:
+        """Return the samples of a channel that lie in segments, one after another."""
+        values = self.channels[channel]
+        if self.segments == ((0, values.size),):
+            return values
+        return np.concatenate([values[begin:end] for begin, end in self.segments])
 
 
 @dataclass(frozen=True)

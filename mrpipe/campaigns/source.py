@@ -64,8 +64,7 @@ class YamlSource:
             first = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")[0]
             key = (*place, *first["loc"])
             if first["type"] == "extra_forbidden":
-                known = [item for item in model.model_fields if item not in content]
-                raise self.error(key, "unknown key", nearest(str(first["loc"][-1]), known)) from None
+                raise self.error(key, "unknown key", nearest(str(first["loc"][-1]), model.model_fields)) from None
             if first["type"] == "missing":
                 raise self.error(key, "is missing", f"write {first['loc'][-1]}: ... here") from None
             raise self.error(key, f"is {first['input']!r}", first["msg"].removeprefix("Value error, ")) from None

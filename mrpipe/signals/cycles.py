@@ -117,12 +117,12 @@ def _longest_steady_run(periods: FloatArray, heights: FloatArray) -> tuple[int, 
 def choose_cycles(cycles: SteadyCycles, count: int, settle: int) -> IntArray:
     """Return the starts of `count` cycles (0: all) after leaving out `settle` cycles at the beginning.
 
-    Where there are too few cycles for both, fewer are left out, so that as many as asked for remain if they exist.
+    Three cycles remain in any case, so that a short test loses fewer at its beginning.
     """
     starts = cycles.starts
     if starts.size < 2:
         return starts
     available = starts.size - 1
-    wanted = available if count == 0 else min(count, available)
-    skip = min(settle, available - wanted) if count else min(settle, available - 1)
-    return starts[skip : skip + (available - skip if count == 0 else wanted) + 1]
+    skip = min(settle, max(0, available - 3))
+    remaining = available - skip
+    return starts[skip : skip + (remaining if count == 0 else min(count, remaining)) + 1]

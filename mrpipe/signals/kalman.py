@@ -44,7 +44,7 @@ def kalman_gains(
     """Return the gains from the standard deviations of noise that is white at one and the same sampling rate.
 
     Without a bias state l = sigma_a / sigma_x and k = sqrt(2 l) (errata D). With one, k, l and m are the coefficients
-    of the stable half of s^6 + (sigma_a/sigma_x)^2 s^2 - (sigma_b/sigma_x)^2, which the steady Riccati equation leads to.
+    of the stable half of s^6 + (sigma_a/sigma_x)^2 s^2 - (sigma_b/sigma_x)^2, where the Riccati equation leads.
 
     Parameters
     ----------

@@ -49,3 +49,50 @@ def force_intercept(displacement: FloatArray, velocity: FloatArray, drive: Float
     columns = [np.ones_like(force), *(term * power for term in odd for power in powers)]
     solution = np.linalg.lstsq(np.column_stack(columns), force, rcond=None)[0]
     return float(solution[0])
+
+
+def drive_favours_a_side(drive: FloatArray, cycles: IntArray) -> bool:
+    """Return whether the drive differs between the two halves of a cycle, which unbalances the extremes of the force.
+
+    Parameters
+    ----------
+    drive
+        Shape (n,).
+    cycles
+        Start indices of the steady cycles and the end of the last one.
+    """
+    span = float(np.ptp(drive[cycles[0] : cycles[-1]]))
+    if span <= 0.02 * float(np.max(np.abs(drive))):
+        return False
+    half = round(float(np.mean(np.diff(cycles))) / 2.0)
+    early = drive[cycles[0] : cycles[-1] - half]
+    late = drive[cycles[0] + half : cycles[-1]]
+    return float(np.sqrt(np.mean((early - late) ** 2))) > 0.05 * span
+
+
+def acceleration_gain(displacement: FloatArray, acceleration: FloatArray, sampling_rate_hz: float) -> float:
+    """Return measured acceleration over the second derivative of displacement: 1 where sign and unit are right.
+
+    Taken by cross spectrum about the strongest frequency of the motion, where the displacement's noise does not matter.
+
+    Parameters
+    ----------
+    displacement, acceleration
+        Shape (n,).
+    sampling_rate_hz
+        Rate.
+
+    Returns
+    -------
+    float
+        Gain with sign; 0 where nothing moves.
+    """
+    window = np.hanning(displacement.size)
+    frequencies = np.fft.rfftfreq(displacement.size, 1.0 / sampling_rate_hz)
+    motion = np.fft.rfft(window * (displacement - displacement.mean()))
+    measured = np.fft.rfft(window * (acceleration - acceleration.mean()))
+    derived = -((2.0 * np.pi * frequencies) ** 2) * motion
+    strongest = frequencies[2 + int(np.argmax(np.abs(motion[2:]) * frequencies[2:]))]
+    band = (frequencies > 0.7 * strongest) & (frequencies < 1.4 * strongest)
+    power = float(np.sum(np.abs(derived[band]) ** 2))
+    return float(np.sum(np.real(np.conj(derived[band]) * measured[band]))) / power if power > 0.0 else 0.0

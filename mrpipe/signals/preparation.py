@@ -22,9 +22,18 @@ from mrpipe.signals.filters import (
     usable_cutoff,
 )
 from mrpipe.signals.kalman import KalmanGains, kalman_gains, kinematic_kalman, kinematic_smoother
-from mrpipe.signals.offsets import balanced_extremes, force_intercept, mean_over_cycles
+from mrpipe.signals.offsets import (
+    acceleration_gain,
+    balanced_extremes,
+    drive_favours_a_side,
+    force_intercept,
+    mean_over_cycles,
+)
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.signals.spectra import cutoff_by_criterion
+
+VELOCITY_SHARE = 0.99
+"""Share of the power of a random motion's velocity that the cut-off by criterion keeps."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +45,7 @@ class PreparationOptions:
     velocity_cutoff_hz: float = 20.0
     order: int = 2
     phase: Phase = "zero"
-    cutoff_choice: Literal["fixed", "criterion"] = "fixed"
+    cutoff_choice: Literal["by-motion", "fixed", "criterion"] = "by-motion"
     differentiation: Literal["backward", "central", "savitzky-golay", "kalman"] = "backward"
     savitzky_golay_window_s: float = 0.03
     kalman_displacement_noise_m: float = 20e-6
@@ -79,6 +88,14 @@ class Preparation:
     findings: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class PreparedCampaign:
+    """All prepared tests, and what holds for the campaign as a whole, one line each."""
+
+    tests: tuple[Preparation, ...]
+    findings: tuple[str, ...] = ()
+
+
 @dataclass
 class _Work:
     """One segment while it is prepared."""
@@ -90,6 +107,7 @@ class _Work:
     channels: dict[str, FloatArray]
     filtered: dict[str, FloatArray] = field(default_factory=dict)
     cutoffs: dict[str, float] = field(default_factory=dict)
+    by_criterion: bool = False
     cycles: SteadyCycles = field(default_factory=lambda: SteadyCycles(np.zeros(0, dtype=np.int64)))
     offsets: dict[str, float] = field(default_factory=dict)
     findings: list[str] = field(default_factory=list)
@@ -97,7 +115,7 @@ class _Work:
 
 def prepare_campaign(
     campaign: Campaign, options: PreparationOptions, progress: Progress = no_progress
-) -> list[Preparation]:
+) -> PreparedCampaign:
     """Prepare every test of a bench campaign; a test with several segments becomes several prepared tests.
 
     Raises
@@ -116,16 +134,18 @@ def prepare_campaign(
             name = recording.name if len(recording.segments) == 1 else f"{recording.name}-{index + 1}"
             work = _on_working_rate(recording, begin, end, name, rate)
             _require_length(work, options, source)
-            _filter(work, options)
-            _measure_offsets(work)
             works.append(work)
+    findings = _check_acceleration(works)
+    for work in works:
+        _filter(work, options)
+        _measure_offsets(work)
     if options.offset == "campaign":
         _share_offsets(works)
     results = []
     for count, work in enumerate(works):
         progress(0.7 + 0.3 * count / len(works), work.name)
         results.append(_finish(work, options, campaign))
-    return results
+    return PreparedCampaign(tuple(results), tuple(findings))
 
 
 def _on_working_rate(recording: Recording, begin: int, end: int, name: str, rate: float) -> _Work:
@@ -158,43 +178,69 @@ def _require_length(work: _Work, options: PreparationOptions, source: str) -> No
 
 def _filter(work: _Work, options: PreparationOptions) -> None:
     """Low-pass every channel; the drive keeps its range."""
+    displacement = work.channels["displacement"]
+    rough = butterworth_lowpass(displacement, options.cutoff_hz, work.rate, order=options.order)
+    periodic = find_steady_cycles(rough, work.rate).periodic
+    work.by_criterion = options.cutoff_choice == "criterion" or (options.cutoff_choice == "by-motion" and not periodic)
     for name, values in work.channels.items():
-        if np.ptp(values) == 0.0:
-            work.filtered[name] = values
-            continue
         cutoff = options.cutoff_hz
-        if options.cutoff_choice == "criterion":
-            cutoff = cutoff_by_criterion(values, work.rate)
-        if usable_cutoff(cutoff, work.rate) is None:
+        if work.by_criterion and np.ptp(values) > 0.0:
+            share = VELOCITY_SHARE if name == "displacement" and not periodic else None
+            cutoff = cutoff_by_criterion(values, work.rate, velocity_share=share)
+        if np.ptp(values) == 0.0 or usable_cutoff(cutoff, work.rate) is None:
             work.filtered[name] = values
             continue
         work.cutoffs[name] = cutoff
         smooth = butterworth_lowpass(values, cutoff, work.rate, order=options.order, phase=options.phase)
         work.filtered[name] = np.clip(smooth, values.min(), values.max()) if name == "drive" else smooth
-    if options.cutoff_choice == "fixed" and usable_cutoff(options.cutoff_hz, work.rate) is None:
+    if not work.by_criterion and usable_cutoff(options.cutoff_hz, work.rate) is None:
         work.findings.append(
             f"no low-pass at {options.cutoff_hz:g} Hz: the sampling rate of {work.rate:g} Hz is too low for it"
         )
     work.cycles = find_steady_cycles(work.filtered["displacement"], work.rate)
 
 
+def _check_acceleration(works: Sequence[_Work]) -> list[str]:
+    """Turn an acceleration round whose sign is against that of the displacement, and tell of a doubtful unit."""
+    gains = [
+        acceleration_gain(work.channels["displacement"], work.channels["acceleration"], work.rate)
+        for work in works
+        if "acceleration" in work.channels
+    ]
+    if not gains:
+        return []
+    gain = float(np.median(gains))
+    findings = []
+    if gain < -0.2:
+        findings.append(
+            "acceleration has the opposite sign of the displacement's second derivative: it was turned round"
+        )
+        for work in works:
+            if "acceleration" in work.channels:
+                work.channels["acceleration"] = -work.channels["acceleration"]
+    if not 0.7 < abs(gain) < 1.4:
+        findings.append(
+            f"acceleration is {abs(gain):.3g} times the second derivative of displacement: check unit, scale and "
+            "place of the accelerometer"
+        )
+    return findings
+
+
 def _measure_offsets(work: _Work) -> None:
     signals = work.filtered
+    displacement = signals["displacement"]
     if work.cycles.periodic:
         starts = work.cycles.starts
         work.offsets = {name: balanced_extremes(signals[name], starts) for name in ("displacement", "force")}
         if "acceleration" in signals:
             work.offsets["acceleration"] = mean_over_cycles(signals["acceleration"], starts)
-        return
-    displacement = signals["displacement"]
-    # a motion of 0.2 s at least, so that noise does not set the scale of the velocity
+        if not drive_favours_a_side(signals["drive"], starts):
+            return
     velocity = central_difference(butterworth_lowpass(displacement, 50.0, work.rate), 1.0 / work.rate)
-    work.offsets = {
-        "displacement": float(np.mean(displacement)),
-        "force": force_intercept(displacement, velocity, signals["drive"], signals["force"]),
-    }
-    if "acceleration" in signals:
-        work.offsets["acceleration"] = float(np.mean(signals["acceleration"]))
+    work.offsets["force"] = force_intercept(displacement, velocity, signals["drive"], signals["force"])
+    for name in ("displacement", "acceleration"):
+        if name in signals:
+            work.offsets.setdefault(name, float(np.mean(signals[name])))
 
 
 def _share_offsets(works: Sequence[_Work]) -> None:
@@ -260,10 +306,14 @@ def _motion(work: _Work, options: PreparationOptions) -> tuple[FloatArray, Float
         return displacement, velocity, measured
     velocity = _differentiate(displacement, dt, options, method)
     cutoff = options.velocity_cutoff_hz
-    if options.cutoff_choice == "criterion":
-        cutoff = work.cutoffs.get("displacement", work.rate)
-    if usable_cutoff(cutoff, work.rate) is not None and options.cutoff_choice == "fixed":
+    # by criterion the displacement has been filtered where its velocity needs it
+    if not work.by_criterion and usable_cutoff(cutoff, work.rate) is not None:
         work.cutoffs["velocity"] = cutoff
+        if work.cycles.frequency_hz > 0.3 * cutoff:
+            work.findings.append(
+                f"the velocity is cut off at {cutoff:g} Hz, near the motion's {work.cycles.frequency_hz:.3g} Hz: raise "
+                "velocity_cutoff_hz"
+            )
         velocity = butterworth_lowpass(velocity, cutoff, work.rate, order=options.order, phase=options.phase)
     if measured is None:
         measured = _differentiate(velocity, dt, options, "central")

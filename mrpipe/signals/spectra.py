@@ -34,13 +34,18 @@ def noise_level(values: FloatArray, sampling_rate_hz: float) -> float:
 
 
 def cutoff_by_criterion(
-    values: FloatArray, sampling_rate_hz: float, *, lowest_hz: float = 5.0, margin: float = 1.25
+    values: FloatArray,
+    sampling_rate_hz: float,
+    *,
+    velocity_share: float | None = None,
+    lowest_hz: float = 5.0,
+    margin: float = 1.25,
 ) -> float:
     """Return the frequency above which noise outweighs the signal.
 
-    Above it the power density, smoothed over a sixth of an octave, stays below twice the noise floor, so what a
-    low-pass there removes is noise as far as a spectrum tells. Because differentiation weights signal and noise alike, it is the
-    right place for displacement, velocity and acceleration.
+    Above it the power density, smoothed over an eighth of its frequency, stays below twice the noise floor, so what
+    a low-pass there removes is noise as far as a spectrum tells. Differentiation weights signal and noise alike, so it
+    is the right place for displacement, velocity and acceleration.
 
     Parameters
     ----------
@@ -48,10 +53,14 @@ def cutoff_by_criterion(
         Shape (n,).
     sampling_rate_hz
         Rate.
+    velocity_share
+        Where given, the cut-off is no higher than the frequency that holds this share of the power of the channel's
+        time derivative. Under random motion the noise of a displacement sensor falls with frequency, and a cut-off at
+        its white part alone would let most of it through (a recording with motions up to 250 Hz taught so).
     lowest_hz
         No cut-off below this.
     margin
-        The cut-off is put this much above the frequency found.
+        The cut-off is put this much above the frequency at which the signal reaches the noise floor.
 
     Returns
     -------
@@ -61,16 +70,21 @@ def cutoff_by_criterion(
     frequencies, density = power_spectrum(values, sampling_rate_hz)
     floor = noise_floor(frequencies, density)
     highest = sampling_rate_hz / 2.0
-    spread = max(1e-30, float(np.max(density)) * 1e-16)
+    rounding = max(1e-300, float(np.max(density)) * 1e-16)
     smooth = _smooth_over_octave(frequencies, density)
-    above = np.flatnonzero(smooth > 2.0 * max(floor, spread))
+    above = np.flatnonzero(smooth > 2.0 * max(floor, rounding))
     above = above[frequencies[above] <= 0.7 * highest]
     if above.size == 0:
         return lowest_hz
     knee = float(frequencies[above[-1]])
-    if knee >= 0.69 * highest:
-        return highest
-    return float(min(highest, max(lowest_hz, margin * knee)))
+    cutoff = highest if knee >= 0.69 * highest else margin * knee
+    if velocity_share is not None:
+        power = np.clip(density - floor, 0.0, None) * frequencies**2
+        power[frequencies > 0.7 * highest] = 0.0
+        held = np.cumsum(power)
+        if held[-1] > 0.0:
+            cutoff = min(cutoff, float(frequencies[np.searchsorted(held, velocity_share * held[-1])]))
+    return float(min(highest, max(lowest_hz, cutoff)))
 
 
 def _smooth_over_octave(frequencies: FloatArray, density: FloatArray) -> FloatArray:

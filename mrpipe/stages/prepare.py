@@ -39,7 +39,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         cycles=settings.cycles,
         settle_cycles=settings.settle_cycles,
     )
-    preparations = prepare_campaign(campaign, options, context.progress)
+    prepared = prepare_campaign(campaign, options, context.progress)
+    preparations = prepared.tests
+    for finding in prepared.findings:
+        context.warn(finding)
     for line in summarised([(item.test.name, line) for item in preparations for line in item.findings]):
         context.warn(line)
     with context.write("prepared.h5") as artifact:

@@ -30,10 +30,10 @@ class PrepareSettings(Section):
         "zero",
         description="zero: forwards and backwards, no channel is late; causal: as on the rig, velocity is 11 ms late.",
     )
-    cutoff_choice: Literal["fixed", "criterion"] = Field(
-        "fixed",
+    cutoff_choice: Literal["by-motion", "fixed", "criterion"] = Field(
+        "by-motion",
         description="fixed: the cut-offs above; criterion: for each test and channel the frequency at which it sinks "
-        "into its noise (right for random motion).",
+        "into its noise; by-motion: fixed for periodic tests, criterion for random motion.",
     )
     differentiation: Literal["backward", "central", "savitzky-golay", "kalman"] = Field(
         "backward",
