@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from mrpipe.artifacts import atomic_write_text
 
-_ROWS_SHOWN = 40
+_ROWS_SHOWN = 15
 
 
 @dataclass(frozen=True)
