@@ -24,8 +24,8 @@ class FitOptions:
 
     method: str = "least-squares"
     starts: int = 2
-    cycles: int = 3
-    maximum_samples: int = 60_000
+    cycles: int = 2
+    maximum_samples: int = 30_000
     raw_force: bool = False
     offsets: bool = True
     equal_tests: bool = False

@@ -16,12 +16,14 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.dampers.comparison import FitOptions, compare_forms
     from mrpipe.dampers.forms import FORMS
-    from mrpipe.dampers.samples import scales_of
+    from mrpipe.dampers.samples import scales_of, smooth_motion
     from mrpipe.dampers.summary import findings
     from mrpipe.signals.prepared import read_prepared
 
     settings = context.settings.identify_damper
     tests = read_prepared(context.artifact("prepare"))
+    if settings.smooth_motion:
+        tests = smooth_motion(tests)
     training = [test for test in tests if test.role == "training"]
     if not training:
         raise StageSkipped("identify-damper: the campaign has no training test")

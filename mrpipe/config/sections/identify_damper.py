@@ -52,9 +52,14 @@ class IdentifyDamperSettings(Section):
     viscosity_order: int = Field(
         1, ge=0, le=3, description="Degree of the viscosity in the drive (2.3); lowered to what the levels can tell."
     )
-    cycles: int = Field(3, ge=0, description="Steady cycles of each periodic test that the fit sees; 0 for all.")
+    smooth_motion: bool = Field(
+        True,
+        description="Low-pass the displacement of periodic tests where it sinks into its noise (zero phase): at a "
+        "reversal micrometres of noise become newtons and bias the shape of the hysteresis.",
+    )
+    cycles: int = Field(2, ge=0, description="Steady cycles of each periodic test that the fit sees; 0 for all.")
     maximum_samples: int = Field(
-        60_000, ge=500, description="Forces are compared at about so many samples; the model runs at the full rate."
+        30_000, ge=500, description="Forces are compared at about so many samples; the model runs at the full rate."
     )
     force: Literal["filtered", "raw"] = Field(
         "filtered", description="The measured force to fit and to judge by: as prepared, or without its low-pass."
