@@ -1,8 +1,8 @@
 """The compiled loop of Figure 5.3: frame, damper, sensors and controller.
 
 One plant step: the frame's linear part is exact for inputs that run straight between the ends of the step
-(`discretise_first_order`), and the force at its end is found together with the motion there, by fixed point and, where a
-law jumps, by bisection. See docs/numerics.md.
+(`discretise_first_order`), and the force at its end is found together with the motion there, by fixed point and, where
+a law jumps, by bisection. See docs/numerics.md.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def run_loop(
     counts, run
         Integers and numbers of the run, indices I_... and R_...
     At, B0, B1
-        Exact step of the frame, shapes (2n, 2n) transposed, (2n, 2), (2n, 2); inputs: ground acceleration, damper force.
+        Exact step of the frame, shapes (2n, 2n) transposed, (2n, 2), (2n, 2); inputs: ground acceleration, force.
     A, B
         Continuous state space, shapes (2n, 2n), (2n, 2).
     M, C, K, w

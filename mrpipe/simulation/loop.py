@@ -11,7 +11,13 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.controller import Controller
-from mrpipe.control.kernel import COMMAND_SIZE, MEASURED_ACCELERATION, MEASURED_DISPLACEMENT, MEASURED_GROUND
+from mrpipe.control.kernel import (
+    COMMAND_SIZE,
+    MEASURED_ACCELERATION,
+    MEASURED_DISPLACEMENT,
+    MEASURED_FLOORS,
+    MEASURED_GROUND,
+)
 from mrpipe.dampers.plant import Chain, build_chain, new_state
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import kernel
@@ -246,7 +252,7 @@ def _run_numbers(
 
 def _noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generator | None) -> FloatArray:
     """Return sensor noise, shape (samples, 4 + n); the damper's acceleration is a difference of two sensors."""
-    result = np.zeros((samples, kernel.MEASURED_FLOORS + floors))
+    result = np.zeros((samples, MEASURED_FLOORS + floors))
     if noise.displacement_m > 0.0 or noise.acceleration_m_s2 > 0.0:
         if rng is None:
             raise ValueError("sensor noise needs a generator")
@@ -265,7 +271,7 @@ def _response(
     ground = tail[:, kernel.T_GROUND]
     absolute = record[:, 2 * n : 3 * n]
     return Response(
-        time_s=np.arange(len(record)) * dt,
+        time_s=dt * np.arange(len(record), dtype=np.float64),
         displacement=record[:, :n],
         velocity=record[:, n : 2 * n],
         acceleration=absolute - ground[:, None],
@@ -281,6 +287,6 @@ def _response(
         work_frame=tail[:, kernel.T_WORK_FRAME],
         energy=tail[:, kernel.T_ENERGY],
         commands=commands,
-        command_time_s=np.arange(len(commands)) * command_dt,
+        command_time_s=command_dt * np.arange(len(commands), dtype=np.float64),
         seconds=seconds,
     )

@@ -1,0 +1,98 @@
+"""Settings of `simulate`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from mrpipe.config.section import Section
+
+
+class ExcitationSettings(Section):
+    """What shakes the base."""
+
+    kind: Literal["harmonic", "sweep", "recorded", "free-decay"] = Field(
+        "harmonic", description="Harmonic with a free decay after its stop, sweep, recorded, or release from a shape."
+    )
+    frequency_rad_s: float | None = Field(
+        8.0, gt=0.0, description="Of the harmonic; null: the free frequency of the calibrated mode."
+    )
+    base_amplitude_m_s2: float | None = Field(
+        None, gt=0.0, description="Of harmonic or sweep; null: adjusted so that vd gives `reference_rms_top_m`."
+    )
+    adjust_with: Literal["damper", "ideal"] = Field(
+        "damper", description="Whether the amplitude is adjusted with the damper in the loop or with perfect tracking."
+    )
+    reference_rms_top_m: float = Field(0.0243, gt=0.0, description="RMS top displacement of vd (thesis Table 5.1).")
+    reference_c_n_s_m: float = Field(650.0, gt=0.0, description="Viscous gain of vd in the adjustment.")
+    factor: float = Field(1.0, gt=0.0, description="Factor on the base acceleration, whatever its kind.")
+    cycles: int = Field(40, ge=2, description="Cycles of the harmonic.")
+    settling_cycles: int = Field(20, ge=1, description="Cycles left out of the indices.")
+    ramp_cycles: float = Field(2.0, ge=0.0, description="Cycles over which the harmonic is eased in.")
+    decay_s: float = Field(8.0, ge=0.0, description="Free decay after the harmonic stops.")
+    release_top_m: float = Field(0.035, gt=0.0, description="Top displacement from which kind free-decay is released.")
+    sweep_first_hz: float = Field(0.5, gt=0.0, description="First frequency of the sweep.")
+    sweep_last_hz: float = Field(3.0, gt=0.0, description="Last frequency of the sweep.")
+    sweep_s: float = Field(60.0, gt=0.0, description="Length of the sweep.")
+    file: str = Field(
+        "", description="Recorded base acceleration: text or CSV of two columns, time [s] and acceleration."
+    )
+    file_unit: str = Field("m/s^2", description="Unit of the recorded acceleration, such as g or cm/s^2.")
+
+
+class ControllerSettings(Section):
+    """The real-time controller of Figure 5.3."""
+
+    rate_hz: float = Field(200.0, gt=0.0, description="Sampling rate; the thesis prints 200 and 500.")
+    delay_s: float = Field(0.0, ge=0.0, description="From sampling to output.")
+    velocity: Literal["kalman", "difference", "measured"] = Field(
+        "kalman", description="Kinematic Kalman filter, backward difference, or a perfect velocity sensor."
+    )
+    kalman_displacement_noise_m: float = Field(20e-6, gt=0.0, description="Displacement noise the filter reckons with.")
+    kalman_acceleration_noise_m_s2: float = Field(0.1, gt=0.0, description="Acceleration noise it reckons with.")
+    kalman_bias_drift_m_s2: float = Field(
+        0.0,
+        ge=0.0,
+        description="Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.",
+    )
+    inverse: Literal["network", "model"] = Field(
+        "network", description="Inverse of the damper: the trained network, or the identified model's post-yield force."
+    )
+    residual_force_n: float = Field(
+        18.0, ge=0.0, description="Switch: below this desired force the drive is 0 (P2 24)."
+    )
+    low_pass_hz: float | None = Field(60.0, gt=0.0, description="Butterworth low-pass on the drive; null: none.")
+    drive_limit: float | None = Field(None, gt=0.0, description="Largest drive; null: that of the damper.")
+    dead_band_m_s: float = Field(0.0, ge=0.0, description="Speed below which the direction of motion is kept.")
+    extremum_step_m: float = Field(1e-4, gt=0.0, description="Way back that makes an extremum count (X of fdns).")
+    extremum_share: float = Field(0.02, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
+
+
+class SensorSettings(Section):
+    """Noise of the sensors in the loop."""
+
+    displacement_noise_m: float = Field(20e-6, ge=0.0, description="RMS noise of the damper displacement.")
+    acceleration_noise_m_s2: float = Field(0.1, ge=0.0, description="RMS noise of each acceleration.")
+    acceleration_bias_m_s2: float = Field(0.0, description="Constant bias of the damper's acceleration.")
+
+
+class SimulateSettings(Section):
+    """The closed loop."""
+
+    frame: str = Field("identified", description="Frame: `identified`, or a set of configs/frames or its YAML file.")
+    damper: str = Field("identified", description="Damper: `identified`, or a set of configs/dampers or its YAML file.")
+    tracking: Literal["damper", "ideal"] = Field(
+        "damper", description="The damper gives the force, or the clipped desired force acts as it is."
+    )
+    plant_rate_hz: float = Field(2000.0, ge=100.0, description="Steps of the plant a second.")
+    record_rate_hz: float = Field(1000.0, gt=0.0, description="Rate of the histories in the artifact.")
+    driver_time_constant_s: float = Field(
+        0.0, ge=0.0, description="Lag of the current driver besides the damper's own."
+    )
+    accelerations: Literal["relative", "absolute"] = Field(
+        "relative", description="Which accelerations rms_a1 and the like are of; errata section B gives relative ones."
+    )
+    excitation: ExcitationSettings = Field(ExcitationSettings(), description="What shakes the base.")
+    controller: ControllerSettings = Field(ControllerSettings(), description="The real-time controller.")
+    sensors: SensorSettings = Field(SensorSettings(), description="Noise of the sensors.")

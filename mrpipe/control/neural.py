@@ -1,0 +1,157 @@
+"""Neural model reference control: a network that gives the force of FDNS from twelve motions (thesis 4.3.4, P3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.networks.assembly import History
+from mrpipe.networks.levenberg_marquardt import StoppingRules
+from mrpipe.networks.network import FeatureSpec, Network, lagged
+from mrpipe.networks.training import TrainingOptions, train
+
+
+@dataclass(frozen=True)
+class ReferenceOptions:
+    """Harmonic loops that the network learns, and how.
+
+    Attributes
+    ----------
+    alpha_n_m
+        Gain of FDNS.
+    amplitudes_m
+        Of the loops; every second one in between is kept for verification.
+    frequencies_hz
+        Of the loops.
+    rate_hz, past_values
+        Of the network: displacement and velocity now and `past_values` before.
+    hidden
+        Neurons of the hidden layers.
+    starts, iterations
+        Of the training.
+    rows
+        Rows of the training set.
+    displacement_noise_m, velocity_noise_m_s
+        Noise on the inputs in training. Lagged samples of a smooth motion are nearly collinear, and a network trained
+        without noise lives on their tiny differences: the noise of an estimator would then drown the force.
+    """
+
+    alpha_n_m: float
+    amplitudes_m: tuple[float, ...]
+    frequencies_hz: tuple[float, ...]
+    rate_hz: float = 200.0
+    past_values: int = 5
+    hidden: tuple[int, ...] = (6, 6)
+    starts: int = 4
+    iterations: int = 150
+    rows: int = 6000
+    displacement_noise_m: float = 2e-5
+    velocity_noise_m_s: float = 1e-3
+
+
+@dataclass(frozen=True)
+class ReferenceNetwork:
+    """The trained network and how well it does on loops of amplitudes and frequencies it has not seen."""
+
+    network: Network
+    training_nrmse: float
+    verification_nrmse: float
+    iterations: int
+
+
+def loop(alpha: float, amplitude_m: float, frequency_hz: float, rate_hz: float) -> tuple[FloatArray, ...]:
+    """Return displacement, velocity and force of two cycles of FDNS in harmonic motion, each of shape (n,)."""
+    omega = 2.0 * np.pi * frequency_hz
+    t = np.arange(int(2.0 * rate_hz / frequency_hz)) / rate_hz
+    x = amplitude_m * np.sin(omega * t)
+    v = amplitude_m * omega * np.cos(omega * t)
+    return x, v, alpha * (np.sign(v) * amplitude_m - x)
+
+
+def train_reference(
+    options: ReferenceOptions, rng: np.random.Generator, progress: Progress = no_progress
+) -> ReferenceNetwork:
+    """Train the network of 4.3.4 on harmonic loops of FDNS.
+
+    The law is of first degree in amplitude and its loop does not depend on frequency; a network is neither by itself,
+    hence the many amplitudes and frequencies.
+    """
+    spec = FeatureSpec(("displacement", "velocity"), options.past_values, False, options.rate_hz, "force")
+    history = _with_noise(_history(options, options.amplitudes_m, options.frequencies_hz), options, rng)
+    trained = train(
+        history,
+        spec,
+        TrainingOptions(
+            hidden=options.hidden,
+            biases=False,
+            starts=options.starts,
+            refined_starts=1,
+            rules=StoppingRules(iterations=options.iterations, held_out_failures=15),
+            subsample_rows=options.rows,
+            subsample_iterations=options.iterations,
+            iterations=20,
+            method="mu-diagonal",
+        ),
+        rng,
+        progress=progress,
+    )
+    between = tuple(np.sqrt(np.multiply(options.amplitudes_m[1:], options.amplitudes_m[:-1])))
+    others = tuple(np.sqrt(np.multiply(options.frequencies_hz[1:], options.frequencies_hz[:-1])))
+    return ReferenceNetwork(
+        trained.network,
+        _nrmse(trained.network, history),
+        _nrmse(trained.network, _history(options, between, others)),
+        trained.iterations,
+    )
+
+
+def network_force(network: Network, x: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the force over one periodic cycle, shape (n,), of a motion sampled at any rate of at least the network's.
+
+    For the equivalent linearisation of the neural loop; the cycle is `x`, `v` of shape (n,) at angular frequency
+    v/x, its past values wrap around.
+    """
+    omega = float(np.max(np.abs(v)) / np.max(np.abs(x)))
+    spacing = omega * len(x) / (2.0 * np.pi * network.features.sampling_rate_hz)
+    past = network.features.past_values
+    places = np.arange(len(x))
+    columns = []
+    for channel in (x, v):
+        for lag in range(past + 1):
+            columns.append(np.interp(places - lag * spacing, places, channel, period=len(x)))
+    return network.predict(np.stack(columns, axis=1))
+
+
+def _history(options: ReferenceOptions, amplitudes: tuple[float, ...], frequencies: tuple[float, ...]) -> History:
+    pairs = [(a, f) for a in amplitudes for f in frequencies]
+    loops = [loop(options.alpha_n_m, a, f, options.rate_hz) for a, f in pairs]
+    names = ("displacement", "velocity", "force")
+    channels = {name: np.concatenate([item[index] for item in loops]) for index, name in enumerate(names)}
+    return History(
+        names=tuple(f"{1e3 * a:.2f}mm-{f:.2f}Hz" for a, f in pairs),
+        channels=channels,
+        starts=np.cumsum([0, *(len(item[0]) for item in loops)], dtype=np.int64),
+        drive_varies=tuple(False for _ in pairs),
+        sampling_rate_hz=options.rate_hz,
+    )
+
+
+def _with_noise(history: History, options: ReferenceOptions, rng: np.random.Generator) -> History:
+    noise = {"displacement": options.displacement_noise_m, "velocity": options.velocity_noise_m_s, "force": 0.0}
+    channels = {
+        name: values + noise[name] * rng.standard_normal(len(values)) for name, values in history.channels.items()
+    }
+    return replace(history, channels=channels)
+
+
+def _nrmse(network: Network, history: History) -> float:
+    errors, sizes = [], []
+    past = network.features.past_values
+    for index in range(len(history.names)):
+        rows = lagged([history.record(index, "displacement"), history.record(index, "velocity")], past)
+        target = history.record(index, "force")[past:]
+        errors.append(network.predict(rows) - target)
+        sizes.append(target)
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2) / np.mean(np.concatenate(sizes) ** 2)))
