@@ -229,7 +229,7 @@ def identify_frame(
     if chosen.mode_matrix is not None:
         _check_given(chosen, mass, forced[0].floors)
     progress(0.05, "poles")
-    fit, band = find_modes(forced, chosen.band_low_hz, chosen.band_high_hz, tests.source)
+    fit, band = find_modes(forced, tests.floor_masses, chosen.band_low_hz, chosen.band_high_hz, tests.source)
     findings += _check_coherence(fit, tests)
     progress(0.4, "decays")
     decays, notes = _decays(tests, fit)

@@ -163,15 +163,17 @@ def _evaluate(
     residual = target - weighted / norms @ coefficients
     coefficients = coefficients / norms[:, None]
     width = blocks[0].shape[1]
-    jacobian = np.empty((residual.size, 2 * modes))
+    changes = []
     for index in range(modes):
         own = coefficients[index * width : (index + 1) * width]
         for which in (0, 1):
             w, z = omega[index], zeta[index]
             moved = problem.mode_columns(w * (1 + _STEP), z) if which == 0 else problem.mode_columns(w, z * (1 + _STEP))
-            change = _stack((moved - blocks[index]) / _STEP) * weight[:, None] @ own
-            change -= q @ (q.T @ change)
-            jacobian[:, index + which * modes] = -change.ravel()
+            changes.append(_stack((moved - blocks[index]) / _STEP) * weight[:, None] @ own)
+    change = np.hstack(changes)
+    change -= q @ (q.T @ change)
+    # blocks follow (mode 1 omega, mode 1 zeta, mode 2 omega, ...): put them in the order of theta
+    jacobian = -change.reshape(target.shape[0], modes, 2, target.shape[1]).transpose(0, 3, 2, 1).reshape(-1, 2 * modes)
     return _State(residual.ravel(), jacobian, coefficients, basis)
 
 
@@ -210,6 +212,16 @@ class _Fit:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         return np.concatenate([state.residual for state in self.states(theta)])
+
+    def compressed(self, theta: FloatArray) -> FloatArray:
+        """Triangle R of [J e]: a problem of a few rows with the same norm, gradient and J'J (exact compression)."""
+        both = np.column_stack([self.jacobian(theta), self.residual(theta)])
+        gram = both.T @ both
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        try:
+            return np.asarray(np.linalg.cholesky(gram / np.outer(scale, scale)).T * scale)
+        except np.linalg.LinAlgError:
+            return np.asarray(np.linalg.qr(both, mode="r"))
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
         return np.vstack([state.jacobian for state in self.states(theta)])
@@ -333,7 +345,14 @@ def fit_modes(
     upper = np.concatenate([guess[:modes] + 0.03, np.full(modes, np.log(0.5))])
     for index in range(passes):
         result = least_squares(
-            fit.residual, theta, jac=fit.jacobian, bounds=(lower, upper), max_nfev=evaluations, x_scale="jac", xtol=1e-9
+            lambda t: fit.compressed(t)[:, -1],
+            theta,
+            jac=lambda t: fit.compressed(t)[:, :-1],
+            bounds=(lower, upper),
+            max_nfev=evaluations,
+            x_scale="jac",
+            xtol=1e-7,
+            ftol=1e-7,
         )
         theta = np.asarray(result.x)
         if index < passes - 1:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
-from mrpipe.modal.checks import possible_sign_changes
+from mrpipe.modal.checks import modal_coupling, possible_sign_changes
 from mrpipe.modal.lscf import PoleCandidate, stable_poles
 from mrpipe.modal.multimode import MultiModeFit, fit_modes
 from mrpipe.modal.records import FrameTest
@@ -20,6 +20,8 @@ _USUAL_HIGH_HZ = 30.0
 _SURPLUS = 4
 _LEAST_COHERENCE = 0.5
 _DIVERGED_DAMPING = 0.25
+_LARGEST_COUPLING = 0.15
+_SAME_SHAPE = 0.6
 
 
 @dataclass(frozen=True)
@@ -60,18 +62,51 @@ def _strength(fit: MultiModeFit) -> FloatArray:
     return np.asarray((peak / np.sqrt(fit.noise_variance)[:, None]).max(axis=0))
 
 
-def _structural(fit: MultiModeFit, floors: int) -> tuple[int, ...]:
-    """Return the modes of the frame: mode r of a shear frame changes sign r - 1 times, a support's peak does not.
+def _couplings(fit: MultiModeFit, masses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the scaled U'MU of all poles, and how large an element may be by the errors of the shapes."""
+    coupling = modal_coupling(fit.residues.real, np.diag(masses))
+    error = np.linalg.norm(fit.residue_errors, axis=0) / np.linalg.norm(fit.residues, axis=0)
+    return coupling, _LARGEST_COUPLING + 2.0 * np.add.outer(error, error)
 
-    Of all rising choices whose shapes can have these sign changes, the one with the strongest peaks; empty where there
-    is none.
+
+def _structural(fit: MultiModeFit, masses: FloatArray) -> tuple[int, ...]:
+    """Return the modes of the frame: the lowest poles that change sign once more each and are orthogonal to the mass.
+
+    A flexible support's peak above the band has the shape of the highest mode, so the lowest fitting choice is taken;
+    empty where there is none.
     """
-    score = np.log(np.maximum(_strength(fit), 1e-300))
-    score[(fit.damping_ratios > _DIVERGED_DAMPING) | (fit.mode_coherence() < _LEAST_COHERENCE)] = -np.inf
-    ranges = [
+    floors = masses.size
+    usable = (fit.damping_ratios < _DIVERGED_DAMPING) & (fit.mode_coherence() >= _LEAST_COHERENCE)
+    ranges = _sign_ranges(fit)
+    coupling, allowed = _couplings(fit, masses)
+
+    def extend(chosen: tuple[int, ...]) -> tuple[int, ...]:
+        wanted = len(chosen)
+        if wanted == floors:
+            return chosen
+        for pole in range(chosen[-1] + 1 if chosen else 0, usable.size):
+            fits = usable[pole] and ranges[pole][0] <= wanted <= ranges[pole][1]
+            if fits and all(abs(coupling[pole, other]) <= allowed[pole, other] for other in chosen):
+                whole = extend((*chosen, pole))
+                if whole:
+                    return whole
+        return ()
+
+    return extend(()) or _strongest_by_signs(fit, floors)
+
+
+def _sign_ranges(fit: MultiModeFit) -> list[tuple[int, int]]:
+    return [
         possible_sign_changes(shape.real, np.maximum(error, 0.01 * np.abs(shape).max()))
         for shape, error in zip(fit.residues.T, fit.residue_errors.T, strict=True)
     ]
+
+
+def _strongest_by_signs(fit: MultiModeFit, floors: int) -> tuple[int, ...]:
+    """Return the strongest rising choice with the sign changes of a shear frame (masses may be wrong), or nothing."""
+    score = np.log(np.maximum(_strength(fit), 1e-300))
+    score[(fit.damping_ratios > _DIVERGED_DAMPING) | (fit.mode_coherence() < _LEAST_COHERENCE)] = -np.inf
+    ranges = _sign_ranges(fit)
     poles = score.size
     best = np.full((floors + 1, poles + 1), -np.inf)
     best[0] = 0.0
@@ -124,8 +159,9 @@ def _sound(fit: MultiModeFit) -> list[int]:
     return sorted(sound)
 
 
-def _look(spectra: tuple[RecordSpectrum, ...], floors: int, band_hz: tuple[float, float]) -> _Found | None:
+def _look(spectra: tuple[RecordSpectrum, ...], masses: FloatArray, band_hz: tuple[float, float]) -> _Found | None:
     """Fit stable poles; then, while the frame's modes are not complete, doubtful ones and peaks of the residual."""
+    floors = masses.size
     band = (2.0 * np.pi * band_hz[0] * 1.05, 2.0 * np.pi * band_hz[1] * 0.99)
     orders = range(2 * floors + 2, 2 * floors + 20, 2)
     candidates = stable_poles(spectra, orders, (0.0, 2.0 * np.pi * band_hz[1]))
@@ -137,10 +173,10 @@ def _look(spectra: tuple[RecordSpectrum, ...], floors: int, band_hz: tuple[float
         return None
     doubtful = [item for item in candidates if item not in firm and item.occurrences >= 2 and item.damping_ratio < 0.05]
     fit = _fit_candidates(spectra, firm)
-    found = _Found(fit, _structural(fit, floors), spectra, band_hz)
+    found = _Found(fit, _structural(fit, masses), spectra, band_hz)
     if not found.keep and doubtful:
         fit = _fit_candidates(spectra, [*firm, *doubtful[: max(_SURPLUS, floors + _SURPLUS - len(firm))]])
-        found = _Found(fit, _structural(fit, floors), spectra, band_hz)
+        found = _Found(fit, _structural(fit, masses), spectra, band_hz)
     if not found.keep:
         sound = _sound(fit)
         fit = fit.only(sound)
@@ -148,7 +184,7 @@ def _look(spectra: tuple[RecordSpectrum, ...], floors: int, band_hz: tuple[float
         omega = np.concatenate([fit.angular_frequencies, extra])
         zeta = np.concatenate([fit.damping_ratios, np.full(len(extra), 0.004)])
         fit = fit_modes(spectra, omega, zeta, evaluations=15)
-        found = _Found(fit, _structural(fit, floors), spectra, band_hz)
+        found = _Found(fit, _structural(fit, masses), spectra, band_hz)
     return found
 
 
@@ -159,7 +195,7 @@ def _fit_candidates(spectra: Sequence[RecordSpectrum], candidates: Sequence[Pole
 
 
 def find_modes(
-    tests: Sequence[FrameTest], low_hz: float, high_hz: float, source: Path
+    tests: Sequence[FrameTest], floor_masses: FloatArray, low_hz: float, high_hz: float, source: Path
 ) -> tuple[MultiModeFit, tuple[float, float]]:
     """Return the fit of as many modes as there are floors, and the band [Hz] used.
 
@@ -168,18 +204,17 @@ def find_modes(
     UserError
         If a mode has no peak in the band.
     """
-    floors = tests[0].floors
     bands = bands_to_try(tests, low_hz, high_hz)
     span = f"between {bands[-1][0]:g} and {bands[-1][1]:.3g} Hz"
     best: _Found | None = None
     for band in bands:
-        found = _look(tuple(record_spectrum(test, band) for test in tests), floors, band)
+        found = _look(tuple(record_spectrum(test, band) for test in tests), floor_masses, band)
         best = found or best
         if found is not None and found.keep:
             return _only(found, found.keep), band
     if best is None:
         raise UserError(source, "forced tests", f"no peak {span}", "check channels, or set identify_frame.band_high_hz")
-    return _only(best, _strongest(best, floors, source, span)), best.band_hz
+    return _only(best, _strongest(best, floor_masses, source, span)), best.band_hz
 
 
 def _only(found: _Found, keep: Sequence[int]) -> MultiModeFit:
@@ -189,7 +224,7 @@ def _only(found: _Found, keep: Sequence[int]) -> MultiModeFit:
     """
     fit = found.fit
     strength = _strength(fit)
-    level = 0.02 * min(strength[list(keep)])
+    level = 0.1 * min(strength[list(keep)])
     others = [i for i in _sound(fit) if i not in keep and strength[i] > level and fit.damping_ratios[i] < 0.1]
     both = sorted([*keep, *others])
     refined = fit_modes(found.spectra, fit.angular_frequencies[both], fit.damping_ratios[both])
@@ -197,17 +232,31 @@ def _only(found: _Found, keep: Sequence[int]) -> MultiModeFit:
     return refined.only(place)
 
 
-def _strongest(found: _Found, floors: int, source: Path, span: str) -> tuple[int, ...]:
-    """Where signs of shapes do not tell: the strongest coherent poles; too few of them is the user's to mend."""
-    fit = found.fit
+def _strongest(found: _Found, masses: FloatArray, source: Path, span: str) -> tuple[int, ...]:
+    """Where signs of shapes do not tell: the strongest coherent poles of different shape, or what is missing."""
+    fit, floors = found.fit, masses.size
     strength = _strength(fit)
+    coupling = modal_coupling(fit.residues.real, np.diag(masses))
     coherent = [i for i in _sound(fit) if fit.mode_coherence()[i] >= _LEAST_COHERENCE]
-    # a floor has at most as many modes; one that is drowned is told, not guessed
-    coherent = [i for i in coherent if strength[i] > 1e-4 * strength.max() and fit.damping_ratios[i] < 0.1]
-    if len(coherent) < floors:
-        present = fit.angular_frequencies[coherent] / (2.0 * np.pi)
+    chosen: list[int] = []
+    for index in sorted((i for i in coherent if fit.damping_ratios[i] < 0.1), key=lambda i: -strength[i]):
+        # two poles of one shape are one mode, or a mode and noise
+        if len(chosen) < floors and all(abs(coupling[index, other]) < _SAME_SHAPE for other in chosen):
+            chosen.append(index)
+    chosen.sort()
+    if len(chosen) < floors:
+        present = fit.angular_frequencies[chosen] / (2.0 * np.pi)
         peaks = ", ".join(f"{value:.3g}" for value in present) or "none"
-        problem = f"mode {len(coherent) + 1} of {floors} has no peak {span} (peaks at {peaks} Hz)"
+        problem = f"mode {_missing_mode(fit, chosen)} of {floors} has no peak {span} (peaks at {peaks} Hz)"
         remedy = "excite it, or set identify_frame.band_low_hz and band_high_hz"
         raise UserError(source, "forced tests", problem, remedy)
-    return tuple(sorted(sorted(coherent, key=lambda i: -strength[i])[:floors]))
+    return tuple(chosen)
+
+
+def _missing_mode(fit: MultiModeFit, chosen: Sequence[int]) -> int:
+    """Return the first mode (from 1) whose number of sign changes no chosen pole can have."""
+    ranges = _sign_ranges(fit)
+    for wanted, pole in enumerate(chosen):
+        if not ranges[pole][0] <= wanted <= ranges[pole][1]:
+            return wanted + 1
+    return len(chosen) + 1
