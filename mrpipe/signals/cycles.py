@@ -11,6 +11,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 
 PERIOD_TOLERANCE = 0.05
 AMPLITUDE_TOLERANCE = 0.05
+STEADY_SHARE = 0.33
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def upward_crossings(values: FloatArray, level: float, hysteresis: float) -> Int
 
 
 def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, fewest: int = 3) -> SteadyCycles:
-    """Find the longest run of cycles that agree in period and amplitude within 5 %.
+    """Find the longest run of cycles that agree in period and amplitude within 5 %, a third of the motion at least.
 
     Parameters
     ----------
@@ -85,7 +86,8 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
     periods = np.diff(crossings).astype(np.float64)
     heights = np.array([0.5 * np.ptp(displacement[begin:end]) for begin, end in pairwise(crossings)])
     begin, end = _longest_steady_run(periods, heights)
-    if end - begin < fewest:
+    # a slow sweep and a random motion have their steady stretches too, but those are not the test
+    if end - begin < fewest or np.sum(periods[begin:end]) < STEADY_SHARE * np.sum(periods):
         return none
     starts = crossings[begin : end + 1].astype(np.int64)
     span = float(starts[-1] - starts[0])

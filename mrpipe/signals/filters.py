@@ -54,9 +54,9 @@ def butterworth_lowpass(
         sections = signal.butter(order, usable, fs=sampling_rate_hz, output="sos")
         start = signal.sosfilt_zi(sections) * values[0]
         return np.asarray(signal.sosfilt(sections, values, zi=start)[0])
-    # twice the order-n magnitude gives half power at cutoff * (sqrt 2 - 1)^(1/2n)
-    design = usable / (math.sqrt(2.0) - 1.0) ** (1.0 / (2.0 * order))
-    design = min(design, 0.98 * sampling_rate_hz / 2.0)
+    # two passes have half power at the design frequency times (sqrt 2 - 1)^(1/2n), on the bilinear map's own scale
+    warped = math.tan(math.pi * usable / sampling_rate_hz) / (math.sqrt(2.0) - 1.0) ** (1.0 / (2.0 * order))
+    design = sampling_rate_hz / math.pi * math.atan(warped)
     sections = signal.butter(order, design, fs=sampling_rate_hz, output="sos")
     padding = min(values.size - 1, math.ceil(3.0 * sampling_rate_hz / usable))
     return np.asarray(signal.sosfiltfilt(sections, values, padlen=padding))

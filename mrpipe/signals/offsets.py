@@ -61,13 +61,10 @@ def drive_favours_a_side(drive: FloatArray, cycles: IntArray) -> bool:
     cycles
         Start indices of the steady cycles and the end of the last one.
     """
-    span = float(np.ptp(drive[cycles[0] : cycles[-1]]))
-    if span <= 0.02 * float(np.max(np.abs(drive))):
-        return False
     half = round(float(np.mean(np.diff(cycles))) / 2.0)
     early = drive[cycles[0] : cycles[-1] - half]
     late = drive[cycles[0] + half : cycles[-1]]
-    return float(np.sqrt(np.mean((early - late) ** 2))) > 0.05 * span
+    return float(np.sqrt(np.mean((early - late) ** 2))) > 0.05 * float(np.max(np.abs(drive)))
 
 
 def acceleration_gain(displacement: FloatArray, acceleration: FloatArray, sampling_rate_hz: float) -> float:
@@ -91,8 +88,8 @@ def acceleration_gain(displacement: FloatArray, acceleration: FloatArray, sampli
     frequencies = np.fft.rfftfreq(displacement.size, 1.0 / sampling_rate_hz)
     motion = np.fft.rfft(window * (displacement - displacement.mean()))
     measured = np.fft.rfft(window * (acceleration - acceleration.mean()))
-    derived = -((2.0 * np.pi * frequencies) ** 2) * motion
+    square = (2.0 * np.pi * frequencies) ** 2
     strongest = frequencies[2 + int(np.argmax(np.abs(motion[2:]) * frequencies[2:]))]
     band = (frequencies > 0.7 * strongest) & (frequencies < 1.4 * strongest)
-    power = float(np.sum(np.abs(derived[band]) ** 2))
-    return float(np.sum(np.real(np.conj(derived[band]) * measured[band]))) / power if power > 0.0 else 0.0
+    power = float(np.sum(square[band] * np.abs(motion[band]) ** 2))
+    return -float(np.sum(np.real(np.conj(motion[band]) * measured[band]))) / power if power > 0.0 else 0.0
