@@ -80,7 +80,7 @@ LAW_SPACING = 19  # the same for the network of nnc
 TABLE_SPEED = 20  # largest speed of the inverse table [m/s]
 TABLE_DRIVE = 21  # largest drive of the inverse table
 HEAD = 24
-# a network in `numbers`: input scale, input shift, output scale, output shift, then weights by row, biases of each layer
+# a network in `numbers`: input scale, input shift, output scale, output shift, then weights by row and biases a layer
 
 # --- state ---
 S_STARTED = 0

@@ -191,7 +191,7 @@ def simulate_law(
     per_sample = max(1, math.ceil(options.plant_rate_hz / rate - 1e-9))
     dt = 1.0 / (rate * per_sample)
     steps = max(1, round(excitation.duration_s / dt))
-    ground = np.ascontiguousarray(excitation.at(np.arange(steps + 1) * dt))
+    ground = np.ascontiguousarray(excitation.at(dt * np.arange(steps + 1, dtype=np.float64)))
     every = max(1, round(1.0 / (dt * options.record_rate_hz)))
     counts, run = _run_numbers(controller, options, steps, per_sample, every, dt)
     space = state_space(frame, -w)

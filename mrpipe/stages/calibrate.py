@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
+    import numpy as np
+
     from mrpipe.control.calibration import calibrate, validity_warnings
     from mrpipe.control.storage import calibration_to_json, write_calibration
     from mrpipe.dampers.model import read_damper
@@ -32,7 +34,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     context.progress(0.3, "laws")
     amplitude = settings.expected_amplitude_m
     speed = amplitude * calibration.modes.omega_0
-    forces = damper.quasi_static_force(speed, [0.0, damper.drive_limit])
+    forces = damper.quasi_static_force(speed, np.array([0.0, damper.drive_limit]))
     for line in validity_warnings(
         calibration, amplitude_m=amplitude, residual_force_n=float(forces[0]), largest_force_n=float(forces[1])
     ):

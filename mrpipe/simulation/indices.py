@@ -1,0 +1,192 @@
+"""What a response comes to: rms, peaks, damping of the decay, tracking, energy, effort (thesis 5.5)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import BoolArray, FloatArray
+from mrpipe.control.kernel import COMMAND_CLIPPED, COMMAND_SWITCHED
+from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.loop import Response
+
+SMALLEST_PEAK = 0.02
+"""Peaks of a decay below this share of the first are left out."""
+
+
+@dataclass(frozen=True)
+class Decay:
+    """Damping of a free decay from the extrema of the top displacement.
+
+    Attributes
+    ----------
+    mean
+        Damping ratio of the exponential fit over the peaks while current flows; NaN with fewer than two peaks.
+    point_to_point
+        Damping ratio from each extremum to the next, shape (p - 1,).
+    peak_time_s, peak_m
+        Extrema, shape (p,).
+    with_current
+        Whether current flowed in the half period before each extremum, shape (p,).
+    """
+
+    mean: float
+    point_to_point: FloatArray
+    peak_time_s: FloatArray
+    peak_m: FloatArray
+    with_current: BoolArray
+
+
+def decay_damping(response: Response, start_s: float, drive_threshold: float) -> Decay:
+    """Return the damping of the decay after `start_s` [s].
+
+    Parameters
+    ----------
+    response
+        Of a run with a decay.
+    start_s
+        When the base stops.
+    drive_threshold
+        Drive above which current counts as flowing; where it never does (passive-off) all peaks count.
+    """
+    chosen = response.time_s >= start_s
+    t, x, v = response.time_s[chosen], response.displacement[chosen, -1], response.velocity[chosen, -1]
+    drive = response.drive[chosen]
+    turns = np.flatnonzero(v[:-1] * v[1:] < 0.0)
+    if len(turns):
+        turns = turns[np.abs(x[turns]) > SMALLEST_PEAK * np.max(np.abs(x[turns]))]
+    # a wiggle of a higher mode is no half period: an extremum counts when the displacement changes sign between
+    keep: list[int] = []
+    for turn in turns:
+        if keep and x[turn] * x[keep[-1]] > 0.0:
+            if abs(x[turn]) > abs(x[keep[-1]]):
+                keep[-1] = int(turn)
+            continue
+        keep.append(int(turn))
+    peaks = np.array(keep, dtype=np.int64)
+    if len(peaks) < 2:
+        empty = np.zeros(0)
+        return Decay(math.nan, empty, t[peaks], x[peaks], np.ones(len(peaks), dtype=bool))
+    flows = np.array(
+        [
+            np.max(drive[(peaks[index - 1] if index else 0) : peak + 1]) > drive_threshold
+            for index, peak in enumerate(peaks)
+        ]
+    )
+    sizes = np.log(np.abs(x[peaks]))
+    ratios = _ratio(sizes[:-1] - sizes[1:])
+    used = np.flatnonzero(flows) if flows.any() else np.arange(len(peaks))
+    if len(used) < 2:
+        used = np.arange(2)
+    slope = np.polyfit(used, sizes[used], 1)[0]
+    return Decay(float(_ratio(np.array([-slope]))[0]), ratios, t[peaks], x[peaks], flows)
+
+
+def _ratio(decrement: FloatArray) -> FloatArray:
+    """Return damping ratios from logarithmic decrements over half a period."""
+    return np.asarray(decrement / np.sqrt(np.pi**2 + decrement**2))
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
+
+
+def indices(
+    response: Response, excitation: Excitation, *, residual_force_n: float, drive_limit: float, absolute: bool = False
+) -> dict[str, Any]:
+    """Return the indices of a response, keys with units; None where one has no meaning.
+
+    Parameters
+    ----------
+    response, excitation
+        Of the run.
+    residual_force_n
+        Of the damper's model at no drive, used where the run never shows it.
+    drive_limit
+        Of the damper.
+    absolute
+        Accelerations relative to the ground, or absolute. The thesis does not say which; the errata's are relative.
+    """
+    first, last = excitation.steady_s
+    steady = (response.time_s >= first) & (response.time_s < last) if last > first else response.time_s >= 0.0
+    floors = response.displacement.shape[1]
+    fifth = min(5, floors) - 1
+    acceleration = response.absolute_acceleration if absolute else response.acceleration
+    result: dict[str, Any] = {
+        "rms_x1_m": _rms(response.displacement[steady, 0]),
+        "rms_x5_m": _rms(response.displacement[steady, fifth]),
+        "rms_x_top_m": _rms(response.displacement[steady, -1]),
+        "rms_a1_m_s2": _rms(acceleration[steady, 0]),
+        "rms_a5_m_s2": _rms(acceleration[steady, fifth]),
+        "peak_x1_m": float(np.max(np.abs(response.displacement[steady, 0]))),
+        "peak_x5_m": float(np.max(np.abs(response.displacement[steady, fifth]))),
+        "peak_a1_m_s2": float(np.max(np.abs(acceleration[steady, 0]))),
+        "peak_a5_m_s2": float(np.max(np.abs(acceleration[steady, fifth]))),
+        "rms_damper_displacement_m": _rms(response.damper_displacement[steady]),
+        "rms_force_n": _rms(response.force[steady]),
+    }
+    if math.isfinite(excitation.decay_from_s):
+        decay = decay_damping(response, excitation.decay_from_s, 0.01 * drive_limit)
+        result["damping_ratio"] = None if math.isnan(decay.mean) else decay.mean
+        result["damping_ratio_point_to_point"] = [float(value) for value in decay.point_to_point[:12]]
+    else:
+        result["damping_ratio"] = None
+    result |= _tracking(response, steady, residual_force_n, drive_limit)
+    result |= _energy(response, steady, excitation)
+    samples = (response.command_time_s >= first) & (response.command_time_s < last)
+    commands = response.commands[samples] if samples.any() else response.commands
+    result |= {
+        "clipped_share": float(np.mean(commands[:, COMMAND_CLIPPED])),
+        "switched_off_share": float(np.mean(commands[:, COMMAND_SWITCHED])),
+        "saturated_share": float(np.mean(response.drive[steady] > 0.99 * drive_limit)),
+        "rms_drive": _rms(response.drive[steady]),
+        "mean_drive": float(np.mean(response.drive[steady])),
+        "energy_balance_error": response.energy_balance_error,
+        "real_time_factor": response.real_time_factor,
+    }
+    return result
+
+
+def _tracking(response: Response, steady: BoolArray, residual: float, drive_limit: float) -> dict[str, Any]:
+    """Return tracking errors, all over the rms desired force, by regime."""
+    wanted, force = response.desired_force[steady], response.force[steady]
+    drive, velocity = response.drive[steady], response.damper_velocity[steady]
+    size = _rms(wanted)
+    error = force - wanted
+    off = drive < 0.01 * drive_limit
+    moving = np.abs(velocity) > 0.3 * np.max(np.abs(velocity)) if len(velocity) else off
+    shown = np.abs(force[off & moving])
+    result: dict[str, Any] = {
+        "force_tracking_nrmse": _rms(error) / size if size > 0.0 else None,
+        "residual_force_n": float(np.median(shown)) if len(shown) > 20 else residual,
+    }
+    if size > 0.0:
+        below = np.abs(wanted) < residual
+        saturated = drive > 0.99 * drive_limit
+        regimes = {
+            "clipped": wanted == 0.0,
+            "below_residual": below & (wanted != 0.0),
+            "tracked": ~below & ~saturated,
+            "saturated": saturated,
+        }
+        result["force_tracking_by_regime"] = {
+            name: {"share": float(np.mean(where)), "nrmse": _rms(error[where]) / size if where.any() else None}
+            for name, where in regimes.items()
+        }
+    return result
+
+
+def _energy(response: Response, steady: BoolArray, excitation: Excitation) -> dict[str, Any]:
+    """Return energies over the steady part, a cycle where the excitation is harmonic."""
+    places = np.flatnonzero(steady)
+    damper = float(response.work_damper[places[-1]] - response.work_damper[places[0]])
+    frame = float(response.work_frame[places[-1]] - response.work_frame[places[0]])
+    result = {"energy_damper_j": damper, "energy_frame_j": frame}
+    if math.isfinite(excitation.frequency_rad_s):
+        seconds = response.time_s[places[-1]] - response.time_s[places[0]]
+        cycles = seconds * excitation.frequency_rad_s / (2.0 * math.pi)
+        result |= {"energy_damper_per_cycle_j": damper / cycles, "energy_frame_per_cycle_j": frame / cycles}
+    return result
