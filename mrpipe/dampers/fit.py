@@ -98,11 +98,11 @@ class Projection:
         self._offsets = offsets
         _, self._group = np.unique(data.test, return_inverse=True)
         self._count = np.bincount(self._group, weights=None if weights is None else weights**2)
-        self.force = self._reduce(data.force[None, :])[0]
+        self.force = self._reduce(data.force[None, :].copy())[0]
         self.rms_force = float(np.sqrt(np.mean(self.force**2)))
 
     def _reduce(self, rows: FloatArray) -> FloatArray:
-        """Weight rows of shape (k, m) and take the (weighted) mean of every test out of them."""
+        """Take the (weighted) mean of every test out of rows of shape (k, m) and weight them, all in place."""
         if self._offsets:
             square = None if self._weights is None else self._weights**2
             for row in rows:

@@ -1,0 +1,140 @@
+"""Forms compared, and the stage that does it."""
+
+from __future__ import annotations
+
+import json
+import logging
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, no_progress
+from mrpipe.config.sections.identify_damper import IdentifyDamperSettings
+from mrpipe.dampers.comparison import FitOptions, compare_forms
+from mrpipe.dampers.forms import FORMS
+from mrpipe.dampers.model import read_damper
+from mrpipe.dampers.samples import scales_of, smooth_motion
+from mrpipe.errors import StageSkipped
+from mrpipe.pipeline.stage import StageContext
+from mrpipe.signals.prepared import write_prepared
+from mrpipe.stages.identify_damper import STAGE
+from tests.dampers.planted import set_c_campaign
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return set_c_campaign()
+
+
+class Report:
+    """Keeps what a stage reports."""
+
+    def __init__(self):
+        self.parts = []
+
+    def text(self, paragraph):
+        self.parts.append(("text", paragraph))
+
+    def table(self, name, frame, caption):
+        self.parts.append(("table", name))
+
+    def figure(self, name, figure, caption):
+        self.parts.append(("figure", name))
+
+
+def run_stage(directory: Path, tests, **settings):
+    directory.mkdir(exist_ok=True)
+    with ArtifactWriter.create(directory / "prepared.h5", Provenance("prepare")) as artifact:
+        write_prepared(artifact, tests)
+    report = Report()
+    context = StageContext(
+        stage="identify-damper",
+        settings=SimpleNamespace(identify_damper=IdentifyDamperSettings(**settings)),
+        inputs={"prepare": directory / "prepared.h5"},
+        run_directory=directory,
+        rng=np.random.default_rng(0),
+        seed=0,
+        jobs=1,
+        progress=no_progress,
+        report=report,
+        log=logging.getLogger("test"),
+        provenance=Provenance("identify-damper"),
+    )
+    return STAGE.run(context), context, report
+
+
+@pytest.mark.planted
+def test_the_planted_form_is_best_on_left_out_and_on_unseen_tests(campaign):
+    tests = smooth_motion(campaign)
+    training = [test for test in tests if test.role == "training"]
+    judged = compare_forms(
+        [FORMS[name] for name in ("bouc-wen", "dahl", "bingham", "saturating-dashpot")],
+        tests,
+        scales_of(training),
+        FitOptions(starts=1, maximum_samples=4000),
+        folds=3,
+    )
+    by_fold = min(judged, key=lambda item: item.cross_validated_nrmse)
+    by_test = min(judged, key=lambda item: item.validation.nrmse)
+    assert by_fold.fit.form.name == by_test.fit.form.name == "bouc-wen"
+    # left-out stretches are noisier than nothing and close to the training error of a form that is right
+    assert by_fold.training.nrmse < 1.1 * by_fold.cross_validated_nrmse < 1.5 * by_fold.training.nrmse
+
+
+@pytest.mark.property
+def test_the_stage_returns_and_stores_what_it_found(tmp_path, campaign):
+    summary, context, report = run_stage(
+        tmp_path, campaign, compare=("bouc-wen", "bingham"), starts=1, maximum_samples=4000
+    )
+    json.dumps(summary, allow_nan=False)
+    assert summary["form"] == "bouc-wen"
+    assert summary["validation_nrmse"] < 0.02
+    assert summary["validation_fit_percent"] > 98.0
+    assert [row["form"] for row in summary["comparison"]] == ["bouc-wen", "bingham"]
+    assert summary["parameters"]["eta"]["unit"] == "1/s"
+    assert summary["parameters"]["eta"]["standard_error"] > 0.0
+    assert summary["thesis_parameters"]["gamma"]["unit"] == "1/m^2"
+    assert len(summary["tests"]) == len(campaign)
+    model = read_damper(Artifact(tmp_path / "damper.h5"))
+    assert {name: row["value"] for name, row in summary["parameters"].items()} == dict(model.parameters)
+    assert read_damper(Artifact(tmp_path / "damper.h5"), "forms/bingham").form == "bingham"
+    assert {name for kind, name in report.parts if kind == "figure"} == {"loops", "comparison", "yield-force"}
+    assert {name for kind, name in report.parts if kind == "table"} >= {"parameters", "comparison", "tests"}
+    assert context.warnings == []
+
+
+@pytest.mark.property
+def test_the_best_form_and_other_settings(tmp_path, campaign):
+    summary, _, _ = run_stage(
+        tmp_path,
+        campaign,
+        form="best",
+        compare=("dahl", "bingham"),
+        starts=1,
+        maximum_samples=2000,
+        force="raw",
+        equal_tests=True,
+        offset_per_test=False,
+        smooth_motion=False,
+        reference_A=500.0,
+        folds=2,
+    )
+    assert summary["form"] == "dahl"
+    assert all(row["cross_validated_nrmse"] is not None for row in summary["comparison"])
+    assert summary["thesis_parameters"]["A"]["value"] == 500.0
+
+
+@pytest.mark.property
+def test_constant_drive_is_said(tmp_path, campaign):
+    constant = [test for test in campaign if np.ptp(test.drive) == 0.0]
+    _, context, _ = run_stage(tmp_path, constant, compare=("bouc-wen",), starts=1, maximum_samples=2000)
+    assert any("lag cannot be told" in line for line in context.warnings)
+    assert any("3 level(s) of drive" in line for line in context.warnings)
+
+
+@pytest.mark.property
+def test_nothing_to_fit_is_skipped(tmp_path, campaign):
+    with pytest.raises(StageSkipped, match="no training test"):
+        run_stage(tmp_path, [test for test in campaign if test.role == "validation"])
