@@ -1,4 +1,4 @@
-"""Calibration of the collocated laws on a benchmark structure: closed forms of chapter 4 and exact complex eigenvalues."""
+"""Calibration of the collocated laws on a benchmark structure: closed forms of chapter 4, exact eigenvalues."""
 
 from __future__ import annotations
 

@@ -100,8 +100,8 @@ def _rms_magnitude(vectors: FloatArray) -> float:
 def base_isolated_indices(controlled: IsolatedResponse, uncontrolled: IsolatedResponse) -> dict[str, float]:
     """Return J1 to J9 of appendix B.
 
-    J6 is the peak of the devices' joint force over the peak base shear of the controlled building; J9 the energy that the
-    devices take over the energy that the ground puts in (absolute), at most 1 by the energy balance.
+    J6 is the peak of the devices' joint force over the peak base shear of the controlled building; J9 the energy that
+    the devices take over the energy that the ground puts in (absolute), at most 1 by the energy balance.
     """
     c, u = controlled, uncontrolled
     return {

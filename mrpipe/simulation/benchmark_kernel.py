@@ -195,9 +195,9 @@ def voltage_of(settings: FloatArray, desired: float, velocity: float, network: A
 
 @njit(cache=True)
 def command(
-    settings: FloatArray, gains: FloatArray, wanted: float, x: float, v: float, amplitude: float, volts: float, net: Any
+    settings: FloatArray, gains: FloatArray, wanted: float, x: float, v: float, amplitude: float, network: Any
 ) -> tuple[float, float]:
-    """Return desired force [N] and filtered voltage [V] of one device from the motion at the start of the step."""
+    """Return desired force [N] and voltage [V] of one device from its motion at a controller sample."""
     law = settings[LAW]
     if law == NONE:
         return 0.0, 0.0
@@ -206,8 +206,7 @@ def command(
     desired = wanted if law == LQG else desired_force(law, gains, x, v, amplitude)
     if settings[REALISATION] < BINGHAM:
         return desired, 0.0
-    smoothing = 1.0 - np.exp(-settings[FILTER_RATE] * settings[DT]) if settings[FILTER_RATE] > 0.0 else 1.0
-    return desired, volts + smoothing * (voltage_of(settings, desired, v, net) - volts)
+    return desired, voltage_of(settings, desired, v, network)
 
 
 @njit(cache=True)
@@ -297,6 +296,8 @@ def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain:
     now, after = np.zeros(loads.shape[1]), np.zeros(loads.shape[1])
     x, v, xf, vf = np.zeros(devices), np.zeros(devices), np.zeros(devices), np.zeros(devices)
     force, desired, volts, wanted = np.zeros(devices), np.zeros(devices), np.zeros(devices), np.zeros(devices)
+    target, every = np.zeros(devices), int(settings[CONTROL_EVERY])
+    smoothing = 1.0 - np.exp(-settings[FILTER_RATE] * settings[DT]) if settings[FILTER_RATE] > 0.0 else 1.0
     amplitude, estimate, energy = np.zeros((devices, 2)), np.zeros(control[1].shape[0]), np.zeros(3)
     memory, trial, wire = np.zeros(chain[3][-1] + 5), np.zeros(chain[3][-1] + 5), np.zeros(WIRE_SIZE)
     wire[FIRST] = 1.0
@@ -307,13 +308,14 @@ def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain:
         free_step(classical, structure, state, now, after, free)
         rod_motion(positions, state, x, v)
         rod_motion(positions, free, xf, vf)
-        if law == LQG and k % int(settings[CONTROL_EVERY]) == 0:
-            observe(control, k // int(settings[CONTROL_EVERY]), state, force, estimate, wanted)
+        sample, sampled = k // every, k % every == 0
+        if law == LQG and sampled:
+            observe(control, sample, state, force, estimate, wanted)
         for d in range(devices):
             update_amplitude(amplitude[d], x[d], v[d])
-            desired[d], volts[d] = command(
-                settings, gains[d], wanted[d], x[d], v[d], amplitude[d, 0], volts[d], network
-            )
+            if sampled:
+                desired[d], target[d] = command(settings, gains[d], wanted[d], x[d], v[d], amplitude[d, 0], network)
+            volts[d] += smoothing * (target[d] - volts[d])
         for _ in range(1 if devices == 1 else 3):
             for d in range(devices):
                 free_x, free_v = xf[d], vf[d]

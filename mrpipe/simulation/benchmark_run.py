@@ -73,6 +73,8 @@ class Controller:
         Dampers side by side at each position.
     filter_rate
         lambda of the voltage filter P4 (24) [1/s]; 0 for none.
+    interval_s
+        Sample of the controller that commands voltages [s]; that of LQG is the observer's.
     device
         Bingham damper: its force, and the inverse that gives the voltage.
     chain
@@ -94,6 +96,7 @@ class Controller:
     capacity: float = 1e30
     dampers: float = 1.0
     filter_rate: float = 0.0
+    interval_s: float = 0.001
     device: BinghamDevice = field(default_factory=BinghamDevice)
     chain: Chain | None = None
     network: Network | None = None
@@ -219,7 +222,7 @@ def _control(controller: Controller, devices: int, dt: float) -> tuple[tuple[Flo
     gains = np.tile(row, (devices, 1))
     observer = controller.observer
     if controller.law != "lqg" or observer is None:
-        return (gains, *(np.zeros((1, 1)) for _ in range(7))), 1
+        return (gains, *(np.zeros((1, 1)) for _ in range(7))), max(1, round(controller.interval_s / dt))
     every = max(1, round(observer.interval_s / dt))
     outputs = observer.gain.shape[1]
     noise = controller.noise if controller.noise is not None else np.zeros((1, outputs))
@@ -326,5 +329,6 @@ def simulate(
         raise DivergedError(f"{controller.law} ({controller.realisation}) diverged; take a shorter step")
     time = np.arange(samples) * dt * save_every
     given = np.arange(len(loads)) * load_interval_s
-    at_samples = np.stack([np.interp(time, given, column) for column in np.asarray(loads).T], axis=1)
+    columns = [np.interp(time, given, column) for column in np.asarray(loads, dtype=np.float64).T]
+    at_samples: FloatArray = np.asarray(np.stack(columns, axis=1), dtype=np.float64)
     return Response(modal, time, result[0][:, :n], result[0][:, n:], at_samples, *result[1:])

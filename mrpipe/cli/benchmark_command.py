@@ -1,0 +1,94 @@
+"""`mrpipe benchmark NAME`: the benchmark structures of chapter 6 and paper P4."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mrpipe.cli.options import CommonOptions, with_common_options
+from mrpipe.cli.stage_commands import build_and_print
+from mrpipe.errors import UserError
+
+NAMES = {"ten-storey": "ten_storey", "base-isolated": "base_isolated", "wind": "wind"}
+_MODEL_KEY = {"ten-storey": "structures", "base-isolated": "model", "wind": "model"}
+_MOTION_KEY = {"ten-storey": "motion.file", "base-isolated": "motion.file", "wind": "load.file"}
+
+
+def overrides_of(
+    name: str, model: str | None, motion: str | None, laws: list[str] | None, everything: bool
+) -> list[str]:
+    """Return the `section.key=value` texts that the options of the command stand for.
+
+    Raises
+    ------
+    UserError
+        If there is no such benchmark, a file is missing, or `--all` is asked where there are no seven motions.
+    """
+    if name not in NAMES:
+        from mrpipe.config.errors import nearest
+
+        raise UserError("benchmark", name, "is no benchmark structure", nearest(name, list(NAMES)))
+    section = f"benchmark.{NAMES[name]}"
+    result = []
+    if model is not None:
+        value = _file("--model", model, needs_file=name != "ten-storey")
+        result.append(f"{section}.{_MODEL_KEY[name]}={json.dumps([value] if name == 'ten-storey' else value)}")
+    if motion is not None:
+        result.append(f"{section}.{_MOTION_KEY[name]}={json.dumps(_file('--motion', motion))}")
+    if laws:
+        result.append(f"{section}.laws={json.dumps(laws)}")
+    if everything:
+        if name != "base-isolated":
+            raise UserError("--all", name, "has no set of motions", "use it with base-isolated, or give --motion")
+        result.append(f"{section}.all_motions=true")
+    digest = _digest([item for item in (model, motion) if item is not None])
+    return [*result, f"benchmark.inputs_digest={json.dumps(digest)}"] if digest else result
+
+
+def _file(option: str, value: str, needs_file: bool = False) -> str:
+    """Return an absolute path where the value is a file, else the value: the name of something that comes along."""
+    path = Path(value)
+    if path.is_file():
+        return str(path.resolve())
+    if needs_file or path.suffix or "/" in value:
+        raise UserError(option, value, "no such file", "give the path of a file that is there")
+    return value
+
+
+def _digest(values: list[str]) -> str:
+    digest = hashlib.sha256()
+    found = False
+    for value in values:
+        if Path(value).is_file():
+            digest.update(Path(value).read_bytes())
+            found = True
+    return digest.hexdigest()[:16] if found else ""
+
+
+@with_common_options("campaign")
+def benchmark(
+    options: CommonOptions,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="ten-storey, base-isolated or wind.")],
+    model: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Published model. Default: the surrogate built by our own code.")
+    ] = None,
+    motion: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Ground motion (AT2, text, csv, mat; or elcentro, kobe, ..) or wind load."),
+    ] = None,
+    law: Annotated[list[str] | None, typer.Option(metavar="LAW", help="Control law; may be repeated.")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="All seven motions, all laws (base-isolated).")] = False,
+) -> None:
+    """Run a benchmark structure and print its indices beside the thesis' figures."""
+    extra = overrides_of(name, model, motion, law, everything)
+    build_and_print([f"benchmark-{name}"], replace(options, overrides=[*extra, *options.overrides]))
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command(name="benchmark")(benchmark)

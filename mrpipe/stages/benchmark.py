@@ -1,0 +1,118 @@
+"""`benchmark NAME`: the ten-storey frame, the base-isolated building and the tall building in wind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.pipeline.stage import Stage, StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.simulation.benchmark_run import BinghamDevice, Response
+    from mrpipe.structures.records import GroundMotion
+
+
+def _motion(context: StageContext, settings: Any, components: int) -> GroundMotion:
+    from mrpipe.structures.benchmark_motion import load_motion
+
+    motion = load_motion(
+        settings.file,
+        context.rng,
+        second_file=settings.second_file,
+        unit=settings.unit,
+        interval_s=settings.interval_s,
+        resampled_interval_s=settings.resampled_interval_s,
+        peak_ground_g=settings.peak_ground_g,
+        duration_s=settings.duration_s,
+    ).in_components(components)
+    for note in motion.notes:
+        context.log.info("%s: %s", motion.name, note)
+    return motion
+
+
+def _motion_summary(motion: GroundMotion) -> dict[str, Any]:
+    return {
+        "name": motion.name,
+        "peaks_m_s2": motion.peaks_m_s2,
+        "duration_s": motion.duration_s,
+        "interval_s": motion.interval_s,
+        "unit_in_file": motion.unit,
+        "unit_from": motion.unit_from,
+        "notes": list(motion.notes),
+    }
+
+
+def _digest(context: StageContext) -> str:
+    """Return the digest of the files that the command was given (empty where it was given none)."""
+    return str(context.settings.benchmark.inputs_digest)
+
+
+def _bingham(name: str) -> BinghamDevice:
+    from mrpipe.artifacts import load_parameter_set
+    from mrpipe.simulation.benchmark_run import BinghamDevice
+
+    values = load_parameter_set("dampers", name)
+    parts = ("yield_force_a", "yield_force_b", "c0_a", "c0_b", "drive_limit")
+    return BinghamDevice(*(values.scalar(part) for part in parts))
+
+
+def _write_response(artifact: Any, group: str, response: Response) -> None:
+    """Store the device's histories of a run."""
+    artifact.put(f"{group}/time", response.time_s, unit="s", dims=("time",))
+    entries = {
+        "stroke": (response.stroke(), "m"),
+        "rod_velocity": (response.rod_velocity(), "m/s"),
+        "force": (response.forces, "N"),
+        "desired_force": (response.desired, "N"),
+        "voltage": (response.voltages, "V"),
+    }
+    for name, (values, unit) in entries.items():
+        artifact.put(f"{group}/{name}", values, unit=unit, dims=("time", "device"))
+    artifact.put(f"{group}/energies", response.energies, unit="J", dims=("time", "input_damping_devices"))
+
+
+def _ten_storey(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.artifacts import load_parameter_set
+    from mrpipe.dampers.model import damper_from_parameter_set
+    from mrpipe.reporting import benchmark_ten_storey as report
+    from mrpipe.simulation import benchmark_ten_storey as bench
+    from mrpipe.structures.benchmark_ten_storey import ten_storey
+
+    settings = context.settings.benchmark.ten_storey
+    motion = _motion(context, settings.motion, 1)
+    device = _bingham(settings.inverse)
+    chain = damper_from_parameter_set(load_parameter_set("dampers", settings.damper)).chain()
+    studies = {}
+    for index, name in enumerate(settings.structures):
+        context.progress(index / (len(settings.structures) + 1), name)
+        study = bench.ten_storey_study(
+            ten_storey(name),
+            motion,
+            device=device,
+            chain=chain,
+            time_step_s=settings.time_step_s,
+            filter_rate=settings.filter_rate_1_s,
+        )
+        studies[name] = (study, study.cases(settings.laws))
+    study, cases = studies[settings.structures[0]]
+    sweep = study.sensitivity(settings.laws, settings.dampers)
+    summary = report.summary(studies, sweep)
+    with context.write("benchmark-ten-storey.h5") as artifact:
+        artifact.put_json("summary", {key: summary[key] for key in ("laws", "variants", "thesis")})
+        for case in cases:
+            if case.variant == "filtered":
+                _write_response(artifact, f"responses/{case.law}", case.response)
+        artifact.attributes("/", model=study.model.origin, source=study.model.source)
+    report.describe(context.report, studies, sweep)
+    return {**summary, "motion_details": _motion_summary(motion), "inputs_digest": _digest(context)}
+
+
+STAGES = (
+    Stage(
+        name="benchmark-ten-storey",
+        summary="The ten-storey frame of paper P4 under a ground motion, one 1000 kN damper at the bottom.",
+        run=_ten_storey,
+        settings=("benchmark.ten_storey", "benchmark.inputs_digest"),
+        outputs=("benchmark-ten-storey.h5",),
+    ),
+)

@@ -1,0 +1,313 @@
+"""Ground-motion records: PEER AT2, text of one to three columns, csv and MATLAB files; g, cm/s^2 or m/s^2.
+
+A record is checked before it is used: finite samples, a uniform clock that agrees with what the file says, the number
+of points it promises, and peaks that a ground motion can have in the unit it claims.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from scipy.io import loadmat
+from scipy.signal import resample_poly
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import UserError
+from mrpipe.units import to_si
+
+GRAVITY = 9.80665
+SMALLEST_PEAK, LARGEST_PEAK = 0.05 * GRAVITY, 1.5 * GRAVITY
+"""Peaks [m/s^2] that tell the unit of a record that does not say it."""
+IMPOSSIBLE_PEAK = 3.0 * GRAVITY
+"""No ground motion on record is stronger [m/s^2]."""
+
+_UNITS = (
+    (re.compile(r"units?\s+of\s+g\b|\(g\)|\[g\]|\bin\s+g\b|,\s*g\s*$|^\s*g\s*$", re.IGNORECASE | re.MULTILINE), "g"),
+    (re.compile(r"cm/s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)|\bgals?\b", re.IGNORECASE), "cm/s^2"),
+    (re.compile(r"(?<![a-z])m/s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)", re.IGNORECASE), "m/s^2"),
+)
+_POINTS = re.compile(r"NPTS\s*[=:]\s*(\d+)", re.IGNORECASE)
+_INTERVAL = re.compile(r"\bDT\s*[=:]\s*([0-9.]+(?:E[-+]?\d+)?)", re.IGNORECASE)
+_OLD_HEADER = re.compile(r"^\s*(\d+)\s+([0-9.]+(?:E[-+]?\d+)?)\s+NPTS\s*,\s*DT", re.IGNORECASE | re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class GroundMotion:
+    """A record in SI.
+
+    Attributes
+    ----------
+    name
+        Of the file, or of the synthesis.
+    acceleration_m_s2
+        Shape (n, components).
+    interval_s
+        Sampling interval [s].
+    unit
+        Unit in the file.
+    unit_from
+        How the unit was found: `given`, `header` or `peak`.
+    notes
+        What was assumed, for tables.
+    """
+
+    name: str
+    acceleration_m_s2: FloatArray
+    interval_s: float
+    unit: str
+    unit_from: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def components(self) -> int:
+        """Number of components."""
+        return int(self.acceleration_m_s2.shape[1])
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return (len(self.acceleration_m_s2) - 1) * self.interval_s
+
+    @property
+    def peaks_m_s2(self) -> FloatArray:
+        """Peak of each component [m/s^2]."""
+        return np.asarray(np.abs(self.acceleration_m_s2).max(axis=0))
+
+    def in_components(self, count: int) -> GroundMotion:
+        """Return the record with `count` components: the first ones, or zeros where it has fewer."""
+        values = self.acceleration_m_s2
+        if self.components >= count:
+            return replace(self, acceleration_m_s2=values[:, :count])
+        missing = np.zeros((len(values), count - self.components))
+        note = f"{self.components} component; the others are zero"
+        return replace(self, acceleration_m_s2=np.hstack([values, missing]), notes=(*self.notes, note))
+
+    def with_second(self, other: GroundMotion) -> GroundMotion:
+        """Return a record of this one's first component and that of `other`, which must have the same clock."""
+        if not np.isclose(self.interval_s, other.interval_s, rtol=1e-6):
+            raise UserError(
+                other.name,
+                "DT",
+                f"is {other.interval_s:g} s, the first component's {self.interval_s:g} s",
+                "use one DT",
+            )
+        length = min(len(self.acceleration_m_s2), len(other.acceleration_m_s2))
+        both = np.stack([self.acceleration_m_s2[:length, 0], other.acceleration_m_s2[:length, 0]], axis=1)
+        return replace(self, name=f"{self.name} + {other.name}", acceleration_m_s2=both)
+
+    def resampled(self, interval_s: float) -> GroundMotion:
+        """Return the record at another interval: a polyphase filter keeps what the new rate cannot hold out of it.
+
+        The mean of the ends is taken out before and put back after, so that a constant stays constant.
+        """
+        ratio = Fraction(self.interval_s / interval_s).limit_denominator(1000)
+        if ratio == 1:
+            return self
+        start = self.acceleration_m_s2[:1]
+        values = resample_poly(self.acceleration_m_s2 - start, ratio.numerator, ratio.denominator, axis=0) + start
+        exact = self.interval_s * ratio.denominator / ratio.numerator
+        note = f"resampled from {1.0 / self.interval_s:g} to {1.0 / exact:g} Hz"
+        return replace(self, acceleration_m_s2=np.asarray(values), interval_s=exact, notes=(*self.notes, note))
+
+
+@dataclass(frozen=True)
+class _Raw:
+    values: FloatArray  # (n, columns) without the clock
+    interval_s: float | None
+    header: str
+    notes: tuple[str, ...] = ()
+
+
+def read_motion(
+    path: Path, *, unit: str | None = None, interval_s: float | None = None, fallback_interval_s: float | None = None
+) -> GroundMotion:
+    """Read a ground motion.
+
+    Parameters
+    ----------
+    path
+        `.at2`; `.mat` (a variable with rows or columns of time and acceleration); anything else is text: one column (or
+        AT2-like rows), time and acceleration, two components, or time and two components.
+    unit
+        Unit of the samples; else the header tells, else the peak where only one unit is plausible.
+    interval_s
+        Sampling interval; must agree with the file where that tells.
+    fallback_interval_s
+        Interval where neither the file nor `interval_s` tells.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, empty, holds NaN, breaks its promises (NPTS, DT), mixes units or does not say enough.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise UserError(path, "", "no such record", "give the path of a ground-motion file")
+    if path.suffix.lower() == ".at2":
+        raw = _read_at2(path)
+    elif path.suffix.lower() == ".mat":
+        raw = _read_mat(path)
+    else:
+        raw = _read_text(path)
+    _check_finite(path, raw.values)
+    interval, notes = _interval(path, raw, interval_s, fallback_interval_s)
+    found, how = _unit(path, raw, unit)
+    values = to_si(raw.values, found, where=str(path), quantity="acceleration")
+    _check_peaks(path, values, found)
+    return GroundMotion(path.stem, values, interval, found, how, (*raw.notes, *notes))
+
+
+def _numbers(line: str) -> list[float] | None:
+    fields = line.replace(",", " ").replace(";", " ").split()
+    try:
+        return [float(field) for field in fields]
+    except ValueError:
+        return None
+
+
+def _read_at2(path: Path) -> _Raw:
+    lines = path.read_text(encoding="latin-1").splitlines()
+    first = next((i for i, line in enumerate(lines) if _numbers(line) and i >= 2), len(lines))
+    header = "\n".join(lines[:first])
+    old = _OLD_HEADER.search(header)
+    points = _POINTS.search(header)
+    interval = _INTERVAL.search(header)
+    count = int(points.group(1)) if points else int(old.group(1)) if old else None
+    step = float(interval.group(1)) if interval else float(old.group(2)) if old else None
+    if count is None or step is None:
+        raise UserError(path, "header", "has no NPTS and DT", "an AT2 file says NPTS= 1234, DT= .0050 SEC in line 4")
+    samples: list[float] = []
+    for number, line in enumerate(lines[first:], start=first + 1):
+        row = _numbers(line)
+        if row is None:
+            raise UserError(path, f"line {number}", "is no row of numbers", "leave text to the four header lines")
+        samples.extend(row)
+    if len(samples) != count:
+        raise UserError(
+            path, "NPTS", f"promises {count} points, the file holds {len(samples)}", "mend the header or the file"
+        )
+    return _Raw(np.array(samples)[:, None], step, header)
+
+
+def _read_mat(path: Path) -> _Raw:
+    try:
+        content = loadmat(path)
+    except (ValueError, NotImplementedError, OSError, TypeError) as error:
+        raise UserError(path, "", f"not a MATLAB file that can be read ({error})", "save it as version 7") from error
+    arrays = {
+        key: np.asarray(value, dtype=np.float64)
+        for key, value in content.items()
+        if not key.startswith("__") and np.issubdtype(np.asarray(value).dtype, np.number) and np.size(value) > 2
+    }
+    if not arrays:
+        raise UserError(path, "", "holds no numeric array", "store time and acceleration in one matrix")
+    values = max(arrays.values(), key=np.size)
+    values = np.atleast_2d(values)
+    if values.shape[0] < values.shape[1]:
+        values = values.T
+    return _split_clock(path, values, "")
+
+
+def _read_text(path: Path) -> _Raw:
+    rows: list[list[float]] = []
+    header: list[str] = []
+    for number, line in enumerate(path.read_text(encoding="latin-1").splitlines(), start=1):
+        text = line.strip()
+        if not text:
+            continue
+        row = _numbers(text)
+        if row is None:
+            if rows and text[0] not in "%#":
+                raise UserError(path, f"line {number}", f"is no row of numbers ({text[:30]!r})", "mend the row")
+            header.append(text)
+            continue
+        if rows and len(row) != len(rows[0]):
+            raise UserError(path, f"line {number}", f"has {len(row)} columns, the first {len(rows[0])}", "mend the row")
+        rows.append(row)
+    if not rows:
+        raise UserError(path, "", "holds no samples", "one row a sample: time and acceleration, or the components")
+    return _split_clock(path, np.array(rows), "\n".join(header))
+
+
+def _split_clock(path: Path, values: FloatArray, header: str) -> _Raw:
+    """Tell a clock in the first column from a component: it rises all the way."""
+    points = _POINTS.search(header)
+    if points and int(points.group(1)) != len(values):
+        raise UserError(
+            path, "NPTS", f"promises {points.group(1)} points, the file holds {len(values)}", "mend the header or file"
+        )
+    said = _INTERVAL.search(header)
+    interval = float(said.group(1)) if said else None
+    first = values[:, 0]
+    if values.shape[1] < 2 or len(first) < 3 or not np.all(np.isfinite(first)) or np.mean(np.diff(first) > 0) < 0.95:
+        return _Raw(values, interval, header)
+    steps = np.diff(first)
+    bad = np.flatnonzero(~(np.abs(steps - np.median(steps)) < 0.02 * np.median(steps)))
+    if len(bad):
+        raise UserError(path, f"row {int(bad[0]) + 2}", "the clock is not uniform", "resample to equal intervals first")
+    clock = float((first[-1] - first[0]) / (len(first) - 1))
+    if interval is not None and abs(clock - interval) > 0.01 * interval:
+        raise UserError(path, "DT", f"header says {interval:g} s, the clock {clock:g} s", "mend one of them")
+    return _Raw(values[:, 1:], clock, header)
+
+
+def _check_finite(path: Path, values: FloatArray) -> None:
+    if len(values) < 10:
+        raise UserError(path, "", f"holds {len(values)} samples", "a record has at least 10")
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        row, column = int(bad[0][0]) + 1, int(bad[0][1]) + 1
+        raise UserError(path, f"sample {row}, component {column}", "is not finite", "mend or leave out the sample")
+    if values.shape[1] > 3:
+        raise UserError(path, "", f"has {values.shape[1]} components", "one or two horizontal components are used")
+
+
+def _interval(path: Path, raw: _Raw, given: float | None, fallback: float | None) -> tuple[float, tuple[str, ...]]:
+    if given is not None and raw.interval_s is not None and abs(given - raw.interval_s) > 0.01 * raw.interval_s:
+        raise UserError(path, "DT", f"is {raw.interval_s:g} s, but {given:g} s was given", "leave one of them out")
+    found = raw.interval_s if raw.interval_s is not None else given
+    notes: tuple[str, ...] = ()
+    if found is None and fallback is not None:
+        found, notes = fallback, (f"no interval in the file: {fallback:g} s assumed",)
+    if found is None:
+        raise UserError(path, "DT", "neither a clock nor a DT in the header", "give benchmark.motion_interval_s")
+    if not 1e-5 <= found <= 0.2:
+        raise UserError(path, "DT", f"is {found:g} s", "a ground motion is sampled every 0.00001 to 0.2 s")
+    return found, notes
+
+
+def _unit(path: Path, raw: _Raw, given: str | None) -> tuple[str, str]:
+    if given:
+        return given, "given"
+    said = {name for pattern, name in _UNITS if pattern.search(raw.header)}
+    if len(said) > 1:
+        raise UserError(path, "header", f"names the units {', '.join(sorted(said))}", "give benchmark.motion_unit")
+    if said:
+        return said.pop(), "header"
+    peak = float(np.abs(raw.values).max())
+    plausible = [
+        name
+        for name, factor in (("g", GRAVITY), ("m/s^2", 1.0), ("cm/s^2", 0.01))
+        if SMALLEST_PEAK <= peak * factor <= LARGEST_PEAK
+    ]
+    if len(plausible) != 1:
+        which = " or ".join(plausible) or "no unit that fits"
+        raise UserError(path, "unit", f"not said, and the peak {peak:g} could be {which}", "give benchmark.motion_unit")
+    return plausible[0], "peak"
+
+
+def _check_peaks(path: Path, values: FloatArray, unit: str) -> None:
+    peaks = np.abs(values).max(axis=0)
+    if peaks.max() == 0.0:
+        raise UserError(path, "", "all samples are zero", "give a record that moves")
+    if peaks.max() > IMPOSSIBLE_PEAK:
+        told = f"peak {peaks.max() / GRAVITY:.3g} g in {unit}"
+        raise UserError(path, "unit", f"{told} is no ground motion", "the unit is wrong: g, cm/s^2 or m/s^2?")
+    moving = peaks[peaks > 0.0]
+    if moving.max() > 50.0 * moving.min():
+        told = ", ".join(f"{peak:.3g}" for peak in peaks)
+        raise UserError(path, "components", f"peaks {told} m/s^2 differ too much: mixed units", "use one unit for all")
