@@ -16,8 +16,8 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 
-CHUNK_ROWS = 4096
-"""Rows of the Jacobian held at a time: fits the second-level cache for some hundred parameters."""
+CHUNK_ROWS = 2048
+"""Rows of the Jacobian held at a time: fits the second-level cache at a hundred parameters."""
 
 
 def layer_slices(layers: tuple[int, ...], biases: bool) -> list[tuple[slice, slice]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -206,17 +207,21 @@ def initial_parameters(
         return rng.uniform(-0.5, 0.5, problem.size)
     from sklearn.neural_network import MLPRegressor
 
-    rows = slice(0, 4000)
+    # every so many rows: the first ones alone would be the first tests alone
+    stride = max(1, problem.rows // 4000)
     perceptron = MLPRegressor(
-        problem.layers[1:-1], activation="tanh", solver="lbfgs", alpha=0.0, max_iter=100, tol=1e-9,
+        hidden_layer_sizes=problem.layers[1:-1],
+        activation="tanh",
+        solver="lbfgs",
+        alpha=0.0,
+        max_iter=100,
+        tol=1e-9,
         random_state=int(rng.integers(2**31)),
-    )  # fmt: skip
-    import warnings
-
+    )
     with warnings.catch_warnings():
         # it is meant to stop early: the start is not the end
         warnings.simplefilter("ignore")
-        perceptron.fit(problem.inputs[:, rows].T, problem.target[rows])
+        perceptron.fit(problem.inputs[:, ::stride].T, problem.target[::stride])
     weights = [np.asarray(matrix, dtype=np.float64).T for matrix in perceptron.coefs_]
     return pack(weights, [np.asarray(item, dtype=np.float64) for item in perceptron.intercepts_], problem.biases)
 
