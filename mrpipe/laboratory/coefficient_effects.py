@@ -12,7 +12,7 @@ HEATING_TWO_NODES, HEATING_ADIABATIC = 10, 8
 STRIBECK_RATIONAL, STRIBECK_CUSP = 11, 12
 MIGRATION_STRETCHED, MIGRATION_SLIP = 13, 14
 ASYMMETRY_YIELD, ASYMMETRY_FORCE = 15, 16
-RATE_HYPERBOLIC, RATE_EYRING = 17, 18
+RATE_CREEP, RATE_EYRING = 17, 18
 PINCHING_QUARTIC, PINCHING_CUSP = 19, 20
 ACCUMULATOR_GAS, ACCUMULATOR_BLADDER = 30, 31
 INERTIA_LAGGED, INERTIA_PLAIN = 32, 33
@@ -50,12 +50,8 @@ def _yield_factor(code: int, numbers: FloatArray, state: FloatArray, x: float, v
         return 1.0 - numbers[0] / (1.0 + state[_SLIP] / numbers[1])
     if code == ASYMMETRY_YIELD:
         return 1.0 + numbers[0] * v / math.sqrt(v * v + numbers[1] * numbers[1])
-    if code == RATE_HYPERBOLIC:
-        return speed / (speed + numbers[0] + 1e-12)
     if code == RATE_EYRING:
-        if numbers[0] <= 0.0:
-            return 1.0
-        return math.asinh(speed / numbers[0]) / math.asinh(numbers[1] / numbers[0])
+        return 1.0 - numbers[0] + numbers[0] * math.asinh(speed / numbers[1]) / math.asinh(numbers[2] / numbers[1])
     if code == PINCHING_QUARTIC:
         return 1.0 - numbers[0] / (1.0 + ((x - numbers[2]) / numbers[1]) ** 4)
     if code == PINCHING_CUSP:
@@ -71,15 +67,13 @@ def coefficient_factors(
     state: FloatArray,
     x: float,
     v: float,
-    u: float,
-    time: float,
     h: float,
 ) -> tuple[float, float]:
     """Return the factors of yield force and viscosity."""
     yielding, viscous = 1.0, 1.0
     for k in range(codes.shape[0]):
         code = codes[k]
-        if code == HEATING_TWO_NODES or code == HEATING_ADIABATIC:
+        if code in (HEATING_TWO_NODES, HEATING_ADIABATIC):
             rise = _heating(code, values[k], memory[k], state[_POWER], h)
             yielding *= 1.0 / (1.0 + values[k, 0] * rise)
             viscous *= math.exp(-2.0 * values[k, 0] * rise)
@@ -148,7 +142,7 @@ def parallel_force(
             force += numbers[0] * v * abs(v) ** (numbers[1] - 1.0)
         elif code == DRAG_TURBULENT:
             force += numbers[0] * v * v * abs(v) / (abs(v) + numbers[1]) * (1.0 if v > 0.0 else -1.0)
-        elif code == END_STOP_HERTZ or code == END_STOP_RUBBER:
+        elif code in (END_STOP_HERTZ, END_STOP_RUBBER):
             force += _end_stop(code, numbers, x, v)
         elif code == OFFSET_PER_TEST:
             force += numbers[0] * numbers[1]

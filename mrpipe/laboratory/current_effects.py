@@ -56,18 +56,19 @@ def _driver(numbers: FloatArray, own: FloatArray, current: float, h: float) -> f
 @njit(cache=True)
 def _relaxing(numbers: FloatArray, own: FloatArray, u: float, v: float, h: float) -> float:
     """Return the field's current with a remanence that saturates, charges fast and fades by time and by slip."""
-    level = numbers[0] * u / (1.0 + u / numbers[1])
+    # the field that stays is always less than the one that was
+    level = min(numbers[0] * u / (1.0 + u / numbers[1]), 0.97 * u)
     kept = own[0]
     if level > kept:
         kept += (level - kept) * (1.0 - math.exp(-h / numbers[2]))
     else:
         fade = 1.0 / numbers[3] + abs(v) / numbers[4]
-        excess = (kept - level) / max(numbers[1], 1e-9)
+        excess = (kept - level) / numbers[1]
         # faster from high excess: a power law and no exponential
         kept -= (kept - level) * (1.0 - math.exp(-h * fade * (0.3 + 2.0 * excess)))
     own[0] = kept
     size = max(u, 1e-12)
-    return float((size**4 + kept**4) ** 0.25)
+    return float((size**8 + kept**8) ** 0.125)
 
 
 @njit(cache=True)

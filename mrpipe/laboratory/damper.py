@@ -50,6 +50,11 @@ class FineMotion:
     current: FloatArray
     offset_draw: float = 0.0
 
+    @property
+    def force_samples(self) -> int:
+        """Number of fine samples."""
+        return int(self.displacement.size)
+
 
 @dataclass(frozen=True)
 class FineResponse:
@@ -125,7 +130,7 @@ def _skewed(force: FloatArray, effect: Planted, step_s: float) -> FloatArray:
         time = np.arange(force.size) * step_s
         return np.interp(time - effect.strength, time, force)
     # a Bessel filter of order two delays low frequencies by norm / (2 pi f)
-    b, a = signal.bessel(2, 1.0 / effect.strength, norm="delay", fs=1.0 / step_s)
+    b, a = signal.bessel(2, 1.0 / (2.0 * np.pi * effect.strength), norm="delay", fs=1.0 / step_s)
     start = signal.lfilter_zi(b, a) * force[0]
     return np.asarray(signal.lfilter(b, a, force, zi=start)[0])
 
@@ -145,7 +150,12 @@ def _share(damper: TrueDamper, motions: Sequence[FineMotion], reference: Sequenc
 
 
 def calibrate_strength(
-    damper: TrueDamper, index: int, motions: Sequence[FineMotion], *, tolerance: float = 0.01
+    damper: TrueDamper,
+    index: int,
+    motions: Sequence[FineMotion],
+    *,
+    share: float | None = None,
+    tolerance: float = 0.01,
 ) -> TrueDamper:
     """Return the damper with the strength of one effect such that it reaches its share of the force RMS.
 
@@ -157,6 +167,8 @@ def calibrate_strength(
         Which effect.
     motions
         Tests to pool.
+    share
+        In place of the effect's own `strength_share`.
     tolerance
         Of the share, relative.
 
@@ -166,18 +178,18 @@ def calibrate_strength(
         If the share is out of reach on these tests.
     """
     effect = damper.effects[index]
-    wanted = effect.strength_share
+    wanted = effect.strength_share if share is None else share
     if wanted is None:
         return damper
     others = list(damper.effects)
     without = damper.with_effects(others[:index] + others[index + 1 :])
     reference = [respond(without, motion).force for motion in motions]
 
-    def share_at(strength: float) -> float:
+    def share_of(strength: float) -> float:
         changed = damper.with_effects([*others[:index], effect.with_strength(strength), *others[index + 1 :]])
         return _share(changed, motions, reference)
 
-    strength = _solve(share_at, wanted, abs(effect.strength), effect.form.strongest, tolerance)
+    strength = _solve(share_of, wanted, abs(effect.strength), effect.form.strongest, tolerance)
     if strength is None:
         raise UserError(
             f"effect {effect.name} ({effect.form.form})",

@@ -109,12 +109,13 @@ FORMS: tuple[Form, ...] = (
         ("drag", "N*s^2/m^2", 5000.0, 500.0, 9000.0), ("onset_speed", "m/s", 0.01, 0.004, 0.03),
     ),
     _form(
-        "rate-dependent-yield", "hyperbolic", coefficient.RATE_HYPERBOLIC, 0.3,
-        ("speed", "m/s", 0.004, 0.001, 0.02),
+        "rate-dependent-yield", "creep", coefficient.RATE_CREEP, 0.5,
+        ("speed", "m/s", 0.01, 0.002, 0.03),
     ),
     _form(
         "rate-dependent-yield", "eyring", coefficient.RATE_EYRING, 1.0,
-        ("speed", "m/s", 0.002, 0.0005, 0.02), ("reference_speed", "m/s", 0.1, 0.06, 0.15),
+        ("share", "1", 0.3, 0.1, 1.0), ("speed", "m/s", 0.004, 0.002, 0.02),
+        ("reference_speed", "m/s", 0.1, 0.06, 0.15),
     ),
     _form(
         "migration", "stretched-time", coefficient.MIGRATION_STRETCHED, 0.95,
@@ -125,13 +126,13 @@ FORMS: tuple[Form, ...] = (
         ("share", "1", 0.3, 0.05, 0.6), ("slip", "m", 0.0015, 0.0006, 0.003),
     ),
     _form(
-        "remanence", "relaxing", current.REMANENCE_RELAXING, 6.0,
-        ("gain", "1", 0.7, 0.2, 1.5), ("saturation", "A", 1.0, 0.8, 3.0), ("rise_time", "s", 0.02, 0.01, 0.03),
-        ("fade_time", "s", 0.4, 0.2, 0.8), ("fade_slip", "m", 0.02, 0.01, 0.06), needs="varying-drive",
+        "remanence", "relaxing", current.REMANENCE_RELAXING, 4.0,
+        ("share", "1", 0.6, 0.2, 0.9), ("saturation", "A", 3.0, 2.0, 6.0), ("rise_time", "s", 0.02, 0.01, 0.03),
+        ("fade_time", "s", 0.4, 0.3, 1.5), ("fade_slip", "m", 0.02, 0.02, 0.15), needs="varying-drive",
     ),
     _form(
-        "remanence", "domains", current.REMANENCE_DOMAINS, 1.5,
-        ("gain", "1", 0.6, 0.2, 1.0), ("threshold", "A", 0.6, 0.3, 1.2), needs="varying-drive",
+        "remanence", "domains", current.REMANENCE_DOMAINS, 2.5,
+        ("gain", "1", 0.6, 0.2, 1.0), ("threshold", "A", 0.9, 0.7, 1.5), needs="varying-drive",
     ),
     _form(
         "heating", "two-nodes", coefficient.HEATING_TWO_NODES, 1.0,
@@ -293,7 +294,7 @@ def packed(effects: tuple[Planted, ...]) -> tuple[IntArray, FloatArray]:
     return np.array([effect.form.code for effect in inside], dtype=np.int64), values
 
 
-def draw_effect(
+def draw_hidden_effect(
     rng: np.random.Generator,
     names: tuple[str, ...] = EFFECT_NAMES,
     share: float | tuple[float, float] | None = None,

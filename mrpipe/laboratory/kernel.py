@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray, IntArray
-from mrpipe.laboratory.coefficient_effects import coefficient_factors, parallel_force
+from mrpipe.laboratory.coefficient_effects import RATE_CREEP, coefficient_factors, parallel_force
 from mrpipe.laboratory.current_effects import effective_current
 
 # state of the damper
@@ -27,21 +27,21 @@ BACKLASH_FREE, BACKLASH_HELD = 50, 51
 
 
 @njit(cache=True, inline="always")
-def _rate(z: float, v: float, base: FloatArray) -> float:
-    """Return z' of (2.2)."""
+def _rate(z: float, v: float, base: FloatArray, creep: float) -> float:
+    """Return z' of (2.2), less what the chains creep under load (a planted effect; 0 without)."""
     size = abs(z)
     power = size if base[9] == 2.0 else size ** (base[9] - 1.0)
-    return base[6] * v - base[7] * abs(v) * z * power - base[8] * v * size * power
+    return base[6] * v - base[7] * abs(v) * z * power - base[8] * v * size * power - creep * z * size * size
 
 
 @njit(cache=True)
-def _hysteresis(z: float, v0: float, v1: float, h: float, base: FloatArray) -> float:
+def _hysteresis(z: float, v0: float, v1: float, h: float, base: FloatArray, creep: float) -> float:
     """Return z after one step of order four; the velocity is linear within the step."""
     middle = 0.5 * (v0 + v1)
-    k1 = _rate(z, v0, base)
-    k2 = _rate(z + 0.5 * h * k1, middle, base)
-    k3 = _rate(z + 0.5 * h * k2, middle, base)
-    k4 = _rate(z + h * k3, v1, base)
+    k1 = _rate(z, v0, base, creep)
+    k2 = _rate(z + 0.5 * h * k1, middle, base, creep)
+    k3 = _rate(z + 0.5 * h * k2, middle, base, creep)
+    k4 = _rate(z + h * k3, v1, base, creep)
     return z + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
@@ -117,6 +117,7 @@ def damper_step(
     speed0, speed1 = v0, v1
     rod = x1
     free = -1
+    creep = 0.0
     for k in range(count):
         if codes[k] == BACKLASH_HELD:
             speed0 = state[ROD_SPEED]
@@ -124,6 +125,9 @@ def damper_step(
             rod = state[ROD]
         elif codes[k] == BACKLASH_FREE:
             free = k
+        elif codes[k] == RATE_CREEP:
+            # the speed at which creep of the fully stretched chains equals the motion
+            creep = values[k, 0] * base[6] * ((base[7] + base[8]) / base[6]) ** (3.0 / base[9])
     if free >= 0:
         speed1 = _rod_free(state, values[free, 0], x1, v1, alpha, c0, base, h)
         speed0 = state[ROD_SPEED]
@@ -139,8 +143,8 @@ def damper_step(
     state[SINCE] += h
 
     if free < 0 or state[CONTACT] != 0.0:
-        state[Z] = _hysteresis(state[Z], speed0, speed1, h, base)
-    yielding, viscous = coefficient_factors(codes, values, memory, state, rod, speed1, u, time, h)
+        state[Z] = _hysteresis(state[Z], speed0, speed1, h, base, creep)
+    yielding, viscous = coefficient_factors(codes, values, memory, state, rod, speed1, h)
     core = alpha * yielding * state[Z] + c0 * viscous * speed1
     if free >= 0:
         if state[CONTACT] == 0.0:

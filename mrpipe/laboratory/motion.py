@@ -81,10 +81,7 @@ def smooth_start(time: FloatArray, length: float) -> FloatArray:
 def _harmonic(test: BenchTest, servo: Servo, time: FloatArray, rng: np.random.Generator) -> FloatArray:
     phase = rng.uniform(0.0, 2.0 * np.pi)
     angle = 2.0 * np.pi * test.frequency_hz * time + phase
-    if test.motion == "triangle":
-        shape = 2.0 / np.pi * np.arcsin(np.sin(angle))
-    else:
-        shape = np.sin(angle)
+    shape = 2.0 / np.pi * np.arcsin(np.sin(angle)) if test.motion == "triangle" else np.sin(angle)
     for order in (2, 3):
         share, shift = servo.harmonic_share * rng.standard_normal(), rng.uniform(0.0, 2.0 * np.pi)
         shape = shape + share * np.sin(order * angle + shift)

@@ -37,15 +37,15 @@ def compact(duration_s: float = 5.0) -> list[BenchTest]:
         name = f"{len(rows) + 1:02d}-{motion}-{a:g}mm-{f:g}Hz-{kind}-{current:g}A"
         rows.append(BenchTest(name, role, motion, a * mm, f, kind, current, d, repeat))  # type: ignore[arg-type]
 
-    for a, f, currents in (
-        (5, 1.0, (0, 2)),
-        (5, 2.2, (0, 3)),
-        (10, 0.5, (0, 1)),
-        (10, 1.8, (0, 4)),
-        (10, 1.27, (0.5, 1, 3)),
+    for a, f, levels in (
+        (5, 1.0, (0.0, 2.0)),
+        (5, 2.2, (0.0, 3.0)),
+        (10, 0.5, (0.0, 1.0)),
+        (10, 1.8, (0.0, 4.0)),
+        (10, 1.27, (0.5, 1.0, 3.0)),
     ):
-        for current in currents:
-            add("training", "sine", a, f, "constant", current)
+        for level in levels:
+            add("training", "sine", a, f, "constant", level)
     for a, f, current in ((5, 1.0, 2), (10, 1.0, 4), (10, 2.2, 1), (5, 1.8, 3)):
         add("training", "sine", a, f, "half-sine", current)
     for motion, a, f, current in (
@@ -111,12 +111,11 @@ def discriminating(duration_s: float = 8.0) -> list[BenchTest]:
         BenchTest(f"dwell-{current:g}A", role, "dwell", 0.012, 1.0, "constant", current, 1.5 * duration_s)
         for current, role in ((0.0, "training"), (2.0, "training"), (1.0, "validation"))
     ]
+    d = duration_s
     tests += [
-        BenchTest("long", "training", "sine", 0.010, 1.8, "constant", 4.0, 5.0 * duration_s),
-        BenchTest(
-            "cooling", "training", "hold", 0.010, 1.8, "constant", 4.0, 5.0 * duration_s, pause_s=2.0 * duration_s
-        ),
-        BenchTest("cooling-b", "validation", "hold", 0.008, 1.5, "constant", 3.0, 5.0 * duration_s, pause_s=duration_s),
+        BenchTest("long", "training", "sine", 0.010, 1.8, "constant", 4.0, 5.0 * d),
+        BenchTest("cooling", "training", "hold", 0.010, 1.8, "constant", 4.0, 5.0 * d, pause_s=2.0 * d),
+        BenchTest("cooling-b", "validation", "hold", 0.008, 1.5, "constant", 3.0, 5.0 * d, pause_s=d),
         BenchTest("again-1", "training", "sine", 0.010, 1.27, "half-sine", 3.0, duration_s),
         BenchTest("again-2", "repeat", "sine", 0.010, 1.27, "half-sine", 3.0, duration_s, "again-1"),
         BenchTest("unlike", "validation", "random", 0.010, 3.0, "random", 4.0, duration_s),

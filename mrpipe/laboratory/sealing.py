@@ -10,7 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from mrpipe.artifacts import atomic_write_text
+from mrpipe.campaigns import CAMPAIGN_FILE
 
 SEALED = "sealed.json"
 
@@ -36,6 +39,16 @@ def campaign_directory(final: Path) -> Iterator[Path]:
             temporary.rename(final)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def write_scales(folder: Path, scales: Mapping[str, float]) -> None:
+    """Add the conversion factors of the sensors to the channels of a written campaign.yaml."""
+    file = folder / CAMPAIGN_FILE
+    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    for quantity, scale in scales.items():
+        content["channels"][quantity]["scale"] = float(scale)
+    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+    atomic_write_text(file, text)
 
 
 def sealed_path(campaign: Path) -> Path:

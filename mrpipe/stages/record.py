@@ -9,6 +9,8 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
     from mrpipe.laboratory.damper import TrueDamper
+    from mrpipe.laboratory.frame_rig import FrameRig
+    from mrpipe.laboratory.structure import TrueStructure
 
 _DAMPER = (
     "laboratory.damper",
@@ -24,7 +26,7 @@ def _true_damper(context: StageContext) -> TrueDamper:
     import numpy as np
 
     from mrpipe.laboratory.damper import damper_from_set, draw_damper
-    from mrpipe.laboratory.effects import Planted, draw_effect, find_form
+    from mrpipe.laboratory.effects import Planted, draw_hidden_effect, find_form
 
     settings = context.settings.laboratory
     rng = np.random.default_rng([context.seed, 41])
@@ -37,7 +39,7 @@ def _true_damper(context: StageContext) -> TrueDamper:
         for item in items
     ]
     if settings.draw_hidden_share is not None:
-        effects.append(draw_effect(rng, share=settings.draw_hidden_share))
+        effects.append(draw_hidden_effect(rng, share=settings.draw_hidden_share))
     return damper.with_effects(effects)
 
 
@@ -77,6 +79,59 @@ def _record_bench(context: StageContext) -> Mapping[str, Any]:
     return _summary(context, "campaigns/bench", record.tests, declared, rig.sampling_rate_hz)
 
 
+def _true_structure(context: StageContext) -> TrueStructure:
+    """Return the structure of the settings."""
+    import numpy as np
+
+    from mrpipe.laboratory.effects import Planted
+    from mrpipe.laboratory.structure import TrueStructure, find_frame_form, random_frame
+    from mrpipe.structures import frame_from_parameter_set
+
+    settings = context.settings.laboratory.frame
+    if settings.random_floors:
+        frame = random_frame(np.random.default_rng([context.seed, 43]), settings.random_floors)
+    else:
+        frame = frame_from_parameter_set(settings.structure)
+    effects = [
+        Planted(find_frame_form(item.name, item.form), item.parameters, item.strength_share, declared)
+        for declared, items in ((True, settings.declared_effects), (False, settings.hidden_effects))
+        for item in items
+    ]
+    return TrueStructure(frame, tuple(effects))
+
+
+def _frame_rig(settings: Any) -> FrameRig:
+    from mrpipe.laboratory.frame_rig import FrameRig
+
+    own = {"structure", "random_floors", "declared_effects", "hidden_effects"}
+    return FrameRig(**settings.model_dump(exclude=own))
+
+
+def _record_frame(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.campaigns import write_campaign
+    from mrpipe.laboratory.frame_rig import floor_masses, record_frame
+    from mrpipe.laboratory.sealing import campaign_directory, write_scales, write_sealed
+
+    rig = _frame_rig(context.settings.laboratory.frame)
+    structure = _true_structure(context)
+    record = record_frame(structure, rig, context.rng, context.progress)
+    declared = [item.name for item in structure.effects if item.declared]
+    final = context.run_directory / "campaigns" / "frame"
+    with campaign_directory(final) as folder:
+        write_campaign(
+            folder,
+            campaign="virtual-frame",
+            rig="shear-frame",
+            sampling_rate_hz=rig.sampling_rate_hz,
+            channels=record.channels,
+            tests=record.tests,
+            extra={"declared_effects": declared, "frame": {"floor_masses_kg": floor_masses(structure)}},
+        )
+        write_scales(folder, record.scales)
+        write_sealed(final, record.truth)
+    return _summary(context, "campaigns/frame", record.tests, declared, rig.sampling_rate_hz)
+
+
 def _summary(
     context: StageContext, campaign: str, tests: list[Any], declared: list[str], rate: float
 ) -> dict[str, Any]:
@@ -86,8 +141,8 @@ def _summary(
     samples = sum(len(next(iter(test.columns.values()))) for test in tests)
     roles = [test.role for test in tests]
     context.report.text(
-        f"The virtual laboratory recorded {len(tests)} tests ({samples / rate:.0f} s at {rate:g} Hz); declared effects: "
-        f"{', '.join(declared) or 'none'}. What else the rig has lies sealed beside the campaign."
+        f"The virtual laboratory recorded {len(tests)} tests ({samples / rate:.0f} s at {rate:g} Hz); declared "
+        f"effects: {', '.join(declared) or 'none'}. What else the rig has lies sealed beside the campaign."
     )
     table = pd.DataFrame(
         [
@@ -114,4 +169,11 @@ RECORD_BENCH = Stage(
     settings=(*_DAMPER, "laboratory.bench"),
     outputs=("campaigns/bench",),
 )
-STAGES = (RECORD_BENCH,)
+RECORD_FRAME = Stage(
+    name="record-frame",
+    summary="The virtual shaking table records sweeps and free decays of the frame.",
+    run=_record_frame,
+    settings=("laboratory.frame",),
+    outputs=("campaigns/frame",),
+)
+STAGES = (RECORD_BENCH, RECORD_FRAME)

@@ -70,8 +70,8 @@ class BenchSettings(Section):
 
     plan: str = Field(
         "table-2.1",
-        description="`table-2.1`, `compact` (44 short tests of unlike motions), `discriminating` (tests that tell alike "
-        "effects apart), several joined by +, or `custom` (the tests listed alone).",
+        description="`table-2.1`, `compact` (44 short tests of unlike motions), `discriminating` (tests that tell "
+        "alike effects apart), several joined by +, or `custom` (the tests listed alone).",
     )
     tests: tuple[CustomTest, ...] = Field((), description="Tests in addition to the plan.")
     cycles: int = Field(10, ge=2, description="Steady cycles of each test of Table 2.1.")
@@ -84,6 +84,44 @@ class BenchSettings(Section):
     sensors: BenchSensorSettings = Field(BenchSensorSettings(), description="Noise and offsets.")
     servo: ServoSettings = Field(ServoSettings(), description="The testing machine.")
     data_format: Literal["h5", "csv"] = Field("h5", description="Format of the data files.")
+
+
+class FrameSettings(Section):
+    """The frame campaign on the shaking table."""
+
+    structure: str = Field("thesis", description="Parameter set of the true frame (configs/frames, or a YAML file).")
+    random_floors: int = Field(
+        0, ge=0, le=12, description="Draw a shear frame of so many floors from the seed instead; 0 takes the set."
+    )
+    declared_effects: tuple[PlantedEffect, ...] = Field(
+        (), description="Effects of the true structure that campaign.yaml names."
+    )
+    hidden_effects: tuple[PlantedEffect, ...] = Field(
+        (), description="Effects of the true structure (joint-friction, cubic-stiffness, ...) that it keeps back."
+    )
+    sampling_rate_hz: float = Field(200.0, ge=50.0, description="Rate of the recorder [Hz].")
+    fine_steps: int = Field(5, ge=1, le=64, description="Integration steps a sample of the true frame.")
+    acceleration_noise_m_s2: float = Field(0.01, ge=0.0, description="Noise of the accelerometers [m/s2].")
+    displacement_noise_m: float = Field(20e-6, ge=0.0, description="Noise of the lasers [m].")
+    acceleration_offset_m_s2: float = Field(0.05, ge=0.0, description="Offset of the accelerometers [m/s2].")
+    displacement_offset_m: float = Field(5e-4, ge=0.0, description="Offset of the lasers [m].")
+    laser_floors: tuple[int, ...] = Field((1, 2, 5), description="Floors whose displacement is measured.")
+    sweep_s: float = Field(300.0, gt=10.0, description="Duration of a sweep, a fifth of it rest [s].")
+    sweeps: int = Field(2, ge=1, description="Number of sweeps; the second runs down.")
+    random_s: float = Field(240.0, ge=0.0, description="Duration of the random test [s]; 0 leaves it out.")
+    sweep_acceleration_m_s2: float = Field(
+        0.06, gt=0.0, description="Amplitude of the sweep at the first frequency, rising with its root [m/s2]."
+    )
+    random_acceleration_m_s2: float = Field(0.15, gt=0.0, description="RMS of the random test [m/s2].")
+    decay_acceleration_m_s2: float = Field(
+        1.5, gt=0.0, description="Largest floor acceleration when a decay test lets go [m/s2]."
+    )
+    sensitivity_error: float = Field(
+        0.0, ge=0.0, description="Standard deviation of the conversion factors' error [1]."
+    )
+    support_share: float = Field(
+        0.15, ge=0.0, description="Participation of a flexible-support mode above the band [1]; 0 leaves it out."
+    )
 
 
 class LaboratorySettings(Section):
@@ -105,3 +143,4 @@ class LaboratorySettings(Section):
         0.0, ge=0.0, le=0.5, description="Log-normal spread by which the damper departs from its set (0: as printed)."
     )
     bench: BenchSettings = Field(BenchSettings(), description="The bench campaign.")
+    frame: FrameSettings = Field(FrameSettings(), description="The frame campaign.")

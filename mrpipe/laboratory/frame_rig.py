@@ -1,0 +1,250 @@
+"""The frame on its shaking table: sweeps, a free decay for each mode, random motion; sensors in volts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.campaigns import TestFile
+from mrpipe.laboratory.kernel import PARAMETERS
+from mrpipe.laboratory.motion import smooth_start
+from mrpipe.laboratory.structure import Assembled, TrueStructure, assemble
+from mrpipe.laboratory.structure_kernel import run_structure
+from mrpipe.structures import natural_modes
+
+ACCELEROMETER_M_S2_PER_V = 9.81
+LASER_M_PER_V = 0.0109
+LOAD_CELL_N_PER_V = 50.0
+"""Conversion factors of Table 3.2."""
+
+
+@dataclass(frozen=True)
+class FrameRig:
+    """Table, sensors and tests.
+
+    Attributes
+    ----------
+    sampling_rate_hz, fine_steps
+        Of the recorder; integration steps a sample.
+    acceleration_noise_m_s2, displacement_noise_m
+        Standard deviations.
+    acceleration_offset_m_s2, displacement_offset_m
+        Standard deviations of the constant offsets.
+    laser_floors
+        Floors whose displacement is measured.
+    sweep_s, sweeps, random_s
+        Duration of a sweep and of the random test [s]; number of sweeps.
+    sweep_acceleration_m_s2, random_acceleration_m_s2
+        Amplitude of the table at the first frequency (rising with its square root), RMS of the random test.
+    decay_acceleration_m_s2
+        Largest floor acceleration when the excitation of a decay test stops.
+    sensitivity_error
+        Standard deviation of the error of each conversion factor [1].
+    support_share
+        Participation of a flexible-support mode above the band [1]; 0 leaves it out.
+    """
+
+    sampling_rate_hz: float = 200.0
+    fine_steps: int = 5
+    acceleration_noise_m_s2: float = 0.01
+    displacement_noise_m: float = 20e-6
+    acceleration_offset_m_s2: float = 0.05
+    displacement_offset_m: float = 5e-4
+    laser_floors: tuple[int, ...] = (1, 2, 5)
+    sweep_s: float = 300.0
+    sweeps: int = 2
+    random_s: float = 240.0
+    sweep_acceleration_m_s2: float = 0.06
+    random_acceleration_m_s2: float = 0.15
+    decay_acceleration_m_s2: float = 1.5
+    sensitivity_error: float = 0.0
+    support_share: float = 0.15
+
+    @property
+    def step_s(self) -> float:
+        """Integration step [s]."""
+        return 1.0 / (self.sampling_rate_hz * self.fine_steps)
+
+
+@dataclass(frozen=True)
+class FrameTestOrder:
+    """One test of the frame: ground acceleration on the fine clock, shape (m,)."""
+
+    name: str
+    role: str
+    kind: str
+    ground: FloatArray
+    mode: int = 0
+
+
+@dataclass(frozen=True)
+class FrameRecord:
+    """A campaign ready to be written, and its truth."""
+
+    tests: list[TestFile]
+    channels: dict[str, tuple[str, str]]
+    scales: dict[str, float]
+    truth: dict[str, Any]
+
+
+def shake(assembled: Assembled, ground: FloatArray, rig: FrameRig) -> tuple[FloatArray, FloatArray]:
+    """Return displacements relative to the ground and absolute accelerations, shape (samples, floors)."""
+    nothing = np.zeros(0)
+    displacement, acceleration, _ = run_structure(
+        assembled.A, assembled.B, assembled.Ad, assembled.B0, assembled.B1, assembled.w, assembled.drift_rows,
+        assembled.floors, ground, rig.step_s, rig.fine_steps, assembled.storey_codes, assembled.storey_values,
+        False, np.zeros(11), np.zeros(0, dtype=np.int64), np.zeros((0, PARAMETERS)), 0, 0, nothing,
+        np.zeros(1, dtype=np.int64), nothing, np.zeros((0, 4)),
+    )  # fmt: skip
+    return displacement[:, : assembled.floors], acceleration
+
+
+def sweep_ground(rig: FrameRig, low_hz: float, high_hz: float, first_hz: float) -> FloatArray:
+    """Return the ground acceleration of a logarithmic sweep with its tail of rest (a fifth), shape (m,)."""
+    time = np.arange(round(rig.sweep_s / rig.step_s), dtype=np.float64) * rig.step_s
+    active = 0.8 * rig.sweep_s
+    rate = np.log(high_hz / low_hz) / active
+    inside = np.minimum(time, active)
+    angle = 2.0 * np.pi * low_hz * (np.exp(rate * inside) - 1.0) / rate
+    frequency = low_hz * np.exp(rate * inside)
+    amplitude = rig.sweep_acceleration_m_s2 * np.sqrt(frequency / first_hz)
+    window = smooth_start(time, 4.0) * smooth_start(active - time, 2.0)
+    return np.asarray(amplitude * np.sin(angle) * window)
+
+
+def random_ground(rig: FrameRig, low_hz: float, high_hz: float, rng: np.random.Generator) -> FloatArray:
+    """Return band-limited random ground acceleration with a tail of rest, shape (m,)."""
+    count = round(rig.random_s / rig.step_s)
+    white = rng.standard_normal(count)
+    shape = signal.butter(4, [low_hz, high_hz], "bandpass", fs=1.0 / rig.step_s, output="sos")
+    motion = signal.sosfilt(shape, white)
+    motion *= rig.random_acceleration_m_s2 / np.sqrt(np.mean(motion**2))
+    time = np.arange(count, dtype=np.float64) * rig.step_s
+    return np.asarray(motion * smooth_start(time, 3.0) * smooth_start(0.85 * rig.random_s - time, 2.0))
+
+
+def decay_ground(rig: FrameRig, structure: TrueStructure, mode: int, rng: np.random.Generator) -> FloatArray:
+    """Return ground acceleration at the resonance of a mode (from 1), then rest for its decay, shape (m,).
+
+    The amplitude is such that the strongest floor reaches `decay_acceleration_m_s2`; the operator's tuning is off by a
+    thousandth or so.
+    """
+    frame = structure.frame
+    modes = natural_modes(frame)
+    omega = float(modes.angular_frequencies[mode - 1])
+    shape = modes.mode_shapes[:, mode - 1]
+    ratio = float(shape @ frame.damping @ shape) / (2.0 * omega)
+    push = abs(float(shape @ frame.mass @ np.ones(frame.floors)))
+    build = float(np.clip(1.5 / (ratio * omega), 12.0, 60.0))
+    rest = float(np.clip(4.0 / (ratio * omega), 30.0, 150.0))
+    grown = 1.0 - np.exp(-ratio * omega * build)
+    amplitude = rig.decay_acceleration_m_s2 * 2.0 * ratio / (push * float(np.abs(shape).max()) * grown)
+    time = np.arange(round((build + rest) / rig.step_s), dtype=np.float64) * rig.step_s
+    tuned = omega * (1.0 + 0.001 * rng.standard_normal() * min(1.0, ratio / 0.001))
+    period = 2.0 * np.pi / omega
+    window = smooth_start(time, 3.0 * period) * smooth_start(build - time, period)
+    return np.asarray(amplitude * np.sin(tuned * time) * window)
+
+
+def frame_tests(structure: TrueStructure, rig: FrameRig, rng: np.random.Generator) -> list[FrameTestOrder]:
+    """Return the orders of a frame campaign: sweeps, decays, random motion."""
+    frequencies = natural_modes(structure.frame).frequencies_hz
+    low, high = 0.4 * float(frequencies[0]), 1.3 * float(frequencies[-1])
+    orders = []
+    for number in range(rig.sweeps):
+        down = number % 2 == 1
+        begin, end = (high, low) if down else (low, high)
+        name = f"sweep-{number + 1}"
+        ground = sweep_ground(rig, begin, end, float(frequencies[0]))
+        orders.append(FrameTestOrder(name, "training" if number == 0 else "validation", "sweep", ground))
+    for mode in range(1, structure.frame.floors + 1):
+        ground = decay_ground(rig, structure, mode, rng)
+        orders.append(FrameTestOrder(f"decay-{mode}", "training", "free-decay", ground, mode))
+    if rig.random_s > 0.0:
+        ground = random_ground(rig, low, high, rng)
+        orders.append(FrameTestOrder("random-1", "validation", "random", ground))
+    return orders
+
+
+def _support_mode(ground: FloatArray, rig: FrameRig, omega: float) -> FloatArray:
+    """Return the acceleration of the flexible support's mode at the recorder's clock, shape (samples,)."""
+    numerator, denominator = [-1.0, 0.0, 0.0], [1.0, 2.0 * 0.01 * omega, omega**2]
+    b, a, _ = signal.cont2discrete((numerator, denominator), rig.step_s, method="foh")
+    return np.asarray(signal.lfilter(np.ravel(b), a, ground))[:: rig.fine_steps]
+
+
+def record_frame(
+    structure: TrueStructure, rig: FrameRig, rng: np.random.Generator, progress: Progress = no_progress
+) -> FrameRecord:
+    """Record a frame campaign (chapter 3): absolute accelerometers of ground and floors, lasers on some floors.
+
+    Parameters
+    ----------
+    structure
+        The true frame; any number of floors.
+    rig
+        Table, sensors and tests.
+    rng
+        Generator of offsets, noise and random motion.
+    progress
+        Told how far it is.
+    """
+    assembled = assemble(structure, rig.step_s)
+    n = structure.frame.floors
+    lasers = tuple(floor for floor in rig.laser_floors if 1 <= floor <= n)
+    quantities = ["ground_acceleration", *(f"floor_acceleration_{floor}" for floor in range(1, n + 1))]
+    quantities += [f"floor_displacement_{floor}" for floor in lasers]
+    units = [ACCELEROMETER_M_S2_PER_V] * (n + 1) + [LASER_M_PER_V] * len(lasers)
+    noise_si = np.array([rig.acceleration_noise_m_s2] * (n + 1) + [rig.displacement_noise_m] * len(lasers))
+    drift_si = np.array([rig.acceleration_offset_m_s2] * (n + 1) + [rig.displacement_offset_m] * len(lasers))
+    offsets = drift_si * rng.standard_normal(len(quantities))
+    errors = 1.0 + rig.sensitivity_error * rng.standard_normal(len(quantities))
+    orders = frame_tests(structure, rig, rng)
+    modes = natural_modes(structure.frame)
+    support = 1.7 * float(modes.angular_frequencies[-1])
+    bend = np.sin(np.pi * np.arange(1, n + 1) / (n + 1.0))
+    tests = []
+    for number, order in enumerate(orders):
+        displacement, acceleration = shake(assembled, order.ground, rig)
+        if rig.support_share > 0.0:
+            own = rig.support_share * _support_mode(order.ground, rig, support)
+            acceleration = acceleration + own[:, None] * bend
+        exact = np.column_stack(
+            [
+                order.ground[:: rig.fine_steps],
+                acceleration,
+                displacement[:, [floor - 1 for floor in lasers]],
+            ]
+        )
+        seen = exact * errors + offsets + noise_si * rng.standard_normal(exact.shape)
+        columns = {f"ch{index + 1}": seen[:, index] / units[index] for index in range(len(quantities))}
+        details: dict[str, Any] = {"kind": order.kind}
+        if order.mode:
+            details |= {"mode": order.mode, "frequency_hz": float(modes.frequencies_hz[order.mode - 1].round(2))}
+        tests.append(TestFile(order.name, order.role, columns, details))
+        progress((number + 1) / len(orders), order.name)
+    channels = {
+        name: (f"ch{index + 1}", "m" if "displacement" in name else "m/s^2") for index, name in enumerate(quantities)
+    }
+    truth = {
+        "frame": structure.frame.name,
+        "frequencies_hz": modes.frequencies_hz.tolist(),
+        "mass_kg": structure.frame.mass.tolist(),
+        "damping_n_s_m": structure.frame.damping.tolist(),
+        "stiffness_n_m": structure.frame.stiffness.tolist(),
+        "effects": [item.described() for item in structure.effects],
+        "support_frequency_hz": support / (2.0 * np.pi) if rig.support_share > 0.0 else None,
+        "offsets": dict(zip(quantities, offsets.tolist(), strict=True)),
+        "sensitivity": dict(zip(quantities, errors.tolist(), strict=True)),
+    }
+    return FrameRecord(tests, channels, dict(zip(quantities, units, strict=True)), truth)
+
+
+def floor_masses(structure: TrueStructure) -> Sequence[float]:
+    """Return the masses that are written into campaign.yaml: weighed, so they are known [kg]."""
+    return [float(mass) for mass in np.diag(structure.frame.mass)]
