@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field
 from mrpipe.config.errors import model_in
 from mrpipe.config.section import Section
 from mrpipe.config.sections.assemble import AssembleSettings
+from mrpipe.config.sections.benchmark import BenchmarkSettings
 from mrpipe.config.sections.calibrate import CalibrateSettings
 from mrpipe.config.sections.campaigns import CampaignsSettings
 from mrpipe.config.sections.close_loop import CloseLoopSettings
@@ -70,6 +71,7 @@ class Config(Section):
     calibrate: CalibrateSettings = Field(CalibrateSettings(), description="Gains of the control laws.")
     simulate: SimulateSettings = Field(SimulateSettings(), description="The closed loop.")
     close_loop: CloseLoopSettings = Field(CloseLoopSettings(), description="From residual to missing effect.")
+    benchmark: BenchmarkSettings = Field(BenchmarkSettings(), description="The benchmark structures of chapter 6.")
     reproduce: ReproduceSettings = Field(ReproduceSettings(), description="The thesis' figures beside ours.")
     export: ExportSettings = Field(ExportSettings(), description="The controller as C.")
     report: ReportSettings = Field(ReportSettings(), description="The report.")

@@ -20,6 +20,7 @@ _MODULES = (
     "calibrate",
     "simulate",
     "close_loop",
+    "benchmark",
     "reproduce",
     "export_controller",
 )
