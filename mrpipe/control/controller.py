@@ -91,7 +91,7 @@ class ControllerOptions:
     drive_limit: float | None = None
     dead_band_m_s: float = 0.0
     extremum_step_m: float = 1e-4
-    extremum_share: float = 0.02
+    extremum_share: float = 0.2
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,8 @@ R_ALPHA = 4
 R_EXTREMUM_STEP = 5
 R_EXTREMUM_SHARE = 6
 R_INITIAL_AMPLITUDE = 7
-R_SIZE = 8
+R_ROUNDING = 8  # speed over which the friction of a perfect damper turns round [m/s]; 0: a jump
+R_SIZE = 9
 
 # --- integers of the run ---
 I_STEPS = 0
@@ -80,10 +81,11 @@ _FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
 @njit(float64(float64[::1], float64, float64, float64), cache=True)
 def ideal_force(run: FloatArray, amplitude: float, x: float, v: float) -> float:
     """Return the force of a perfect damper: law (4.14) or (4.18), clipped by P2 (22). It never falls with v."""
-    direction = 1.0 if v > 0.0 else -1.0
     if run[R_ALPHA] > 0.0:
         largest = max(amplitude, abs(x))
-        return run[R_ALPHA] * (direction * largest - x)
+        side = math.tanh(v / run[R_ROUNDING]) if run[R_ROUNDING] > 0.0 else (1.0 if v > 0.0 else -1.0)
+        force = run[R_ALPHA] * (side * largest - x)
+        return force if force * v >= 0.0 else 0.0
     force = run[R_C] * v + run[R_K] * x
     return force if force * v >= 0.0 else 0.0
 

@@ -67,14 +67,18 @@ class LoopOptions:
         Of the sensors.
     record_rate_hz
         Rate of the histories in the response.
+    ideal_rounding_m_s
+        Speed over which the friction of a perfect damper changes its sign, tanh(v/v0); 0: a jump. With a jump the loop
+        of fdns has no steady state that a smaller step would not change (docs/numerics.md).
     """
 
-    plant_rate_hz: float = 1000.0
+    plant_rate_hz: float = 2000.0
     tracking: Tracking = "damper"
     delay_s: float = 0.0
     driver_time_constant_s: float = 0.0
     noise: SensorNoise = field(default_factory=SensorNoise)
     record_rate_hz: float = 1000.0
+    ideal_rounding_m_s: float = 0.02
 
 
 @dataclass(frozen=True)
@@ -244,6 +248,7 @@ def _run_numbers(
     run[kernel.R_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
     run[kernel.R_C], run[kernel.R_K] = controller.gains.c_n_s_m, controller.gains.k_n_m
     run[kernel.R_ALPHA] = controller.gains.alpha_n_m
+    run[kernel.R_ROUNDING] = options.ideal_rounding_m_s
     # the perfect damper's tracker needs no room for noise
     run[kernel.R_EXTREMUM_STEP] = 1e-6
     run[kernel.R_EXTREMUM_SHARE] = controller.options.extremum_share

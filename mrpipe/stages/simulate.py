@@ -305,7 +305,8 @@ def _words(law: str, excitation: Excitation, values: Mapping[str, Any]) -> str:
     decay = "" if damping is None else f" Free decay: mean damping ratio {damping:.3f} while current flows."
     return (
         f"Law {law}, {excitation.details['kind']} excitation: rms top displacement "
-        f"{1e3 * values['rms_x_top_m']:.1f} mm, first floor {1e3 * values['rms_x1_m']:.1f} mm; {values['switched_off_share']:.0%} of the time switched off, "
+        f"{1e3 * values['rms_x_top_m']:.1f} mm, first floor {1e3 * values['rms_x1_m']:.1f} mm; "
+        f"{values['switched_off_share']:.0%} of the time switched off, "
         f"{values['clipped_share']:.0%} clipped.{decay} Energy balance closed to {values['energy_balance_error']:.1e}; "
         f"{values['real_time_factor']:.0f} times real time."
     )
