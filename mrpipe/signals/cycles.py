@@ -12,6 +12,8 @@ from mrpipe.artifacts import FloatArray, IntArray
 PERIOD_TOLERANCE = 0.05
 AMPLITUDE_TOLERANCE = 0.05
 STEADY_SHARE = 0.33
+SHARE_OF_A_PAIR = 0.6
+SINE_TOLERANCE = 0.03
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ def upward_crossings(values: FloatArray, level: float, hysteresis: float) -> Int
     return crossings
 
 
-def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, fewest: int = 3) -> SteadyCycles:
+def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, fewest: int = 2) -> SteadyCycles:
     """Find the longest run of cycles that agree in period and amplitude within 5 %, a third of the motion at least.
 
     Parameters
@@ -73,7 +75,7 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
     sampling_rate_hz
         Rate.
     fewest
-        Shorter runs do not make a motion periodic.
+        Shorter runs do not make a motion periodic; two cycles do only where they are most of the motion.
     """
     none = SteadyCycles(np.zeros(0, dtype=np.int64))
     low, high = np.percentile(displacement, [2.0, 98.0])
@@ -87,7 +89,8 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
     heights = np.array([0.5 * np.ptp(displacement[begin:end]) for begin, end in pairwise(crossings)])
     begin, end = _longest_steady_run(periods, heights)
     # a slow sweep and a random motion have their steady stretches too, but those are not the test
-    if end - begin < fewest or np.sum(periods[begin:end]) < STEADY_SHARE * np.sum(periods):
+    share = SHARE_OF_A_PAIR if end - begin == 2 else STEADY_SHARE
+    if end - begin < fewest or np.sum(periods[begin:end]) < share * np.sum(periods):
         return none
     starts = crossings[begin : end + 1].astype(np.int64)
     span = float(starts[-1] - starts[0])
@@ -114,6 +117,25 @@ def _longest_steady_run(periods: FloatArray, heights: FloatArray) -> tuple[int, 
         if end - begin > best[1] - best[0]:
             best = (begin, end)
     return best
+
+
+def is_sine(displacement: FloatArray, cycles: SteadyCycles) -> bool:
+    """Return whether the steady motion is a sine: its harmonics reach at most 3 % of it (a triangle's 12 %).
+
+    Parameters
+    ----------
+    displacement
+        Shape (n,), low-passed.
+    cycles
+        Steady cycles of it.
+    """
+    if not cycles.periodic:
+        return False
+    values = displacement[cycles.span]
+    phase = 2.0 * np.pi * (cycles.starts.size - 1) * np.arange(values.size) / values.size
+    basis = np.column_stack([np.ones_like(phase), phase, np.sin(phase), np.cos(phase)])
+    rest = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+    return float(np.std(rest)) <= SINE_TOLERANCE * float(np.std(values))
 
 
 def choose_cycles(cycles: SteadyCycles, count: int, settle: int) -> IntArray:

@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.campaigns import Campaign, Recording
 from mrpipe.errors import UserError
-from mrpipe.signals.cycles import SteadyCycles, choose_cycles, find_steady_cycles
+from mrpipe.signals.cycles import SteadyCycles, choose_cycles, find_steady_cycles, is_sine
 from mrpipe.signals.differentiation import backward_difference, central_difference, savitzky_golay
 from mrpipe.signals.filters import (
     Phase,
@@ -34,6 +34,10 @@ from mrpipe.signals.spectra import cutoff_by_criterion
 
 VELOCITY_SHARE = 0.99
 """Share of the power of a random motion's velocity that the cut-off by criterion keeps."""
+
+
+LENT_OFFSET_SPREAD = 0.05
+"""Largest spread between tests, over the deviation of the channel, at which an offset passes for one of the sensor."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,7 @@ class _Work:
     by_criterion: bool = False
     cycles: SteadyCycles = field(default_factory=lambda: SteadyCycles(np.zeros(0, dtype=np.int64)))
     offsets: dict[str, float] = field(default_factory=dict)
+    trusted: set[str] = field(default_factory=set)
     findings: list[str] = field(default_factory=list)
 
 
@@ -141,6 +146,8 @@ def prepare_campaign(
         _measure_offsets(work)
     if options.offset == "campaign":
         _share_offsets(works)
+    else:
+        _lend_offsets(works)
     results = []
     for count, work in enumerate(works):
         progress(0.7 + 0.3 * count / len(works), work.name)
@@ -180,12 +187,14 @@ def _filter(work: _Work, options: PreparationOptions) -> None:
     """Low-pass every channel; the drive keeps its range."""
     displacement = work.channels["displacement"]
     rough = butterworth_lowpass(displacement, options.cutoff_hz, work.rate, order=options.order)
-    periodic = find_steady_cycles(rough, work.rate).periodic
-    work.by_criterion = options.cutoff_choice == "criterion" or (options.cutoff_choice == "by-motion" and not periodic)
+    cycles = find_steady_cycles(rough, work.rate)
+    work.by_criterion = options.cutoff_choice == "criterion" or (
+        options.cutoff_choice == "by-motion" and not is_sine(rough, cycles)
+    )
     for name, values in work.channels.items():
         cutoff = options.cutoff_hz
         if work.by_criterion and np.ptp(values) > 0.0:
-            share = VELOCITY_SHARE if name == "displacement" and not periodic else None
+            share = VELOCITY_SHARE if name == "displacement" and not cycles.periodic else None
             cutoff = cutoff_by_criterion(values, work.rate, velocity_share=share)
         if np.ptp(values) == 0.0 or usable_cutoff(cutoff, work.rate) is None:
             work.filtered[name] = values
@@ -234,8 +243,10 @@ def _measure_offsets(work: _Work) -> None:
         work.offsets = {name: balanced_extremes(signals[name], starts) for name in ("displacement", "force")}
         if "acceleration" in signals:
             work.offsets["acceleration"] = mean_over_cycles(signals["acceleration"], starts)
+        work.trusted = set(work.offsets)
         if not drive_favours_a_side(signals["drive"], starts):
             return
+        work.trusted.remove("force")
     velocity = central_difference(butterworth_lowpass(displacement, 50.0, work.rate), 1.0 / work.rate)
     work.offsets["force"] = force_intercept(displacement, velocity, signals["drive"], signals["force"])
     for name in ("displacement", "acceleration"):
@@ -243,12 +254,38 @@ def _measure_offsets(work: _Work) -> None:
             work.offsets.setdefault(name, float(np.mean(signals[name])))
 
 
+def _campaign_offset(works: Sequence[_Work], name: str) -> tuple[float, float]:
+    """Return a sensor's offset over the campaign and its spread between the tests that give it well.
+
+    Where none does, the mean by length of all tests, and no spread.
+    """
+    values = np.array([work.offsets[name] for work in works if name in work.trusted])
+    if values.size:
+        middle = float(np.median(values))
+        return middle, 1.48 * float(np.median(np.abs(values - middle)))
+    measured = [work for work in works if name in work.offsets]
+    lengths = [work.time.size for work in measured]
+    return float(np.average([work.offsets[name] for work in measured], weights=lengths)), 0.0
+
+
 def _share_offsets(works: Sequence[_Work]) -> None:
     for name in ("displacement", "force", "acceleration"):
-        values = [work.offsets[name] for work in works if name in work.offsets]
         for work in works:
             if name in work.offsets:
-                work.offsets[name] = float(np.median(values))
+                work.offsets[name] = _campaign_offset(works, name)[0]
+
+
+def _lend_offsets(works: Sequence[_Work]) -> None:
+    """Give a test whose own motion or drive does not show an offset well that of the others, if they agree."""
+    for name in ("displacement", "force", "acceleration"):
+        if not any(name in work.offsets for work in works):
+            continue
+        middle, spread = _campaign_offset(works, name)
+        for work in works:
+            if name not in work.offsets or name in work.trusted:
+                continue
+            if spread <= LENT_OFFSET_SPREAD * float(np.std(work.filtered[name])):
+                work.offsets[name] = middle
 
 
 def _finish(work: _Work, options: PreparationOptions, campaign: Campaign) -> Preparation:

@@ -83,8 +83,11 @@ def cutoff_by_criterion(
         power[frequencies > 0.7 * highest] = 0.0
         held = np.cumsum(power)
         if held[-1] > 0.0:
-            cutoff = min(cutoff, float(frequencies[np.searchsorted(held, velocity_share * held[-1])]))
-    return float(min(highest, max(lowest_hz, cutoff)))
+            cutoff = min(cutoff, margin * float(frequencies[np.searchsorted(held, velocity_share * held[-1])]))
+    # a low-pass of low order takes a little off well below its cut-off, so it keeps away from the bulk of the power
+    power = np.cumsum(np.clip(density - floor, 0.0, None))
+    middle = float(frequencies[np.searchsorted(power, 0.5 * power[-1])])
+    return float(min(highest, max(lowest_hz, 3.0 * middle, cutoff)))
 
 
 def _smooth_over_octave(frequencies: FloatArray, density: FloatArray) -> FloatArray:

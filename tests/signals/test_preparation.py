@@ -81,7 +81,7 @@ def velocity_limit(rate: float) -> float:
 def test_the_default_gives_back_the_truth() -> None:
     (item,) = prepare_campaign(campaign(recording("one")), PreparationOptions()).tests
     found = errors(item)
-    # the force jumps at reversal, which a low-pass at 100 Hz rounds; the acceleration is 0.14 m/s2 rms on a noisy sensor
+    # a low-pass at 100 Hz rounds the jump of the force at reversal; the acceleration of 0.14 m/s2 rms drowns in noise
     velocity = velocity_limit(1000.0)
     limits = {"displacement": 0.004, "velocity": velocity, "acceleration": 0.4, "drive": 0.015, "force": 0.02}
     assert {key: value for key, value in found.items() if value > limits[key]} == {}

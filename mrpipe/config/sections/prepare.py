@@ -33,7 +33,7 @@ class PrepareSettings(Section):
     cutoff_choice: Literal["by-motion", "fixed", "criterion"] = Field(
         "by-motion",
         description="fixed: the cut-offs above; criterion: for each test and channel the frequency at which it sinks "
-        "into its noise; by-motion: fixed for periodic tests, criterion for random motion.",
+        "into its noise; by-motion: fixed for sines, criterion for every other motion.",
     )
     differentiation: Literal["backward", "central", "savitzky-golay", "kalman"] = Field(
         "backward",
