@@ -112,6 +112,7 @@ def _rig(context: StageContext) -> Rig:
             sensors.displacement_noise_m, sensors.acceleration_noise_m_s2, sensors.acceleration_bias_m_s2
         ),
         record_rate_hz=settings.record_rate_hz,
+        ideal_rounding_m_s=settings.ideal_rounding_m_s,
     )
     return Rig(frame, damper, position, options)
 

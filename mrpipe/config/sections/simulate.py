@@ -66,7 +66,7 @@ class ControllerSettings(Section):
     drive_limit: float | None = Field(None, gt=0.0, description="Largest drive; null: that of the damper.")
     dead_band_m_s: float = Field(0.0, ge=0.0, description="Speed below which the direction of motion is kept.")
     extremum_step_m: float = Field(1e-4, gt=0.0, description="Way back that makes an extremum count (X of fdns).")
-    extremum_share: float = Field(0.02, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
+    extremum_share: float = Field(0.2, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
 
 
 class SensorSettings(Section):
@@ -87,6 +87,9 @@ class SimulateSettings(Section):
     )
     plant_rate_hz: float = Field(2000.0, ge=100.0, description="Steps of the plant a second.")
     record_rate_hz: float = Field(1000.0, gt=0.0, description="Rate of the histories in the artifact.")
+    ideal_rounding_m_s: float = Field(
+        0.02, ge=0.0, description="Speed over which the friction of a perfect damper changes its sign; 0: a jump."
+    )
     driver_time_constant_s: float = Field(
         0.0, ge=0.0, description="Lag of the current driver besides the damper's own."
     )
