@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+
+from mrpipe.modal.decay import analyse_decay, damping_from_decrement, decay_start
+from mrpipe.modal.records import FrameTest
+from mrpipe.structures import complex_modes, frame_from_parameter_set, natural_modes, shear_frame
+from tests.modal.rig import Rig, decay_test
+
+
+def decay_of(zeta, noise=1e-3, omega=20.0, seconds=30.0, rate=500.0, seed=0):
+    rng = np.random.default_rng(seed)
+    time = np.arange(int(seconds * rate)) / rate
+    wave = np.exp(-zeta * omega * time) * np.cos(omega * np.sqrt(1 - zeta**2) * time)
+    return FrameTest(
+        "decay", "free-decay", rate, None, (wave + noise * rng.standard_normal(time.size))[:, None], (False,)
+    )
+
+
+def analyse(zeta, **options):
+    return analyse_decay(decay_of(zeta, **options), np.ones((1, 1)), np.array([20.0]), np.array([zeta]))
+
+
+@pytest.mark.literature
+def test_decrement_of_one_period():
+    # (3.1): a decrement of 2 pi zeta / sqrt(1 - zeta2) gives zeta back
+    for zeta in (0.001, 0.1, 0.5):
+        assert damping_from_decrement(2 * np.pi * zeta / np.sqrt(1 - zeta**2)) == pytest.approx(zeta, rel=1e-12)
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("zeta", [0.001, 0.003, 0.01, 0.02])
+def test_three_methods_agree_where_the_band_pass_is_right(zeta):
+    result = analyse(zeta)
+    assert result.filtered
+    assert result.exponential_fit.value == pytest.approx(zeta, rel=0.005)
+    assert result.logarithmic_decrement.value == pytest.approx(zeta, rel=0.05)
+    assert result.point_to_point.value == pytest.approx(zeta, rel=0.05)
+    assert result.angular_frequency == pytest.approx(20.0, rel=1e-4)
+
+
+@pytest.mark.planted
+def test_heavy_damping_is_not_band_passed():
+    result = analyse(0.1)
+    assert not result.filtered
+    assert result.exponential_fit.value == pytest.approx(0.1, rel=0.01)
+
+
+@pytest.mark.planted
+def test_the_interval_of_the_exponential_fit_holds_the_truth_about_as_often_as_it_says():
+    inside = 0
+    for seed in range(20):
+        fit = analyse(0.01, noise=0.05, seed=seed, seconds=15.0, rate=200.0).exponential_fit
+        inside += fit.low <= 0.01 <= fit.high
+        assert fit.half_width < 0.002
+    assert inside >= 16
+
+
+@pytest.mark.planted
+def test_only_noise_is_no_decay():
+    rng = np.random.default_rng(0)
+    test = FrameTest("noise", "free-decay", 200.0, None, rng.standard_normal((4000, 1)), (False,))
+    assert analyse_decay(test, np.ones((1, 1)), np.array([20.0]), np.array([0.01])) is None
+
+
+@pytest.mark.planted
+def test_the_stop_of_the_table_is_found():
+    frame = frame_from_parameter_set("thesis")
+    rig = Rig(rate=250.0, decay_s=20.0)
+    test = decay_test(frame, np.random.default_rng(0), rig, 2)
+    assert decay_start(test) / rig.rate == pytest.approx(15.0, abs=0.3)
+
+
+@pytest.mark.planted
+def test_close_modes_are_told_apart_by_their_shapes():
+    # the two highest modes of eight floors lie closer than the band-pass is wide
+    frame = shear_frame(np.full(8, 6.0), np.full(8, 5500.0), np.linspace(0.002, 0.006, 8))
+    modes = natural_modes(frame)
+    truth = complex_modes(frame).damping_ratios
+    assert np.diff(modes.angular_frequencies)[-1] < np.pi
+    rig = Rig(rate=250.0, decay_s=20.0)
+    for mode in (7, 8):
+        test = decay_test(frame, np.random.default_rng(mode), rig, mode)
+        result = analyse_decay(test, modes.mode_shapes, modes.angular_frequencies, 1.3 * truth)
+        assert result.exponential_fit.value == pytest.approx(truth[mode - 1], rel=0.05)

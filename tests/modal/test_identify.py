@@ -1,0 +1,216 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrpipe.artifacts import load_parameter_set
+from mrpipe.errors import UserError
+from mrpipe.modal.identify import IdentificationOptions, identify_frame
+from mrpipe.modal.records import FrameTest, frame_tests
+from mrpipe.structures import complex_modes, frame_from_parameter_set, modal_assurance, natural_modes
+from tests.modal.rig import (
+    Rig,
+    campaign_of,
+    decay_test,
+    full_set,
+    on_flexible_support,
+    random_frame,
+    random_test,
+    sweep_test,
+)
+
+# noise of 0.01 m/s2 at 250 Hz is as dense as 0.02 m/s2 at 1 kHz
+RIG = Rig(noise=0.01, rate=250.0, sweep_s=120.0, decay_s=20.0)
+HERE = Path("planted")
+
+
+def identify(frame, tests, options=None, masses=None):
+    return identify_frame(frame_tests(campaign_of(frame, tests, HERE, masses)), options)
+
+
+def assert_close(result, frame, truth=None):
+    """The figures that issue 4 asks for."""
+    modes = complex_modes(truth or frame)
+    count = frame.floors
+    omega = np.array([item.value for item in result.frequencies])
+    zeta = np.array([item.value for item in result.damping])
+    assert omega == pytest.approx(modes.angular_frequencies[:count], rel=2e-3)
+    assert zeta == pytest.approx(modes.damping_ratios[:count], rel=0.05)
+    assert np.diag(modal_assurance(result.mode_shapes, natural_modes(frame).mode_shapes)).min() >= 0.995
+    error = np.linalg.norm(result.frame.stiffness - frame.stiffness) / np.linalg.norm(frame.stiffness)
+    assert error <= 0.02
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("seed", range(10))
+def test_random_frames_of_three_to_eight_floors(seed):
+    rng = np.random.default_rng(seed)
+    frame = random_frame(rng, 3 + seed % 6)
+    result = identify(frame, full_set(frame, rng, RIG))
+    assert_close(result, frame)
+    storeys = result.tridiagonal.stiffness
+    assert np.linalg.norm(storeys - frame.stiffness) / np.linalg.norm(frame.stiffness) <= 0.02
+    assert np.diag(result.mac).min() >= 0.995
+
+
+@pytest.mark.literature
+def test_the_thesis_frame_comes_back():
+    frame = frame_from_parameter_set("thesis")
+    result = identify(frame, full_set(frame, np.random.default_rng(1), RIG))
+    assert_close(result, frame)
+    omega = [item.value for item in result.frequencies]
+    assert omega[:4] == pytest.approx([8.0, 24.2, 38.4, 49.9], rel=1e-3)
+    assert set(result.damping_source) == {"decay"}
+    second = [item.value for item in result.sweep_damping]
+    assert second == pytest.approx([0.003, 0.0024, 0.002, 0.0015, 0.00101], rel=0.05)
+
+
+@pytest.mark.planted
+def test_the_peak_of_a_flexible_support_is_no_mode():
+    rng = np.random.default_rng(4)
+    frame = frame_from_parameter_set("thesis")
+    frame = random_frame(rng, 5)
+    support = on_flexible_support(frame, 12.5)
+    whole = sweep_test(support, rng, RIG)
+    test = replace(whole, responses=whole.responses[:, 1:], is_displacement=(False,) * 5)
+    assert natural_modes(support).frequencies_hz[5] < 13.0
+    assert_close(identify(frame, [test]), frame, truth=support)
+
+
+@pytest.mark.planted
+def test_a_shaker_on_the_top_floor_serves_as_well():
+    rng = np.random.default_rng(7)
+    frame = random_frame(rng, 4)
+    assert_close(identify(frame, [sweep_test(frame, rng, RIG, shaker_floor=4)]), frame)
+
+
+@pytest.mark.planted
+def test_random_excitation_and_no_decay():
+    rng = np.random.default_rng(3)
+    frame = random_frame(rng, 4)
+    result = identify(frame, [random_test(frame, rng, replace(RIG, sweep_s=240.0))])
+    assert_close(result, frame)
+    assert result.damping_source == ("sweep",) * 4
+    assert any("no free decay" in line for line in result.findings)
+
+
+@pytest.mark.planted
+def test_a_floor_with_a_laser_only():
+    rng = np.random.default_rng(2)
+    frame = random_frame(rng, 3)
+    test = sweep_test(frame, rng, RIG)
+    from mrpipe.structures.response import linear_response
+
+    clean = linear_response(frame, test.excitation, 1 / RIG.rate)
+    responses = test.responses.copy()
+    responses[:, 1] = clean.displacement[:, 1] + 2e-5 * rng.standard_normal(responses.shape[0])
+    assert_close(identify_one(frame, replace(test, responses=responses, is_displacement=(False, True, False))), frame)
+
+
+def identify_one(frame, test):
+    from mrpipe.modal.records import FrameTests
+
+    return identify_frame(FrameTests((test,), (), np.diag(frame.mass), HERE / "campaign.yaml"))
+
+
+@pytest.mark.planted
+def test_decays_of_some_modes_only():
+    rng = np.random.default_rng(6)
+    frame = random_frame(rng, 3)
+    result = identify(frame, [sweep_test(frame, rng, RIG), decay_test(frame, rng, RIG, 2)])
+    assert result.damping_source[1] == "decay"
+    assert result.damping_source[0] == result.damping_source[2] == "sweep"
+    assert_close(result, frame)
+
+
+@pytest.mark.literature
+def test_the_printed_mode_matrix_is_refused_and_the_mended_one_taken():
+    frame = frame_from_parameter_set("thesis")
+    tests = [sweep_test(frame, np.random.default_rng(1), RIG)]
+    shapes = load_parameter_set("frames", "thesis-printed").values["mode_shapes"]
+    with pytest.raises(UserError, match=r"U33 = \+0\.941 and U34 = \+0\.119 is wrong") as caught:
+        identify(frame, tests, IdentificationOptions(mode_matrix=shapes, mode_matrix_name="thesis-printed"))
+    assert "\n" not in str(caught.value)
+    mended = load_parameter_set("frames", "thesis").values["mode_shapes"]
+    result = identify(frame, tests, IdentificationOptions(mode_matrix=mended, mode_matrix_name="thesis"))
+    assert result.frame.stiffness[0, 0] == pytest.approx(9500.0, rel=7e-3)
+
+
+@pytest.mark.planted
+def test_choices_of_damping_and_stiffness_are_followed():
+    rng = np.random.default_rng(6)
+    frame = random_frame(rng, 3)
+    tests = [sweep_test(frame, rng, RIG), decay_test(frame, rng, RIG, 1)]
+    result = identify(frame, tests, IdentificationOptions(damping_from="sweep", stiffness_form="tridiagonal"))
+    assert result.damping_source == ("sweep",) * 3
+    assert result.frame.stiffness[0, 2] == 0.0
+    raw = identify(frame, tests, IdentificationOptions(orthogonal=False, band_high_hz=13.0))
+    assert raw.band_hz == (0.2, 13.0)
+    assert not np.allclose(raw.mode_shapes, result.mode_shapes, rtol=0.0, atol=1e-9)
+
+
+def message_of(action):
+    with pytest.raises(UserError) as caught:
+        action()
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+@pytest.mark.planted
+def test_a_mode_without_a_peak_is_told():
+    rng = np.random.default_rng(9)
+    frame = random_frame(rng, 5)
+    tests = [sweep_test(frame, rng, replace(RIG, top_hz=7.0))]
+    assert "of 5 has no peak between 0.2 and" in message_of(lambda: identify(frame, tests))
+
+
+@pytest.mark.planted
+def test_a_dead_channel_is_told():
+    rng = np.random.default_rng(9)
+    frame = random_frame(rng, 4)
+    test = sweep_test(frame, rng, RIG)
+    test.responses[:, 2] = rng.standard_normal(test.responses.shape[0])
+    text = message_of(lambda: identify(frame, [test]))
+    assert "floor 3" in text
+    assert "coherence is below 0.5 at every peak" in text
+
+
+@pytest.mark.planted
+def test_masses_that_cannot_be_are_told():
+    rng = np.random.default_rng(9)
+    frame = random_frame(rng, 3)
+    tests = [sweep_test(frame, rng, replace(RIG, sweep_s=20.0))]
+    assert "mass of floor 2 is -6 kg" in message_of(lambda: identify(frame, tests, masses=(6.0, -6.0, 6.0)))
+    assert "has 2 entries; the channels are of 3 floors" in message_of(
+        lambda: identify(frame, tests, masses=(6.0, 6.0))
+    )
+    assert "frame.floor_masses_kg: is missing" in message_of(lambda: identify(frame, tests, masses=()))
+
+
+@pytest.mark.planted
+def test_singular_or_ill_sized_mode_matrices_are_told():
+    rng = np.random.default_rng(9)
+    frame = random_frame(rng, 3)
+    tests = [sweep_test(frame, rng, replace(RIG, sweep_s=20.0))]
+    singular = np.array([[1.0, 1.0, 0.0], [2.0, 2.0, 1.0], [3.0, 3.0, 0.5]])
+    assert "is singular" in message_of(lambda: identify(frame, tests, IdentificationOptions(mode_matrix=singular)))
+    assert "is 2 x 2" in message_of(lambda: identify(frame, tests, IdentificationOptions(mode_matrix=np.eye(2))))
+
+
+@pytest.mark.planted
+def test_a_shaker_without_its_floor_is_told():
+    rng = np.random.default_rng(9)
+    frame = random_frame(rng, 3)
+    test = sweep_test(frame, rng, replace(RIG, sweep_s=20.0), shaker_floor=2)
+    campaign = campaign_of(frame, [test], HERE)
+    bare = replace(campaign.recordings[0], details={})
+    text = message_of(lambda: frame_tests(replace(campaign, recordings=(bare,))))
+    assert "does not say on which floor the shaker acts" in text
+    no_channel = {k: v for k, v in campaign.recordings[0].channels.items() if k != "floor_acceleration_2"}
+    text = message_of(lambda: frame_tests(replace(campaign, recordings=(replace(bare, channels=no_channel),))))
+    assert "no floor_acceleration_2" in text
+    only_decays = replace(campaign, recordings=(replace(campaign.recordings[0], kind="free-decay"),))
+    assert "no test of kind sweep or random" in message_of(lambda: frame_tests(only_decays))
+    assert isinstance(test, FrameTest)

@@ -1,0 +1,32 @@
+import numpy as np
+import pytest
+
+from mrpipe.structures import discretise_first_order, floor_position, frame_from_parameter_set, state_space
+from mrpipe.structures.response import linear_response
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("shaker", [0, 3])
+def test_modal_steps_equal_matrix_steps(shaker):
+    frame = frame_from_parameter_set("thesis")
+    rng = np.random.default_rng(0)
+    dt, load = 0.005, rng.standard_normal(400)
+    space = state_space(frame, floor_position(5, shaker) if shaker else None)
+    step, first, second = discretise_first_order(space.A, space.B[:, [1 if shaker else 0]], dt)
+    start = 1e-3 * rng.standard_normal(10)
+    states = [start]
+    for k in range(load.size - 1):
+        states.append(step @ states[-1] + first[:, 0] * load[k] + second[:, 0] * load[k + 1])
+    response = linear_response(frame, load, dt, shaker_floor=shaker, initial_state=start)
+    scale = np.abs(states).max()
+    np.testing.assert_allclose(np.hstack([response.displacement, response.velocity]), states, atol=1e-11 * scale)
+
+
+@pytest.mark.property
+def test_floors_that_follow_the_ground_feel_its_acceleration():
+    frame = frame_from_parameter_set("thesis")
+    # far below the first mode the frame moves with the ground
+    time = np.arange(200_000) * 1e-3
+    ground = np.sin(0.1 * time) * np.minimum(time / 100.0, 1.0)
+    response = linear_response(frame, ground, 1e-3)
+    np.testing.assert_allclose(response.absolute_acceleration[-1], ground[-1], rtol=2e-3)
