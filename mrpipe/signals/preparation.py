@@ -30,7 +30,7 @@ from mrpipe.signals.offsets import (
     mean_over_cycles,
 )
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.signals.spectra import cutoff_by_criterion
+from mrpipe.signals.spectra import cutoff_by_criterion, noise_level
 
 VELOCITY_SHARE = 0.99
 """Share of the power of a random motion's velocity that the cut-off by criterion keeps."""
@@ -59,10 +59,12 @@ class PreparationOptions:
     cycles: int = 10
     settle_cycles: int = 1
 
-    def gains(self) -> KalmanGains:
-        """Return the gains of the kinematic Kalman filter."""
+    def gains(self, displacement: FloatArray, acceleration: FloatArray, rate: float) -> KalmanGains:
+        """Return the gains of the kinematic Kalman filter; noise levels of 0 are estimated from the channels."""
         return kalman_gains(
-            self.kalman_displacement_noise_m, self.kalman_acceleration_noise_m_s2, self.kalman_bias_drift_m_s3
+            self.kalman_displacement_noise_m or max(noise_level(displacement, rate), 1e-9),
+            self.kalman_acceleration_noise_m_s2 or max(noise_level(acceleration, rate), 1e-6),
+            self.kalman_bias_drift_m_s3,
         )
 
 
@@ -339,7 +341,7 @@ def _motion(work: _Work, options: PreparationOptions) -> tuple[FloatArray, Float
         raw = work.channels["displacement"] - work.offsets["displacement"]
         raw_acceleration = work.channels["acceleration"] - work.offsets["acceleration"]
         estimate = kinematic_smoother if options.phase == "zero" else kinematic_kalman
-        _, velocity, _ = estimate(raw, raw_acceleration, dt, options.gains())
+        _, velocity, _ = estimate(raw, raw_acceleration, dt, options.gains(raw, raw_acceleration, work.rate))
         return displacement, velocity, measured
     velocity = _differentiate(displacement, dt, options, method)
     cutoff = options.velocity_cutoff_hz

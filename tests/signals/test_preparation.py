@@ -104,6 +104,15 @@ def test_every_way_to_the_velocity(method: str) -> None:
     assert abs(late) < 3e-4
 
 
+@pytest.mark.planted
+def test_noise_levels_of_zero_are_found_in_the_spectra() -> None:
+    test = recording("one").channels
+    gains = PreparationOptions(kalman_displacement_noise_m=0.0, kalman_acceleration_noise_m_s2=0.0).gains(
+        test["displacement"], test["acceleration"], 1000.0
+    )
+    assert gains.l == pytest.approx(NOISE["acceleration"] / NOISE["displacement"], rel=0.15)
+
+
 @pytest.mark.literature
 def test_the_causal_way_of_the_thesis_is_late_and_says_so_by_its_signs() -> None:
     (item,) = prepare_campaign(campaign(recording("one")), PreparationOptions(phase="causal")).tests
@@ -168,6 +177,63 @@ def test_offsets_by_test_by_campaign_and_not_at_all() -> None:
     assert offsets["test"] == pytest.approx([-12.0, -12.0, 18.0], abs=0.5)
     assert offsets["campaign"] == pytest.approx([-12.0] * 3, abs=0.5)
     assert offsets["off"] == [0.0] * 3
+
+
+def lopsided(seed: int) -> Recording:
+    """Return a short test of random motion with a drive that steps, which shows no offset well."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(5000) / 1000.0
+    tones, phases = rng.uniform(0.2, 3.0, 30), rng.uniform(0, 6.28, 30)
+    waves = 2 * np.pi * tones[:, None] * t + phases[:, None]
+    v = np.sum(1e-3 * (2 * np.pi * tones)[:, None] * np.cos(waves), axis=0)
+    drive = np.repeat(rng.uniform(0, 4.0, 10), 500)
+    exact = {
+        "displacement": np.sum(1e-3 * np.sin(waves), axis=0),
+        "acceleration": np.gradient(v, 1e-3),
+        "drive": drive,
+        "force": (20 + 40 * drive) * np.tanh(v / 5e-3) + 150 * v,
+    }
+    channels = {key: exact[key] + OFFSET[key] + NOISE[key] * rng.standard_normal(t.size) for key in NOISE}
+    return Recording(f"random-{seed}", "training", 1000.0, t, channels, ((0, 5000),))
+
+
+@pytest.mark.planted
+def test_a_test_that_shows_no_offset_borrows_that_of_the_others() -> None:
+    sines = [recording(str(seed), seed=seed) for seed in range(2)]
+    alone = prepare_campaign(campaign(lopsided(1), lopsided(2)), PreparationOptions()).tests
+    lent = prepare_campaign(campaign(*sines, lopsided(1), lopsided(2)), PreparationOptions()).tests[2:]
+    for item in lent:
+        assert item.test.excitation == "random"
+        assert item.test.force_offset_n == pytest.approx(-12.0, abs=0.3)
+        assert item.test.displacement_offset_m == pytest.approx(1.5e-3, abs=1e-5)
+    # without such others they share what they show together
+    assert alone[0].test.force_offset_n == alone[1].test.force_offset_n
+    assert alone[0].test.force_offset_n == pytest.approx(-12.0, abs=8.0)
+
+
+@pytest.mark.planted
+def test_offsets_that_differ_between_tests_are_lent_to_none() -> None:
+    sines = [recording(str(seed), seed=seed) for seed in range(3)]
+    moved = [
+        replace(test, channels={**test.channels, "force": test.channels["force"] + 60.0 * index})
+        for index, test in enumerate(sines)
+    ]
+    item = prepare_campaign(campaign(*moved, lopsided(1)), PreparationOptions()).tests[-1]
+    assert item.test.force_offset_n == pytest.approx(-12.0, abs=10.0)
+
+
+@pytest.mark.planted
+def test_fixed_cutoffs_are_for_sines() -> None:
+    test = recording("one")
+    triangle = 5e-3 * 2 / np.pi * np.arcsin(np.sin(2 * np.pi * 2.0 * test.time_s))
+    noise = 5e-6 * np.random.default_rng(0).standard_normal(triangle.size)
+    other = replace(test, name="two", channels={**test.channels, "displacement": triangle + noise})
+    sine, corner = prepare_campaign(campaign(test, other), PreparationOptions()).tests
+    assert sine.cutoffs_hz["displacement"] == 100.0 and sine.cutoffs_hz["velocity"] == 20.0
+    assert "velocity" not in corner.cutoffs_hz
+    exact = 40e-3 * np.sign(np.cos(2 * np.pi * 2.0 * test.time_s))
+    fixed = prepare_campaign(campaign(test, other), PreparationOptions(cutoff_choice="fixed")).tests[1]
+    assert rms(corner.test.velocity_m_s - exact) < 0.8 * rms(fixed.test.velocity_m_s - exact)
 
 
 @pytest.mark.planted

@@ -42,10 +42,15 @@ class PrepareSettings(Section):
     )
     savitzky_golay_window_s: float = Field(0.03, gt=0.0, description="Window of the Savitzky-Golay differentiation.")
     kalman_displacement_noise_m: float = Field(
-        20e-6, gt=0.0, description="Noise of the displacement sensor (standard deviation) for the Kalman filter."
+        20e-6,
+        ge=0.0,
+        description="Noise of the displacement sensor (standard deviation) for the Kalman filter; 0 estimates it from "
+        "the spectrum of each test.",
     )
     kalman_acceleration_noise_m_s2: float = Field(
-        0.1, gt=0.0, description="Noise of the accelerometer (standard deviation) for the Kalman filter."
+        0.1,
+        ge=0.0,
+        description="Noise of the accelerometer (standard deviation) for the Kalman filter; 0 estimates it as above.",
     )
     kalman_bias_drift_m_s3: float = Field(
         0.0, ge=0.0, description="How fast the accelerometer's bias wanders; 0 leaves the bias state out."
