@@ -213,7 +213,7 @@ def record_bench(
     shares = {item.name: effect_share(damper, index, motions) for index, item in enumerate(damper.effects)}
     truth = {
         "damper": damper.name,
-        "parameters": dict(zip(BASE_NAMES, damper.base.tolist(), strict=True)),
+        "parameters": damper.numbers(),
         "effects": [{**item.described(), "share_of_force_rms": shares[item.name]} for item in damper.effects],
         "offsets": dict(zip(CHANNELS, offsets.tolist(), strict=True)),
         "noise_floor_nrmse": float(np.sqrt(disturbed / total)) if total > 0.0 else None,
@@ -241,4 +241,11 @@ def calibrated(damper: TrueDamper, motions: Sequence[FineMotion]) -> TrueDamper:
     return damper
 
 
-BASE_NAMES = ("alpha_a", "alpha_b", "alpha_c", "alpha_d", "c0_a", "c0_b", "A", "gamma", "beta", "n", "eta")
+def calibrated_on(
+    damper: TrueDamper, tests: Sequence[BenchTest], rig: BenchRig, rng: np.random.Generator
+) -> TrueDamper:
+    """Return the damper as :func:`record_bench` with the same arguments has it, without recording."""
+    if all(effect.strength_share is None for effect in damper.effects):
+        return damper
+    seed = int(rng.integers(2**62))
+    return calibrated(damper, [fine_motion(test, rig, seed) for test in tests])

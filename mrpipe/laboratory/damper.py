@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import signal
 
-from mrpipe.artifacts import FloatArray, load_parameter_set
+from mrpipe.artifacts import FloatArray, IntArray, load_parameter_set
 from mrpipe.errors import UserError
+from mrpipe.laboratory.coefficient_effects import OFFSET_PER_TEST
 from mrpipe.laboratory.effects import CHANNEL_SKEW_CONSTANT, SENSOR_CODES, Planted, packed
 from mrpipe.laboratory.kernel import BASE, run_damper
 
@@ -35,6 +36,10 @@ class TrueDamper:
     def with_effects(self, effects: Sequence[Planted]) -> TrueDamper:
         """Return the damper with other effects."""
         return replace(self, effects=tuple(effects))
+
+    def numbers(self) -> dict[str, float]:
+        """Return the base by name."""
+        return dict(zip(BASE, self.base.tolist(), strict=True))
 
 
 @dataclass(frozen=True)
@@ -92,20 +97,17 @@ def draw_damper(rng: np.random.Generator, around: TrueDamper, spread: float = 0.
     return TrueDamper(base, around.effects, f"{around.name}, varied")
 
 
+def packed_for(damper: TrueDamper, offset_draw: float) -> tuple[IntArray, FloatArray]:
+    """Return codes (k,) and numbers (k, 8) of the effects for one test; `offset_draw` is the test's own offset."""
+    codes, values = packed(damper.effects)
+    for row in np.flatnonzero(codes == OFFSET_PER_TEST):
+        values[row, 1] = offset_draw
+    return codes, values
+
+
 def respond(damper: TrueDamper, motion: FineMotion) -> FineResponse:
     """Return what the damper answers to a motion, without noise."""
-    effects = [
-        Planted(item.form, {**item.values, item.form.numbers[0].name: item.strength * motion.offset_draw})
-        if item.form.form == "per-test"
-        else item
-        for item in damper.effects
-    ]
-    codes, values = packed(tuple(effects))
-    for row, item in enumerate(entry for entry in effects if entry.form.code not in SENSOR_CODES):
-        if item.form.form == "per-test":
-            values[row, 1] = 1.0
-        if item.form.form == "driver" or item.form.form == "knee":
-            values[row, 0] = max(values[row, 0], 1e-6)
+    codes, values = packed_for(damper, motion.offset_draw)
     force, knock, _ = run_damper(
         damper.base,
         codes,
@@ -116,7 +118,7 @@ def respond(damper: TrueDamper, motion: FineMotion) -> FineResponse:
         motion.current,
         motion.step_s,
     )
-    for item in effects:
+    for item in damper.effects:
         if item.form.code in SENSOR_CODES:
             force = _skewed(force, item, motion.step_s)
     return FineResponse(force, knock)

@@ -38,7 +38,7 @@ def compact(duration_s: float = 5.0) -> list[BenchTest]:
         rows.append(BenchTest(name, role, motion, a * mm, f, kind, current, d, repeat))  # type: ignore[arg-type]
 
     for a, f, levels in (
-        (5, 1.0, (0.0, 2.0)),
+        (5.0, 1.0, (0.0, 2.0)),
         (5, 2.2, (0.0, 3.0)),
         (10, 0.5, (0.0, 1.0)),
         (10, 1.8, (0.0, 4.0)),
@@ -46,7 +46,7 @@ def compact(duration_s: float = 5.0) -> list[BenchTest]:
     ):
         for level in levels:
             add("training", "sine", a, f, "constant", level)
-    for a, f, current in ((5, 1.0, 2), (10, 1.0, 4), (10, 2.2, 1), (5, 1.8, 3)):
+    for a, f, current in ((5, 1.0, 2.0), (10, 1.0, 4.0), (10, 2.2, 1.0), (5, 1.8, 3.0)):
         add("training", "sine", a, f, "half-sine", current)
     for motion, a, f, current in (
         ("sine", 10, 1.0, 4),

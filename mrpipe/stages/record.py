@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from mrpipe.laboratory.bench import BenchRig
     from mrpipe.laboratory.damper import TrueDamper
     from mrpipe.laboratory.frame_rig import FrameRig
+    from mrpipe.laboratory.motion import BenchTest
     from mrpipe.laboratory.structure import TrueStructure
 
 _DAMPER = (
@@ -43,15 +47,15 @@ def _true_damper(context: StageContext) -> TrueDamper:
     return damper.with_effects(effects)
 
 
-def _record_bench(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.campaigns import write_campaign
-    from mrpipe.laboratory.bench import CHANNELS, BenchRig, BenchSensors, record_bench
+def _bench_order(context: StageContext) -> tuple[list[BenchTest], BenchRig, np.random.Generator]:
+    """Return the tests, the machine and the generator of the bench; the table asks for the same damper."""
+    import numpy as np
+
+    from mrpipe.laboratory.bench import BenchRig, BenchSensors
     from mrpipe.laboratory.motion import BenchTest, Servo
     from mrpipe.laboratory.plans import tests_of
-    from mrpipe.laboratory.sealing import campaign_directory, write_sealed
 
     bench = context.settings.laboratory.bench
-    damper = _true_damper(context)
     rig = BenchRig(
         servo=Servo(**bench.servo.model_dump()),
         sensors=BenchSensors(**bench.sensors.model_dump()),
@@ -61,7 +65,18 @@ def _record_bench(context: StageContext) -> Mapping[str, Any]:
     )
     listed = [] if bench.plan == "custom" else tests_of(bench.plan, cycles=bench.cycles, duration_s=bench.short_test_s)
     tests = [*listed, *(BenchTest(**item.model_dump()) for item in bench.tests)]
-    record = record_bench(damper, tests, rig, context.rng, context.progress)
+    return tests, rig, np.random.default_rng([context.seed, 47])
+
+
+def _record_bench(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.campaigns import write_campaign
+    from mrpipe.laboratory.bench import CHANNELS, record_bench
+    from mrpipe.laboratory.sealing import campaign_directory, write_sealed
+
+    bench = context.settings.laboratory.bench
+    damper = _true_damper(context)
+    tests, rig, rng = _bench_order(context)
+    record = record_bench(damper, tests, rig, rng, context.progress)
     declared = [item.name for item in damper.effects if item.declared]
     final = context.run_directory / "campaigns" / "bench"
     with campaign_directory(final) as folder:
@@ -132,6 +147,40 @@ def _record_frame(context: StageContext) -> Mapping[str, Any]:
     return _summary(context, "campaigns/frame", record.tests, declared, rig.sampling_rate_hz)
 
 
+def _record_closed_loop(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.campaigns import write_campaign
+    from mrpipe.dampers.model import read_damper
+    from mrpipe.laboratory.bench import calibrated_on
+    from mrpipe.laboratory.closed_loop import LoopRig, record_closed_loop
+    from mrpipe.laboratory.frame_rig import floor_masses
+    from mrpipe.laboratory.sealing import campaign_directory, write_scales, write_sealed
+    from mrpipe.stages.simulate import controller
+    from mrpipe.structures import read_frame
+
+    settings = context.settings.laboratory.closed_loop
+    rig = LoopRig(**settings.model_dump(exclude={"laws"}))
+    damper, structure = calibrated_on(_true_damper(context), *_bench_order(context)), _true_structure(context)
+    frame, model = read_frame(context.artifact("identify-frame")), read_damper(context.artifact("identify-damper"))
+    controllers = {law: controller(context, law, frame, model) for law in settings.laws}
+    record = record_closed_loop(damper, structure, controllers, rig, context.rng, context.progress)
+    declared = [item.name for item in (*damper.effects, *structure.effects) if item.declared]
+    final = context.run_directory / "campaigns" / "closed-loop"
+    with campaign_directory(final) as folder:
+        write_campaign(
+            folder,
+            campaign="virtual-closed-loop",
+            rig="shear-frame",
+            sampling_rate_hz=rig.sampling_rate_hz,
+            channels=record.channels,
+            tests=record.tests,
+            extra={"declared_effects": declared, "frame": {"floor_masses_kg": floor_masses(structure)}},
+        )
+        write_scales(folder, record.scales)
+        write_sealed(final, record.truth)
+    summary = _summary(context, "campaigns/closed-loop", record.tests, declared, rig.sampling_rate_hz)
+    return {**summary, "laws": list(settings.laws)}
+
+
 def _summary(
     context: StageContext, campaign: str, tests: list[Any], declared: list[str], rate: float
 ) -> dict[str, Any]:
@@ -176,4 +225,12 @@ RECORD_FRAME = Stage(
     settings=("laboratory.frame",),
     outputs=("campaigns/frame",),
 )
-STAGES = (RECORD_BENCH, RECORD_FRAME)
+RECORD_CLOSED_LOOP = Stage(
+    name="record-closed-loop",
+    summary="The virtual shaking table records the closed loop under every law.",
+    run=_record_closed_loop,
+    inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+    settings=(*_DAMPER, "laboratory.frame", "laboratory.bench", "laboratory.closed_loop", "simulate.controller"),
+    outputs=("campaigns/closed-loop",),
+)
+STAGES = (RECORD_BENCH, RECORD_FRAME, RECORD_CLOSED_LOOP)

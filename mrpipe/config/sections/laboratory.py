@@ -124,6 +124,33 @@ class FrameSettings(Section):
     )
 
 
+class ClosedLoopSettings(Section):
+    """The closed-loop campaign on the shaking table."""
+
+    laws: tuple[str, ...] = Field(
+        ("vd", "vdps", "vdns", "fdns", "passive-off", "passive-on"), min_length=1, description="Control laws recorded."
+    )
+    frequency_rad_s: float = Field(8.0, gt=0.0, description="Frequency of the base [rad/s].")
+    base_amplitude_m_s2: float = Field(
+        0.788, gt=0.0, description="Amplitude of the base's acceleration [m/s2]; 0.788 gives vd about 24 mm on top."
+    )
+    rest_s: float = Field(1.0, ge=0.0, description="Rest before the motion [s].")
+    shaking_s: float = Field(32.0, gt=5.0, description="Harmonic motion of the base [s].")
+    decay_s: float = Field(10.0, ge=0.0, description="Free decay after it stops [s].")
+    validation_factor: float = Field(
+        0.85, gt=0.0, description="Amplitude of the validation test of each law over that of the training test."
+    )
+    sampling_rate_hz: float = Field(500.0, ge=50.0, description="Rate of the recorder [Hz].")
+    fine_steps: int = Field(16, ge=4, le=64, description="Integration steps a sample of the true rig.")
+    acceleration_noise_m_s2: float = Field(0.05, ge=0.0, description="Noise of the accelerometers [m/s2].")
+    displacement_noise_m: float = Field(20e-6, ge=0.0, description="Noise of the lasers [m].")
+    force_noise_n: float = Field(0.5, ge=0.0, description="Noise of the load cell [N].")
+    current_noise_a: float = Field(5e-3, ge=0.0, description="Noise of the current measurement [A].")
+    acceleration_offset_m_s2: float = Field(0.01, ge=0.0, description="Offset of the accelerometers [m/s2].")
+    force_offset_n: float = Field(0.5, ge=0.0, description="Offset of the load cell [N].")
+    laser_floors: tuple[int, ...] = Field((1, 2, 5), description="Floors whose displacement is measured.")
+
+
 class LaboratorySettings(Section):
     """The virtual rig: one damper, its bench, the frame, the shaking table."""
 
@@ -133,7 +160,13 @@ class LaboratorySettings(Section):
         description="Effects of the true damper that campaign.yaml names.",
     )
     hidden_effects: tuple[PlantedEffect, ...] = Field(
-        (PlantedEffect(name="remanence", form="relaxing"),),
+        (
+            PlantedEffect(
+                name="remanence",
+                form="relaxing",
+                parameters={"share": 0.9, "saturation": 3.0, "fade_time": 0.4, "fade_slip": 0.04},
+            ),
+        ),
         description="Effects of the true damper that campaign.yaml keeps back; the truth lies sealed beside it.",
     )
     draw_hidden_share: float | None = Field(
@@ -144,3 +177,4 @@ class LaboratorySettings(Section):
     )
     bench: BenchSettings = Field(BenchSettings(), description="The bench campaign.")
     frame: FrameSettings = Field(FrameSettings(), description="The frame campaign.")
+    closed_loop: ClosedLoopSettings = Field(ClosedLoopSettings(), description="The closed-loop campaign.")
