@@ -1,0 +1,50 @@
+"""`export controller`: the calibrated controller as C and JSON for a real-time target."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mrpipe.pipeline.stage import Stage, StageContext
+
+FOLDER = "controller"
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.artifacts import atomic_write_text
+    from mrpipe.control.export import controller_files
+    from mrpipe.dampers.model import read_damper
+    from mrpipe.stages.simulate import controller
+    from mrpipe.structures import read_frame
+
+    settings = context.settings.export
+    frame = read_frame(context.artifact("identify-frame"))
+    damper = read_damper(context.artifact("identify-damper"))
+    built = controller(context, settings.law, frame, damper)
+    details = {"drive_unit": damper.drive_unit, "inverse": context.settings.simulate.controller.inverse}
+    folder = context.run_directory / FOLDER
+    files = controller_files(built, settings.prefix, details)
+    for name, text in files.items():
+        atomic_write_text(folder / name, text)
+    context.report.text(
+        f"Law {settings.law} as C99 at {built.options.rate_hz:g} Hz: {len(built.numbers)} numbers, {built.state_size} "
+        f"of memory, in `{FOLDER}/`."
+    )
+    return {
+        "law": settings.law,
+        "folder": str(folder),
+        "files": list(files),
+        "sample_time_s": built.sample_time_s,
+        "state_size": built.state_size,
+    }
+
+
+STAGE = Stage(
+    name="export-controller",
+    summary="the calibrated controller as C and JSON",
+    run=_run,
+    inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+    settings=("export", "simulate.controller"),
+    outputs=(f"{FOLDER}/controller.json", f"{FOLDER}/controller.c", f"{FOLDER}/controller.h", f"{FOLDER}/README.md"),
+    modules=("mrpipe.stages.export_controller",),
+)

@@ -1,0 +1,100 @@
+"""The exported C does what the Python controller does."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrpipe.control import COMMAND_SIZE, ControllerOptions, Gains, build_controller, controller_step, inverse_table
+from mrpipe.control.controller import Controller
+from mrpipe.control.export import controller_files
+from mrpipe.control.lqg import Weights, lqg_observer
+from tests.control.conftest import random_network
+
+MAIN = """
+#include <stdio.h>
+#include "controller.h"
+int main(void) {
+    double state[RIG_STATE_SIZE], measured[RIG_MEASURED_SIZE], command[RIG_COMMAND_SIZE] = {0.0};
+    rig_controller_reset(state);
+    for (;;) {
+        for (int i = 0; i < RIG_MEASURED_SIZE; ++i)
+            if (scanf("%la", &measured[i]) != 1) return 0;
+        rig_controller_step(state, measured, command);
+        for (int i = 0; i < RIG_COMMAND_SIZE; ++i) printf("%a ", command[i]);
+        printf("\\n");
+    }
+}
+"""
+
+
+def recorded_signal(width: int, rate_hz: float) -> np.ndarray:
+    """Motion of the damper as sensors give it: harmonic, a decay, noise."""
+    rng = np.random.default_rng(3)
+    t = np.arange(int(6.0 * rate_hz)) / rate_hz
+    envelope = np.where(t < 3.0, 1.0, np.exp(-1.2 * (t - 3.0)))
+    x = 0.009 * envelope * np.sin(8.0 * t)
+    signal = 0.1 * rng.standard_normal((len(t), width))
+    signal[:, 0] = x + 2e-5 * rng.standard_normal(len(t))
+    signal[:, 1] = -64.0 * x + 0.1 * rng.standard_normal(len(t))
+    signal[:, 2] = np.gradient(x, t)
+    return signal
+
+
+def in_python(controller: Controller, signal: np.ndarray) -> np.ndarray:
+    state = controller.new_state()
+    commands = np.zeros((len(signal), COMMAND_SIZE))
+    for row, command in zip(signal, commands, strict=True):
+        controller_step(controller.numbers, controller.layout, state, np.ascontiguousarray(row), command)
+    return commands
+
+
+def in_c(controller: Controller, signal: np.ndarray, folder: Path) -> np.ndarray:
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler here")
+    for name, text in controller_files(controller, "rig", {}).items():
+        (folder / name).write_text(text)
+    (folder / "main.c").write_text(MAIN)
+    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
+    # each law leaves some of the shared functions or macros alone, none of the code unused
+    subprocess.run([compiler, *flags, "controller.c", "main.c", "-o", "rig", "-lm"], cwd=folder, check=True)
+    text = "\n".join(" ".join(float(value).hex() for value in row) for row in signal)
+    run = subprocess.run([str(folder / "rig")], input=text, capture_output=True, text=True, check=True)
+    return np.array([[float.fromhex(word) for word in line.split()] for line in run.stdout.splitlines()])
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("law", ["vd", "vdns", "fdns", "nnc", "lqg", "passive-on"])
+@pytest.mark.parametrize("kind", ["network", "table"])
+def test_c_equals_python(law, kind, tmp_path, thesis_frame, floor_one, set_c):
+    rate = 500.0 if law == "fdns" else 200.0
+    gains = {"vd": Gains(650.0), "vdns": Gains(250.0, -4500.0), "fdns": Gains(alpha_n_m=3000.0)}.get(law, Gains())
+    controller = build_controller(
+        law,
+        gains,
+        ControllerOptions(rate_hz=rate, drive_limit=4.0, bias_drift_m_s2=0.01, dead_band_m_s=1e-3),
+        inverse=random_network(("velocity", "force"), "drive", 3, True) if kind == "network" else inverse_table(set_c),
+        reference=random_network(("displacement", "velocity"), "force", 5, False) if law == "nnc" else None,
+        observer=lqg_observer(thesis_frame, floor_one, Weights(), 1.0 / rate) if law == "lqg" else None,
+    )
+    signal = recorded_signal(controller.measured_size, rate)
+    python, c = in_python(controller, signal), in_c(controller, signal, tmp_path)
+    assert python.shape == c.shape
+    assert np.ptp(python[:, 0]) > 0.5 or law == "passive-on"
+    np.testing.assert_allclose(c, python, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.golden
+def test_description_is_json_with_all_numbers(set_c):
+    controller = build_controller("vd", Gains(650.0), ControllerOptions(), inverse=inverse_table(set_c))
+    files = controller_files(controller, "rig", {"drive_unit": "A"})
+    content = json.loads(files["controller.json"])
+    assert content["law"] == "vd" and content["gains"]["c_n_s_m"] == 650.0 and content["drive_unit"] == "A"
+    assert content["numbers"] == list(controller.numbers)
+    assert "rig_controller_step" in files["README.md"] and "rig_controller_step" in files["controller.h"]

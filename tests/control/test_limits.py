@@ -1,0 +1,172 @@
+"""Printed figures of chapter 4 and P2, corrected as the errata says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mrpipe.control import exact, limits
+from mrpipe.control.calibration import (
+    CalibrationOptions,
+    Gains,
+    calibrate,
+    gains_to_json,
+    needed_force,
+    validity_warnings,
+)
+from mrpipe.control.linearisation import (
+    clipped_force,
+    clipped_linear_stiffness,
+    equivalent_stiffness,
+    friction_stiffness,
+)
+from mrpipe.errors import UserError
+from mrpipe.structures import Frame, complex_modes, floor_position, shear_frame, storey_position
+
+
+@pytest.fixture(scope="module")
+def modes(thesis_frame, floor_one):
+    return limits.limiting_modes(thesis_frame, floor_one)
+
+
+@pytest.fixture(scope="module")
+def bare(thesis_frame):
+    return exact.undamped(thesis_frame)
+
+
+@pytest.mark.literature
+def test_limiting_frequencies_and_flexibility(modes, thesis_frame, floor_one):
+    assert modes.omega_0 == pytest.approx(8.000, rel=1e-3)
+    assert modes.omega_inf == pytest.approx(10.450, rel=6e-3)
+    assert modes.nu == pytest.approx(1.5404e-4, rel=2e-3)
+    assert thesis_frame.stiffness[0, 0] == pytest.approx(9556.0, rel=7e-3)
+    assert limits.static_stiffness(thesis_frame, floor_one) == pytest.approx(4123.0, rel=1e-3)
+    assert modes.shape_0 @ thesis_frame.mass @ modes.shape_0 == pytest.approx(1.0)
+    assert modes.shape_inf @ thesis_frame.mass @ modes.shape_inf == pytest.approx(1.0)
+    assert floor_one @ modes.shape_inf == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.literature
+def test_closed_forms(modes):
+    assert limits.optimal_viscosity(modes) == pytest.approx(811.0, rel=5e-3)
+    assert limits.optimal_viscosity_thesis(modes) == pytest.approx(704.0, rel=5e-3)
+    assert limits.optimal_viscosity(modes, -4500.0) == pytest.approx(249.0, rel=5e-3)
+    assert limits.optimal_viscosity_thesis(modes, -4500.0) == pytest.approx(141.0, rel=5e-3)
+    assert limits.optimal_friction(modes) == pytest.approx(4010.0, rel=1e-2)
+    assert limits.optimal_force_ratio(modes) == pytest.approx(1.24 / modes.nu, rel=1e-2)
+    assert limits.attainable_damping(modes) == pytest.approx(0.133, rel=1e-2)
+    assert limits.attainable_damping(modes, -4500.0) == pytest.approx(0.433, rel=1e-2)
+    assert limits.attainable_damping_friction(modes) == pytest.approx(0.273, rel=1e-2)
+
+
+@pytest.mark.literature
+def test_exact_viscous_damping(bare, floor_one, modes):
+    def ratio(c):
+        return exact.exact_damping(bare, floor_one, modes, c, 0.0).damping_ratio
+
+    assert ratio(650.0) == pytest.approx(0.154, abs=5e-4)
+    assert ratio(538.0) == pytest.approx(0.160, abs=5e-4)
+    best = exact.best_gain(ratio, 3000.0)
+    assert best.gain == pytest.approx(538.0, rel=5e-3)
+
+
+@pytest.mark.literature
+def test_exact_friction_damping(bare, floor_one, modes):
+    best = exact.best_gain(lambda a: exact.exact_friction(bare, floor_one, modes, a).damping_ratio, 6500.0)
+    assert best.gain == pytest.approx(3130.0, rel=5e-3)
+    assert best.damping_ratio == pytest.approx(0.284, abs=1e-3)
+    # with the equivalent viscosity taken at omega_0 in place of a loop that does not depend on frequency
+    c = 4.0 * 3000.0 / (np.pi * modes.omega_0)
+    assert exact.exact_damping(bare, floor_one, modes, c, -3000.0).damping_ratio == pytest.approx(0.288, abs=1e-3)
+
+
+@pytest.mark.literature
+def test_negative_stiffness_beyond_the_static_limit_folds(bare, thesis_frame, floor_one, modes):
+    answer = exact.exact_damping(bare, floor_one, modes, 250.0, -4500.0)
+    assert not answer.stable and answer.unstable_pole == pytest.approx(1.29, abs=0.01)
+    assert answer.damping_ratio == -1.0
+    assert exact.exact_damping(bare, floor_one, modes, 250.0, -4000.0).stable
+    calibration = calibrate(thesis_frame, floor_one, CalibrationOptions())
+    said = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0)
+    assert any("vdns" in line and "beyond the static limit of -4123" in line and "+1.29" in line for line in said)
+    near = CalibrationOptions(overrides={"vdns": Gains(250.0, -4000.0)})
+    said = validity_warnings(
+        calibrate(thesis_frame, floor_one, near), amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0
+    )
+    assert any("vdns" in line and "97%" in line for line in said)
+
+
+@pytest.mark.literature
+def test_residual_force_is_the_limit_and_not_saturation(thesis_frame, floor_one):
+    calibration = calibrate(thesis_frame, floor_one, CalibrationOptions())
+    assert needed_force(Gains(650.0), 0.0093, 8.0) == pytest.approx(48.0, abs=0.5)
+    said = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0)
+    assert any(line.startswith("vd: the residual force of 22 N") for line in said)
+    weak = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=1.0, largest_force_n=40.0)
+    assert any("vd: needs 48 N, but the damper gives at most 40 N" in line for line in weak)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("c,k", [(100.0, 0.0), (650.0, 0.0), (400.0, 2500.0), (300.0, -2000.0)])
+def test_exact_damping_is_that_of_the_state_space(thesis_frame, floor_one, modes, c, k):
+    ours = exact.exact_damping(thesis_frame, floor_one, modes, c, k)
+    poles = complex_modes(thesis_frame, position=floor_one, damping=c, stiffness=k)
+    assert np.min(np.abs(poles.poles - ours.pole)) < 1e-6
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("c,k", [(250.0, -4500.0), (400.0, 2500.0), (650.0, 0.0), (10.0, -3000.0)])
+def test_clipped_linearisation_is_the_fourier_integral(c, k):
+    exactly = clipped_linear_stiffness(c, k, 8.0)
+    sampled = equivalent_stiffness(lambda x, v: clipped_force(c, k, x, v), 0.01, 8.0)
+    assert abs(exactly - sampled) < 1e-5 * abs(exactly)
+    friction = equivalent_stiffness(lambda x, v: 3000.0 * (np.sign(v) * 0.01 - x), 0.01, 8.0)
+    assert abs(friction - friction_stiffness(3000.0)) < 1e-5 * abs(friction)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("floors,mode,floor", [(3, 1, 1), (5, 2, 2), (8, 1, 3)])
+def test_any_mode_and_any_position(floors, mode, floor):
+    frame = shear_frame(np.full(floors, 6.0), np.full(floors, 5000.0), 0.002)
+    for position in (floor_position(floors, floor), storey_position(floors, floor)):
+        modes = limits.limiting_modes(frame, position, mode)
+        assert modes.omega_inf > modes.omega_0
+        # a light damper adds u_0^2 c/(2 omega_0) to first order, in the estimate as in the eigenvalue
+        c = 1e-3 * limits.optimal_viscosity(modes)
+        added = modes.u_0**2 * c / (2.0 * modes.omega_0)
+        answer = exact.exact_damping(exact.undamped(frame), position, modes, c, 0.0)
+        assert answer.damping_ratio == pytest.approx(added, rel=2e-3)
+
+
+@pytest.mark.golden
+def test_bad_input_is_told_in_one_line(thesis_frame, floor_one):
+    cases = [
+        (lambda: limits.limiting_modes(thesis_frame, floor_one, 5), "mode: is 5"),
+        (lambda: limits.limiting_modes(thesis_frame, np.zeros(5)), "not all zero"),
+        (
+            lambda: limits.limiting_modes(
+                Frame(np.diag([1.0, 0.0, 1.0]), np.zeros((3, 3)), np.eye(3)), np.array([1.0, 0.0, 0.0])
+            ),
+            "mass: is singular",
+        ),
+        (
+            lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vdns": Gains(250.0, 4000.0)})),
+            "negative stiffness is meant",
+        ),
+        (
+            lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vd": Gains(-1.0)})),
+            "is negative",
+        ),
+    ]
+    for call, words in cases:
+        with pytest.raises(UserError, match=words) as caught:
+            call()
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.golden
+def test_sources_of_gains(thesis_frame, floor_one):
+    for source, c in (("thesis", 650.0), ("closed-form", 811.5), ("exact", 537.9)):
+        calibration = calibrate(thesis_frame, floor_one, CalibrationOptions(source=source))
+        assert calibration.laws["vd"].gains.c_n_s_m == pytest.approx(c, rel=1e-3)
+    assert gains_to_json("fdns", calibration.laws["fdns"].gains) == {"alpha_n_m": pytest.approx(3127.6, rel=1e-3)}

@@ -1,0 +1,66 @@
+"""Regulator and observer against the control package."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mrpipe.control.lqg import Weights, lqg_observer, observer_gain, regulator_gain, state_weight
+from mrpipe.errors import UserError
+from mrpipe.structures import Frame, discretise_zero_order, state_space
+
+control = pytest.importorskip("control")
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("weights", [Weights(), Weights(energy=0.0, top_displacement=1e4), Weights(force=1e-3)])
+def test_regulator_equals_the_control_package(thesis_frame, floor_one, weights):
+    space = state_space(thesis_frame, floor_one)
+    theirs, _, poles = control.lqr(space.A, space.B[:, 1:], state_weight(thesis_frame, weights), [[weights.force]])
+    ours = regulator_gain(thesis_frame, floor_one, weights)
+    np.testing.assert_allclose(ours, theirs[0], rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
+    # one minus sign: the loop is stable (errata row 18)
+    assert np.max(np.linalg.eigvals(space.A - np.outer(space.B[:, 1], ours)).real) < 0.0
+    assert np.max(poles.real) < 0.0
+
+
+@pytest.mark.oracle
+def test_observer_equals_the_control_package(thesis_frame, floor_one):
+    weights, dt = Weights(), 0.005
+    n = thesis_frame.floors
+    space = state_space(thesis_frame, -floor_one)
+    Ad, Bd = discretise_zero_order(space.A, space.B, dt)
+    C = np.vstack([np.concatenate([floor_one, np.zeros(n)]), space.absolute_acceleration()[0]])
+    W = weights.ground_noise_m_s2**2 * np.outer(Bd[:, 0], Bd[:, 0])
+    W[n:, n:] += (0.05 * weights.ground_noise_m_s2 * dt) ** 2 * np.eye(n)
+    V = np.diag([weights.displacement_noise_m**2] + [weights.acceleration_noise_m_s2**2] * n)
+    theirs, _, _ = control.dlqe(Ad, np.eye(2 * n), C, W, V)
+    ours = observer_gain(thesis_frame, floor_one, weights, dt)
+    # theirs is the gain of the predictor A P C' (C P C' + V)^-1, as ours
+    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.abs(ours).max())
+
+
+@pytest.mark.property
+def test_observer_follows_the_plant_without_noise(thesis_frame, floor_one):
+    """Started from nothing, the estimate ends on the state, the force being what the controller thinks it is."""
+    dt = 0.005
+    observer = lqg_observer(thesis_frame, floor_one, Weights(), dt)
+    space = state_space(thesis_frame, -floor_one)
+    Ad, Bd = discretise_zero_order(space.A, space.B, dt)
+    C, D = space.absolute_acceleration()
+    z = np.zeros(10)
+    z[4] = 0.01
+    estimate = np.zeros(10)
+    for step in range(4000):
+        u = np.array([0.3 * np.sin(8.0 * step * dt), 5.0 * np.sin(3.0 * step * dt)])
+        y = np.concatenate([[z[0]], [u[0]], C @ z + D @ u])
+        estimate = observer.transition @ estimate + observer.force_input * u[1] + observer.innovation @ y
+        z = Ad @ z + Bd @ u
+    np.testing.assert_allclose(estimate, z, atol=1e-6 * np.abs(z).max())
+
+
+@pytest.mark.golden
+def test_singular_mass_is_told(floor_one):
+    frame = Frame(np.diag([1.0, 1.0, 1.0, 1.0, 0.0]), np.zeros((5, 5)), np.eye(5), "mine")
+    with pytest.raises(UserError, match="frame mine: mass: is singular"):
+        regulator_gain(frame, floor_one, Weights())
