@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
@@ -75,6 +75,58 @@ def find_clipping(test: Recording) -> list[str]:
                 f"{values.min():.4g} or {values.max():.4g}"
             )
     return lines
+
+
+def find_dropouts(test: Recording) -> list[str]:
+    """Return a line for each measured channel that stands still and then jumps, or falls to exactly 0 on its way.
+
+    A channel of coarse resolution stands still too, but its next step is no longer than the others.
+    """
+    lines = []
+    for channel in test.channels:
+        if "drive" in channel or "desired" in channel:
+            continue
+        values = test.used(channel)
+        times = test.used_time()
+        still = _longest_freeze(values)
+        if still is not None:
+            begin, length = still
+            lines.append(f"{channel} stands still for {length} samples at {times[begin]:.4g} s and then jumps")
+        lost = _falls_to_zero(values)
+        if lost.size:
+            lines.append(f"{channel} falls to exactly 0 in {lost.size} samples, the first at {times[lost[0]]:.4g} s")
+    return lines
+
+
+def _longest_freeze(values: FloatArray) -> tuple[int, int] | None:
+    """Return begin and length of the longest freeze that ends in a jump worth half of the motion missed."""
+    steps = np.abs(np.diff(values))
+    speed = float(np.sqrt(np.mean(steps**2))) if steps.size else 0.0
+    edges = np.diff(np.concatenate(([0], (steps == 0.0).astype(np.int8), [0])))
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    inside = ends < steps.size
+    begins, ends = begins[inside], ends[inside]
+    lengths = ends - begins
+    frozen = np.flatnonzero((lengths >= 8) & (steps[ends] > 0.5 * lengths * speed))
+    if frozen.size == 0:
+        return None
+    longest = frozen[np.argmax(lengths[frozen])]
+    return int(begins[longest]), int(lengths[longest]) + 1
+
+
+def _falls_to_zero(values: FloatArray) -> IntArray:
+    """Return the samples that are exactly 0 while the last one before and the next one after are far from it."""
+    zeros = values == 0.0
+    known = np.flatnonzero(~zeros)
+    if known.size < 2 or not zeros.any():
+        return np.zeros(0, dtype=np.int64)
+    lost = np.flatnonzero(zeros)
+    place = np.searchsorted(known, lost)
+    within = (place > 0) & (place < known.size)
+    lost, place = lost[within], place[within]
+    near = np.minimum(np.abs(values[known[place - 1]]), np.abs(values[known[place]]))
+    same_side = np.sign(values[known[place - 1]]) == np.sign(values[known[place]])
+    return np.asarray(lost[same_side & (near > 0.2 * np.max(np.abs(values)))], dtype=np.int64)
 
 
 def force_sign(recordings: Sequence[Recording]) -> float:

@@ -32,9 +32,8 @@ def open_data_file(path: Path, layout: TextEntry | None = None) -> DataFile:
     ending = path.suffix.lower()
     if not path.is_file():
         raise UserError(path, "", "no such file", "mend `file` in campaign.yaml or put the file there")
-    if ending in {".csv", ".txt", ".dat", ".tsv"}:
-        return read_table(path, layout)
     readers: dict[str, Callable[[Path], DataFile]] = {
+        **dict.fromkeys((".csv", ".txt", ".dat", ".tsv"), lambda table: read_table(table, layout)),
         ".mat": _read_matlab,
         ".h5": _read_hdf5,
         ".hdf5": _read_hdf5,
@@ -49,7 +48,9 @@ def open_data_file(path: Path, layout: TextEntry | None = None) -> DataFile:
     except UserError:
         raise
     except Exception as error:
-        raise UserError(path, "", f"is damaged or not what its ending says ({error})", "export it again") from error
+        raise UserError(
+            path, "", f"is damaged or not what its ending says ({str(error).strip()})", "export it again"
+        ) from error
 
 
 def _flatten(content: Any, prefix: str = "") -> dict[str, Any]:
@@ -79,7 +80,8 @@ def _read_hdf5(path: Path, matlab: bool = False) -> DataFile:
 
     def note(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
-            names.append(name)
+            fields = item.dtype.names
+            names.extend(f"{name}/{field}" for field in fields) if fields else names.append(name)
 
     with h5py.File(path, "r") as handle:
         handle.visititems(note)
@@ -87,7 +89,9 @@ def _read_hdf5(path: Path, matlab: bool = False) -> DataFile:
 
     def fetch(name: str) -> Any:
         with h5py.File(path, "r") as handle:
-            values = np.asarray(handle[name][()])
+            table, _, field = name.rpartition("/")
+            inside = name not in handle or not isinstance(handle[name], h5py.Dataset)
+            values = np.asarray(handle[table][field] if inside else handle[name][()])
         # MATLAB stores columns first, so its matrices appear transposed
         return values.T if matlab else values
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrpipe import units
 from mrpipe.artifacts import FloatArray, public_data_directory
-from mrpipe.campaigns.checks import find_clipping, force_sign, require_finite, require_roles
+from mrpipe.campaigns.checks import find_clipping, find_dropouts, force_sign, require_finite, require_roles
 from mrpipe.campaigns.clock import build_clock
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.files import open_data_file
@@ -98,7 +98,7 @@ def load_campaign(path: Path) -> Campaign:
     require_roles(campaign, str(file))
     _require_floors(source, campaign)
     for test in campaign.recordings:
-        reader.findings += [f"test {test.name}: {line}" for line in find_clipping(test)]
+        reader.findings += [f"test {test.name}: {line}" for line in (*find_clipping(test), *find_dropouts(test))]
     if campaign.rig == "damper-bench":
         campaign = _with_force_sign(campaign, reader.findings)
     return replace(campaign, findings=tuple(reader.findings))
@@ -189,7 +189,9 @@ def _test_entry(reader: _Reader, shared: dict[str, ChannelEntry], index: int) ->
         missing = [name for name in _NEEDED_ON_BENCH if name not in merged]
         if missing:
             raise source.error(
-                ("channels",), f"no channel {missing[0]}", f"write {missing[0]}: {{column: ..., unit: ...}}"
+                ("channels",),
+                f"no channel {missing[0]}",
+                f"write {missing[0]}: {{column: ..., unit: ...}}, or {{value: ..., unit: ...}} for a constant",
             )
         if entry.role is None:
             raise source.error((*place, "role"), "is missing", "write role: training, validation or repeat")

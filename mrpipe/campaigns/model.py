@@ -46,7 +46,13 @@ class Recording:
 
     def used(self, channel: str) -> FloatArray:
         """Return the samples of a channel that lie in segments, one after another."""
-        values = self.channels[channel]
+        return self._in_segments(self.channels[channel])
+
+    def used_time(self) -> FloatArray:
+        """Return the times [s] of the samples that :meth:`used` returns."""
+        return self._in_segments(self.time_s)
+
+    def _in_segments(self, values: FloatArray) -> FloatArray:
         if self.segments == ((0, values.size),):
             return values
         return np.concatenate([values[begin:end] for begin, end in self.segments])

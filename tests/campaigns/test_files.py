@@ -106,12 +106,13 @@ def test_matlab(tmp_path: Path, column: str, version: str) -> None:
 
 
 @pytest.mark.golden
-@pytest.mark.parametrize("column", ["bench/one/F", "/bench/one/F", "bench/all[:,2]", "wide[2,:]"])
+@pytest.mark.parametrize("column", ["bench/one/F", "/bench/one/F", "bench/all[:,2]", "wide[2,:]", "table/F", "table.F"])
 def test_hdf5(tmp_path: Path, column: str) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as handle:
         handle["bench/one/F"] = COLUMNS["F"]
         handle["bench/all"] = MATRIX
         handle["wide"] = MATRIX.T
+        handle["table"] = np.rec.fromarrays([COLUMNS["t"], COLUMNS["F"]], names="t,F")
     np.testing.assert_allclose(open_data_file(tmp_path / "a.h5").column(column, "test"), COLUMNS["F"])
 
 
@@ -173,6 +174,7 @@ def test_uff_without_its_package_is_told_in_a_line(tmp_path: Path, monkeypatch: 
         ("a.json", b"3", "holds no named columns"),
         ("a.csv", b"", "holds no row of numbers"),
         ("a.csv", b"only,words\nhere,too\n", "holds no row of numbers"),
+        ("a.csv", b"t,x\n1,2\n2,3,4,5,6\n", "is damaged or not what its ending says"),
         ("a.txt", b"Header Size: x\n", "the logger's header is not whole"),
     ],
 )

@@ -226,6 +226,17 @@ def test_clipping_dropouts_and_jitter_are_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.planted
+def test_channels_that_freeze_or_fall_out_are_reported(tmp_path: Path) -> None:
+    columns = motion()
+    columns["x"][2000:2030] = columns["x"][2000]
+    columns["F"][3300:3303] = 0.0
+    findings = load_campaign(campaign(tmp_path, columns)).findings
+    assert "test one: displacement stands still for 30 samples at 2 s and then jumps" in findings
+    assert "test one: force falls to exactly 0 in 3 samples, the first at 3.3 s" in findings
+    assert len(findings) == 2
+
+
+@pytest.mark.planted
 def test_a_coarsely_resolved_peak_and_a_rest_are_no_clipping(tmp_path: Path) -> None:
     columns = motion()
     columns["x"] = np.round(columns["x"] / 0.05) * 0.05
