@@ -128,8 +128,10 @@ def sweep(
     digest = _digest_of(data, options, seed)
     with threadpool_limits(1):
         costs = predicted_costs(data.fit, candidates, options)
-    share = min(1.0, options.refined / max(1, len(candidates)))
-    predicted = float(costs[0].sum() + share * costs[1].sum()) / max(1, jobs)
+    screening = float(costs[0].sum())
+    # it is mostly the larger networks that go on
+    refining = float(np.sort(costs[1])[::-1][: options.refined].sum())
+    predicted = (screening + refining) / max(1, jobs)
     tell(f"{len(candidates)} candidates x {options.starts} starts: about {predicted:.0f} s on {jobs} cores")
 
     def screen(index: int) -> tuple[FloatArray, FloatArray]:
@@ -137,7 +139,7 @@ def sweep(
             cache, f"screen-{digest}", candidates[index], lambda: _fit_all(data, candidates[index], options, seed)
         )
 
-    middle = float(costs[0].sum() / (costs[0].sum() + share * costs[1].sum()))
+    middle = screening / max(screening + refining, 1e-9)
     screened = _pass(screen, len(candidates), jobs, _part(progress, 0.0, middle), "screened")
     order = np.argsort([float(np.mean(np.log(errors))) for errors, _ in screened], kind="stable")
     chosen = sorted({0, *(int(index) for index in order[: options.refined])})

@@ -26,9 +26,10 @@ def training_plan(context: StageContext, settings: Any, kind: str) -> tuple[Feat
 
     training = context.artifact("assemble")
     spec = spec_from_json(training.json(f"{kind}/features"))
+    biases = settings.biases
     if settings.architecture == "sweep":
         choice = context.artifact("sweep").json("choice")
-        hidden = tuple(choice["hidden"])
+        hidden, biases = tuple(choice["hidden"]), choice["biases"]
         spec = replace(spec, past_values=choice["past_values"])
         if kind == "forward":
             spec = replace(spec, channels=tuple(choice["channels"]))
@@ -45,7 +46,7 @@ def training_plan(context: StageContext, settings: Any, kind: str) -> tuple[Feat
     )
     return spec, TrainingOptions(
         hidden=hidden,
-        biases=settings.biases,
+        biases=biases,
         starts=settings.starts,
         refined_starts=settings.refined_starts,
         method=settings.method,

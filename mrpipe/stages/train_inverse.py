@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from mrpipe.errors import UserError
 from mrpipe.pipeline.stage import Stage, StageContext
 from mrpipe.stages.train_forward import histories_of, report_training, summary_of, training_plan
 
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.campaigns import require_varying
     from mrpipe.networks.assembly import drive_range
     from mrpipe.networks.evaluation import judge
     from mrpipe.networks.network import write_network
@@ -23,7 +23,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
     training, validation = histories_of(context)
     span = drive_range(training)
-    _require_varying_drive(context, training, span)
+    require_varying(
+        {name: training.record(index, "drive") for index, name in enumerate(training.names)},
+        str(context.inputs["assemble"]),
+    )
     spec, options = training_plan(context, context.settings.train_inverse, "inverse")
     trained = train(training, spec, options, context.rng, jobs=context.jobs, progress=context.progress)
     judged = judge(trained.network, training, validation)
@@ -54,17 +57,6 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     else:
         context.report.text("There is no forward network, so round trip and viscous emulation are left out.")
     return summary
-
-
-def _require_varying_drive(context: StageContext, training: History, span: float) -> None:
-    largest = float(abs(training.channels["drive"]).max())
-    if span <= 0.02 * largest or largest == 0.0:
-        raise UserError(
-            context.inputs["assemble"],
-            "training/drive",
-            f"the drive never changes ({largest:g} {training.drive_unit} in all training tests): no inverse exists",
-            "give training tests at several drive levels, or leave train-inverse out of `stages`",
-        )
 
 
 def _signed_share(context: StageContext, training: History, validation: History) -> float:
