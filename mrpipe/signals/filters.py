@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 from scipy import signal
+from scipy.interpolate import CubicSpline
 
 from mrpipe.artifacts import FloatArray
 
@@ -86,6 +87,15 @@ def resample(values: FloatArray, from_hz: float, to_hz: float) -> FloatArray:
 def decimate(values: FloatArray, factor: int) -> FloatArray:
     """Return every `factor`-th sample after a zero-phase anti-aliasing filter, shape (ceil(n / factor),)."""
     return resample(values, float(factor), 1.0)
+
+
+def advance(values: FloatArray, seconds: float, sampling_rate_hz: float) -> FloatArray:
+    """Return `values` as they were `seconds` later (cubic interpolation); what lies beyond an end keeps its value."""
+    if seconds == 0.0:
+        return values
+    place = np.arange(values.size, dtype=np.float64)
+    wanted = np.clip(place + seconds * sampling_rate_hz, 0.0, values.size - 1.0)
+    return np.asarray(CubicSpline(place, values)(wanted))
 
 
 def even_clock(time_s: FloatArray, values: FloatArray, sampling_rate_hz: float, even_time_s: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from mrpipe.signals.cycles import SteadyCycles, choose_cycles, find_steady_cycle
 from mrpipe.signals.differentiation import backward_difference, central_difference, savitzky_golay
 from mrpipe.signals.filters import (
     Phase,
+    advance,
     butterworth_lowpass,
     even_clock,
     resample,
@@ -56,6 +57,7 @@ class PreparationOptions:
     kalman_acceleration_noise_m_s2: float = 0.1
     kalman_bias_drift_m_s3: float = 0.0
     offset: Literal["test", "campaign", "off"] = "test"
+    displacement_late_s: float = 0.0
     cycles: int = 10
     settle_cycles: int = 1
 
@@ -140,6 +142,7 @@ def prepare_campaign(
         for index, (begin, end) in enumerate(recording.segments):
             name = recording.name if len(recording.segments) == 1 else f"{recording.name}-{index + 1}"
             work = _on_working_rate(recording, begin, end, name, rate)
+            work.channels["displacement"] = advance(work.channels["displacement"], options.displacement_late_s, rate)
             _require_length(work, options, source)
             works.append(work)
     findings = _check_acceleration(works)

@@ -36,6 +36,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         kalman_acceleration_noise_m_s2=settings.kalman_acceleration_noise_m_s2,
         kalman_bias_drift_m_s3=settings.kalman_bias_drift_m_s3,
         offset=settings.offset,
+        displacement_late_s=settings.displacement_late_s,
         cycles=settings.cycles,
         settle_cycles=settings.settle_cycles,
     )

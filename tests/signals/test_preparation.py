@@ -139,6 +139,18 @@ def test_a_missing_acceleration_is_derived() -> None:
 
 
 @pytest.mark.planted
+@pytest.mark.parametrize("late", [0.0043, -0.0017])
+def test_a_displacement_recorded_late_is_brought_in_time(late: float) -> None:
+    test = recording("one")
+    moved = truth(test.time_s - late)["displacement"]
+    source = campaign(replace(test, channels={**test.channels, "displacement": moved}))
+    (skewed,) = prepare_campaign(source, PreparationOptions()).tests
+    (mended,) = prepare_campaign(source, PreparationOptions(displacement_late_s=late)).tests
+    assert errors(skewed)["velocity"] > 0.9 * OMEGA * abs(late)
+    assert errors(mended)["velocity"] < 1e-3 and errors(mended)["displacement"] < 1e-3
+
+
+@pytest.mark.planted
 def test_tests_of_different_rates_come_to_one() -> None:
     source = campaign(recording("fast"), recording("slow", rate=250.0), recording("odd", rate=3004.8))
     for asked, expected in ((0.0, 3004.8), (500.0, 500.0)):

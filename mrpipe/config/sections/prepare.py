@@ -60,5 +60,12 @@ class PrepareSettings(Section):
         description="Sensor offsets taken out: of each test by itself, one for the whole campaign (median over the "
         "tests), or none.",
     )
+    displacement_late_s: float = Field(
+        0.0,
+        ge=-0.1,
+        le=0.1,
+        description="Time by which the displacement is recorded later than the other channels (the effect channel-skew "
+        "gives it); taken out.",
+    )
     cycles: int = Field(10, ge=0, description="Steady cycles kept of each periodic test; 0 keeps all.")
     settle_cycles: int = Field(1, ge=0, description="Steady cycles left out at the beginning, where there are enough.")
