@@ -69,28 +69,15 @@ def _bench_order(context: StageContext) -> tuple[list[BenchTest], BenchRig, np.r
 
 
 def _record_bench(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.campaigns import write_campaign
-    from mrpipe.laboratory.bench import CHANNELS, record_bench
-    from mrpipe.laboratory.sealing import campaign_directory, write_sealed
+    from mrpipe.laboratory.bench import record_bench
+    from mrpipe.laboratory.blind import write_bench
 
     bench = context.settings.laboratory.bench
-    damper = _true_damper(context)
     tests, rig, rng = _bench_order(context)
-    record = record_bench(damper, tests, rig, rng, context.progress)
-    declared = [item.name for item in damper.effects if item.declared]
+    record = record_bench(_true_damper(context), tests, rig, rng, context.progress)
+    declared = [item.name for item in record.damper.effects if item.declared]
     final = context.run_directory / "campaigns" / "bench"
-    with campaign_directory(final) as folder:
-        write_campaign(
-            folder,
-            campaign="virtual-bench",
-            rig="damper-bench",
-            sampling_rate_hz=rig.sampling_rate_hz,
-            channels=CHANNELS,
-            tests=record.tests,
-            extra={"declared_effects": declared, "about": {"plan": bench.plan}},
-            data_format=bench.data_format,
-        )
-        write_sealed(final, record.truth)
+    write_bench(final, record, rig, plan=bench.plan, data_format=bench.data_format)
     return _summary(context, "campaigns/bench", record.tests, declared, rig.sampling_rate_hz)
 
 

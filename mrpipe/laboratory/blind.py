@@ -1,0 +1,110 @@
+"""Blind campaigns for tests and benchmarks: a rig drawn from a seed, its effects kept back, its truth sealed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mrpipe.campaigns import write_campaign
+from mrpipe.errors import UserError
+from mrpipe.laboratory.bench import CHANNELS, BenchRecord, BenchRig, record_bench
+from mrpipe.laboratory.damper import damper_from_set, draw_damper
+from mrpipe.laboratory.effects import EFFECT_NAMES, Planted, draw_hidden_effect
+from mrpipe.laboratory.motion import BenchTest
+from mrpipe.laboratory.plans import tests_of
+from mrpipe.laboratory.sealing import campaign_directory, write_sealed
+
+_DRAWS = 12
+
+
+def write_bench(
+    final: Path, record: BenchRecord, rig: BenchRig, *, plan: str = "", data_format: Literal["h5", "csv"] = "h5"
+) -> Path:
+    """Write a recorded bench campaign atomically with its sealed truth beside it, and return its directory."""
+    declared = [item.name for item in record.damper.effects if item.declared]
+    with campaign_directory(final) as folder:
+        write_campaign(
+            folder,
+            campaign="virtual-bench",
+            rig="damper-bench",
+            sampling_rate_hz=rig.sampling_rate_hz,
+            channels=CHANNELS,
+            tests=record.tests,
+            extra={"declared_effects": declared, "about": {"plan": plan}},
+            data_format=data_format,
+        )
+        write_sealed(final, record.truth)
+    return final
+
+
+def record_blind(
+    final: Path,
+    seed: int,
+    *,
+    names: Sequence[str] = EFFECT_NAMES,
+    share: float | tuple[float, float] = 0.05,
+    count: int = 1,
+    plan: str = "compact",
+    tests: Sequence[BenchTest] | None = None,
+    rig: BenchRig | None = None,
+    vary: float = 0.1,
+    damper: str = "set-c",
+    declared: Sequence[Planted] = (),
+) -> Path:
+    """Record a bench campaign with `count` undeclared effects drawn from a seed.
+
+    Parameters
+    ----------
+    final
+        Directory of the campaign; the truth goes to `<final>.truth/sealed.json`.
+    seed
+        Everything follows from it.
+    names
+        Effects to draw from (`unfamiliar` for shapes of no family), without repetition.
+    share
+        RMS of each effect over RMS of the force; a pair is a range.
+    count
+        How many; 0 records a clean rig.
+    plan, tests
+        Which tests: a plan's name, or a list in its place.
+    rig
+        Machine and sensors.
+    vary
+        Log-normal spread of the damper's numbers about its set.
+    declared
+        Effects that campaign.yaml names.
+
+    Raises
+    ------
+    UserError
+        If no draw reaches the share on these tests.
+    """
+    rng = np.random.default_rng([seed, 977])
+    rig = rig or BenchRig()
+    orders = list(tests) if tests is not None else tests_of(plan)
+    base = draw_damper(rng, damper_from_set(damper), vary) if vary > 0.0 else damper_from_set(damper)
+    problem: UserError | None = None
+    for _ in range(_DRAWS):
+        planted = _draw(rng, tuple(names), share, count)
+        try:
+            record = record_bench(base.with_effects([*declared, *planted]), orders, rig, rng)
+        except UserError as error:
+            # this draw's own numbers do not reach the share on these tests
+            problem = error
+            continue
+        return write_bench(final, record, rig, plan=plan if tests is None else "listed")
+    assert problem is not None
+    raise problem
+
+
+def _draw(
+    rng: np.random.Generator, names: tuple[str, ...], share: float | tuple[float, float], count: int
+) -> list[Planted]:
+    planted: list[Planted] = []
+    for _ in range(count):
+        left = tuple(name for name in names if name not in [item.name for item in planted])
+        planted.append(draw_hidden_effect(rng, left, share))
+    return planted
