@@ -14,9 +14,6 @@ from mrpipe.dampers.samples import FitData, fit_data
 from mrpipe.dampers.scoring import PooledScore, TestScore, pool, score_tests
 from mrpipe.signals.prepared import PreparedTest
 
-COSTLY_MOTION = 15_000
-"""Samples of motion that a costly form is fitted on."""
-
 
 @dataclass(frozen=True)
 class FitOptions:
@@ -122,7 +119,7 @@ def cross_validate(fit: FormFit, data: FitData, options: FitOptions, folds: int)
 def _fit(
     form: Form, data: FitData, scales: Scales, options: FitOptions, warm: dict[str, float] | None = None
 ) -> FormFit:
-    chosen = data.thinned(COSTLY_MOTION) if form.costly else data
+    chosen = data if form.motion_limit is None else data.thinned(form.motion_limit)
     weights = None
     if options.equal_tests:
         _, owner = np.unique(chosen.test, return_inverse=True)
@@ -134,7 +131,7 @@ def _fit(
         chosen,
         scales,
         method=options.method,
-        starts=1 if form.costly else options.starts,
+        starts=options.starts if form.motion_limit is None else 1,
         offsets=options.offsets,
         weights=weights,
         warm=warm,

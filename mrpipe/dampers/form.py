@@ -116,8 +116,8 @@ class Form:
         Scales -> degree of each block's polynomial.
     known
         (values, motion, effective drive, scales) -> a force without linear coefficients, shape (n,); None for most.
-    costly
-        A trial takes long: fit it on thinned recordings.
+    motion_limit
+        Where a trial takes long: the form is fitted on recordings thinned to about so many samples.
     """
 
     name: str
@@ -128,7 +128,7 @@ class Form:
     fixed: Callable[[Scales], dict[str, float]] = nothing_fixed
     orders: Callable[[Scales], dict[str, int]] = yield_and_viscosity
     known: Callable[[Values, Motion, FloatArray, Scales], FloatArray] | None = None
-    costly: bool = False
+    motion_limit: int | None = None
 
     def parameters(self, scales: Scales) -> tuple[NonlinearParameter, ...]:
         """Return all that the fit searches; the lag of the drive only where the drive varies within tests."""

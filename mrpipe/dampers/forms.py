@@ -195,6 +195,7 @@ _ALL = (
         "saturating-dashpot",
         _dashpot,
         _dashpot_blocks,
+        motion_limit=60_000,
     ),
     Form(
         "modified-bouc-wen",
@@ -205,7 +206,7 @@ _ALL = (
         _square,
         _spring_order,
         _modified_known,
-        costly=True,
+        motion_limit=15_000,
     ),
 )
 

@@ -55,15 +55,20 @@ def thesis_table(fit: FormFit, A: float) -> dict[str, dict[str, Any]]:
     return table
 
 
+def number_or_none(value: float) -> float | None:
+    """Return the number, None where it is none (no test of the role): JSON knows no NaN."""
+    return float(value) if np.isfinite(value) else None
+
+
 def comparison_rows(judged: Sequence[JudgedFit]) -> list[dict[str, Any]]:
     """Return a row a form, the one with the smallest validation error first."""
     rows = [
         {
             "form": item.fit.form.name,
             "training_nrmse": item.training.nrmse,
-            "validation_nrmse": item.validation.nrmse,
-            "validation_fit_percent": item.validation.fit_percent,
-            "validation_r2": item.validation.r2,
+            "validation_nrmse": number_or_none(item.validation.nrmse),
+            "validation_fit_percent": number_or_none(item.validation.fit_percent),
+            "validation_r2": number_or_none(item.validation.r2),
             "cross_validated_nrmse": item.cross_validated_nrmse,
             "parameter_count": len(item.fit.names),
             "spread_over_starts": float(np.ptp(item.fit.start_nrmse)),
@@ -72,7 +77,12 @@ def comparison_rows(judged: Sequence[JudgedFit]) -> list[dict[str, Any]]:
         }
         for item in judged
     ]
-    return sorted(rows, key=lambda row: (np.isnan(row["validation_nrmse"]), row["validation_nrmse"]))
+    return sorted(rows, key=_judged_error)
+
+
+def _judged_error(row: dict[str, Any]) -> float:
+    unseen = row["validation_nrmse"]
+    return float(row["training_nrmse"] if unseen is None else unseen)
 
 
 def correlation_rows(fit: FormFit, limit: float = 0.95) -> list[dict[str, Any]]:
@@ -89,7 +99,7 @@ def test_rows(judged: JudgedFit) -> list[dict[str, Any]]:
         {
             "name": score.name,
             "role": score.role,
-            "nrmse": score.nrmse,
+            "nrmse": number_or_none(score.nrmse),
             "rms_error_n": float(np.sqrt(score.squared_error / max(score.samples, 1))),
             "rms_force_n": float(np.sqrt(score.squared_force / max(score.samples, 1))),
         }

@@ -68,7 +68,14 @@ def _chosen(judged: Sequence[JudgedFit], form: str) -> JudgedFit:
 
 
 def _summary(judged: Sequence[JudgedFit], chosen: JudgedFit, reference: float) -> dict[str, Any]:
-    from mrpipe.dampers.summary import comparison_rows, correlation_rows, parameter_table, test_rows, thesis_table
+    from mrpipe.dampers.summary import (
+        comparison_rows,
+        correlation_rows,
+        number_or_none,
+        parameter_table,
+        test_rows,
+        thesis_table,
+    )
 
     model = chosen.fit.model
     return {
@@ -78,9 +85,9 @@ def _summary(judged: Sequence[JudgedFit], chosen: JudgedFit, reference: float) -
         "parameters": parameter_table(chosen.fit),
         "thesis_parameters": thesis_table(chosen.fit, reference),
         "training_nrmse": chosen.training.nrmse,
-        "validation_nrmse": chosen.validation.nrmse,
-        "validation_fit_percent": chosen.validation.fit_percent,
-        "validation_r2": chosen.validation.r2,
+        "validation_nrmse": number_or_none(chosen.validation.nrmse),
+        "validation_fit_percent": number_or_none(chosen.validation.fit_percent),
+        "validation_r2": number_or_none(chosen.validation.r2),
         "comparison": comparison_rows(judged),
         "correlated": correlation_rows(chosen.fit),
         "start_nrmse": list(chosen.fit.start_nrmse),
@@ -120,7 +127,8 @@ def _report(
 
     context.report.text(
         f"Damper model {chosen.fit.form.name} ({chosen.fit.form.summary}): NRMSE {chosen.training.nrmse:.3f} on the "
-        f"training tests, {chosen.validation.nrmse:.3f} on the validation tests."
+        f"training tests, {chosen.validation.nrmse:.3f} on the validation tests; of the forms compared "
+        f"{summary['comparison'][0]['form']} does best on them."
     )
     for warning in context.warnings:
         context.report.text(f"Noticed: {warning}.")
