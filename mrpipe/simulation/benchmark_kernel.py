@@ -281,7 +281,7 @@ def chain_force(
     return guess
 
 
-@njit(void(_V, _STRUCTURE, _CONTROL, _NETWORK, _CHAIN, _RESULT), cache=True)
+@njit(void(_V, _STRUCTURE, _CONTROL, _NETWORK, _CHAIN, _RESULT), cache=True, nogil=True)
 def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain: Any, result: Any) -> None:
     """Run the structure from rest; see :mod:`mrpipe.simulation.benchmark_run` for what the arrays hold.
 

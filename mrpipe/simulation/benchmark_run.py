@@ -327,7 +327,7 @@ def simulate(
     run(settings, structure, control, _network(controller.network), chain.arguments, result)
     if not np.all(np.isfinite(result[0][-1])):
         raise DivergedError(f"{controller.law} ({controller.realisation}) diverged; take a shorter step")
-    time = np.arange(samples) * dt * save_every
+    time: FloatArray = np.arange(samples, dtype=np.float64) * dt * save_every
     given = np.arange(len(loads)) * load_interval_s
     columns = [np.interp(time, given, column) for column in np.asarray(loads, dtype=np.float64).T]
     at_samples: FloatArray = np.asarray(np.stack(columns, axis=1), dtype=np.float64)

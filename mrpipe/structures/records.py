@@ -196,7 +196,7 @@ def _read_at2(path: Path) -> _Raw:
 def _read_mat(path: Path) -> _Raw:
     try:
         content = loadmat(path)
-    except (ValueError, NotImplementedError, OSError, TypeError) as error:
+    except Exception as error:  # scipy raises half a dozen kinds for a bad file
         raise UserError(path, "", f"not a MATLAB file that can be read ({error})", "save it as version 7") from error
     arrays = {
         key: np.asarray(value, dtype=np.float64)

@@ -39,7 +39,7 @@ class MotionSettings(Section):
 class TenStoreySettings(Section):
     """The ten-storey frame of paper P4."""
 
-    motion: MotionSettings = Field(default_factory=MotionSettings, description="Ground motion.")
+    motion: MotionSettings = Field(MotionSettings(), description="Ground motion.")
     laws: tuple[str, ...] = Field(
         ("vd", "kelvin-0.3", "kelvin-0.7", "passive-off", "passive-on"),
         description="Laws: vd, kelvin-SHARE (that share of the storey stiffness as negative stiffness), passive-off, "
@@ -60,11 +60,60 @@ class TenStoreySettings(Section):
     )
 
 
+class RegulatorWeights(Section):
+    """Weights of an LQG design (appendix E)."""
+
+    displacement: float = Field(100.0, ge=0.0, description="Weight of regulated displacements [1/m^2].")
+    acceleration: float = Field(1.0, ge=0.0, description="Weight of regulated absolute accelerations [s^4/m^2].")
+    force_n: float = Field(1e6, gt=0.0, description="A force of this size weighs 1: R is the identity in it [N].")
+    interval_s: float = Field(0.001, gt=0.0, le=0.05, description="Sample of the controller [s].")
+
+
+class BaseIsolatedSettings(Section):
+    """The base-isolated building of section 6.2."""
+
+    model: str | None = Field(
+        None,
+        description="Path of the published STRUC.mat; `published` for that of the public data; null: the surrogate of "
+        "our own.",
+    )
+    surrogate: str = Field(
+        "base-isolated-surrogate", description="Parameter set in configs/structures (or YAML file) of the surrogate."
+    )
+    bearing_stiffness_n_m: float = Field(919.422e3, gt=0.0, description="Of each bearing, published model [N/m].")
+    bearing_viscosity_n_s_m: float = Field(27.717e3, ge=0.0, description="Of each bearing, published model [N s/m].")
+    motion: MotionSettings = Field(MotionSettings(), description="Ground motion of two components.")
+    all_motions: bool = Field(False, description="Run all seven public motions besides (--all).")
+    laws: tuple[str, ...] = Field(
+        ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on"),
+        min_length=1,
+        description="Laws: vd, vdns, fdns (MR dampers), lqg (ideal actuators), lqg-clipped (MR dampers), passive-off, "
+        "passive-on.",
+    )
+    damper: str = Field("bingham-1000kn", description="Bingham parameter set in configs/dampers.")
+    neural_inverse: bool = Field(
+        True, description="Voltage from a neural inverse of the damper, as the thesis; false: from the formula."
+    )
+    hidden_neurons: int = Field(6, ge=2, le=20, description="Neurons of both hidden layers of the neural inverse.")
+    damping_ratio: float = Field(
+        0.1, gt=0.0, lt=0.6, description="Damping ratio of the isolation modes to which vd, vdns and fdns are set."
+    )
+    stiffness_share: float = Field(
+        0.2, ge=0.0, lt=0.9, description="Share of the isolation's stiffness that vdns takes away."
+    )
+    lqg: RegulatorWeights = Field(RegulatorWeights(), description="Weights of LQG.")
+    time_step_s: float = Field(0.001, gt=0.0, le=0.005, description="Longest time step [s].")
+    dampers: tuple[float, ...] = Field(
+        (1.0, 2.0, 5.0, 10.0, 20.0), description="Dampers at each of the two positions, for the sensitivity."
+    )
+
+
 class BenchmarkSettings(Section):
     """The benchmark structures of chapter 6 and paper P4."""
 
-    ten_storey: TenStoreySettings = Field(
-        default_factory=TenStoreySettings, description="The ten-storey frame of paper P4."
+    ten_storey: TenStoreySettings = Field(TenStoreySettings(), description="The ten-storey frame of paper P4.")
+    base_isolated: BaseIsolatedSettings = Field(
+        BaseIsolatedSettings(), description="The base-isolated building of section 6.2."
     )
     inputs_digest: str = Field(
         "",

@@ -1,0 +1,122 @@
+"""The neural inverse of the large Bingham damper (6.1): |v|, |f| to volts, trained on four kinds of motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.networks.assembly import History
+from mrpipe.networks.network import FeatureSpec
+from mrpipe.networks.training import Trained, TrainingOptions, train
+from mrpipe.simulation.benchmark_run import BinghamDevice
+
+KINDS = ("sine", "triangle", "step", "gaussian")
+"""Displacement inputs of the training set (6.1)."""
+RATE_HZ = 200.0
+"""Sampling of the training records; the inverse has no memory, so that the rate of its use is free."""
+_RECORD_S = 4.0
+
+
+def bingham_force(device: BinghamDevice, velocity: FloatArray, voltage: FloatArray) -> FloatArray:
+    """Return the force [N] of P4 (6), of the shape of `velocity` [m/s] and `voltage` [V]."""
+    yielding = device.force + device.force_per_volt * voltage
+    viscosity = device.viscosity + device.viscosity_per_volt * voltage
+    return np.asarray(yielding * np.sign(velocity) + viscosity * velocity)
+
+
+def _band_limited(rng: np.random.Generator, time: FloatArray, highest_hz: float) -> FloatArray:
+    """Return Gaussian noise of unit size below `highest_hz`."""
+    spectrum = np.fft.rfft(rng.standard_normal(len(time)))
+    frequencies = np.fft.rfftfreq(len(time), float(time[1] - time[0]))
+    signal = np.fft.irfft(np.where(frequencies <= highest_hz, spectrum, 0.0), len(time))
+    return np.asarray(signal / np.abs(signal).max())
+
+
+def _velocity(kind: str, rng: np.random.Generator, time: FloatArray, peak: float) -> FloatArray:
+    frequency = rng.uniform(0.3, 3.0)
+    phase = 2.0 * np.pi * (frequency * time + rng.uniform())
+    if kind == "sine":
+        return np.asarray(peak * np.cos(phase))
+    if kind == "triangle":
+        return np.asarray(peak * np.sign(np.cos(phase)))
+    if kind == "step":
+        # a displacement step through the lag of an actuator: the velocity decays
+        return np.asarray(peak * np.sign(np.cos(phase)) * np.exp(-4.0 * np.mod(frequency * time, 0.5) / frequency))
+    return peak * _band_limited(rng, time, 3.0)
+
+
+def _voltage(kind: str, rng: np.random.Generator, time: FloatArray, highest: float) -> FloatArray:
+    if kind == "step":
+        levels = rng.uniform(0.0, highest, 8)
+        return np.asarray(levels[np.minimum((time / _RECORD_S * 8).astype(int), 7)])
+    if kind == "gaussian":
+        return np.asarray(0.5 * highest * (1.0 + _band_limited(rng, time, 4.0)))
+    return np.asarray(0.5 * highest * (1.0 - np.cos(2.0 * np.pi * rng.uniform(0.3, 3.0) * time)))
+
+
+def training_history(
+    device: BinghamDevice, rng: np.random.Generator, *, fastest_m_s: float = 2.0, records: int = 6
+) -> History:
+    """Return records of all combinations of motion and drive kinds.
+
+    Parameters
+    ----------
+    device
+        The damper.
+    rng
+        For frequencies, phases and noise.
+    fastest_m_s
+        Highest velocity [m/s].
+    records
+        Of each kind of motion.
+    """
+    time: FloatArray = np.arange(round(_RECORD_S * RATE_HZ), dtype=np.float64) / RATE_HZ
+    names, velocities, volts = [], [], []
+    for kind in KINDS:
+        for number in range(records):
+            drive = KINDS[number % len(KINDS)]
+            names.append(f"{kind}-{drive}-{number}")
+            velocities.append(_velocity(kind, rng, time, fastest_m_s * rng.uniform(0.1, 1.0)))
+            volts.append(_voltage(drive, rng, time, device.highest_voltage))
+    velocity, voltage = np.concatenate(velocities), np.concatenate(volts)
+    force = bingham_force(device, velocity, voltage)
+    zeros = np.zeros_like(velocity)
+    channels = {"displacement": zeros, "velocity": velocity, "acceleration": zeros, "drive": voltage, "force": force}
+    starts = np.arange(len(names) + 1, dtype=np.int64) * len(time)
+    return History(tuple(names), channels, starts, tuple(True for _ in names), RATE_HZ, "V")
+
+
+def train_inverse(device: BinghamDevice, rng: np.random.Generator, *, hidden: int = 6, jobs: int = 1) -> Trained:
+    """Train the inverse network of |v| and |f|, two hidden layers.
+
+    Parameters
+    ----------
+    device
+        The damper.
+    rng
+        For the records, starts and the split.
+    hidden
+        Neurons of each hidden layer.
+    jobs
+        Threads.
+    """
+    spec = FeatureSpec(("velocity", "force"), 0, True, RATE_HZ, "drive")
+    options = TrainingOptions(
+        hidden=(hidden, hidden),
+        starts=4,
+        refined_starts=1,
+        subsample_rows=4000,
+        subsample_iterations=120,
+        iterations=40,
+    )
+    return train(training_history(device, rng), spec, options, rng, jobs=jobs)
+
+
+def inverse_validation(device: BinghamDevice, trained: Trained) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return time [s], true and estimated voltage [V] of Figure 6.1 (b): 0.1 m at 3 Hz, a drive of 5 V at 3 Hz."""
+    time: FloatArray = np.arange(0.0, 1.0, 0.001)
+    velocity = 0.1 * 6.0 * np.pi * np.cos(6.0 * np.pi * time)
+    voltage = 5.0 * np.abs(np.sin(6.0 * np.pi * time + 0.5))
+    force = bingham_force(device, velocity, voltage)
+    estimate = trained.network.predict(np.stack([np.abs(velocity), np.abs(force)], axis=1))
+    return time, voltage, estimate

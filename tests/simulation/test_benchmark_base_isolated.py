@@ -1,0 +1,258 @@
+"""The base-isolated building: matrices, calibration, indices by hand, energy, superposition, laws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrpipe.artifacts import FloatArray, public_data_directory
+from mrpipe.control.benchmark_gains import damped_modes
+from mrpipe.errors import UserError
+from mrpipe.simulation.benchmark_base_isolated import (
+    LAWS,
+    IsolationStudy,
+    capacity_sensitivity,
+    isolation_study,
+    run_cases,
+)
+from mrpipe.simulation.benchmark_indices import IsolatedResponse, base_isolated_indices
+from mrpipe.simulation.benchmark_inverse import inverse_validation, train_inverse
+from mrpipe.simulation.benchmark_isolation_design import LqgWeights
+from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, Response
+from mrpipe.structures.benchmark_base_isolated import (
+    IsolatedBuilding,
+    bearing_grid,
+    location_matrix,
+    published_building,
+    surrogate_building,
+)
+from mrpipe.structures.benchmark_model import natural_periods
+from mrpipe.structures.benchmark_motion import load_motion, spectrum_compatible_motion
+from mrpipe.structures.records import GroundMotion
+
+
+def study_of(building: IsolatedBuilding) -> IsolationStudy:
+    return isolation_study(
+        building, device=BinghamDevice(), network=None, damping_ratio=0.1, stiffness_share=0.2, lqg=LqgWeights()
+    )
+
+
+@pytest.fixture(scope="module")
+def study() -> IsolationStudy:
+    return study_of(surrogate_building())
+
+
+@pytest.fixture(scope="module")
+def motion() -> GroundMotion:
+    return spectrum_compatible_motion(np.random.default_rng(8), duration_s=20.0)
+
+
+@pytest.fixture(scope="module")
+def free(study: IsolationStudy, motion: GroundMotion) -> Response:
+    return study.run(motion)
+
+
+def public_model() -> Path:
+    folder = public_data_directory()
+    if folder is None:
+        pytest.skip("the public data are not there (MRPIPE_DATA)")
+    return folder / "asce_base_isolated" / "STRUC.mat"
+
+
+@pytest.mark.real
+@pytest.mark.literature
+def test_published_building() -> None:
+    building = published_building(public_model())
+    assert building.model.origin == "published"
+    np.testing.assert_allclose(building.fixed_base_periods_s[:3], [0.897, 0.780, 0.658], rtol=2e-3)
+    assert building.isolation_period_s == pytest.approx(3.11, rel=2e-3)
+    assert building.isolation_damping_ratio == pytest.approx(0.030, abs=0.001)
+    assert building.model.total_mass_kg == pytest.approx(20705e3, rel=1e-4)
+    assert building.bearings_m.shape == (92, 2)
+    # rigid building with its eccentric bearings: an independent eigenvalue problem of three degrees of freedom
+    rigid = np.sqrt(np.linalg.eigvals(np.linalg.solve(building.model.mass[-3:, -3:], building.isolation_stiffness)))
+    flexible = natural_periods(building.model)[:3]
+    assert np.all(flexible > np.sort(2.0 * np.pi / rigid)[::-1])
+    assert np.all(flexible < 1.03 * np.sort(2.0 * np.pi / rigid)[::-1])
+
+
+@pytest.mark.real
+def test_published_building_under_el_centro_keeps_its_energy_and_j9() -> None:
+    study = study_of(published_building(public_model()))
+    motion = load_motion("elcentro", np.random.default_rng(0))
+    free, cases = run_cases(study, motion, ("vd", "fdns", "lqg"))
+    assert free.energy_balance_error < 5e-3
+    for case in cases:
+        assert case.response.energy_balance_error < 5e-3
+        assert 0.0 < case.indices["J9"] <= 1.0
+        assert case.indices["J6"] < 0.15, "two dampers are small against this building (errata row 20)"
+
+
+@pytest.mark.planted
+def test_files_that_are_no_model(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such model"):
+        published_building(tmp_path / "nothing.mat")
+    wrong = tmp_path / "wrong.mat"
+    wrong.write_text("no MATLAB file")
+    with pytest.raises(UserError, match="is not the published model"):
+        published_building(wrong)
+
+
+@pytest.mark.literature
+def test_surrogate_has_the_published_facts(study: IsolationStudy) -> None:
+    building = study.building
+    assert building.model.origin == "surrogate"
+    np.testing.assert_allclose(np.sort(building.fixed_base_periods_s[:3])[::-1], [0.89, 0.78, 0.66], rtol=1e-9)
+    assert building.isolation_period_s == pytest.approx(3.0, rel=1e-9)
+    assert building.isolation_damping_ratio == pytest.approx(0.03, rel=1e-9)
+    assert building.model.total_mass_kg == pytest.approx(20705e3, rel=1e-4)
+    assert len(building.bearings_m) == 92
+    assert len(np.unique(building.bearings_m, axis=0)) == 92
+
+
+@pytest.mark.property
+def test_location_matrix_of_bearings() -> None:
+    positions = bearing_grid(np.array([-1.0, 1.0, 3.0]), np.array([-2.0, 0.0, 2.0]))
+    total = np.zeros((3, 3))
+    for x, y in positions:
+        r = np.array([[1.0, 0.0], [0.0, 1.0], [-y, x]])
+        total += r @ r.T
+    np.testing.assert_allclose(location_matrix(positions), total, atol=1e-9)
+
+
+@pytest.mark.literature
+def test_calibration_gives_the_isolation_modes_their_damping(study: IsolationStudy) -> None:
+    gains = study.gains
+    omega = 2.0 * np.pi / study.building.isolation_period_s
+    for c, k in (
+        (gains.viscous, 0.0),
+        (gains.negative_viscous, gains.negative_stiffness),
+        (4.0 * gains.friction / (np.pi * omega), -gains.friction),
+    ):
+        _, ratios = damped_modes(study.modal, np.full(2, c), np.full(2, k))
+        assert ratios[:2].min() == pytest.approx(0.1, rel=1e-6)
+
+
+def complex_superposition(study: IsolationStudy, motion: GroundMotion) -> FloatArray:
+    """The building alone as a sum of complex modes, each a scalar recursion in closed form; shape (n, 27)."""
+    A = study.modal.state_matrix()
+    B = study.modal.input_matrix(study.modal.load)
+    poles, vectors = np.linalg.eig(A)
+    inputs = np.linalg.solve(vectors, B.astype(complex)) @ motion.acceleration_m_s2.T
+    h = motion.interval_s
+    # z' = s z + g0 + (g1 - g0) t/h over each sample
+    growth = np.exp(poles * h)
+    first = (growth * (poles * h - 1.0) + 1.0) / (poles**2 * h)
+    second = (growth - 1.0 - poles * h) / (poles**2 * h)
+    state = np.zeros((len(motion.acceleration_m_s2), len(poles)), dtype=complex)
+    for k in range(len(state) - 1):
+        state[k + 1] = growth * state[k] + first * inputs[:, k] + second * inputs[:, k + 1]
+    n = study.modal.modes
+    return np.asarray((state @ vectors[:n].T).real @ study.modal.shapes.T)
+
+
+@pytest.mark.oracle
+def test_uncontrolled_run_is_modal_superposition(study: IsolationStudy, motion: GroundMotion, free: Response) -> None:
+    expected = complex_superposition(study, motion)
+    ours = free.displacement()[:: round(motion.interval_s / 0.001)]
+    assert np.abs(ours - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("law", LAWS)
+def test_energy_j9_and_step_halving(study: IsolationStudy, motion: GroundMotion, free: Response, law: str) -> None:
+    controller = study.controller(law)
+    response = study.run(motion, controller)
+    indices = study.indices(response, free)
+    assert response.energy_balance_error < 5e-3
+    assert 0.0 <= indices["J9"] <= 1.0
+    finer = study.indices(study.run(motion, controller, refine=2), study.run(motion, refine=2))
+    for name, value in indices.items():
+        assert finer[name] == pytest.approx(value, rel=5e-3), name
+
+
+@pytest.mark.property
+def test_voltages_and_clipping(study: IsolationStudy, motion: GroundMotion) -> None:
+    response = study.run(motion, study.controller("vdns"))
+    assert response.voltages.min() >= 0.0
+    assert response.voltages.max() <= 10.0
+    work = np.sum(response.forces[1:] * np.diff(response.stroke(), axis=0), axis=1)
+    assert -work[work < 0.0].sum() < 1e-3 * work.sum()
+
+
+@pytest.mark.property
+def test_active_lqg_agrees_with_the_continuous_loop(study: IsolationStudy, motion: GroundMotion) -> None:
+    """Full-state feedback inside the structure's matrix bounds what the sampled observer loop may do."""
+    response = study.run(motion, study.controller("lqg"))
+    free = study.run(motion)
+    assert np.abs(response.stroke()).max() < np.abs(free.stroke()).max()
+    assert np.all(np.isfinite(response.forces))
+
+
+@pytest.mark.planted
+def test_more_dampers_matter_more(study: IsolationStudy, motion: GroundMotion) -> None:
+    sweep = capacity_sensitivity(study, motion, "vd", (1.0, 3.0, 9.0))
+    assert sweep[1.0]["J3"] > sweep[3.0]["J3"] > sweep[9.0]["J3"]
+    assert sweep[1.0]["J6"] < sweep[9.0]["J6"]
+
+
+@pytest.mark.planted
+def test_unknown_law_is_told(study: IsolationStudy) -> None:
+    with pytest.raises(UserError, match="no law of the base-isolated building"):
+        study.controller("vdps2")
+
+
+@pytest.mark.literature
+def test_indices_by_hand() -> None:
+    time = np.array([0.0, 1.0, 2.0])
+    ones = np.ones((3, 2))
+    free = IsolatedResponse(
+        time_s=time,
+        base_shear_n=np.array([[3.0, 4.0], [0.0, 0.0], [0.0, 1.0]]),
+        storey_shear_n=2.0 * ones,
+        base_displacement_m=np.array([[[0.0, 2.0]], [[0.0, 0.0]], [[0.0, 0.0]]]),
+        drift=np.array([[[0.1, 0.0]], [[0.0, 0.2]], [[0.0, 0.0]]]),
+        floor_acceleration_m_s2=np.array([[[6.0, 8.0]], [[0.0, 0.0]], [[0.0, 0.0]]]),
+        device_force_n=np.zeros((3, 2)),
+        device_velocity_m_s=np.zeros((3, 2)),
+        device_work_j=0.0,
+        ground_velocity_m_s=ones,
+    )
+    controlled = replace(
+        free,
+        base_shear_n=np.array([[-2.0, 0.0], [-2.0, 0.0], [-2.0, 0.0]]),
+        storey_shear_n=ones,
+        base_displacement_m=0.5 * free.base_displacement_m,
+        drift=0.25 * free.drift,
+        floor_acceleration_m_s2=0.3 * free.floor_acceleration_m_s2,
+        device_force_n=np.array([[0.6, 0.8], [0.0, 0.0], [0.0, 0.0]]),
+        device_work_j=3.0,
+    )
+    indices = base_isolated_indices(controlled, free)
+    expected = {"J1": 0.4, "J2": 0.5, "J3": 0.5, "J4": 0.25, "J5": 0.3, "J6": 0.5, "J7": 0.5, "J8": 0.3, "J9": 0.75}
+    assert indices == pytest.approx(expected)
+
+
+@pytest.mark.planted
+def test_neural_inverse_of_the_bingham_damper(study: IsolationStudy, motion: GroundMotion, free: Response) -> None:
+    trained = train_inverse(BinghamDevice(), np.random.default_rng(4))
+    _, truth, estimate = inverse_validation(BinghamDevice(), trained)
+    assert np.sqrt(np.mean((estimate - truth) ** 2)) < 0.02 * np.sqrt(np.mean(truth**2))
+    formula = study.indices(study.run(motion, study.controller("vd")), free)
+    neural = replace(study, network=trained.network)
+    by_network = neural.indices(neural.run(motion, neural.controller("vd")), free)
+    for name, value in formula.items():
+        assert by_network[name] == pytest.approx(value, rel=0.02), name
+
+
+@pytest.mark.oracle
+def test_ideal_actuator_is_a_linear_dashpot(study: IsolationStudy, motion: GroundMotion) -> None:
+    c = 5e6
+    modal = study.modal
+    inside = replace(modal, damping=modal.damping + c * modal.devices @ modal.devices.T)
+    expected = replace(study, modal=inside).run(motion).displacement()
+    ours = study.run(motion, Controller("kelvin", "active", viscous=c)).displacement()
+    assert np.abs(ours - expected).max() < 1e-3 * np.abs(expected).max()
