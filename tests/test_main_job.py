@@ -18,7 +18,8 @@ from mrpipe.pipeline.fingerprint import digest_of_artifact
 
 SMALL = {
     "name": "small",
-    "stages": ["record-bench", "prepare", "assemble", "sweep", "train-forward", "train-inverse", "identify-damper", "report"],
+    "stages": ["record-bench", "prepare", "assemble", "sweep", "train-forward", "train-inverse", "identify-damper",
+               "report"],
     "campaigns": {"bench": "laboratory", "frame": None, "closed_loop": None},
     "laboratory": {
         "hidden_effects": [],
