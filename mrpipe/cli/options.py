@@ -79,7 +79,7 @@ def with_common_options(*left_out: str) -> Callable[[Callable[..., None]], Calla
         signature = own.replace(parameters=sorted(parameters, key=lambda item: item.kind))
         command.__signature__ = signature  # type: ignore[attr-defined]
         command.__annotations__ = {item.name: item.annotation for item in signature.parameters.values()}
-        del command.__wrapped__  # type: ignore[attr-defined]
+        del command.__wrapped__
         return command
 
     return decorate
