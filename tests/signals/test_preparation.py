@@ -12,7 +12,7 @@ import pytest
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray, Provenance, config_directory
 from mrpipe.campaigns import Campaign, Recording, load_campaign
 from mrpipe.errors import UserError
-from mrpipe.signals.preparation import Preparation, PreparationOptions, prepare_campaign
+from mrpipe.signals.preparation import Preparation, PreparationOptions, common_rate, prepare_campaign
 from mrpipe.signals.prepared import read_prepared, write_prepared
 
 OMEGA = 2 * np.pi * 1.0
@@ -153,13 +153,21 @@ def test_a_displacement_recorded_late_is_brought_in_time(late: float) -> None:
 @pytest.mark.planted
 def test_tests_of_different_rates_come_to_one() -> None:
     source = campaign(recording("fast"), recording("slow", rate=250.0), recording("odd", rate=3004.8))
-    for asked, expected in ((0.0, 3004.8), (500.0, 500.0)):
+    for asked, expected in ((0.0, 250.0), (500.0, 500.0), (1500.0, 1500.0)):
         items = prepare_campaign(source, PreparationOptions(working_rate_hz=asked)).tests
         assert {item.test.sampling_rate_hz for item in items} == {expected}
         for item in items:
             assert errors(item)["force"] < 0.08
             native = {"fast": 1000.0, "slow": 250.0, "odd": 3004.8}[item.test.name]
             assert errors(item)["velocity"] < velocity_limit(native)
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(
+    ("rates", "expected"), [([1000.0, 200.0], 200.0), ([100.0, 50.0], 100.0), ([100.0, 1000.0, 3004.8], 1000.0)]
+)
+def test_the_rate_of_a_mixed_campaign(rates: list[float], expected: float) -> None:
+    assert common_rate(rates) == expected
 
 
 @pytest.mark.planted

@@ -15,7 +15,8 @@ class PrepareSettings(Section):
     working_rate_hz: float = Field(
         0.0,
         ge=0.0,
-        description="Sampling rate to which all tests are brought; 0 keeps the highest rate of the campaign.",
+        description="Sampling rate to which all tests are brought; 0 takes the lowest of the campaign that is at least "
+        "200 Hz, so that no test is filled up with samples that it does not have.",
     )
     cutoff_hz: float = Field(
         100.0,
