@@ -167,8 +167,8 @@ def _remember(layout: IntArray, state: FloatArray, x: float, v: float, a: float,
 @njit(float64(float64[::1], int64[::1], float64[::1], int64, float64), cache=True)
 def _evaluate(numbers: FloatArray, layout: IntArray, state: FloatArray, where: int, spacing: float) -> float:
     """Return the output of a network on the histories; past values lie `spacing` samples apart."""
-    signal = np.zeros(WIDEST)
-    result = np.zeros(WIDEST)
+    signal = np.empty(WIDEST)
+    result = np.empty(WIDEST)
     past = layout[where + NET_PAST]
     width = layout[where + NET_NEURONS]
     at = layout[where + NET_AT]

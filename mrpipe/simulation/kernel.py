@@ -74,6 +74,7 @@ T_SIZE = 8
 
 PLAIN_ITERATIONS = 12
 TOLERANCE_N = 1e-5
+CORRECTED_N = 1e-2
 
 _FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
 
@@ -124,14 +125,14 @@ def _multiply(transposed: FloatArray, z: FloatArray, result: FloatArray) -> None
             result[row] += transposed[column, row] * value
 
 
-@njit(float64(float64[:, ::1], float64[::1], int64), cache=True)
-def _quadratic(A: FloatArray, z: FloatArray, offset: int) -> float:
+@njit(float64(float64[:, ::1], float64[::1]), cache=True)
+def _quadratic(A: FloatArray, z: FloatArray) -> float:
     total = 0.0
-    for row in range(A.shape[0]):
+    for row in range(z.shape[0]):
         part = 0.0
-        for column in range(A.shape[1]):
-            part += A[row, column] * z[offset + column]
-        total += part * z[offset + row]
+        for column in range(z.shape[0]):
+            part += A[row, column] * z[column]
+        total += part * z[row]
     return total
 
 
@@ -154,16 +155,62 @@ def _amplitude(run: FloatArray, motion: FloatArray, tracker: FloatArray) -> None
 
 @njit(
     void(
-        int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1],
-        float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1],
+        float64[:, ::1], float64[::1], float64[::1], float64[::1], float64, float64, float64[::1], float64[::1],
+    ),
+    cache=True,
+)  # fmt: skip
+def _sense(
+    lower: FloatArray, gain: FloatArray, w: FloatArray, z: FloatArray, force: float, ground: float,
+    noise: FloatArray, measured: FloatArray,
+) -> None:  # fmt: skip
+    """Fill what the sensors say; `lower` is the transposed lower half of A, `gain` what a newton accelerates."""
+    n = w.shape[0]
+    floors = measured[MEASURED_FLOORS:]
+    _multiply(lower, z, floors)
+    x, v, a = 0.0, 0.0, 0.0
+    for floor in range(n):
+        floors[floor] += gain[floor] * force
+        x += w[floor] * z[floor]
+        v += w[floor] * z[n + floor]
+        # difference of a floor's and the ground's accelerometer
+        a += w[floor] * (floors[floor] - ground)
+        floors[floor] += noise[MEASURED_FLOORS + floor]
+    measured[MEASURED_GROUND] = ground + noise[MEASURED_GROUND]
+    measured[MEASURED_DISPLACEMENT] = x + noise[MEASURED_DISPLACEMENT]
+    measured[MEASURED_VELOCITY] = v
+    measured[MEASURED_ACCELERATION] = a + noise[MEASURED_ACCELERATION]
+
+
+@njit(
+    void(float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64, float64[::1]),
+    cache=True,
+)  # fmt: skip
+def _note(
+    lower: FloatArray, gain: FloatArray, M: FloatArray, K: FloatArray, z: FloatArray, force: float, row: FloatArray
+) -> None:
+    """Write state, absolute accelerations and stored energy into a row of the record."""
+    n = gain.shape[0]
+    for index in range(2 * n):
+        row[index] = z[index]
+    accelerations = row[2 * n : 3 * n]
+    _multiply(lower, z, accelerations)
+    for floor in range(n):
+        accelerations[floor] += gain[floor] * force
+    row[3 * n + T_ENERGY] = 0.5 * (_quadratic(M, z[n:]) + _quadratic(K, z[:n]))
+
+
+@njit(
+    void(
+        int64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1],
+        float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1],
         _FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1],
         float64[::1], int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1],
     ),
     cache=True,
 )  # fmt: skip
 def run_loop(
-    counts: IntArray, run: FloatArray, At: FloatArray, B0: FloatArray, B1: FloatArray, A: FloatArray, B: FloatArray,
-    M: FloatArray, C: FloatArray, K: FloatArray, w: FloatArray, ground: FloatArray, z: FloatArray,
+    counts: IntArray, run: FloatArray, step_matrix: FloatArray, at_end: FloatArray, lower: FloatArray,
+    gain: FloatArray, M: FloatArray, C: FloatArray, K: FloatArray, w: FloatArray, ground: FloatArray, z: FloatArray,
     functions: Any, parameters: FloatArray, parameter_offsets: IntArray, state_offsets: IntArray, damper: FloatArray,
     numbers: FloatArray, layout: IntArray, memory: FloatArray, noise: FloatArray, commands: FloatArray,
     record: FloatArray,
@@ -174,10 +221,14 @@ def run_loop(
     ----------
     counts, run
         Integers and numbers of the run, indices I_... and R_...
-    At, B0, B1
-        Exact step of the frame, shapes (2n, 2n) transposed, (2n, 2), (2n, 2); inputs: ground acceleration, force.
-    A, B
-        Continuous state space, shapes (2n, 2n), (2n, 2).
+    step_matrix
+        Transposed, shape (2n + 3, 2n + 4): from [z, ground before, ground after, force before] to the state after the
+        step, followed by displacement, velocity and acceleration of the damper and the momentum-like sum 1'M x; all
+        without the force at the end of the step.
+    at_end
+        Shape (2n + 4,): what one newton at the end of the step adds to these.
+    lower, gain
+        Transposed lower half of A, shape (2n, n), and accelerations of one newton of damper force, shape (n,).
     M, C, K, w
         Of the frame; connectivity vector, shape (n,).
     ground
@@ -196,115 +247,84 @@ def run_loop(
         Filled, shape (records, 3n + T_SIZE).
     """
     n = w.shape[0]
+    size = 2 * n
     track, per_sample, every = counts[I_TRACK], counts[I_PER_SAMPLE], counts[I_RECORD]
     dt = run[R_DT]
-    mass_of_ground = np.zeros(n)
-    step_b1_x = 0.0
-    step_b1_v = 0.0
-    gain_a = 0.0
-    row_a = np.zeros(2 * n)
-    row_g = 0.0
-    for floor in range(n):
-        step_b1_x += w[floor] * B1[floor, 1]
-        step_b1_v += w[floor] * B1[n + floor, 1]
-        gain_a += w[floor] * B[n + floor, 1]
-        row_g += w[floor] * B[n + floor, 0]
-        for column in range(2 * n):
-            row_a[column] += w[floor] * A[n + floor, column]
-        for column in range(n):
-            mass_of_ground[floor] += M[column, floor]
+    end_x, end_v, end_a = at_end[size], at_end[size + 1], at_end[size + 2]
     wire = np.zeros(WIRE_SIZE)
     measured = np.zeros(MEASURED_FLOORS + n)
     trial = np.zeros(damper.shape[0])
-    free = np.zeros(2 * n)
-    motion = np.zeros(2)
-    tracker = np.zeros(3)
-    drive = 0.0
-    force, force_before, slope = 0.0, 0.0, 0.0
+    before = np.zeros(size + 3)
+    after = np.zeros(size + 4)
+    motion, tracker = np.zeros(2), np.zeros(3)
+    velocities = after[n:size]
+    drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
     work_in, work_damper, work_frame = 0.0, 0.0, 0.0
-    loss = _quadratic(C, z, n)
+    loss = _quadratic(C, z[n:])
+    x, pushed = 0.0, 0.0
+    for floor in range(n):
+        before[floor], before[n + floor] = z[floor], z[n + floor]
+        x += w[floor] * z[floor]
+        motion[1] += w[floor] * z[n + floor]
+        for column in range(n):
+            pushed += M[floor, column] * z[column]
+    motion[0] = x
+    _amplitude(run, motion, tracker)
+    state = before[:size]
+    sample, active, written = -1, -1, 0
+    to_sample, to_output, to_record = 0, 0, 0
+    wanted, asked = 0.0, 0.0
     for step in range(counts[I_STEPS] + 1):
-        x, v = 0.0, 0.0
-        for floor in range(n):
-            x += w[floor] * z[floor]
-            v += w[floor] * z[n + floor]
-        if step == 0:
-            motion[0], motion[1] = x, v
-            _amplitude(run, motion, tracker)
-        # --- sensors and controller
-        if step % per_sample == 0:
-            sample = step // per_sample
-            for floor in range(n):
-                total = 0.0
-                for column in range(2 * n):
-                    total += A[n + floor, column] * z[column]
-                measured[MEASURED_FLOORS + floor] = (
-                    total + B[n + floor, 1] * force + noise[sample, MEASURED_FLOORS + floor]
-                )
-            measured[MEASURED_GROUND] = ground[step] + noise[sample, MEASURED_GROUND]
-            measured[MEASURED_DISPLACEMENT] = x + noise[sample, MEASURED_DISPLACEMENT]
-            measured[MEASURED_VELOCITY] = v
-            # the difference of two accelerometers; the ground's share of `measured` cancels in it
-            relative = gain_a * force + row_g * ground[step]
-            for column in range(2 * n):
-                relative += row_a[column] * z[column]
-            measured[MEASURED_ACCELERATION] = relative + noise[sample, MEASURED_ACCELERATION]
+        # counters in place of remainders: integer division costs as much as the rest of the bookkeeping
+        if to_sample == 0:
+            sample += 1
+            to_sample = per_sample
+            _sense(lower, gain, w, state, force, ground[step], noise[sample], measured)
             controller_step(numbers, layout, memory, measured, commands[sample])
-        active = max((step - counts[I_DELAY]) // per_sample, 0)
-        wanted = commands[active, COMMAND_FORCE] if step >= counts[I_DELAY] else 0.0
-        asked = commands[active, COMMAND_DRIVE]
+        to_sample -= 1
+        if step >= counts[I_DELAY]:
+            if to_output == 0:
+                active += 1
+                to_output = per_sample
+                wanted, asked = commands[active, COMMAND_FORCE], commands[active, COMMAND_DRIVE]
+            to_output -= 1
+        elif step == 0:
+            asked = commands[0, COMMAND_DRIVE]
         if step == 0:
             # all lags start in equilibrium with the first command
             drive = asked
             wire[FIRST] = 1.0
             if track == TRACK_DAMPER:
-                relative = row_g * ground[0]
-                for column in range(2 * n):
-                    relative += row_a[column] * z[column]
                 force = _damper_force(
-                    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, v,
-                    relative, drive, dt,
+                    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, motion[1],
+                    measured[MEASURED_ACCELERATION] - noise[0, MEASURED_ACCELERATION], drive, dt,
                 )  # fmt: skip
                 for index in range(damper.shape[0]):
                     damper[index] = trial[index]
             elif track == TRACK_LAW:
-                force = ideal_force(run, tracker[2], x, v)
+                force = ideal_force(run, tracker[2], x, motion[1])
             force_before = force
             wire[FIRST] = 0.0
-        if step % every == 0:
-            row = step // every
-            for index in range(2 * n):
-                record[row, index] = z[index]
-            for floor in range(n):
-                total = B[n + floor, 1] * force
-                for column in range(2 * n):
-                    total += A[n + floor, column] * z[column]
-                record[row, 2 * n + floor] = total
-            record[row, 3 * n + T_FORCE] = force
-            record[row, 3 * n + T_DRIVE] = drive
-            record[row, 3 * n + T_DESIRED] = wanted if track != TRACK_LAW else force
-            record[row, 3 * n + T_GROUND] = ground[step]
-            record[row, 3 * n + T_WORK_IN] = work_in
-            record[row, 3 * n + T_WORK_DAMPER] = work_damper
-            record[row, 3 * n + T_WORK_FRAME] = work_frame
-            record[row, 3 * n + T_ENERGY] = 0.5 * (_quadratic(M, z, n) + _quadratic(K, z, 0))
+        if to_record == 0:
+            to_record = every
+            row = record[written]
+            written += 1
+            _note(lower, gain, M, K, state, force, row)
+            row[3 * n + T_FORCE] = force
+            row[3 * n + T_DRIVE] = drive
+            row[3 * n + T_DESIRED] = wanted if track != TRACK_LAW else force
+            row[3 * n + T_GROUND] = ground[step]
+            row[3 * n + T_WORK_IN] = work_in
+            row[3 * n + T_WORK_DAMPER] = work_damper
+            row[3 * n + T_WORK_FRAME] = work_frame
+        to_record -= 1
         if step == counts[I_STEPS]:
             break
         # --- plant: all but the force at the end of the step
         drive += run[R_LAG] * (asked - drive)
-        _multiply(At, z, free)
-        x_free, v_free, a_free = 0.0, 0.0, row_g * ground[step + 1]
-        for row in range(2 * n):
-            free[row] += B0[row, 0] * ground[step] + B1[row, 0] * ground[step + 1] + B0[row, 1] * force
-        for floor in range(n):
-            x_free += w[floor] * free[floor]
-            v_free += w[floor] * free[n + floor]
-        for column in range(2 * n):
-            a_free += row_a[column] * free[column]
-        # what the force at the end adds to the acceleration there, directly and through the motion
-        gain_end = gain_a
-        for column in range(2 * n):
-            gain_end += row_a[column] * B1[column, 1]
+        before[size], before[size + 1], before[size + 2] = ground[step], ground[step + 1], force
+        _multiply(step_matrix, before, after)
+        x_free, v_free, a_free = after[size], after[size + 1], after[size + 2]
         # --- the force at the end of the step, with the motion there
         time = (step + 1) * dt
         guess = 2.0 * force - force_before if track == TRACK_DAMPER else force
@@ -313,19 +333,23 @@ def run_loop(
         converged = False
         low, high = -math.inf, math.inf
         for iteration in range(60):
-            x_end = x_free + step_b1_x * guess
-            v_end = v_free + step_b1_v * guess
+            x_end, v_end = x_free + end_x * guess, v_free + end_v * guess
             if track == TRACK_DAMPER:
                 found = _damper_force(
                     functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, time, x_end, v_end,
-                    a_free + gain_end * guess, drive, dt,
+                    a_free + end_a * guess, drive, dt,
                 )  # fmt: skip
             elif track == TRACK_LAW:
                 found = ideal_force(run, tracker[2], x_end, v_end)
             else:
                 found = wanted if wanted * v_end >= 0.0 else 0.0
             difference = found - guess
-            if abs(difference) <= TOLERANCE_N + 1e-9 * abs(found):
+            if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
+                converged = True
+                break
+            if track == TRACK_DAMPER and abs(difference) <= CORRECTED_N + 1e-3 * abs(found):
+                # so near that the slope of the step before leaves an error far below what matters
+                found = guess + difference / (1.0 - slope)
                 converged = True
                 break
             # the answer grows with the motion and the motion shrinks with the force: the root is bracketed
@@ -348,25 +372,22 @@ def run_loop(
         if not converged:
             # a jump: within the bracket any force is an answer of the law, and the one found lets the damper stick
             found = guess
-        for row in range(2 * n):
-            free[row] += B1[row, 1] * found
+        for row_index in range(size + 4):
+            after[row_index] += at_end[row_index] * found
         # --- energy
-        moved, pushed = 0.0, 0.0
-        for floor in range(n):
-            moved += w[floor] * (free[floor] - z[floor])
-            pushed += mass_of_ground[floor] * (free[floor] - z[floor])
-        loss_end = _quadratic(C, free, n)
-        work_damper += 0.5 * (force + found) * moved
-        work_in -= 0.5 * (ground[step] + ground[step + 1]) * pushed
+        loss_end = _quadratic(C, velocities)
+        work_damper += 0.5 * (force + found) * (after[size] - x)
+        work_in -= 0.5 * (ground[step] + ground[step + 1]) * (after[size + 3] - pushed)
         work_frame += 0.5 * (loss + loss_end) * dt
-        loss = loss_end
-        force_before = force
-        force = found
-        for index in range(2 * n):
-            z[index] = free[index]
+        loss, x, pushed = loss_end, after[size], after[size + 3]
+        force_before, force = force, found
+        for index in range(size):
+            before[index] = after[index]
         if track == TRACK_DAMPER:
             for index in range(damper.shape[0]):
                 damper[index] = trial[index]
         elif track == TRACK_LAW:
-            motion[0], motion[1] = x_free + step_b1_x * found, v_free + step_b1_v * found
+            motion[0], motion[1] = after[size], after[size + 1]
             _amplitude(run, motion, tracker)
+    for index in range(size):
+        z[index] = before[index]

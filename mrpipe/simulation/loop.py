@@ -198,24 +198,45 @@ def simulate_law(
     ground = np.ascontiguousarray(excitation.at(dt * np.arange(steps + 1, dtype=np.float64)))
     every = max(1, round(1.0 / (dt * options.record_rate_hz)))
     counts, run = _run_numbers(controller, options, steps, per_sample, every, dt)
-    space = state_space(frame, -w)
-    Ad, B0, B1 = discretise_first_order(space.A, space.B, dt)
     samples = steps // per_sample + 1
     commands = np.zeros((samples, COMMAND_SIZE))
     record = np.zeros((steps // every + 1, 3 * n + kernel.T_SIZE))
     z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
     noise = _noise(options.noise, samples, n, rng)
-    contiguous = [np.ascontiguousarray(item) for item in (Ad.T, B0, B1, space.A, space.B)]
     matrices = [np.ascontiguousarray(item) for item in (frame.mass, frame.damping, frame.stiffness, w)]
+    plant = _plant(frame, w, dt)
+    memory = controller.new_state()
     began = time.perf_counter()
     kernel.run_loop(
-        counts, run, *contiguous, *matrices, ground, z, *chain.arguments, new_state(chain),
-        controller.numbers, controller.layout, controller.new_state(), noise, commands, record,
+        counts, run, *plant, *matrices, ground, z, *chain.arguments, new_state(chain),
+        controller.numbers, controller.layout, memory, noise, commands, record,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     if not np.all(np.isfinite(record)):
         raise DivergedError(f"law {controller.law}: the response grows without bound; lower the negative stiffness")
     return _response(record, commands, w, dt * every, dt * per_sample, seconds)
+
+
+def _plant(frame: Frame, w: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return step matrix, what the force at the end adds, lower half of A and gain of the force for the kernel."""
+    n = frame.floors
+    space = state_space(frame, -w)
+    Ad, B0, B1 = discretise_first_order(space.A, space.B, dt)
+    relative = w @ space.A[n:]
+    # rows below the state: displacement, velocity and acceleration of the damper, and the sum 1'M x
+    outputs = np.zeros((2 * n + 4, 2 * n))
+    outputs[: 2 * n] = np.eye(2 * n)
+    outputs[2 * n, :n] = w
+    outputs[2 * n + 1, n:] = w
+    outputs[2 * n + 2] = relative
+    outputs[2 * n + 3, :n] = frame.mass.sum(axis=0)
+    step_matrix = outputs @ np.column_stack([Ad, B0[:, 0], B1[:, 0], B0[:, 1]])
+    step_matrix[2 * n + 2, 2 * n + 1] += w @ space.B[n:, 0]
+    at_end = outputs @ B1[:, 1]
+    at_end[2 * n + 2] += w @ space.B[n:, 1]
+    parts = (step_matrix.T, at_end, space.A[n:].T, space.B[n:, 1])
+    first, second, third, fourth = (np.ascontiguousarray(part) for part in parts)
+    return first, second, third, fourth
 
 
 def _position(frame: Frame, position: FloatArray | None) -> FloatArray:

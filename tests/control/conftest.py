@@ -12,7 +12,6 @@ from mrpipe.dampers.model import DamperModel, damper_from_parameter_set
 from mrpipe.networks.network import FeatureSpec, Network
 from mrpipe.structures import Frame, frame_from_parameter_set
 
-
 SCALES = {"displacement": 0.01, "velocity": 0.07, "force": 60.0}
 
 
