@@ -218,7 +218,7 @@ def _filter(work: _Work, options: PreparationOptions) -> None:
         work.filtered[name] = np.clip(smooth, values.min(), values.max()) if name == "drive" else smooth
     if not work.by_criterion and usable_cutoff(options.cutoff_hz, work.rate) is None:
         work.findings.append(
-            f"no low-pass at {options.cutoff_hz:g} Hz: a sampling rate of {work.rate:g} Hz leaves next to nothing above it"
+            f"no low-pass at {options.cutoff_hz:g} Hz: a rate of {work.rate:g} Hz leaves next to nothing above it"
         )
     work.cycles = find_steady_cycles(work.filtered["displacement"], work.rate)
 
