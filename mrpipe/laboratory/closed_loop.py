@@ -13,7 +13,7 @@ from mrpipe.campaigns import TestFile
 from mrpipe.control.controller import Controller
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.laboratory import structure_kernel as kernel
-from mrpipe.laboratory.coefficient_effects import INERTIA_PLAIN
+from mrpipe.laboratory.coefficient_effects import INERTIA_GROWTH, INERTIA_PLAIN
 from mrpipe.laboratory.damper import TrueDamper, packed_for
 from mrpipe.laboratory.frame_rig import ACCELEROMETER_M_S2_PER_V, LASER_M_PER_V, LOAD_CELL_N_PER_V
 from mrpipe.laboratory.motion import smooth_start
@@ -132,8 +132,8 @@ def run_loop(
         )
     plain = [item for item in damper.effects if item.form.code == INERTIA_PLAIN]
     assembled = assemble(structure, rig.step_s, added_mass_kg=sum(item.strength for item in plain))
-    rest = damper.with_effects([item for item in damper.effects if item.form.code != INERTIA_PLAIN])
-    codes, values = packed_for(rest, 1.0)
+    codes, values = packed_for(damper, 1.0)
+    codes[codes == INERTIA_PLAIN] = INERTIA_GROWTH
     floors = assembled.floors
     ticks = ground.size // every + 1
     noise = rig.acceleration_noise_m_s2 * rng.standard_normal((ticks, 4 + floors))

@@ -15,7 +15,7 @@ ASYMMETRY_YIELD, ASYMMETRY_FORCE = 15, 16
 RATE_CREEP, RATE_EYRING = 17, 18
 PINCHING_QUARTIC, PINCHING_CUSP = 19, 20
 ACCUMULATOR_GAS, ACCUMULATOR_BLADDER = 30, 31
-INERTIA_LAGGED, INERTIA_PLAIN = 32, 33
+INERTIA_LAGGED, INERTIA_PLAIN, INERTIA_GROWTH = 32, 33, 29
 DRAG_POWER, DRAG_TURBULENT = 34, 35
 END_STOP_HERTZ, END_STOP_RUBBER = 36, 37
 OFFSET_PER_TEST, OFFSET_DRIVE = 38, 39
@@ -138,6 +138,9 @@ def parallel_force(
             force += numbers[0] * own[0]
         elif code == INERTIA_PLAIN:
             force += numbers[0] * a * (1.0 + (x / numbers[1]) ** 2)
+        elif code == INERTIA_GROWTH:
+            # what is left of it where the constant part moves as a mass of the structure
+            force += numbers[0] * a * (x / numbers[1]) ** 2
         elif code == DRAG_POWER:
             force += numbers[0] * v * abs(v) ** (numbers[1] - 1.0)
         elif code == DRAG_TURBULENT:
