@@ -66,12 +66,16 @@ class Problem:
         Neurons of each layer, input and output included: (8, 6, 6, 1).
     biases
         Whether biases are parameters.
+    weight_decay
+        Penalty lambda |parameters|^2 beside the mean squared error (0 in the thesis): it keeps a network smooth between
+        the few levels of the drive that a campaign may have.
     """
 
     inputs: FloatArray
     target: FloatArray
     layers: tuple[int, ...]
     biases: bool
+    weight_decay: float = 0.0
 
     @cached_property
     def size(self) -> int:
@@ -99,13 +103,13 @@ class Problem:
         return self.output(parameters) - self.target
 
     def mean_square(self, parameters: FloatArray) -> float:
-        """Return the mean squared residual."""
+        """Return the mean squared residual, and the penalty where there is one."""
         total = 0.0
         for start in range(0, self.rows, 4 * CHUNK_ROWS):
             part = slice(start, start + 4 * CHUNK_ROWS)
             error = self.output(parameters, self.inputs[:, part]) - self.target[part]
             total += float(error @ error)
-        return total / self.rows
+        return total / self.rows + self.weight_decay * float(parameters @ parameters)
 
     def jacobian(self, parameters: FloatArray) -> FloatArray:
         """Return the Jacobian of the residual, shape (n, P)."""
@@ -114,7 +118,7 @@ class Problem:
         return np.ascontiguousarray(stacked[:-1].T)
 
     def gram(self, parameters: FloatArray) -> FloatArray:
-        """Return [J e]'[J e] / n, shape (P + 1, P + 1), from chunks of rows."""
+        """Return [J e]'[J e] / n, shape (P + 1, P + 1), from chunks of rows; the penalty counts as further rows."""
         total = np.zeros((self.size + 1, self.size + 1))
         buffer = np.empty((self.size + 1) * min(CHUNK_ROWS, self.rows))
         for start in range(0, self.rows, CHUNK_ROWS):
@@ -124,7 +128,11 @@ class Problem:
             self._fill(parameters, self.inputs[:, part], self.target[part], stacked)
             # numpy calls the symmetric product (half the work) where both factors are one array
             total += stacked @ stacked.T
-        return total / self.rows
+        total /= self.rows
+        if self.weight_decay > 0.0:
+            extended = np.column_stack([np.eye(self.size), parameters])
+            total += self.weight_decay * (extended.T @ extended)
+        return total
 
     def compressed(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return residual (P + 1,) and Jacobian (P + 1, P) with the norm, gradient and J'J of the problem over n."""

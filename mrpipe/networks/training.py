@@ -47,6 +47,8 @@ class TrainingOptions:
         See :mod:`mrpipe.networks.scaling`.
     held_out_share
         Share of the training records kept for early stopping and for the choice between starts.
+    weight_decay
+        See :class:`mrpipe.networks.problem.Problem`; it does not count where starts are compared.
     """
 
     hidden: tuple[int, ...] = (6, 6)
@@ -62,6 +64,7 @@ class TrainingOptions:
     normalisation: Normalisation = "maximum"
     whitened: bool = True
     held_out_share: float = 0.15
+    weight_decay: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -292,7 +295,7 @@ def train(
     layers = data.layers(options.hidden)
     rows = np.sort(rng.permutation(len(data.fit_rows.target))[: options.subsample_rows])
     seeds = rng.spawn(options.starts)
-    small = data.problem(layers, options.biases, rows)
+    small = replace(data.problem(layers, options.biases, rows), weight_decay=options.weight_decay)
     monitor = _monitor(data, layers, options.biases, rng)
 
     def first(index: int) -> tuple[FitResult, float]:
@@ -308,7 +311,7 @@ def train(
     chosen = [int(index) for index in order[: max(1, options.refined_starts)]]
     late: list[tuple[FitResult, float]] = []
     if options.iterations > 0:
-        whole = data.problem(layers, options.biases)
+        whole = replace(data.problem(layers, options.biases), weight_decay=options.weight_decay)
         held = data.problem(layers, options.biases, held=True) if len(data.held_rows.target) else None
 
         def second(place: int) -> tuple[FitResult, float]:

@@ -58,6 +58,7 @@ def training_plan(context: StageContext, settings: Any, kind: str) -> tuple[Feat
         normalisation=training.attributes("/")["normalisation"],
         whitened=settings.whitened,
         held_out_share=settings.held_out_share,
+        weight_decay=settings.weight_decay,
     )
 
 

@@ -135,3 +135,16 @@ def test_every_rule_can_end_training(rules: StoppingRules, reason: str) -> None:
         # at the optimum no step is better, so the damping grows to its limit
         start = fit(problem, start, method="mu-identity").parameters
     assert fit(problem, start, method="mu-identity", rules=rules).reason == reason
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("method", ["least-squares", "mu-identity"])
+def test_weight_decay_is_ridge_regression_where_the_network_is_linear(method: str) -> None:
+    from dataclasses import replace
+
+    from sklearn.linear_model import Ridge
+
+    problem = replace(common_problem(layers=(4, 1), biases=False), weight_decay=0.3)
+    outcome = fit(problem, np.zeros(problem.size), method=method, rules=StoppingRules(gradient=1e-12))  # type: ignore[arg-type]
+    oracle = Ridge(alpha=0.3 * problem.rows, fit_intercept=False).fit(problem.inputs.T, problem.target)
+    np.testing.assert_allclose(outcome.parameters, oracle.coef_, atol=1e-6)

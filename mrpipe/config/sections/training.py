@@ -17,7 +17,9 @@ class TrainingSettings(Section):
         description="Hidden layers: `thesis` (two of six neurons), `sweep` (what the sweep chose, its past values and "
         "input states and biases included) or the neurons of each layer, such as [12, 6].",
     )
-    biases: bool = Field(False, description="Biases are trained; the thesis has none (2.7), which costs about a quarter in error.")
+    biases: bool = Field(
+        False, description="Biases are trained; the thesis has none (2.7), which costs about a quarter in error."
+    )
     starts: int = Field(10, ge=1, description="Random starts; the best on held-out records is kept.")
     refined_starts: int = Field(2, ge=1, description="How many of the starts go on with all rows.")
     method: Literal["mu-identity", "mu-diagonal", "least-squares"] = Field(
@@ -35,6 +37,12 @@ class TrainingSettings(Section):
     iterations: int = Field(60, ge=0, description="Iterations with all rows at most (0: only the first phase).")
     held_out_share: float = Field(
         0.15, ge=0.0, lt=0.9, description="Share of the training records held out for early stopping and choice."
+    )
+    weight_decay: float = Field(
+        0.0,
+        ge=0.0,
+        description="Penalty on the squared weights beside the mean squared normalised error; 1e-6 to 1e-4 smooths a "
+        "network between the few drive levels of a campaign, the thesis has none.",
     )
     held_out_failures: int = Field(
         6, ge=1, description="Consecutive iterations without gain on the held-out records that end training (trainlm)."
