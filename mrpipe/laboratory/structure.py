@@ -45,7 +45,7 @@ FRAME_FORMS: tuple[Form, ...] = (
     ),
     _form(
         "impact", "hertz", kernel.IMPACT_HERTZ, 1e10,
-        ("stiffness", "N/m^1.5", 5e5, 1e5, 2e6), ("clearance", "m", 0.006, 0.004, 0.01), ("floor", "1", 1.0, 1.0, 1.0),
+        ("stiffness", "N/m^1.5", 5e6, 1e6, 2e7), ("clearance", "m", 0.006, 0.004, 0.01), ("floor", "1", 1.0, 1.0, 1.0),
         ("damping", "s/m", 0.5, 0.1, 1.0),
     ),
     _form(

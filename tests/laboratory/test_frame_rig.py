@@ -127,8 +127,9 @@ def test_impact_stops_the_floor_at_its_clearance(structure: TrueStructure) -> No
     bumper = structure.with_effects([Planted(find_frame_form("impact"), {"clearance": 0.004, "stiffness": 2e7})])
     free, _ = shake(assemble(structure, rig.step_s), ground, rig)
     held, _ = shake(assemble(bumper, rig.step_s), ground, rig)
-    assert np.abs(free[:, 0]).max() > 0.006
-    assert np.abs(held[:, 0]).max() < 0.0048
+    assert np.abs(free[:, 0]).max() > 0.007
+    # the bumper gives by what its stiffness needs to turn the floor round
+    assert np.abs(held[:, 0]).max() < 0.0055
 
 
 @pytest.mark.property
