@@ -1,0 +1,58 @@
+"""All claims of the chapters that were asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mrpipe.artifacts import Progress, no_progress
+from mrpipe.reporting.claims.chapter2 import chapter_2
+from mrpipe.reporting.claims.chapter3 import chapter_3
+from mrpipe.reporting.claims.chapter4 import chapter_4
+from mrpipe.reporting.claims.chapter5 import chapter_5
+from mrpipe.reporting.claims.chapter6 import chapter_6
+from mrpipe.reporting.claims.claim import Claim
+from mrpipe.structures import frame_from_parameter_set
+
+
+@dataclass(frozen=True)
+class ClaimOptions:
+    """What is recomputed.
+
+    Attributes
+    ----------
+    chapters
+        Of the thesis, 2 to 6.
+    frame
+        Parameter set of chapters 3 to 5.
+    duration_s
+        Of each closed-loop run.
+    """
+
+    chapters: tuple[int, ...] = (2, 3, 4, 5, 6)
+    frame: str = "thesis"
+    duration_s: float = 60.0
+
+
+def collect_claims(options: ClaimOptions, progress: Progress = no_progress) -> list[Claim]:
+    """Return the claims in the order of the chapters.
+
+    Raises
+    ------
+    UserError
+        If the frame's parameter set is not there.
+    """
+    frame = frame_from_parameter_set(options.frame)
+    claims: list[Claim] = []
+    for chapter in sorted(set(options.chapters)):
+        progress(0.1 * chapter, f"chapter {chapter}")
+        if chapter == 2:
+            claims += chapter_2()
+        elif chapter == 3:
+            claims += chapter_3(frame)
+        elif chapter == 4:
+            claims += chapter_4(frame)
+        elif chapter == 5:
+            claims += chapter_5(frame, options.duration_s, progress)
+        elif chapter == 6:
+            claims += chapter_6(frame)
+    return claims

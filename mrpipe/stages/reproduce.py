@@ -1,0 +1,42 @@
+"""`reproduce`: every printed figure of the thesis beside ours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mrpipe.pipeline.stage import Stage, StageContext
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    import pandas as pd
+
+    from mrpipe.artifacts import atomic_write_text
+    from mrpipe.reporting import reproduce as page
+    from mrpipe.reporting.claims import ClaimOptions, collect_claims
+
+    settings = context.settings.reproduce
+    options = ClaimOptions(tuple(settings.chapters), settings.frame, settings.duration_s)
+    claims = collect_claims(options, context.progress)
+    number = page.counts(claims)
+    with context.write("reproduce.h5") as artifact:
+        artifact.put_json("claims", [claim.as_dict() for claim in claims])
+        artifact.put("deviation", page.deviations(claims), unit="1", dims=("claim",))
+    atomic_write_text(context.run_directory / "reproduce.md", page.markdown(claims))
+    context.report.text(
+        f"{len(claims)} printed figures were recomputed: {number['holds']} hold, {number['differs']} differ, "
+        f"{number['cannot-be-recomputed']} cannot be recomputed from what is printed or published."
+    )
+    context.report.table("claims", pd.DataFrame(page.rows(claims)), "Printed figures of the thesis beside ours.")
+    context.report.figure("deviations", page.deviation_figure(claims), "Deviation of each recomputed figure.")
+    return {"claims": [claim.as_dict() for claim in claims], "counts": number}
+
+
+STAGE = Stage(
+    name="reproduce",
+    summary="recompute the printed figures of the thesis and say which hold",
+    run=_run,
+    settings=("reproduce",),
+    outputs=("reproduce.h5", "reproduce.md"),
+    modules=("mrpipe.stages.reproduce",),
+)
