@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,59 +92,48 @@ def findings(outcomes: Sequence[Outcome], centre: Candidate) -> list[Finding]:
     Each compares the thesis' architecture with the best alternative that differs in one respect: the error is smaller
     where more than a tenth and more than two standard errors separate them.
     """
+    past, depth = centre.past_values, len(centre.hidden)
+    width = centre.hidden[0] if centre.hidden else 0
+    statements = (
+        ("velocity", "velocity is mandatory", "worse"),
+        ("displacement", "displacement besides velocity is no gain", "no gain"),
+        ("acceleration", "acceleration besides velocity is no gain", "no gain"),
+        ("both", "displacement and acceleration are no gain", "no gain"),
+        ("past", f"more than {past} past values are no gain", "no gain"),
+        ("fewer-past", f"fewer than {past} past values are worse", "worse"),
+        ("layers", f"more than {depth} hidden layers are no gain", "no gain"),
+        ("fewer-layers", f"fewer than {depth} hidden layers are worse", "worse"),
+        ("neurons", f"more than {width} neurons a layer are no gain", "no gain"),
+    )
+    others = _alternatives(outcomes, centre)
+    reference = next((outcome for outcome in outcomes if outcome.candidate == centre), None)
+    return [_compare(name, statement, reference, others[name], claim) for name, statement, claim in statements]
+
+
+def _alternatives(outcomes: Sequence[Outcome], centre: Candidate) -> dict[str, list[Outcome]]:
+    """Return what each finding compares the centre with: outcomes that differ from it in one respect."""
+    states = [o for o in outcomes if replace(o.candidate, states=centre.states) == centre]
+    past = [o for o in outcomes if replace(o.candidate, past_values=centre.past_values) == centre]
+    shapes = [o for o in outcomes if replace(o.candidate, hidden=centre.hidden) == centre]
+    depth = len(centre.hidden)
     motion = {"displacement", "acceleration"}
 
-    def like(candidate: Candidate, **same: object) -> bool:
-        fields = {"states", "past_values", "hidden", "biases"} - same.keys()
-        return all(getattr(candidate, name) == getattr(centre, name) for name in fields)
+    def seeing(*wanted: str) -> list[Outcome]:
+        return [o for o in states if set(o.candidate.states) == set(wanted)]
 
-    def with_states(*states: str) -> list[Outcome]:
-        return [o for o in outcomes if like(o.candidate, states=0) and set(o.candidate.states) == set(states)]
-
-    without_velocity = [
-        o for o in outcomes if like(o.candidate, states=0) and o.candidate.states and set(o.candidate.states) <= motion
-    ]
-    more_past = [
-        o for o in outcomes if like(o.candidate, past_values=0) and o.candidate.past_values > centre.past_values
-    ]
-    fewer_past = [
-        o for o in outcomes if like(o.candidate, past_values=0) and o.candidate.past_values < centre.past_values
-    ]
-    depth, width = len(centre.hidden), centre.hidden[0] if centre.hidden else 0
-    deeper = [
-        o
-        for o in outcomes
-        if like(o.candidate, hidden=0) and o.candidate.hidden[1:] and len(o.candidate.hidden) > depth
-    ]
-    wider = [
-        o
-        for o in outcomes
-        if like(o.candidate, hidden=0) and len(o.candidate.hidden) == depth and o.candidate.hidden[0] > width
-    ]
-    shallower = [o for o in outcomes if like(o.candidate, hidden=0) and len(o.candidate.hidden) < depth]
-    table = (
-        ("velocity", "velocity is mandatory", without_velocity, "worse"),
-        (
-            "displacement",
-            "displacement besides velocity is no gain",
-            with_states("velocity", "displacement"),
-            "no gain",
-        ),
-        (
-            "acceleration",
-            "acceleration besides velocity is no gain",
-            with_states("velocity", "acceleration"),
-            "no gain",
-        ),
-        ("both", "displacement and acceleration are no gain", with_states("velocity", *motion), "no gain"),
-        ("past", "more than three past values are no gain", more_past, "no gain"),
-        ("fewer-past", "fewer than three past values are worse", fewer_past, "worse"),
-        ("layers", "more than two layers are no gain", deeper, "no gain"),
-        ("one-layer", "one layer is worse", shallower, "worse"),
-        ("neurons", "more than six neurons a layer are no gain", wider, "no gain"),
-    )
-    reference = next((o for o in outcomes if o.candidate == centre), None)
-    return [_compare(name, statement, reference, others, claim) for name, statement, others, claim in table]
+    return {
+        "velocity": [o for o in states if o.candidate.states and set(o.candidate.states) <= motion],
+        "displacement": seeing("velocity", "displacement"),
+        "acceleration": seeing("velocity", "acceleration"),
+        "both": seeing("velocity", *motion),
+        "past": [o for o in past if o.candidate.past_values > centre.past_values],
+        "fewer-past": [o for o in past if o.candidate.past_values < centre.past_values],
+        "layers": [o for o in shapes if len(o.candidate.hidden) > depth],
+        "fewer-layers": [o for o in shapes if len(o.candidate.hidden) < depth],
+        "neurons": [
+            o for o in shapes if len(o.candidate.hidden) == depth > 0 and o.candidate.hidden[0] > centre.hidden[0]
+        ],
+    }
 
 
 def _compare(name: str, statement: str, reference: Outcome | None, others: Sequence[Outcome], claim: str) -> Finding:

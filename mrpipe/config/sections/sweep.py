@@ -36,13 +36,13 @@ class SweepSettings(Section):
     biases: tuple[bool, ...] = Field(
         (False, True), min_length=1, description="Without or with biases; the first is the thesis'."
     )
-    starts: int = Field(4, ge=1, description="Random starts of each candidate; their spread decides what is better.")
-    screen_rows: int = Field(2500, ge=50, description="Rows of the screening fit.")
+    starts: int = Field(5, ge=1, description="Random starts of each candidate; their spread decides what is better.")
+    screen_rows: int = Field(2000, ge=50, description="Rows of the screening fit.")
     screen_iterations: int = Field(60, ge=0, description="Iterations of the screening fit at most.")
-    refined: int = Field(14, ge=1, description="How many candidates, the best of the screening, are trained on.")
+    refined: int = Field(12, ge=1, description="How many candidates, the best of the screening, are trained on.")
     refine_rows: int = Field(6000, ge=50, description="Rows of the second fit.")
     refine_iterations: int = Field(80, ge=0, description="Iterations of the second fit at most.")
-    held_out_rows: int = Field(6000, ge=50, description="Rows of held-out records on which candidates are judged.")
+    held_out_rows: int = Field(5000, ge=50, description="Rows of held-out records on which candidates are judged.")
     held_out_share: float = Field(0.25, gt=0.0, lt=0.9, description="Share of the training records held out.")
     held_out_failures: int = Field(
         10, ge=1, description="Consecutive iterations without gain on the held-out records that end a fit."
