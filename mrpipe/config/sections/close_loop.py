@@ -1,0 +1,40 @@
+"""Settings of the tracing of residuals (`close-loop`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from mrpipe.config.section import Section
+
+
+class CloseLoopSettings(Section):
+    """From the residual of a model to the effect that it lacks."""
+
+    model: Literal["bouc-wen", "dahl", "rate-dependent-yield"] = Field(
+        "bouc-wen", description="Declared base model; the ladder of base forms is judged beside it."
+    )
+    yield_order: int = Field(3, ge=0, le=3, description="Degree of the yield force in the drive.")
+    viscosity_order: int = Field(1, ge=0, le=3, description="Degree of the viscosity in the drive.")
+    most_effects: int = Field(3, ge=0, le=3, description="Most effects that are named together.")
+    candidates: tuple[str, ...] = Field((), description="Effects to consider; empty for all of the library.")
+    effect_files: tuple[Path, ...] = Field((), description="Python files of one's own, each with one more EFFECT.")
+    fit_rate_hz: float = Field(250.0, gt=0.0, description="Rate at which candidates are fitted [Hz].")
+    displacement_cutoff_hz: float = Field(
+        0.0, ge=0.0, description="Zero-phase low-pass of the displacement [Hz]; 0 chooses it for each test."
+    )
+    refits: int = Field(8, ge=1, description="How many of the screened families are refitted jointly.")
+    folds: int = Field(3, ge=2, description="Folds of the cross-validation over whole training tests.")
+    bootstrap_draws: int = Field(400, ge=50, description="Draws of the block bootstrap.")
+    named_share: float = Field(0.9, gt=0.5, le=1.0, description="Share of the recoverable residual that proves a name.")
+    least_share: float = Field(
+        0.5, gt=0.0, lt=1.0, description="Share of the recoverable residual below which the cause is unknown."
+    )
+    lead: float = Field(0.1, ge=0.0, lt=1.0, description="Lead in share over other families that a name needs.")
+    record_gain: bool = Field(False, description="Fit a gain for each record of the validation tests (weak sessions).")
+    observation_filter: bool = Field(
+        True, description="Look for a moving average that the records went through, in shares of a period."
+    )
+    unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")

@@ -1,0 +1,116 @@
+"""Is an effect worth having: error on whole training tests left out, with a block bootstrap; intervals."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.discrepancy.engine import Fit, centred, fit, jacobian_of, predict, regressors, weighting
+from mrpipe.discrepancy.problem import Problem
+from mrpipe.discrepancy.structure import BLOCK_S
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What an effect gains on tests that its fit has not seen.
+
+    Attributes
+    ----------
+    share
+        Share of the squared error that goes, cross-validated.
+    interval
+        95 % interval of it by block bootstrap.
+    """
+
+    share: float
+    interval: tuple[float, float]
+
+    @property
+    def significant(self) -> bool:
+        """Whether the interval lies above nothing."""
+        return self.interval[0] > 0.0
+
+
+def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
+    """Return the weighted residual of every training test by a fit that has not seen it, shape (n,)."""
+    problem = found.problem
+    recordings = problem.recordings
+    # folds of every k-th test: neighbours in a campaign are alike
+    parts = [[t for t in range(recordings.tests) if t % folds == k] for k in range(folds)]
+
+    def one(part: list[int]) -> tuple[list[int], FloatArray]:
+        keep = [t for t in range(recordings.tests) if t not in part]
+        within = np.isin(recordings.test, keep)
+        learned = fit(
+            replace(problem, recordings=recordings.subset(keep), root_weight=problem.root_weight[within]),
+            found.theta,
+            iterations=2,
+        )
+        return part, predict(learned, recordings.subset(part))
+
+    result = np.zeros(len(recordings.force))
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        for part, force in pool.map(one, [part for part in parts if part]):
+            within = np.isin(recordings.test, part)
+            result[within] = recordings.force[within] - force
+    return _without_offsets(result, problem)
+
+
+def _without_offsets(error: FloatArray, problem: Problem) -> FloatArray:
+    """Return the weighted error without each test's mean, which is a sensor's offset."""
+    weight = problem.root_weight**2
+    test = problem.recordings.test
+    sums = np.bincount(test, weights=weight)
+    means = np.bincount(test, weights=weight * error) / np.maximum(sums, 1e-300)
+    return np.asarray((error - means[test]) * problem.root_weight)
+
+
+def gain_of(before: FloatArray, after: FloatArray, problem: Problem, *, draws: int, rng: np.random.Generator) -> Gain:
+    """Return the share of the left-out squared error that goes from `before` to `after`, with its interval."""
+    recordings = problem.recordings
+    length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
+    within = (np.arange(len(before)) - recordings.starts[recordings.test]) // length[recordings.test]
+    block = np.unique(recordings.test * 100_000 + within, return_inverse=True)[1]
+    first = np.bincount(block, weights=before**2)
+    second = np.bincount(block, weights=after**2)
+    chosen = rng.integers(len(first), size=(draws, len(first)))
+    shares = 1.0 - second[chosen].sum(axis=1) / np.maximum(first[chosen].sum(axis=1), 1e-300)
+    low, high = np.quantile(shares, [0.025, 0.975])
+    return Gain(float(1.0 - second.sum() / max(first.sum(), 1e-300)), (float(low), float(high)))
+
+
+def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
+    """Return 95 % intervals of every parameter of the effects, from the Jacobian and blocks of the residual."""
+    problem = found.problem
+    w = weighting(problem)
+    low, high = problem.bounds()
+    residual = found.residual[w.at]
+    # the Jacobian of the projected residual gives the searched values; amplitudes are differentiated with them
+    searched = jacobian_of(problem, found.theta, residual, w, low, high)
+    linear = centred(regressors(problem, found.theta)[:, w.at], w)[0]
+    first = problem.base.yield_order + problem.base.viscosity_order + 2
+    recordings = problem.recordings
+    length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
+    within = ((np.arange(len(recordings.force)) - recordings.starts[recordings.test]) // length[recordings.test])[w.at]
+    block = np.unique(recordings.test[w.at] * 100_000 + within, return_inverse=True)[1]
+    rows = np.concatenate([-searched, linear])
+    inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
+    scores = np.stack([np.bincount(block, weights=row * residual) for row in rows])
+    deviation = np.sqrt(np.maximum(np.diag(inverse @ (scores @ scores.T) @ inverse), 0.0))
+    factor = float(stats.norm.ppf(0.975))
+    result: list[dict[str, tuple[float, float]]] = [{} for _ in problem.terms]
+    for k, (index, parameter) in enumerate(problem.searched):
+        if index >= 0:
+            edges = [found.theta[k] - factor * deviation[k], found.theta[k] + factor * deviation[k]]
+            unit = problem.scales.of(parameter.scale)
+            pair = [float(np.exp(min(e, 60.0))) if parameter.logarithmic else float(e * unit) for e in edges]
+            result[index][parameter.name] = (pair[0], pair[1])
+    for k, (index, parameter) in enumerate(problem.amplitudes):
+        half = factor * deviation[len(problem.searched) + first + k]
+        value = float(found.linear[first + k])
+        result[index][parameter.name] = (value - half, value + half)
+    return result

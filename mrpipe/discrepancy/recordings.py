@@ -1,0 +1,233 @@
+"""Recordings laid end to end for the tracing: displacement filtered without phase, force as it was measured."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import BoolArray, FloatArray, IntArray
+from mrpipe.effects.contract import EffectScales
+from mrpipe.signals.filters import butterworth_lowpass
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.signals.spectra import cutoff_by_criterion, noise_level
+
+SETTLING_SHARE = 0.3
+"""Share of the peak-to-peak displacement travelled before forces are compared: the hysteresis begins unknown."""
+
+STEADY_OFFSET_SHARE = 0.03
+"""Displacement offsets that spread by less than this share of the stroke are taken as one of the whole campaign."""
+
+ACCELERATION_CUTOFF_HZ = 40.0
+"""Least cut-off of a measured acceleration."""
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """Several tests end to end.
+
+    Attributes
+    ----------
+    displacement, velocity, acceleration, drive, force
+        Shape (n,); SI. The force carries the offset that was measured.
+    starts
+        Shape (tests + 1,): first sample of each test, and n.
+    dt
+        Shape (tests,) [s].
+    names
+        Names of the tests.
+    test
+        Test of each sample, shape (n,).
+    used
+        Samples at which forces are compared, shape (n,).
+    displacement_noise, velocity_noise, force_noise
+        Standard deviation of what the sensors add after filtering, shape (tests,); m, m/s, N.
+    force_offset
+        Offset that prepare found, shape (tests,) [N].
+    period_s
+        Period of the motion, shape (tests,); 0 where it is not periodic.
+    cutoff_hz
+        Cut-off of the displacement, shape (tests,).
+    """
+
+    displacement: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    drive: FloatArray
+    force: FloatArray
+    starts: IntArray
+    dt: FloatArray
+    names: tuple[str, ...]
+    test: IntArray
+    used: BoolArray
+    displacement_noise: FloatArray
+    velocity_noise: FloatArray
+    force_noise: FloatArray
+    force_offset: FloatArray
+    period_s: FloatArray
+    cutoff_hz: FloatArray
+
+    @property
+    def tests(self) -> int:
+        """Number of tests."""
+        return len(self.dt)
+
+    @property
+    def time(self) -> FloatArray:
+        """Time since the beginning of each test [s], shape (n,)."""
+        index = np.arange(len(self.force)) - self.starts[self.test]
+        return index * self.dt[self.test]
+
+    @property
+    def force_rms(self) -> float:
+        """RMS of the offset-free force over the samples compared [N]."""
+        force = (self.force - self.force_offset[self.test])[self.used]
+        return float(np.sqrt(np.mean(force**2)))
+
+    def subset(self, tests: Sequence[int]) -> Recordings:
+        """Return some of the tests."""
+        pieces = [slice(int(self.starts[k]), int(self.starts[k + 1])) for k in tests]
+        lengths = [piece.stop - piece.start for piece in pieces]
+        chosen = np.asarray(tests, dtype=np.int64)
+
+        def cut(values: FloatArray) -> FloatArray:
+            return np.ascontiguousarray(np.concatenate([values[piece] for piece in pieces]))
+
+        return replace(
+            self,
+            displacement=cut(self.displacement),
+            velocity=cut(self.velocity),
+            acceleration=cut(self.acceleration),
+            drive=cut(self.drive),
+            force=cut(self.force),
+            starts=np.cumsum([0, *lengths], dtype=np.int64),
+            dt=self.dt[chosen],
+            names=tuple(self.names[k] for k in tests),
+            test=np.repeat(np.arange(len(tests)), lengths).astype(np.int64),
+            used=np.concatenate([self.used[piece] for piece in pieces]),
+            displacement_noise=self.displacement_noise[chosen],
+            velocity_noise=self.velocity_noise[chosen],
+            force_noise=self.force_noise[chosen],
+            force_offset=self.force_offset[chosen],
+            period_s=self.period_s[chosen],
+            cutoff_hz=self.cutoff_hz[chosen],
+        )
+
+    def scales(self) -> EffectScales:
+        """Return what bounds and starts of effects are multiples of."""
+        starts = self.starts
+        strokes = [0.5 * np.ptp(self.displacement[a:b]) for a, b in itertools.pairwise(starts)]
+        lengths = np.diff(starts) * self.dt
+        return EffectScales(
+            stroke=float(max(strokes)),
+            speed=float(np.quantile(np.abs(self.velocity), 0.998)),
+            acceleration=float(np.quantile(np.abs(self.acceleration), 0.998)),
+            drive=float(np.max(np.abs(self.drive))) or 1.0,
+            force=self.force_rms or 1.0,
+            time=float(np.max(lengths)),
+        )
+
+
+def record_tests(
+    tests: Sequence[PreparedTest], *, rate_hz: float = 500.0, cutoff_hz: float = 0.0, longest_s: float = 60.0
+) -> Recordings:
+    """Lay prepared tests end to end.
+
+    Parameters
+    ----------
+    tests
+        Prepared tests; their raw displacement and force are used.
+    rate_hz
+        Tests are thinned to at most about this rate after the displacement has been filtered. Forces are picked, never
+        filtered.
+    cutoff_hz
+        Cut-off of the displacement; 0 chooses it for each test by criterion.
+    longest_s
+        Of longer tests only so much is used.
+    """
+    offsets = np.array([test.displacement_offset_m for test in tests])
+    stroke = max(0.5 * float(np.ptp(test.displacement_m)) for test in tests)
+    periodic = np.array([test.excitation == "periodic" for test in tests])
+    trusted = offsets[periodic] if periodic.any() else offsets
+    one = bool(np.std(trusted) < STEADY_OFFSET_SHARE * stroke)
+    shared = float(np.median(trusted))
+    rows = [
+        _one_test(test, rate_hz, cutoff_hz, shared if one else test.displacement_offset_m, longest_s) for test in tests
+    ]
+    lengths = [len(row["force"]) for row in rows]
+
+    def joined(name: str) -> FloatArray:
+        return np.ascontiguousarray(np.concatenate([row[name] for row in rows]), dtype=np.float64)
+
+    def numbers(name: str) -> FloatArray:
+        return np.array([row[name] for row in rows], dtype=np.float64)
+
+    return Recordings(
+        displacement=joined("displacement"),
+        velocity=joined("velocity"),
+        acceleration=joined("acceleration"),
+        drive=joined("drive"),
+        force=joined("force"),
+        starts=np.cumsum([0, *lengths], dtype=np.int64),
+        dt=numbers("dt"),
+        names=tuple(test.name for test in tests),
+        test=np.repeat(np.arange(len(tests)), lengths).astype(np.int64),
+        used=np.concatenate([row["used"] for row in rows]).astype(np.bool_),
+        displacement_noise=numbers("displacement_noise"),
+        velocity_noise=numbers("velocity_noise"),
+        force_noise=numbers("force_noise"),
+        force_offset=numbers("force_offset"),
+        period_s=numbers("period_s"),
+        cutoff_hz=numbers("cutoff_hz"),
+    )
+
+
+def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: float, longest_s: float) -> dict[str, Any]:
+    rate = test.sampling_rate_hz
+    raw = test.displacement_raw_m + (test.displacement_offset_m - offset)
+    cutoff = cutoff_hz or displacement_cutoff(test)
+    smooth = butterworth_lowpass(raw, cutoff, rate)
+    velocity = np.gradient(smooth, 1.0 / rate)
+    acceleration = np.gradient(velocity, 1.0 / rate)
+    if _acceleration_was_measured(test):
+        # an accelerometer is far quieter than a displacement differentiated twice
+        acceleration = butterworth_lowpass(test.acceleration_m_s2, max(1.5 * cutoff, ACCELERATION_CUTOFF_HZ), rate)
+    length = min(len(raw), int(longest_s * rate))
+    stride = max(1, round(rate / max(rate_hz, 5.0 * min(cutoff, 0.1 * rate))))
+    chosen = np.arange(0, length, stride)
+    path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(smooth)))])[chosen]
+    edge = chosen / rate
+    used = (path >= SETTLING_SHARE * np.ptp(smooth)) & (edge > 1.0 / cutoff) & (length / rate - edge > 1.0 / cutoff)
+    band = min(1.0, 2.0 * cutoff / rate)
+    noise = noise_level(test.displacement_raw_m, rate)
+    periods = np.diff(test.cycles)
+    return {
+        "displacement": smooth[chosen],
+        "velocity": velocity[chosen],
+        "acceleration": acceleration[chosen],
+        "drive": test.drive[chosen],
+        "force": (test.force_raw_n + test.force_offset_n)[chosen],
+        "used": used,
+        "dt": stride / rate,
+        "displacement_noise": noise * np.sqrt(band),
+        "velocity_noise": noise * np.sqrt(band) * 2.0 * np.pi * cutoff / np.sqrt(3.0),
+        "force_noise": noise_level(test.force_raw_n, rate),
+        "force_offset": test.force_offset_n,
+        "period_s": float(np.median(periods)) / rate if len(periods) else 0.0,
+        "cutoff_hz": cutoff,
+    }
+
+
+def _acceleration_was_measured(test: PreparedTest) -> bool:
+    derived = np.gradient(test.velocity_m_s, test.dt)
+    difference = test.acceleration_m_s2 - derived
+    return float(np.std(difference)) > 0.02 * float(np.std(derived))
+
+
+def displacement_cutoff(test: PreparedTest) -> float:
+    """Return the cut-off [Hz] of the displacement: where it sinks into its noise, at most a quarter of the rate."""
+    found = cutoff_by_criterion(test.displacement_raw_m, test.sampling_rate_hz, velocity_share=0.9995, margin=1.5)
+    return float(min(max(found, 12.0), 0.25 * test.sampling_rate_hz, 250.0))

@@ -1,0 +1,123 @@
+"""From candidates to a verdict: what is named, with what confidence, what it is tied with, what stays unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from mrpipe.discrepancy.crossvalidation import Gain
+from mrpipe.discrepancy.engine import Fit
+from mrpipe.discrepancy.select import Candidate, Selection, share_of
+from mrpipe.effects.contract import Effect
+
+
+@dataclass(frozen=True)
+class Rules:
+    """When a cause is named.
+
+    Attributes
+    ----------
+    named_share
+        Share of the recoverable residual that proves a name.
+    least_share
+        Share below which the cause is unknown.
+    lead
+        Lead in share over other families; within it they are tied.
+    """
+
+    named_share: float = 0.9
+    least_share: float = 0.5
+    lead: float = 0.1
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect of the verdict."""
+
+    effect: Effect
+    form: str
+    parameters: dict[str, dict[str, Any]]
+    confidence: float
+    tied_with: tuple[str, ...] = ()
+    separating_tests: dict[str, str] = field(default_factory=dict)
+    gain: Gain | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as contract section 4 has it."""
+        found: dict[str, Any] = {
+            "name": self.effect.name,
+            "form": self.form,
+            "parameters": self.parameters,
+            "confidence": self.confidence,
+            "tied_with": list(self.tied_with),
+            "physics": self.effect.physics,
+            "remedy": self.effect.remedy,
+            "corrected_in": "prepare" if self.effect.sensor else "plant",
+        }
+        if self.separating_tests:
+            found["separating_tests"] = self.separating_tests
+        if self.gain is not None:
+            found["cross_validated_gain"] = {"share": self.gain.share, "interval": list(self.gain.interval)}
+        return found
+
+
+def tied(candidates: Sequence[Candidate], lead: float) -> tuple[str, ...]:
+    """Return the families within `lead` of the best of a round."""
+    if not candidates:
+        return ()
+    best = candidates[0]
+    return tuple(item.name for item in candidates[1:] if item.share > best.share - lead)
+
+
+def unnamed_reason(selection: Selection, rules: Rules) -> str:
+    """Return why nothing may be named, or nothing where something may."""
+    if not selection.structured:
+        return "the residual is noise: nothing is missing"
+    if not selection.rounds or selection.chosen is selection.base:
+        return "no effect of the library changes the error"
+    if selection.share(selection.chosen) < rules.least_share:
+        return "no effect of the library recovers enough of what is recoverable"
+    return ""
+
+
+def confidence_of(share: float, lead: float, gain: Gain | None, rules: Rules) -> float:
+    """Return a confidence 0..1: high for a large share, a clear lead and a gain that holds on left-out tests."""
+    proven = min(1.0, share / rules.named_share)
+    clear = min(1.0, max(0.0, lead) / rules.lead) if rules.lead > 0.0 else 1.0
+    held = 1.0 if gain is None or gain.significant else 0.4
+    return round(float(proven * (0.5 + 0.5 * clear) * held * 0.99), 3)
+
+
+def parameter_table(
+    found: Fit, index: int, limits: Mapping[str, tuple[float, float]], drive_unit: str
+) -> dict[str, dict[str, Any]]:
+    """Return value, unit and interval of every parameter of one effect."""
+    term, values = found.problem.terms[index], found.term_values[index]
+    return {
+        item.name: {
+            "value": float(values[item.name]),
+            "unit": item.unit.replace("drive", drive_unit),
+            "interval": [float(edge) for edge in limits.get(item.name, (values[item.name], values[item.name]))],
+        }
+        for item in term.form.parameters
+    }
+
+
+def ranking(selection: Selection, errors: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return the whole ranking of the first round: error on validation tests, evidence, share, forms tried."""
+    if not selection.rounds:
+        return []
+    base, noise = selection.base, selection.noise
+    return [
+        {
+            "name": item.name,
+            "form": item.fit.problem.terms[-1].form.name,
+            "nrmse": float(errors.get(item.name, float("nan"))),
+            "evidence": float(0.5 * (base.cost - item.fit.cost) / max(noise, 1e-12)),
+            "share": float(share_of(base, item.fit, noise)),
+            "forms": {name: float(value) for name, value in item.forms.items()},
+            "at_bound": list(item.fit.at_bound),
+        }
+        for item in selection.rounds[0]
+    ]

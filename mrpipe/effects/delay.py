@@ -1,0 +1,108 @@
+"""Delay: the drive lags more than the model's first-order lag."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import CURRENT, FIRST, STEP_SIGNATURE, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Values, strength
+
+BUFFER = 512
+"""Samples of effective drive that the dead time can look back."""
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def dead_time_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: dead time [s]. State: ring of past effective drives, and where it stands."""
+    size = state.shape[0] - 1
+    u = wire[CURRENT]
+    if wire[FIRST] > 0.5:
+        for index in range(size):
+            state[index] = u
+        state[size] = 0.0
+    at = int(state[size])
+    state[at] = u
+    back = min(parameters[0] / dt, size - 2.0)
+    whole = int(back)
+    part = back - whole
+    first = state[(at - whole + size) % size]
+    second = state[(at - whole - 1 + size) % size]
+    state[size] = (at + 1) % size
+    wire[CURRENT] = (1.0 - part) * first + part * second
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def second_lag_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: time constants [s] rising and falling, largest slope [A/s] (0: none). State: output, last input."""
+    u = wire[CURRENT]
+    if wire[FIRST] > 0.5:
+        state[0] = u
+        state[1] = u
+    rising, falling = parameters[0], parameters[1]
+    constant = rising if u > state[0] else falling
+    middle = 0.5 * (u + state[1])
+    if constant > 1e-9:
+        state[0] += (1.0 - math.exp(-dt / constant)) * (middle - state[0])
+    else:
+        state[0] = u
+    state[1] = u
+    wire[CURRENT] = state[0]
+
+
+def _dead_time(values: Values) -> list[Step]:
+    return [Step("dead-time", Phase.CURRENT_EFFECT, dead_time_step, np.array([values["delay"]]), BUFFER + 1)]
+
+
+def _lag(rising: float, falling: float) -> list[Step]:
+    return [Step("second-lag", Phase.CURRENT_EFFECT, second_lag_step, np.array([rising, falling]), 2)]
+
+
+def _second(values: Values) -> list[Step]:
+    return _lag(values["time_constant"], values["time_constant"])
+
+
+def _rise(values: Values) -> list[Step]:
+    return _lag(values["rise_time"], 0.0)
+
+
+def _fall(values: Values) -> list[Step]:
+    return _lag(0.0, values["fall_time"])
+
+
+EFFECT = Effect(
+    name="delay",
+    summary="the drive acts later than the model's lag says",
+    physics="Power electronics, eddy currents and the build-up of chains add dead time or a second lag.",
+    remedy="Record the coil current itself at the damper, step it up and down at constant velocity, declare the lag.",
+    source="Koo et al. 2006 on response time of MR dampers; eddy currents as a second pole",
+    acts_on="effective drive",
+    forms=(
+        EffectForm(
+            "dead-time", "u(t - T)", (strength("delay", "s", "dead time", "one", 0.0, 0.15, 0.002),), _dead_time
+        ),
+        EffectForm(
+            "second-lag",
+            "tau w' = u - w",
+            (strength("time_constant", "s", "time constant", "one", 0.0, 0.5, 0.002),),
+            _second,
+        ),
+        EffectForm(
+            "slow-rise",
+            "tau w' = u - w while rising",
+            (strength("rise_time", "s", "time constant when the drive rises", "one", 0.0, 0.5, 0.002),),
+            _rise,
+        ),
+        EffectForm(
+            "slow-fall",
+            "tau w' = u - w while falling",
+            (strength("fall_time", "s", "time constant when the drive falls", "one", 0.0, 0.5, 0.002),),
+            _fall,
+        ),
+    ),
+    needs=("varying-drive",),
+    separated_by={"remanence": "current steps up and down at constant velocity"},
+)

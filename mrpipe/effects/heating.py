@@ -1,0 +1,76 @@
+"""Heating: dissipated work warms the fluid, which yields and flows more easily."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import FIRST, STEP_SIGNATURE, VISCOSITY, WORK, YIELD_FORCE, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Values, shape, strength
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def heating_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: loss for each joule, cooling rate [1/s], kind (0 both, 1 yield, 2 viscosity), law (0, 1).
+
+    State: heat [J], last work [J]. Heat is that of the simulated force, never of a measured one.
+    """
+    if wire[FIRST] > 0.5:
+        state[0] = 0.0
+        state[1] = wire[WORK]
+    state[0] = state[0] * math.exp(-parameters[1] * dt) + wire[WORK] - state[1]
+    state[1] = wire[WORK]
+    loss = parameters[0] * state[0]
+    factor = math.exp(-min(max(loss, -5.0), 20.0)) if parameters[3] == 0.0 else 1.0 / max(1.0 + loss, 0.05)
+    if parameters[2] != 2.0:
+        wire[YIELD_FORCE] *= factor
+    if parameters[2] != 1.0:
+        wire[VISCOSITY] *= factor
+
+
+def _step(loss: float, rate: float, kind: float, law: float = 0.0) -> list[Step]:
+    return [Step("heating", Phase.COEFFICIENT_EFFECT, heating_step, np.array([loss, rate, kind, law]), 2)]
+
+
+def _adiabatic(values: Values) -> list[Step]:
+    return _step(values["loss"], 0.0, 0.0)
+
+
+def _cooling(values: Values) -> list[Step]:
+    return _step(values["loss"], 1.0 / values["cooling_time"], 0.0)
+
+
+def _yield(values: Values) -> list[Step]:
+    return _step(values["loss"], 1.0 / values["cooling_time"], 1.0)
+
+
+def _viscosity(values: Values) -> list[Step]:
+    return _step(values["loss"], 1.0 / values["cooling_time"], 2.0)
+
+
+def _rational(values: Values) -> list[Step]:
+    return _step(values["loss"], 0.0, 1.0, 1.0)
+
+
+_LOSS = strength("loss", "1/J", "share of the force lost for each joule", "one/force/speed/time", 0.0, 8.0, 0.03)
+_TIME = shape("cooling_time", "s", "time constant of cooling", "time", 0.1, 30.0, (0.6, 4.0))
+
+EFFECT = Effect(
+    name="heating",
+    summary="forces fall as work is dissipated within a test",
+    physics="The dissipated work stays in the fluid for minutes; a warm carrier is thinner and the chains are weaker.",
+    remedy="Measure the temperature, pause between tests, repeat the first test at the end.",
+    source="Dogruoz et al. 2003; Wilson and Wereley 2013 on temperature of MR dampers",
+    acts_on="yield force",
+    forms=(
+        EffectForm("adiabatic", "alpha, c exp(-b W)", (_LOSS,), _adiabatic),
+        EffectForm("cooling", "alpha, c exp(-b Q), Q' = P - Q/tau", (_LOSS, _TIME), _cooling),
+        EffectForm("yield-only", "alpha exp(-b Q)", (_LOSS, _TIME), _yield),
+        EffectForm("viscosity-only", "c exp(-b Q)", (_LOSS, _TIME), _viscosity),
+        EffectForm("rational", "alpha/(1 + b W)", (_LOSS,), _rational),
+    ),
+    separated_by={"offset": "a long run, a cooling dwell, a repeat", "migration": "a long run with a cooling dwell"},
+)

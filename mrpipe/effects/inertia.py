@@ -1,0 +1,59 @@
+"""Inertia of rod and fluid beyond the load cell."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import ACCELERATION, CURRENT, FORCE, STEP_SIGNATURE, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def mass_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: mass [kg], power of the drive, filter rate [1/s] (0 for none). State: filtered acceleration."""
+    a = wire[ACCELERATION]
+    if parameters[2] > 0.0:
+        share = 1.0 - np.exp(-parameters[2] * dt)
+        state[0] += share * (a - state[0])
+        a = state[0]
+    wire[FORCE] += parameters[0] * a * (wire[CURRENT] if parameters[1] > 0.5 else 1.0)
+
+
+def _mass(values: Values) -> list[Step]:
+    return [Step("mass", Phase.FORCE_EFFECT, mass_step, np.array([values["mass"], 0.0, 0.0]), 1)]
+
+
+def _with_drive(values: Values) -> list[Step]:
+    return [
+        Step("mass", Phase.FORCE_EFFECT, mass_step, np.array([values["mass"], 0.0, 0.0]), 1),
+        Step("mass-with-drive", Phase.FORCE_EFFECT, mass_step, np.array([values["mass_rate"], 1.0, 0.0]), 1),
+    ]
+
+
+_MASS = amplitude("mass", "kg", "moving mass", "force/acceleration", 0.0, 10.0)
+
+EFFECT = Effect(
+    name="inertia",
+    summary="a force that goes with acceleration",
+    physics="Rod, clevis and fluid between load cell and piston have to be accelerated.",
+    remedy="Weigh what moves beyond the load cell and subtract mass times acceleration, or move the cell.",
+    source="Newton; fluid inertance as in Wang and Wereley",
+    acts_on="force",
+    forms=(
+        EffectForm("mass", "F + m a", (_MASS,), _mass, {"mass": 0}),
+        EffectForm(
+            "mass-with-drive",
+            "F + (m + m1 u) a",
+            (_MASS, amplitude("mass_rate", "kg/drive", "its change with the drive", "force/acceleration/drive", -5.0)),
+            _with_drive,
+            {"mass": 0, "mass_rate": 1},
+        ),
+    ),
+    needs=("several-frequencies",),
+    separated_by={
+        "accumulator": "the same stroke at several frequencies",
+        "channel-skew": "time-stamp check, frequency sweep",
+    },
+)

@@ -1,0 +1,76 @@
+"""All effects, found by walking the package; a user's own from files that the configuration names."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import mrpipe.effects as package
+from mrpipe.effects.contract import Effect
+from mrpipe.errors import UserError
+
+
+@cache
+def all_effects() -> dict[str, Effect]:
+    """Return name -> effect of every module of the package that defines EFFECT, damper effects first."""
+    found = []
+    for module in pkgutil.iter_modules(package.__path__):
+        effect = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), "EFFECT", None)
+        if isinstance(effect, Effect):
+            found.append(effect)
+    found.sort(key=lambda item: (item.rig != "damper", item.name))
+    return {item.name: item for item in found}
+
+
+def damper_effects() -> dict[str, Effect]:
+    """Return the effects on a damper."""
+    return {name: item for name, item in all_effects().items() if item.rig == "damper"}
+
+
+def load_effect_file(path: Path) -> Effect:
+    """Load the EFFECT of a user's own file.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, cannot be run, or defines no EFFECT.
+    """
+    if not Path(path).is_file():
+        raise UserError(path, "close_loop.effect_files", "no such file", "name a Python file that defines EFFECT")
+    name = f"mrpipe_user_effect_{Path(path).stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise UserError(path, "close_loop.effect_files", "is no Python file", "name a .py file that defines EFFECT")
+    module: ModuleType = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise UserError(path, "close_loop.effect_files", f"cannot be run: {error}", "mend the file") from error
+    effect = getattr(module, "EFFECT", None)
+    if not isinstance(effect, Effect):
+        raise UserError(path, "EFFECT", "is missing", "define EFFECT = Effect(...) as mrpipe/effects/*.py do")
+    return effect
+
+
+def effects_named(names: Sequence[str], files: Sequence[Path] = ()) -> dict[str, Effect]:
+    """Return the damper effects of these names (all where none), with those of the user's files.
+
+    Raises
+    ------
+    UserError
+        If a name is not known.
+    """
+    known = damper_effects()
+    own = [load_effect_file(path) for path in files]
+    for name in names:
+        if name not in known:
+            raise UserError(
+                "configuration", "close_loop.candidates", f"no effect {name!r}", f"known: {', '.join(known)}"
+            )
+    chosen = {name: known[name] for name in names} if names else dict(known)
+    return {**chosen, **{item.name: item for item in own}}

@@ -1,0 +1,126 @@
+"""Migration: after a reversal the force rises slowly, as particles move back into the gap."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import (
+    CURRENT,
+    FIRST,
+    FORCE,
+    HYSTERESIS,
+    SINCE_REVERSAL,
+    SLIP,
+    STEP_SIGNATURE,
+    VELOCITY,
+    YIELD_FORCE,
+    Phase,
+    Step,
+)
+from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: amplitude, length [m] or time [s], kind of rise (0..3), of amplitude (0 of yield, 1, 2 with drive).
+
+    State: a variable that follows the direction of motion with slip, its direction memory.
+    """
+    kind = parameters[2]
+    if kind == 0.0:
+        rise = 1.0 - math.exp(-wire[SLIP] / parameters[1])
+    elif kind == 1.0:
+        rise = 1.0 - math.exp(-wire[SINCE_REVERSAL] / parameters[1])
+    elif kind == 2.0:
+        rise = wire[SLIP] / (wire[SLIP] + parameters[1])
+    else:
+        # a second, slow hysteretic variable: it follows the direction of motion along the path
+        if wire[FIRST] > 0.5:
+            state[0] = 0.0
+        path = abs(wire[VELOCITY]) * dt / parameters[1]
+        direction = 1.0 if wire[VELOCITY] > 0.0 else -1.0
+        state[0] = direction + (state[0] - direction) * math.exp(-path)
+        rise = state[0]
+    if parameters[3] == 0.0:
+        force = wire[YIELD_FORCE]
+    elif parameters[3] == 1.0:
+        force = 1.0
+    else:
+        force = wire[CURRENT]
+    shape_of = 1.0 if kind == 3.0 else wire[HYSTERESIS]
+    wire[FORCE] += parameters[0] * force * rise * shape_of
+
+
+def _step(value: float, length: float, kind: float, of: float) -> Step:
+    return Step("migration", Phase.FORCE_EFFECT, migration_step, np.array([value, length, kind, of]), 1)
+
+
+def _slip(values: Values) -> list[Step]:
+    return [_step(values["share"], values["slip_length"], 0.0, 0.0)]
+
+
+def _time(values: Values) -> list[Step]:
+    return [_step(values["share"], values["rise_time"], 1.0, 0.0)]
+
+
+def _rational(values: Values) -> list[Step]:
+    return [_step(values["share"], values["slip_length"], 2.0, 0.0)]
+
+
+def _slow(values: Values) -> list[Step]:
+    return [_step(values["share"], values["slip_length"], 3.0, 0.0)]
+
+
+def _own(values: Values) -> list[Step]:
+    length = values["slip_length"]
+    return [_step(values["friction"], length, 0.0, 1.0), _step(values["friction_rate"], length, 0.0, 2.0)]
+
+
+_LENGTH = shape("slip_length", "m", "path over which the force comes back", "stroke", 0.1, 0.9, (0.15, 0.4))
+_SHARE = amplitude("share", "1", "share of the yield force that comes late", "one", 0.0, 3.0)
+
+EFFECT = Effect(
+    name="migration",
+    summary="the force rises slowly after every reversal",
+    physics="Particles settle or leave the gap as the flow turns; the field needs a path or a time to bring them back.",
+    remedy="Run triangles at several speeds with dwells after reversal; agitate, refill, or declare length or time.",
+    source="Sahin et al. 2010 on response after reversal; second hysteretic variable of longer yield displacement",
+    acts_on="yield force",
+    forms=(
+        EffectForm("slip", "alpha (1 + s (1 - exp(-slip/L)))", (_LENGTH, _SHARE), _slip, {"share": 0}),
+        EffectForm(
+            "time",
+            "alpha (1 + s (1 - exp(-t_rev/tau)))",
+            (
+                shape("rise_time", "s", "time over which the force comes back", "stroke/speed", 0.15, 20.0, (0.5, 2.0)),
+                _SHARE,
+            ),
+            _time,
+            {"share": 0},
+        ),
+        EffectForm("rational", "alpha (1 + s slip/(slip + L))", (_LENGTH, _SHARE), _rational, {"share": 0}),
+        EffectForm(
+            "slow-hysteresis", "F + s alpha w, dw = (sign v - w) |dx|/L", (_LENGTH, _SHARE), _slow, {"share": 0}
+        ),
+        EffectForm(
+            "own-friction",
+            "alpha + (a + b u) (1 - exp(-slip/L))",
+            (
+                _LENGTH,
+                amplitude("friction", "N", "what comes late, no drive", "force", -0.05, 5.0),
+                amplitude("friction_rate", "N/drive", "its rise with the drive", "force/drive", -0.1, 5.0),
+            ),
+            _own,
+            {"friction": 0, "friction_rate": 1},
+        ),
+    ),
+    separated_by={
+        "accumulator": "dwell at several positions",
+        "backlash": "slow small triangles about reversal at two currents",
+        "heating": "a long run with a cooling dwell",
+    },
+)

@@ -1,0 +1,76 @@
+"""Load cell offset that goes with the drive (what changes from test to test is told by the fit of the records)."""
+
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import CURRENT, DRIVE, FORCE, STEP_SIGNATURE, TIME, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def offset_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: amplitude, kind (0 drive, 1 drive squared, 2 effective drive, 3 time)."""
+    kind = parameters[1]
+    if kind == 0.0:
+        wire[FORCE] += parameters[0] * wire[DRIVE]
+    elif kind == 1.0:
+        wire[FORCE] += parameters[0] * wire[DRIVE] * wire[DRIVE]
+    elif kind == 2.0:
+        wire[FORCE] += parameters[0] * wire[CURRENT]
+    else:
+        wire[FORCE] += parameters[0] * wire[TIME]
+
+
+def _with_drive(values: Values) -> list[Step]:
+    return [Step("offset", Phase.SENSOR, offset_step, np.array([values["rate"], 0.0]))]
+
+
+def _with_square(values: Values) -> list[Step]:
+    return [
+        Step("offset", Phase.SENSOR, offset_step, np.array([values["rate"], 0.0])),
+        Step("offset-square", Phase.SENSOR, offset_step, np.array([values["square"], 1.0])),
+    ]
+
+
+def _with_lag(values: Values) -> list[Step]:
+    return [Step("offset", Phase.SENSOR, offset_step, np.array([values["rate"], 2.0]))]
+
+
+def _drift(values: Values) -> list[Step]:
+    return [Step("drift", Phase.SENSOR, offset_step, np.array([values["rate"], 3.0]))]
+
+
+_RATE = amplitude("rate", "N/drive", "offset for each unit of drive", "force/drive", -5.0, 5.0)
+
+EFFECT = Effect(
+    name="offset",
+    summary="the zero of the load cell moves from test to test or with the drive",
+    physics="Current leaks into the bridge of the load cell, or its amplifier is zeroed anew between tests.",
+    remedy="Zero the load cell before every test with the coil on, separate the coil's cable from the bridge's.",
+    source="sensor practice; contract section 4",
+    acts_on="force",
+    forms=(
+        EffectForm("with-drive", "F + b i", (_RATE,), _with_drive, {"rate": 0}),
+        EffectForm(
+            "with-drive-squared",
+            "F + b i + c i^2",
+            (_RATE, amplitude("square", "N/drive^2", "curvature of it", "force/drive^2", -5.0, 5.0)),
+            _with_square,
+            {"rate": 0, "square": 1},
+        ),
+        EffectForm("with-effective-drive", "F + b u", (_RATE,), _with_lag, {"rate": 0}),
+        EffectForm(
+            "drift",
+            "F + b t",
+            (amplitude("rate", "N/s", "drift of the zero", "force/time", -5.0, 5.0),),
+            _drift,
+            {"rate": 0},
+        ),
+    ),
+    sensor=True,
+    separated_by={"asymmetry": "constant drive at several speeds; rest at several drives"},
+)

@@ -1,0 +1,82 @@
+"""Pinching: the yield force is lower about the middle of the stroke."""
+
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import CURRENT, DISPLACEMENT, FORCE, HYSTERESIS, STEP_SIGNATURE, YIELD_FORCE, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def pinching_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: amplitude, width [m], kind of dip (0 gaussian, 1 rational, 2 exponential), of amplitude (0, 1, 2)."""
+    ratio = wire[DISPLACEMENT] / parameters[1]
+    if parameters[2] == 0.0:
+        dip = math.exp(-ratio * ratio)
+    elif parameters[2] == 1.0:
+        dip = 1.0 / (1.0 + ratio * ratio)
+    else:
+        dip = math.exp(-abs(ratio))
+    force = wire[YIELD_FORCE]
+    if parameters[3] == 1.0:
+        force = 1.0
+    elif parameters[3] == 2.0:
+        force = wire[CURRENT]
+    wire[FORCE] -= parameters[0] * force * dip * wire[HYSTERESIS]
+
+
+def _step(value: float, width: float, dip: float, of: float = 0.0) -> Step:
+    return Step("pinching", Phase.FORCE_EFFECT, pinching_step, np.array([value, width, dip, of]))
+
+
+def _gaussian(values: Values) -> list[Step]:
+    return [_step(values["depth"], values["width"], 0.0)]
+
+
+def _rational(values: Values) -> list[Step]:
+    return [_step(values["depth"], values["width"], 1.0)]
+
+
+def _exponential(values: Values) -> list[Step]:
+    return [_step(values["depth"], values["width"], 2.0)]
+
+
+def _own(values: Values) -> list[Step]:
+    width = values["width"]
+    return [_step(values["friction"], width, 0.0, 1.0), _step(values["friction_rate"], width, 0.0, 2.0)]
+
+
+_WIDTH = shape("width", "m", "half width of the dip", "stroke", 0.02, 1.0, (0.12, 0.4))
+_DEPTH = amplitude("depth", "1", "share of the yield force that is missing in the middle", "one", 0.0, 1.0)
+
+EFFECT = Effect(
+    name="pinching",
+    summary="loops are narrow about the middle of the stroke",
+    physics="Wear where the piston passes most often widens the gap, or parts slip before they grip.",
+    remedy="Move the middle of the stroke on the bench; renew the bore or the pads.",
+    source="Baber and Noori 1985",
+    acts_on="yield force",
+    forms=(
+        EffectForm("gaussian", "alpha (1 - d exp(-(x/w)^2))", (_WIDTH, _DEPTH), _gaussian, {"depth": 0}),
+        EffectForm("rational", "alpha (1 - d/(1 + (x/w)^2))", (_WIDTH, _DEPTH), _rational, {"depth": 0}),
+        EffectForm("exponential", "alpha (1 - d exp(-|x|/w))", (_WIDTH, _DEPTH), _exponential, {"depth": 0}),
+        EffectForm(
+            "own-friction",
+            "alpha - (a + b u) exp(-(x/w)^2)",
+            (
+                _WIDTH,
+                amplitude("friction", "N", "what is missing, no drive", "force", -0.05, 5.0),
+                amplitude("friction_rate", "N/drive", "its rise with the drive", "force/drive", -0.1, 5.0),
+            ),
+            _own,
+            {"friction": 0, "friction_rate": 1},
+        ),
+    ),
+    separated_by={"migration": "the same motion about another middle"},
+)

@@ -1,0 +1,77 @@
+"""Quadratic drag: orifice losses of the turbulent flow."""
+
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import CURRENT, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def drag_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: coefficient, exponent, reference speed [m/s], power of the drive (0 or 1)."""
+    v = wire[VELOCITY]
+    speed = abs(v) / parameters[2]
+    force = speed ** parameters[1] * (1.0 if v >= 0.0 else -1.0)
+    wire[FORCE] += parameters[0] * force * (wire[CURRENT] if parameters[3] > 0.5 else 1.0)
+
+
+def _step(value: float, exponent: float, with_drive: float = 0.0) -> Step:
+    return Step("drag", Phase.FORCE_EFFECT, drag_step, np.array([value, exponent, 1.0, with_drive]))
+
+
+def _square(values: Values) -> list[Step]:
+    return [_step(values["drag"], 2.0)]
+
+
+def _with_drive(values: Values) -> list[Step]:
+    return [_step(values["drag"], 2.0), _step(values["drag_rate"], 2.0, 1.0)]
+
+
+def _power(values: Values) -> list[Step]:
+    return [_step(values["drag"], values["exponent"])]
+
+
+_DRAG = amplitude("drag", "N*s^2/m^2", "force at 1 m/s", "force/speed^2", 0.0, 20.0)
+
+EFFECT = Effect(
+    name="quadratic-drag",
+    summary="a force that goes with the square of speed",
+    physics="Fluid is throttled in valve and gap; its kinetic energy is lost behind them.",
+    remedy="Test up to the largest speed; widen the bypass, or declare the coefficient.",
+    source="Bernoulli and Borda; orifice flow",
+    acts_on="viscous force",
+    forms=(
+        EffectForm("square", "F + c v|v|", (_DRAG,), _square, {"drag": 0}, dissipative=True),
+        EffectForm(
+            "square-with-drive",
+            "F + (c + d u) v|v|",
+            (
+                _DRAG,
+                amplitude("drag_rate", "N*s^2/m^2/drive", "its change with the drive", "force/speed^2/drive", -5.0),
+            ),
+            _with_drive,
+            {"drag": 0, "drag_rate": 1},
+        ),
+        EffectForm(
+            "power",
+            "F + c |v|^p sign v",
+            (
+                shape("exponent", "1", "power of the speed", "one", 1.4, 3.2, (1.75, 2.5)),
+                amplitude("drag", "N*(s/m)^p", "force at 1 m/s", "force/speed^2", 0.0, 200.0),
+            ),
+            _power,
+            {"drag": 0},
+            dissipative=True,
+        ),
+    ),
+    needs=("varying-speed",),
+    separated_by={
+        "stribeck": "triangular displacement at log-spaced speeds",
+        "rate-dependent-yield": "triangular displacement at log-spaced speeds",
+    },
+)

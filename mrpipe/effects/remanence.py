@@ -1,0 +1,138 @@
+"""Remanence: the core stays magnetised after the current has gone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import CURRENT, FIRST, PAST_CURRENT, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Values, shape, strength
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: gain, length [m] or time [s] or width [A], kind, time [s]. State: memory, last effective drive.
+
+    Kinds: 0 the memory follows a rising drive at once and decays with slip; 1 with time; 2 largest drive so far; 3 play
+    of a width; 4 Bouc-Wen like memory that follows the direction of change of the drive; 5 to 7 time and slip together.
+    """
+    u = wire[CURRENT]
+    gain, size, kind = parameters[0], parameters[1], parameters[2]
+    if wire[FIRST] > 0.5:
+        state[0] = u if kind != 4.0 else 0.0
+        state[1] = u
+    if kind == 0.0 or kind == 1.0:
+        path = abs(wire[VELOCITY]) * dt if kind == 0.0 else dt
+        state[0] = max(u, u + (state[0] - u) * math.exp(-path / size))
+        wire[CURRENT] = u + gain * (state[0] - u)
+    elif kind >= 5.0:
+        # a memory that time and slip break together: of what lies above the drive (5), or down to nothing (6, 7)
+        path = abs(wire[VELOCITY]) * dt / size + dt / parameters[3]
+        floor = u if kind == 5.0 else 0.0
+        state[0] = max(u, floor + (state[0] - floor) * math.exp(-path))
+        if kind == 5.0:
+            wire[CURRENT] = u + gain * (state[0] - u)
+        elif kind == 6.0:
+            wire[CURRENT] = max(u, gain * state[0])
+        else:
+            wire[CURRENT] = u + gain * (state[0] - u) * state[0] / (state[0] + abs(u) + 1e-12)
+    elif kind == 2.0:
+        largest = max(wire[PAST_CURRENT], abs(u))
+        wire[CURRENT] = u + gain * (largest - u)
+    elif kind == 3.0:
+        state[0] = min(max(state[0], u), u + size)
+        wire[CURRENT] = u + gain * (state[0] - u)
+    else:
+        change = u - state[1]
+        direction = 1.0 if change > 0.0 else -1.0
+        state[0] = direction + (state[0] - direction) * math.exp(-abs(change) / size)
+        wire[CURRENT] = u - gain * size * state[0]
+    if wire[CURRENT] < 0.0 and u >= 0.0:
+        wire[CURRENT] = 0.0
+    state[1] = u
+
+
+def _step(gain: float, size: float, kind: float) -> list[Step]:
+    return [Step("remanence", Phase.CURRENT_EFFECT, remanence_step, np.array([gain, size, kind]), 2)]
+
+
+def _together(kind: float) -> Callable[[Values], list[Step]]:
+    def steps(values: Values) -> list[Step]:
+        numbers = np.array([values["gain"], values["slip_length"], kind, values["relaxation_time"]])
+        return [Step("remanence", Phase.CURRENT_EFFECT, remanence_step, numbers, 2)]
+
+    return steps
+
+
+def _slip(values: Values) -> list[Step]:
+    return _step(values["gain"], values["slip_length"], 0.0)
+
+
+def _time(values: Values) -> list[Step]:
+    return _step(values["gain"], values["relaxation_time"], 1.0)
+
+
+def _past(values: Values) -> list[Step]:
+    return _step(values["gain"], 1.0, 2.0)
+
+
+def _play(values: Values) -> list[Step]:
+    return _step(values["gain"], values["width"], 3.0)
+
+
+def _loop(values: Values) -> list[Step]:
+    return _step(values["gain"], values["width"], 4.0)
+
+
+_GAIN = strength("gain", "1", "share of the surplus of the past drive that stays", "one", 0.0, 1.0, 0.03)
+
+_LENGTH = shape("slip_length", "m", "path that breaks it", "stroke", 0.05, 100.0, (2.0, 8.0))
+_TIME = shape("relaxation_time", "s", "time that breaks it", "time", 0.008, 12.0, (0.06, 0.3))
+
+EFFECT = Effect(
+    name="remanence",
+    summary="the damper remembers a larger current: after it the force stays higher",
+    physics="Iron core and particle chains keep part of their magnetisation until motion or time breaks it.",
+    remedy="Demagnetise with a decaying alternating current, or declare the memory; step the current up and down.",
+    source="An and Kwon 2003 on hysteresis of MR actuators; thesis P2 residual force 22 to 30 N",
+    acts_on="effective drive",
+    forms=(
+        EffectForm(
+            "relaxing-with-slip",
+            "u + g (m - u), m decays to u over the slip L",
+            (_GAIN, shape("slip_length", "m", "path that breaks it", "stroke", 0.05, 60.0, (0.5, 3.0, 12.0))),
+            _slip,
+        ),
+        EffectForm(
+            "relaxing-with-time",
+            "u + g (m - u), m decays to u over the time tau",
+            (_GAIN, shape("relaxation_time", "s", "time that breaks it", "time", 0.008, 6.0, (0.05, 0.2, 1.0))),
+            _time,
+        ),
+        EffectForm("relaxing", "u + g (m - u), m decays to u over L and tau", (_GAIN, _LENGTH, _TIME), _together(5.0)),
+        EffectForm("fading", "max(u, g m), m decays to 0 over L and tau", (_GAIN, _LENGTH, _TIME), _together(6.0)),
+        EffectForm("fading-field", "u + g (m - u) m/(m + u), m decays to 0", (_GAIN, _LENGTH, _TIME), _together(7.0)),
+        EffectForm("past-maximum", "u + g (max u - u)", (_GAIN,), _past),
+        EffectForm(
+            "play",
+            "u + g (play_w(u) - u)",
+            (_GAIN, shape("width", "drive", "width of the loop", "drive", 0.01, 0.9, (0.1, 0.4))),
+            _play,
+        ),
+        EffectForm(
+            "loop",
+            "u - g w m, dm = (sign du - m) |du|/w",
+            (
+                strength("gain", "1", "size of the loop over its width", "one", 0.0, 1.0, 0.03),
+                shape("width", "drive", "change of drive that turns the memory", "drive", 0.01, 1.5, (0.08, 0.3)),
+            ),
+            _loop,
+        ),
+    ),
+    needs=("varying-drive",),
+    separated_by={"delay": "current steps up and down at constant velocity", "saturation": "current steps up and down"},
+)

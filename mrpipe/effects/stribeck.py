@@ -1,0 +1,95 @@
+"""Stribeck effect: friction falls as speed rises."""
+
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import CURRENT, FORCE, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def stribeck_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: amplitude, velocity scale [m/s], kind of fall (0, 1, 2), of amplitude (0, 1, 2)."""
+    ratio = abs(wire[VELOCITY]) / parameters[1]
+    if parameters[2] == 0.0:
+        fall = math.exp(-ratio)
+    elif parameters[2] == 1.0:
+        fall = math.exp(-ratio * ratio)
+    else:
+        fall = 1.0 / (1.0 + ratio * ratio)
+    if parameters[3] == 0.0:
+        force = wire[YIELD_FORCE]
+    elif parameters[3] == 1.0:
+        force = 1.0
+    else:
+        force = wire[CURRENT]
+    wire[FORCE] += parameters[0] * force * fall * wire[HYSTERESIS]
+
+
+def _step(value: float, scale: float, fall: float, of: float) -> Step:
+    return Step("stribeck", Phase.FORCE_EFFECT, stribeck_step, np.array([value, scale, fall, of]))
+
+
+def _exponential(values: Values) -> list[Step]:
+    return [_step(values["share"], values["velocity_scale"], 0.0, 0.0)]
+
+
+def _gaussian(values: Values) -> list[Step]:
+    return [_step(values["share"], values["velocity_scale"], 1.0, 0.0)]
+
+
+def _rational(values: Values) -> list[Step]:
+    return [_step(values["share"], values["velocity_scale"], 2.0, 0.0)]
+
+
+def _own(values: Values) -> list[Step]:
+    scale = values["velocity_scale"]
+    return [_step(values["friction"], scale, 0.0, 1.0), _step(values["friction_rate"], scale, 0.0, 2.0)]
+
+
+def _own_gaussian(values: Values) -> list[Step]:
+    scale = values["velocity_scale"]
+    return [_step(values["friction"], scale, 1.0, 1.0), _step(values["friction_rate"], scale, 1.0, 2.0)]
+
+
+_SCALE = shape("velocity_scale", "m/s", "speed at which the surplus has fallen", "speed", 0.004, 0.7, (0.06, 0.2))
+_SHARE = amplitude("share", "1", "surplus of the yield force at rest", "one", 0.0, 5.0)
+_OWN = (
+    amplitude("friction", "N", "surplus at rest without drive", "force", -0.05, 10.0),
+    amplitude("friction_rate", "N/drive", "its rise with the drive", "force/drive", -10.0, 10.0),
+)
+
+EFFECT = Effect(
+    name="stribeck",
+    summary="more friction at low speed than at high",
+    physics="At low speed seals and guides touch, at high speed they swim on the fluid.",
+    remedy="Run slow triangles at log-spaced speeds; change seals or guides, or declare the surplus.",
+    source="Stribeck 1902; Armstrong-Helouvry et al. 1994",
+    acts_on="yield force",
+    forms=(
+        EffectForm("exponential", "alpha (1 + s exp(-|v|/vs))", (_SCALE, _SHARE), _exponential, {"share": 0}),
+        EffectForm("gaussian", "alpha (1 + s exp(-(v/vs)^2))", (_SCALE, _SHARE), _gaussian, {"share": 0}),
+        EffectForm("rational", "alpha (1 + s/(1 + (v/vs)^2))", (_SCALE, _SHARE), _rational, {"share": 0}),
+        EffectForm(
+            "own-friction", "alpha + (a + b u) exp(-|v|/vs)", (_SCALE, *_OWN), _own, {"friction": 0, "friction_rate": 1}
+        ),
+        EffectForm(
+            "own-friction-gaussian",
+            "alpha + (a + b u) exp(-(v/vs)^2)",
+            (_SCALE, *_OWN),
+            _own_gaussian,
+            {"friction": 0, "friction_rate": 1},
+        ),
+    ),
+    needs=("varying-speed",),
+    separated_by={
+        "quadratic-drag": "triangular displacement at log-spaced speeds",
+        "rate-dependent-yield": "triangular displacement at log-spaced speeds",
+    },
+)
