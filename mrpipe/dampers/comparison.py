@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,8 +40,8 @@ class JudgedFit:
         Score of every test, in the order given.
     training, validation
         Pooled figures; not a number where there are no tests of the role.
-    cross_validated_nrmse
-        NRMSE over training tests left out in turn; None where that was not asked for.
+    cross_validated_nrmse, fold_nrmse
+        NRMSE over training tests left out in turn, and that of each fold; None and empty where not asked for.
     """
 
     fit: FormFit
@@ -49,6 +49,29 @@ class JudgedFit:
     training: PooledScore
     validation: PooledScore
     cross_validated_nrmse: float | None = None
+    fold_nrmse: tuple[float, ...] = ()
+
+
+def best_by_folds(judged: Sequence[JudgedFit]) -> JudgedFit:
+    """Return the form with the fewest parameters among those within one standard error of the best.
+
+    The errors of two forms on the same fold go up and down together, so the standard error is that of their difference.
+
+    Raises
+    ------
+    ValueError
+        If a form was not cross-validated.
+    """
+    if any(item.cross_validated_nrmse is None for item in judged):
+        raise ValueError("every form must be cross-validated")
+    best = min(judged, key=lambda item: item.cross_validated_nrmse or 0.0)
+    close = []
+    for item in judged:
+        difference = np.subtract(item.fold_nrmse, best.fold_nrmse)
+        error = np.std(difference, ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
+        if np.mean(difference) <= error:
+            close.append(item)
+    return min(close or [best], key=lambda item: (len(item.fit.names), item.cross_validated_nrmse or 0.0))
 
 
 def compare_forms(
@@ -72,19 +95,16 @@ def compare_forms(
     for place, form in enumerate(forms):
         progress(place / len(forms), f"fit {form.name}")
         fit = _fit(form, data, scales, options)
-        left_out = cross_validate(fit, data, options, folds) if folds > 1 else None
-        judged.append(judge(fit, tests, raw_force=options.raw_force, cross_validated_nrmse=left_out))
+        item = judge(fit, tests, raw_force=options.raw_force)
+        if folds > 1:
+            pooled, each = cross_validate(fit, data, options, folds)
+            item = replace(item, cross_validated_nrmse=pooled, fold_nrmse=each)
+        judged.append(item)
     progress(1.0, "fitted")
     return judged
 
 
-def judge(
-    fit: FormFit,
-    tests: Sequence[PreparedTest],
-    *,
-    raw_force: bool = False,
-    cross_validated_nrmse: float | None = None,
-) -> JudgedFit:
+def judge(fit: FormFit, tests: Sequence[PreparedTest], *, raw_force: bool = False) -> JudgedFit:
     """Score a fit on all tests."""
     scores = score_tests(fit.model, tests, raw_force=raw_force)
     return JudgedFit(
@@ -92,18 +112,18 @@ def judge(
         tests=scores,
         training=pool([score for score in scores if score.role == "training"]),
         validation=pool([score for score in scores if score.role == "validation"]),
-        cross_validated_nrmse=cross_validated_nrmse,
     )
 
 
-def cross_validate(fit: FormFit, data: FitData, options: FitOptions, folds: int) -> float:
-    """Return the NRMSE on stretches left out in turn: whole tests where there are enough, else parts of them.
+def cross_validate(fit: FormFit, data: FitData, options: FitOptions, folds: int) -> tuple[float, tuple[float, ...]]:
+    """Return the NRMSE on stretches left out in turn, pooled and of each fold.
 
-    The model runs over all of the motion each time; the forces left out are not compared in the fit.
+    Whole tests are left out where there are enough of them, else parts of them. The model runs over all of the motion
+    each time; the forces left out are not compared in the fit.
     """
     group = data.test if data.motion.tests >= 2 * folds else data.block
     _, group = np.unique(group, return_inverse=True)
-    error = force = 0.0
+    squares = []
     for fold in range(folds):
         out = group % folds == fold
         if not out.any() or out.all():
@@ -111,9 +131,9 @@ def cross_validate(fit: FormFit, data: FitData, options: FitOptions, folds: int)
         again = _fit(fit.form, data.subset(~out), fit.scales, options, warm=fit.values)
         missed = Projection(fit.form, fit.scales, data.subset(out), offsets=False, weights=None)
         columns, target = missed.columns(again.values)
-        error += float(np.sum((target - again.linear @ columns) ** 2))
-        force += float(np.sum(missed.data.force**2))
-    return float(np.sqrt(error / force)) if force > 0.0 else float("nan")
+        squares.append((float(np.sum((target - again.linear @ columns) ** 2)), float(np.sum(missed.data.force**2))))
+    error, force = np.sum(squares, axis=0)
+    return float(np.sqrt(error / force)), tuple(float(np.sqrt(e / f)) for e, f in squares)
 
 
 def _fit(

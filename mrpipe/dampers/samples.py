@@ -66,12 +66,13 @@ class FitData:
             starts=np.cumsum([0, *map(len, kept)], dtype=np.int64),
             dt=motion.dt * stride,
         )
-        # the forces are known at the samples compared alone: between two of them they run straight
+        # the forces are known at the samples compared alone: between two neighbours they run straight, gaps stay gaps
         order = np.searchsorted(self.at, index)
         inside = (order > 0) & (order < len(self.at))
         left, right = np.clip(order - 1, 0, len(self.at) - 1), np.clip(order, 0, len(self.at) - 1)
         owner = thin.test_of_sample()
         inside &= (self.test[left] == owner) & (self.test[right] == owner)
+        inside &= self.at[right] - self.at[left] <= 1.5 * np.median(np.diff(self.at))
         at = np.flatnonzero(inside).astype(np.int64)
         force = np.interp(index[at], self.at, self.force)
         return FitData(thin, force, at, owner[at], self.block[right[at]])

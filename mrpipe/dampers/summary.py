@@ -47,9 +47,12 @@ def thesis_table(fit: FormFit, A: float) -> dict[str, dict[str, Any]]:
     table: dict[str, dict[str, Any]] = {}
     for (name, value), error in zip(values.items(), errors, strict=True):
         known = name not in ("A", "n")
+        unit = parameter_unit(name, model.drive_unit)
+        if name in ("gamma", "beta"):
+            unit = "1/m" if values["n"] == 1.0 else f"1/m^{values['n']:g}"
         table[name] = {
             "value": float(value),
-            "unit": parameter_unit(name, model.drive_unit),
+            "unit": unit,
             "standard_error": float(error) if known else None,
         }
     return table

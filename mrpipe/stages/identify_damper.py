@@ -62,9 +62,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 
 def _chosen(judged: Sequence[JudgedFit], form: str) -> JudgedFit:
-    if form == "best":
-        return min(judged, key=lambda item: item.cross_validated_nrmse or float("inf"))
-    return next(item for item in judged if item.fit.form.name == form)
+    from mrpipe.dampers.comparison import best_by_folds
+
+    return best_by_folds(judged) if form == "best" else next(item for item in judged if item.fit.form.name == form)
 
 
 def _summary(judged: Sequence[JudgedFit], chosen: JudgedFit, reference: float) -> dict[str, Any]:

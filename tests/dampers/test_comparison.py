@@ -12,7 +12,7 @@ import pytest
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, no_progress
 from mrpipe.config.sections.identify_damper import IdentifyDamperSettings
-from mrpipe.dampers.comparison import FitOptions, compare_forms
+from mrpipe.dampers.comparison import FitOptions, best_by_folds, compare_forms
 from mrpipe.dampers.forms import FORMS
 from mrpipe.dampers.model import read_damper
 from mrpipe.dampers.samples import scales_of, smooth_motion
@@ -70,15 +70,16 @@ def test_the_planted_form_is_best_on_left_out_and_on_unseen_tests(campaign):
     tests = smooth_motion(campaign)
     training = [test for test in tests if test.role == "training"]
     judged = compare_forms(
-        [FORMS[name] for name in ("bouc-wen", "dahl", "bingham", "saturating-dashpot")],
+        [FORMS[name] for name in ("rounded-yield", "bouc-wen", "dahl", "bingham")],
         tests,
         scales_of(training),
         FitOptions(starts=1, maximum_samples=4000),
         folds=3,
     )
-    by_fold = min(judged, key=lambda item: item.cross_validated_nrmse)
-    by_test = min(judged, key=lambda item: item.validation.nrmse)
-    assert by_fold.fit.form.name == by_test.fit.form.name == "bouc-wen"
+    by_fold = best_by_folds(judged)
+    # rounded-yield holds Bouc-Wen and fits as well: the rule is what tells them apart
+    assert by_fold.fit.form.name == "bouc-wen"
+    assert by_fold.validation.nrmse < 0.5 * min(item.validation.nrmse for item in judged[2:])
     # left-out stretches are noisier than nothing and close to the training error of a form that is right
     assert by_fold.training.nrmse < 1.1 * by_fold.cross_validated_nrmse < 1.5 * by_fold.training.nrmse
 

@@ -205,3 +205,14 @@ def test_thinned_data_keep_the_motion_and_its_forces(campaign):
     original = {float(x): f for x, f in zip(data.motion.displacement[data.at], data.force, strict=True)}
     for place, force in zip(thin.at, thin.force, strict=True):
         assert original[float(thin.motion.displacement[place])] == pytest.approx(force)
+
+
+@pytest.mark.property
+def test_thinned_data_leave_gaps_alone(campaign):
+    data = fit_data(campaign[:1])
+    kept = data.subset(data.block % 2 == 0)
+    thin = kept.thinned(len(data.motion.drive) // 4)
+    stride = round(thin.motion.dt[0] / data.motion.dt[0])
+    # a force that lies in a stretch that was taken out would have been made up
+    assert np.isin(thin.at * stride, kept.at).mean() > 0.95
+    assert 0.3 * len(thin.motion.drive) < len(thin.at) < 0.6 * len(thin.motion.drive)

@@ -26,7 +26,8 @@ class IdentifyDamperSettings(Section):
     form: FormName | Literal["best"] = Field(
         "bouc-wen",
         description="Form of the damper that later stages use: one by name (bouc-wen is the thesis' simplified "
-        "Bouc-Wen, 2.1 to 2.4), or best: the one with the smallest cross-validated error on the training tests.",
+        "Bouc-Wen, 2.1 to 2.4), or best: the one with the fewest parameters within one standard error of the smallest "
+        "cross-validated error on the training tests.",
     )
     compare: tuple[FormName, ...] = Field(
         (
@@ -43,7 +44,8 @@ class IdentifyDamperSettings(Section):
     method: Literal["least-squares", "nelder-mead"] = Field(
         "least-squares",
         description="least-squares: trust region over the nonlinear parameters, linear ones projected out; "
-        "nelder-mead: the simplex of thesis 2.2 in its place, restarted until it gains nothing.",
+        "nelder-mead: the simplex of thesis 2.2 in its place, restarted until it gains nothing (over a minute for "
+        "modified-bouc-wen).",
     )
     starts: int = Field(2, ge=1, le=20, description="How many starts of each form are followed to the end.")
     yield_order: int = Field(
