@@ -77,8 +77,13 @@ class ControllerOptions:
         Largest drive; that of the inverse or the damper where None.
     dead_band_m_s
         Speed below which the direction of motion is taken to be unchanged.
+    friction_rounding_m_s
+        Speed over which the friction of fdns changes its sign, tanh(v/v0); 0: the jump of (4.18), which makes the loop
+        chatter on the noise of the velocity.
     extremum_step_m, extremum_share
         How far the displacement must come back from an extremum to make it count: metres, or share of the amplitude.
+    extremum_memory_s
+        After this time without a new extremum the pending one counts; three quarters of a period suits.
     """
 
     rate_hz: float = 200.0
@@ -90,8 +95,10 @@ class ControllerOptions:
     low_pass_hz: float | None = 60.0
     drive_limit: float | None = None
     dead_band_m_s: float = 0.0
+    friction_rounding_m_s: float = 0.005
     extremum_step_m: float = 1e-4
     extremum_share: float = 0.2
+    extremum_memory_s: float = 0.6
 
 
 @dataclass(frozen=True)
@@ -217,8 +224,10 @@ class _Pack:
             options.displacement_noise_m, options.acceleration_noise_m_s2, dt, options.bias_drift_m_s2
         )
         head[kernel.DEAD_BAND] = options.dead_band_m_s
+        head[kernel.ROUNDING] = options.friction_rounding_m_s
         head[kernel.EXTREMUM_STEP] = options.extremum_step_m
         head[kernel.EXTREMUM_SHARE] = options.extremum_share
+        head[kernel.MEMORY] = options.extremum_memory_s
         head[kernel.LOW_PASS : kernel.LOW_PASS + 5] = _low_pass(options)
         self.numbers = [head]
         self.layout = np.zeros(kernel.LAYOUT_SIZE, dtype=np.int64)

@@ -58,6 +58,7 @@ static void follow_motion(double *state)
         state[S_AMPLITUDE] = fabs(x);
         return;
     }
+    state[S_AGE] += numbers[SAMPLE_TIME];
     const double seeking = state[S_SEEKING];
     if (seeking * x > seeking * state[S_EXTREME]) state[S_EXTREME] = x;
     const double step = larger(numbers[EXTREMUM_STEP], numbers[EXTREMUM_SHARE] * state[S_AMPLITUDE]);
@@ -65,6 +66,12 @@ static void follow_motion(double *state)
         state[S_AMPLITUDE] = fabs(state[S_EXTREME]);
         state[S_SEEKING] = -seeking;
         state[S_EXTREME] = x;
+        state[S_AGE] = 0.0;
+    } else if (state[S_AGE] > numbers[MEMORY]) {
+        state[S_AMPLITUDE] = fabs(state[S_EXTREME]);
+        state[S_SEEKING] = v >= 0.0 ? 1.0 : -1.0;
+        state[S_EXTREME] = x;
+        state[S_AGE] = 0.0;
     }
 }
 
@@ -160,9 +167,11 @@ static double law(double *state, const double *measured)
     switch (layout[LAW]) {
     case LAW_LINEAR:
         return numbers[GAIN_C] * state[S_V] + numbers[GAIN_K] * state[S_X];
-    case LAW_FRICTION:
-        return numbers[GAIN_ALPHA]
-               * (state[S_DIRECTION] * larger(state[S_AMPLITUDE], fabs(state[S_X])) - state[S_X]);
+    case LAW_FRICTION: {
+        const double amplitude = larger(state[S_AMPLITUDE], fabs(state[S_X]));
+        const double side = numbers[ROUNDING] > 0.0 ? tanh(state[S_V] / numbers[ROUNDING]) : state[S_DIRECTION];
+        return numbers[GAIN_ALPHA] * (side * amplitude - state[S_X]);
+    }
     case LAW_NETWORK:
         return evaluate(state, layout[NETWORK_LAW], numbers[LAW_SPACING]);
     case LAW_OBSERVER:

@@ -79,6 +79,8 @@ INVERSE_SPACING = 18  # samples between past values of the inverse network
 LAW_SPACING = 19  # the same for the network of nnc
 TABLE_SPEED = 20  # largest speed of the inverse table [m/s]
 TABLE_DRIVE = 21  # largest drive of the inverse table
+ROUNDING = 22  # speed over which the friction of fdns changes its sign [m/s]; 0: a jump
+MEMORY = 23  # how long an extremum counts [s]
 HEAD = 24
 # a network in `numbers`: input scale, input shift, output scale, output shift, then weights by row and biases a layer
 
@@ -95,6 +97,7 @@ S_AMPLITUDE = 8
 S_FILTER = 9  # two
 S_FORCE = 11  # last desired force
 S_DISPLACEMENT = 12  # last measured displacement
+S_AGE = 13  # time since the last extremum
 S_HEAD = 16
 
 WIDEST = 64
@@ -139,6 +142,7 @@ def _follow_motion(numbers: FloatArray, state: FloatArray) -> None:
         state[S_EXTREME] = x
         state[S_AMPLITUDE] = abs(x)
         return
+    state[S_AGE] += numbers[SAMPLE_TIME]
     seeking = state[S_SEEKING]
     if seeking * x > seeking * state[S_EXTREME]:
         state[S_EXTREME] = x
@@ -147,6 +151,13 @@ def _follow_motion(numbers: FloatArray, state: FloatArray) -> None:
         state[S_AMPLITUDE] = abs(state[S_EXTREME])
         state[S_SEEKING] = -seeking
         state[S_EXTREME] = x
+        state[S_AGE] = 0.0
+    elif state[S_AGE] > numbers[MEMORY]:
+        # a damper that sticks shows no extremum: without this the last one would keep it locked
+        state[S_AMPLITUDE] = abs(state[S_EXTREME])
+        state[S_SEEKING] = 1.0 if v >= 0.0 else -1.0
+        state[S_EXTREME] = x
+        state[S_AGE] = 0.0
 
 
 @njit(void(int64[::1], float64[::1], float64, float64, float64, float64), cache=True)
@@ -261,7 +272,10 @@ def _law(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: Flo
     if law == LAW_FRICTION:
         # the pending extremum counts where it already exceeds the last one, so that a growing motion stays dissipative
         amplitude = max(state[S_AMPLITUDE], abs(state[S_X]))
-        return numbers[GAIN_ALPHA] * (state[S_DIRECTION] * amplitude - state[S_X])
+        side = state[S_DIRECTION]
+        if numbers[ROUNDING] > 0.0:
+            side = math.tanh(state[S_V] / numbers[ROUNDING])
+        return numbers[GAIN_ALPHA] * (side * amplitude - state[S_X])
     if law == LAW_NETWORK:
         return _evaluate(numbers, layout, state, layout[NETWORK_LAW], numbers[LAW_SPACING])
     if law == LAW_OBSERVER:

@@ -48,6 +48,8 @@ class Weights:
         Weight of the damper force squared [1/N^2].
     ground_noise_m_s2
         Noise of the measured ground acceleration, with model error, that drives the state.
+    force_noise_n
+        By how much the damper's force differs from the desired one (its residual force at least), as a noise.
     displacement_noise_m, acceleration_noise_m_s2
         Noise of the sensors.
     """
@@ -56,6 +58,7 @@ class Weights:
     top_displacement: float = 0.0
     force: float = 1e-4
     ground_noise_m_s2: float = 0.1
+    force_noise_n: float = 20.0
     displacement_noise_m: float = 20e-6
     acceleration_noise_m_s2: float = 0.1
 
@@ -96,12 +99,15 @@ def observer_gain(frame: Frame, position: FloatArray, weights: Weights, dt: floa
 
     The noise of the ground's accelerometer drives the state and the floors' accelerometers have their own.
     """
-    Ad, Bd, C, _ = _sampled(frame, position, dt)
+    Ad, Bd, C, D = _sampled(frame, position, dt)
     W = weights.ground_noise_m_s2**2 * np.outer(Bd[:, 0], Bd[:, 0])
+    W += weights.force_noise_n**2 * np.outer(Bd[:, 1], Bd[:, 1])
     # a little noise on every velocity keeps the observer awake in modes that the ground hardly drives
     n = frame.floors
     W[n:, n:] += (0.05 * weights.ground_noise_m_s2 * dt) ** 2 * np.eye(n)
     V = np.diag([weights.displacement_noise_m**2] + [weights.acceleration_noise_m_s2**2] * n)
+    # an accelerometer on the damper's floor feels the force at once
+    V += weights.force_noise_n**2 * np.diag(D[:, 1] ** 2)
     P = solve_discrete_are(Ad.T, C.T, W, V)
     return np.asarray(Ad @ P @ C.T @ np.linalg.inv(C @ P @ C.T + V))
 

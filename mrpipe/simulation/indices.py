@@ -16,6 +16,12 @@ from mrpipe.simulation.loop import Response
 SMALLEST_PEAK = 0.02
 """Peaks of a decay below this share of the first are left out."""
 
+QUICK = 0.45
+"""A decay whose second extremum is below this share of the first is over within a period: the two give its damping."""
+
+SMALLEST_FITTED_PEAK = 0.15
+"""Peaks below this share of the first are no decay under control any more: residual force or a locked damper."""
+
 
 @dataclass(frozen=True)
 class Decay:
@@ -24,7 +30,9 @@ class Decay:
     Attributes
     ----------
     mean
-        Damping ratio of the exponential fit over the peaks while current flows; NaN with fewer than two peaks.
+        Damping ratio of the exponential fit over the peaks after the base stopped, as long as current flows before each
+        and they are not small (thesis 5.5.1); of the first half period where the decay is quick (QUICK); NaN with fewer
+        than two extrema.
     point_to_point
         Damping ratio from each extremum to the next, shape (p - 1,).
     peak_time_s, peak_m
@@ -52,10 +60,12 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     drive_threshold
         Drive above which current counts as flowing; where it never does (passive-off) all peaks count.
     """
-    chosen = response.time_s >= start_s
-    t, x, v = response.time_s[chosen], response.displacement[chosen, -1], response.velocity[chosen, -1]
-    drive = response.drive[chosen]
+    t, x, v = response.time_s, response.displacement[:, -1], response.velocity[:, -1]
     turns = np.flatnonzero(v[:-1] * v[1:] < 0.0)
+    # the extremum nearest to the stop is where the decay starts from: a quick one has few others
+    if len(turns):
+        turns = turns[int(np.argmin(np.abs(t[turns] - start_s))) :]
+    drive = response.drive
     if len(turns):
         turns = turns[np.abs(x[turns]) > SMALLEST_PEAK * np.max(np.abs(x[turns]))]
     # a wiggle of a higher mode is no half period: an extremum counts when the displacement changes sign between
@@ -70,16 +80,15 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     if len(peaks) < 2:
         empty = np.zeros(0)
         return Decay(math.nan, empty, t[peaks], x[peaks], np.ones(len(peaks), dtype=bool))
-    flows = np.array(
-        [
-            np.max(drive[(peaks[index - 1] if index else 0) : peak + 1]) > drive_threshold
-            for index, peak in enumerate(peaks)
-        ]
-    )
+    flows = np.ones(len(peaks), dtype=bool)
+    for index in range(1, len(peaks)):
+        flows[index] = np.max(drive[peaks[index - 1] : peaks[index] + 1]) > drive_threshold
     sizes = np.log(np.abs(x[peaks]))
     ratios = _ratio(sizes[:-1] - sizes[1:])
-    used = np.flatnonzero(flows) if flows.any() else np.arange(len(peaks))
-    if len(used) < 2:
+    large = np.abs(x[peaks]) >= SMALLEST_FITTED_PEAK * np.abs(x[peaks[0]])
+    ends = np.flatnonzero(~(large & (flows if flows[1:].any() else large)))
+    used = np.arange(1, max(int(ends[0]) if len(ends) else len(peaks), 3))
+    if len(peaks) == 2 or abs(x[peaks[1]]) < QUICK * abs(x[peaks[0]]):
         used = np.arange(2)
     slope = np.polyfit(used, sizes[used], 1)[0]
     return Decay(float(_ratio(np.array([-slope]))[0]), ratios, t[peaks], x[peaks], flows)

@@ -18,10 +18,7 @@ from mrpipe.control.kernel import (
     COMMAND_DRIVE,
     COMMAND_FORCE,
     MEASURED_ACCELERATION,
-    MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
-    MEASURED_GROUND,
-    MEASURED_VELOCITY,
     controller_step,
 )
 from mrpipe.dampers.plant import (
@@ -37,58 +34,36 @@ from mrpipe.dampers.plant import (
     WIRE_SIZE,
     advance,
 )
-
-# --- how the desired force becomes a force ---
-TRACK_DAMPER, TRACK_LAW, TRACK_HELD = 0, 1, 2
-
-# --- numbers of the run ---
-R_DT = 0
-R_LAG = 1  # share of the way to the command that the driver goes in a step, 1 without lag
-R_C = 2
-R_K = 3
-R_ALPHA = 4
-R_EXTREMUM_STEP = 5
-R_EXTREMUM_SHARE = 6
-R_INITIAL_AMPLITUDE = 7
-R_ROUNDING = 8  # speed over which the friction of a perfect damper turns round [m/s]; 0: a jump
-R_SIZE = 9
-
-# --- integers of the run ---
-I_STEPS = 0
-I_PER_SAMPLE = 1
-I_DELAY = 2
-I_TRACK = 3
-I_RECORD = 4  # plant steps between records
-I_SIZE = 5
-
-# --- columns of the record after the 2n of the state and the n absolute accelerations ---
-T_FORCE = 0
-T_DRIVE = 1
-T_DESIRED = 2
-T_GROUND = 3
-T_WORK_IN = 4
-T_WORK_DAMPER = 5
-T_WORK_FRAME = 6
-T_ENERGY = 7
-T_SIZE = 8
+from mrpipe.simulation.parts import (
+    I_DELAY,
+    I_PER_SAMPLE,
+    I_RECORD,
+    I_STEPS,
+    I_TRACK,
+    R_DT,
+    R_LAG,
+    T_DESIRED,
+    T_DRIVE,
+    T_FORCE,
+    T_GROUND,
+    T_WORK_DAMPER,
+    T_WORK_FRAME,
+    T_WORK_IN,
+    TRACK_DAMPER,
+    TRACK_LAW,
+    amplitude,
+    ideal_force,
+    multiply,
+    note,
+    quadratic,
+    sense,
+)
 
 PLAIN_ITERATIONS = 12
 TOLERANCE_N = 1e-5
 CORRECTED_N = 1e-2
 
 _FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
-
-
-@njit(float64(float64[::1], float64, float64, float64), cache=True)
-def ideal_force(run: FloatArray, amplitude: float, x: float, v: float) -> float:
-    """Return the force of a perfect damper: law (4.14) or (4.18), clipped by P2 (22). It never falls with v."""
-    if run[R_ALPHA] > 0.0:
-        largest = max(amplitude, abs(x))
-        side = math.tanh(v / run[R_ROUNDING]) if run[R_ROUNDING] > 0.0 else (1.0 if v > 0.0 else -1.0)
-        force = run[R_ALPHA] * (side * largest - x)
-        return force if force * v >= 0.0 else 0.0
-    force = run[R_C] * v + run[R_K] * x
-    return force if force * v >= 0.0 else 0.0
 
 
 @njit(
@@ -112,91 +87,6 @@ def _damper_force(
     wire[DRIVE] = drive
     advance(functions, parameters, parameter_offsets, state_offsets, state, wire, dt)
     return wire[FORCE]
-
-
-@njit(void(float64[:, ::1], float64[::1], float64[::1]), cache=True)
-def _multiply(transposed: FloatArray, z: FloatArray, result: FloatArray) -> None:
-    """Write A z; by columns of A, so that the inner loop runs along memory without a sum."""
-    for row in range(result.shape[0]):
-        result[row] = 0.0
-    for column in range(z.shape[0]):
-        value = z[column]
-        for row in range(result.shape[0]):
-            result[row] += transposed[column, row] * value
-
-
-@njit(float64(float64[:, ::1], float64[::1]), cache=True)
-def _quadratic(A: FloatArray, z: FloatArray) -> float:
-    total = 0.0
-    for row in range(z.shape[0]):
-        part = 0.0
-        for column in range(z.shape[0]):
-            part += A[row, column] * z[column]
-        total += part * z[row]
-    return total
-
-
-@njit(void(float64[::1], float64[::1], float64[::1]), cache=True)
-def _amplitude(run: FloatArray, motion: FloatArray, tracker: FloatArray) -> None:
-    """Keep the most recent extremum of a perfect sensor; tracker: seeking, extreme, amplitude."""
-    x = motion[0]
-    if tracker[0] == 0.0:
-        tracker[0] = 1.0 if motion[1] >= 0.0 else -1.0
-        tracker[1] = x
-        tracker[2] = max(abs(x), run[R_INITIAL_AMPLITUDE])
-    if tracker[0] * x > tracker[0] * tracker[1]:
-        tracker[1] = x
-    step = max(run[R_EXTREMUM_STEP], run[R_EXTREMUM_SHARE] * tracker[2])
-    if tracker[0] * (tracker[1] - x) > step:
-        tracker[2] = abs(tracker[1])
-        tracker[0] = -tracker[0]
-        tracker[1] = x
-
-
-@njit(
-    void(
-        float64[:, ::1], float64[::1], float64[::1], float64[::1], float64, float64, float64[::1], float64[::1],
-    ),
-    cache=True,
-)  # fmt: skip
-def _sense(
-    lower: FloatArray, gain: FloatArray, w: FloatArray, z: FloatArray, force: float, ground: float,
-    noise: FloatArray, measured: FloatArray,
-) -> None:  # fmt: skip
-    """Fill what the sensors say; `lower` is the transposed lower half of A, `gain` what a newton accelerates."""
-    n = w.shape[0]
-    floors = measured[MEASURED_FLOORS:]
-    _multiply(lower, z, floors)
-    x, v, a = 0.0, 0.0, 0.0
-    for floor in range(n):
-        floors[floor] += gain[floor] * force
-        x += w[floor] * z[floor]
-        v += w[floor] * z[n + floor]
-        # difference of a floor's and the ground's accelerometer
-        a += w[floor] * (floors[floor] - ground)
-        floors[floor] += noise[MEASURED_FLOORS + floor]
-    measured[MEASURED_GROUND] = ground + noise[MEASURED_GROUND]
-    measured[MEASURED_DISPLACEMENT] = x + noise[MEASURED_DISPLACEMENT]
-    measured[MEASURED_VELOCITY] = v
-    measured[MEASURED_ACCELERATION] = a + noise[MEASURED_ACCELERATION]
-
-
-@njit(
-    void(float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64, float64[::1]),
-    cache=True,
-)  # fmt: skip
-def _note(
-    lower: FloatArray, gain: FloatArray, M: FloatArray, K: FloatArray, z: FloatArray, force: float, row: FloatArray
-) -> None:
-    """Write state, absolute accelerations and stored energy into a row of the record."""
-    n = gain.shape[0]
-    for index in range(2 * n):
-        row[index] = z[index]
-    accelerations = row[2 * n : 3 * n]
-    _multiply(lower, z, accelerations)
-    for floor in range(n):
-        accelerations[floor] += gain[floor] * force
-    row[3 * n + T_ENERGY] = 0.5 * (_quadratic(M, z[n:]) + _quadratic(K, z[:n]))
 
 
 @njit(
@@ -256,11 +146,11 @@ def run_loop(
     trial = np.zeros(damper.shape[0])
     before = np.zeros(size + 3)
     after = np.zeros(size + 4)
-    motion, tracker = np.zeros(2), np.zeros(3)
+    motion, tracker = np.zeros(2), np.zeros(4)
     velocities = after[n:size]
     drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
     work_in, work_damper, work_frame = 0.0, 0.0, 0.0
-    loss = _quadratic(C, z[n:])
+    loss = quadratic(C, z[n:])
     x, pushed = 0.0, 0.0
     for floor in range(n):
         before[floor], before[n + floor] = z[floor], z[n + floor]
@@ -269,7 +159,7 @@ def run_loop(
         for column in range(n):
             pushed += M[floor, column] * z[column]
     motion[0] = x
-    _amplitude(run, motion, tracker)
+    amplitude(run, motion, tracker)
     state = before[:size]
     sample, active, written = -1, -1, 0
     to_sample, to_output, to_record = 0, 0, 0
@@ -279,7 +169,7 @@ def run_loop(
         if to_sample == 0:
             sample += 1
             to_sample = per_sample
-            _sense(lower, gain, w, state, force, ground[step], noise[sample], measured)
+            sense(lower, gain, w, state, force, ground[step], noise[sample], measured)
             controller_step(numbers, layout, memory, measured, commands[sample])
         to_sample -= 1
         if step >= counts[I_DELAY]:
@@ -309,7 +199,7 @@ def run_loop(
             to_record = every
             row = record[written]
             written += 1
-            _note(lower, gain, M, K, state, force, row)
+            note(lower, gain, M, K, state, force, row)
             row[3 * n + T_FORCE] = force
             row[3 * n + T_DRIVE] = drive
             row[3 * n + T_DESIRED] = wanted if track != TRACK_LAW else force
@@ -323,7 +213,7 @@ def run_loop(
         # --- plant: all but the force at the end of the step
         drive += run[R_LAG] * (asked - drive)
         before[size], before[size + 1], before[size + 2] = ground[step], ground[step + 1], force
-        _multiply(step_matrix, before, after)
+        multiply(step_matrix, before, after)
         x_free, v_free, a_free = after[size], after[size + 1], after[size + 2]
         # --- the force at the end of the step, with the motion there
         time = (step + 1) * dt
@@ -375,7 +265,7 @@ def run_loop(
         for row_index in range(size + 4):
             after[row_index] += at_end[row_index] * found
         # --- energy
-        loss_end = _quadratic(C, velocities)
+        loss_end = quadratic(C, velocities)
         work_damper += 0.5 * (force + found) * (after[size] - x)
         work_in -= 0.5 * (ground[step] + ground[step + 1]) * (after[size + 3] - pushed)
         work_frame += 0.5 * (loss + loss_end) * dt
@@ -388,6 +278,6 @@ def run_loop(
                 damper[index] = trial[index]
         elif track == TRACK_LAW:
             motion[0], motion[1] = after[size], after[size + 1]
-            _amplitude(run, motion, tracker)
+            amplitude(run, motion, tracker)
     for index in range(size):
         z[index] = before[index]

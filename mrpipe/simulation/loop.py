@@ -20,7 +20,7 @@ from mrpipe.control.kernel import (
 )
 from mrpipe.dampers.plant import Chain, build_chain, new_state
 from mrpipe.errors import DivergedError, UserError
-from mrpipe.simulation import kernel
+from mrpipe.simulation import kernel, parts
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
@@ -200,7 +200,7 @@ def simulate_law(
     counts, run = _run_numbers(controller, options, steps, per_sample, every, dt)
     samples = steps // per_sample + 1
     commands = np.zeros((samples, COMMAND_SIZE))
-    record = np.zeros((steps // every + 1, 3 * n + kernel.T_SIZE))
+    record = np.zeros((steps // every + 1, 3 * n + parts.T_SIZE))
     z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
     noise = _noise(options.noise, samples, n, rng)
     matrices = [np.ascontiguousarray(item) for item in (frame.mass, frame.damping, frame.stiffness, w)]
@@ -256,23 +256,24 @@ def _run_numbers(
 ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int64]], FloatArray]:
     if options.delay_s < 0.0 or options.driver_time_constant_s < 0.0:
         raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
-    track = kernel.TRACK_DAMPER
+    track = parts.TRACK_DAMPER
     if options.tracking == "ideal":
-        track = kernel.TRACK_LAW if controller.law in _LINEAR_OR_FRICTION else kernel.TRACK_HELD
-    counts = np.zeros(kernel.I_SIZE, dtype=np.int64)
-    counts[kernel.I_STEPS], counts[kernel.I_PER_SAMPLE], counts[kernel.I_RECORD] = steps, per_sample, every
-    counts[kernel.I_DELAY] = round(options.delay_s / dt)
-    counts[kernel.I_TRACK] = track
-    run = np.zeros(kernel.R_SIZE)
-    run[kernel.R_DT] = dt
+        track = parts.TRACK_LAW if controller.law in _LINEAR_OR_FRICTION else parts.TRACK_HELD
+    counts = np.zeros(parts.I_SIZE, dtype=np.int64)
+    counts[parts.I_STEPS], counts[parts.I_PER_SAMPLE], counts[parts.I_RECORD] = steps, per_sample, every
+    counts[parts.I_DELAY] = round(options.delay_s / dt)
+    counts[parts.I_TRACK] = track
+    run = np.zeros(parts.R_SIZE)
+    run[parts.R_DT] = dt
     lag = options.driver_time_constant_s
-    run[kernel.R_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
-    run[kernel.R_C], run[kernel.R_K] = controller.gains.c_n_s_m, controller.gains.k_n_m
-    run[kernel.R_ALPHA] = controller.gains.alpha_n_m
-    run[kernel.R_ROUNDING] = options.ideal_rounding_m_s
+    run[parts.R_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
+    run[parts.R_C], run[parts.R_K] = controller.gains.c_n_s_m, controller.gains.k_n_m
+    run[parts.R_ALPHA] = controller.gains.alpha_n_m
+    run[parts.R_ROUNDING] = options.ideal_rounding_m_s
     # the perfect damper's tracker needs no room for noise
-    run[kernel.R_EXTREMUM_STEP] = 1e-6
-    run[kernel.R_EXTREMUM_SHARE] = controller.options.extremum_share
+    run[parts.R_EXTREMUM_STEP] = 1e-6
+    run[parts.R_EXTREMUM_SHARE] = controller.options.extremum_share
+    run[parts.R_MEMORY] = controller.options.extremum_memory_s
     return counts, run
 
 
@@ -294,7 +295,7 @@ def _response(
 ) -> Response:
     n = len(w)
     tail = record[:, 3 * n :]
-    ground = tail[:, kernel.T_GROUND]
+    ground = tail[:, parts.T_GROUND]
     absolute = record[:, 2 * n : 3 * n]
     return Response(
         time_s=dt * np.arange(len(record), dtype=np.float64),
@@ -304,14 +305,14 @@ def _response(
         absolute_acceleration=absolute,
         damper_displacement=record[:, :n] @ w,
         damper_velocity=record[:, n : 2 * n] @ w,
-        force=tail[:, kernel.T_FORCE],
-        drive=tail[:, kernel.T_DRIVE],
-        desired_force=tail[:, kernel.T_DESIRED],
+        force=tail[:, parts.T_FORCE],
+        drive=tail[:, parts.T_DRIVE],
+        desired_force=tail[:, parts.T_DESIRED],
         ground_acceleration=ground,
-        work_in=tail[:, kernel.T_WORK_IN],
-        work_damper=tail[:, kernel.T_WORK_DAMPER],
-        work_frame=tail[:, kernel.T_WORK_FRAME],
-        energy=tail[:, kernel.T_ENERGY],
+        work_in=tail[:, parts.T_WORK_IN],
+        work_damper=tail[:, parts.T_WORK_DAMPER],
+        work_frame=tail[:, parts.T_WORK_FRAME],
+        energy=tail[:, parts.T_ENERGY],
         commands=commands,
         command_time_s=command_dt * np.arange(len(commands), dtype=np.float64),
         seconds=seconds,

@@ -89,6 +89,7 @@ def _weights(regulator: Any) -> Weights:
         top_displacement=regulator.top_displacement_weight,
         force=regulator.force_weight,
         ground_noise_m_s2=regulator.ground_noise_m_s2,
+        force_noise_n=regulator.force_noise_n,
     )
 
 

@@ -121,6 +121,8 @@ def controller(
     context: StageContext, law: str, frame: Frame, damper: DamperModel, gains: Gains | None = None
 ) -> Controller:
     """Return the controller of a law as the settings of simulate.controller say; `gains` in place of the calibrated."""
+    import math
+
     from mrpipe.control.controller import PASSIVE, ControllerOptions, Gains, build_controller
     from mrpipe.control.inverse import inverse_table
     from mrpipe.control.lqg import lqg_observer
@@ -140,7 +142,9 @@ def controller(
         drive_limit=settings.drive_limit or damper.drive_limit,
         dead_band_m_s=settings.dead_band_m_s,
         extremum_step_m=settings.extremum_step_m,
+        friction_rounding_m_s=settings.friction_rounding_m_s,
         extremum_share=settings.extremum_share,
+        extremum_memory_s=settings.extremum_memory_periods * 2.0 * math.pi / calibrated.scalar("omega_0"),
     )
     if settings.inverse == "network":
         inverse: Any = read_network(context.artifact("train-inverse"), "network")

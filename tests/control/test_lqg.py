@@ -33,7 +33,10 @@ def test_observer_equals_the_control_package(thesis_frame, floor_one):
     C = np.vstack([np.concatenate([floor_one, np.zeros(n)]), space.absolute_acceleration()[0]])
     W = weights.ground_noise_m_s2**2 * np.outer(Bd[:, 0], Bd[:, 0])
     W[n:, n:] += (0.05 * weights.ground_noise_m_s2 * dt) ** 2 * np.eye(n)
+    W += weights.force_noise_n**2 * np.outer(Bd[:, 1], Bd[:, 1])
+    direct = np.concatenate([[0.0], space.absolute_acceleration()[1][:, 1]])
     V = np.diag([weights.displacement_noise_m**2] + [weights.acceleration_noise_m_s2**2] * n)
+    V += weights.force_noise_n**2 * np.diag(direct**2)
     theirs, _, _ = control.dlqe(Ad, np.eye(2 * n), C, W, V)
     ours = observer_gain(thesis_frame, floor_one, weights, dt)
     # theirs is the gain of the predictor A P C' (C P C' + V)^-1, as ours

@@ -38,6 +38,9 @@ class RegulatorSettings(Section):
     top_displacement_weight: float = Field(0.0, ge=0.0, description="Weight of the top displacement squared [1/m2].")
     force_weight: float = Field(1e-4, gt=0.0, description="Weight of the damper force squared [1/N2].")
     ground_noise_m_s2: float = Field(0.1, gt=0.0, description="Noise of the ground's accelerometer, with model error.")
+    force_noise_n: float = Field(
+        20.0, ge=0.0, description="By how much the damper's force differs from the desired one, as a noise."
+    )
 
 
 class CalibrateSettings(Section):

@@ -65,6 +65,12 @@ class ControllerSettings(Section):
     low_pass_hz: float | None = Field(60.0, gt=0.0, description="Butterworth low-pass on the drive; null: none.")
     drive_limit: float | None = Field(None, gt=0.0, description="Largest drive; null: that of the damper.")
     dead_band_m_s: float = Field(0.0, ge=0.0, description="Speed below which the direction of motion is kept.")
+    friction_rounding_m_s: float = Field(
+        0.005, ge=0.0, description="Speed over which the friction of fdns changes its sign; 0: the jump of (4.18)."
+    )
+    extremum_memory_periods: float = Field(
+        0.75, gt=0.0, description="Free periods after which a pending extremum counts though nothing came back from it."
+    )
     extremum_step_m: float = Field(1e-4, gt=0.0, description="Way back that makes an extremum count (X of fdns).")
     extremum_share: float = Field(0.2, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
 

@@ -1,0 +1,156 @@
+"""Parts of the compiled loop: constants of its arrays, perfect damper, sensors, record."""
+
+from __future__ import annotations
+
+import math
+
+from numba import float64, njit, void
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control.kernel import (
+    MEASURED_ACCELERATION,
+    MEASURED_DISPLACEMENT,
+    MEASURED_FLOORS,
+    MEASURED_GROUND,
+    MEASURED_VELOCITY,
+)
+
+# --- how the desired force becomes a force ---
+TRACK_DAMPER, TRACK_LAW, TRACK_HELD = 0, 1, 2
+
+# --- numbers of the run ---
+R_DT = 0
+R_LAG = 1  # share of the way to the command that the driver goes in a step, 1 without lag
+R_C = 2
+R_K = 3
+R_ALPHA = 4
+R_EXTREMUM_STEP = 5
+R_EXTREMUM_SHARE = 6
+R_INITIAL_AMPLITUDE = 7
+R_ROUNDING = 8  # speed over which the friction of a perfect damper turns round [m/s]; 0: a jump
+R_MEMORY = 9  # how long an extremum counts [s]
+R_SIZE = 10
+
+# --- integers of the run ---
+I_STEPS = 0
+I_PER_SAMPLE = 1
+I_DELAY = 2
+I_TRACK = 3
+I_RECORD = 4  # plant steps between records
+I_SIZE = 5
+
+# --- columns of the record after the 2n of the state and the n absolute accelerations ---
+T_FORCE = 0
+T_DRIVE = 1
+T_DESIRED = 2
+T_GROUND = 3
+T_WORK_IN = 4
+T_WORK_DAMPER = 5
+T_WORK_FRAME = 6
+T_ENERGY = 7
+T_SIZE = 8
+
+
+@njit(float64(float64[::1], float64, float64, float64), cache=True)
+def ideal_force(run: FloatArray, amplitude: float, x: float, v: float) -> float:
+    """Return the force of a perfect damper: law (4.14) or (4.18), clipped by P2 (22). It never falls with v."""
+    if run[R_ALPHA] > 0.0:
+        largest = max(amplitude, abs(x))
+        side = math.tanh(v / run[R_ROUNDING]) if run[R_ROUNDING] > 0.0 else (1.0 if v > 0.0 else -1.0)
+        force = run[R_ALPHA] * (side * largest - x)
+        return force if force * v >= 0.0 else 0.0
+    force = run[R_C] * v + run[R_K] * x
+    return force if force * v >= 0.0 else 0.0
+
+
+@njit(void(float64[:, ::1], float64[::1], float64[::1]), cache=True)
+def multiply(transposed: FloatArray, z: FloatArray, result: FloatArray) -> None:
+    """Write A z; by columns of A, so that the inner loop runs along memory without a sum."""
+    for row in range(result.shape[0]):
+        result[row] = 0.0
+    for column in range(z.shape[0]):
+        value = z[column]
+        for row in range(result.shape[0]):
+            result[row] += transposed[column, row] * value
+
+
+@njit(float64(float64[:, ::1], float64[::1]), cache=True)
+def quadratic(A: FloatArray, z: FloatArray) -> float:
+    """Return z'A z."""
+    total = 0.0
+    for row in range(z.shape[0]):
+        part = 0.0
+        for column in range(z.shape[0]):
+            part += A[row, column] * z[column]
+        total += part * z[row]
+    return total
+
+
+@njit(void(float64[::1], float64[::1], float64[::1]), cache=True)
+def amplitude(run: FloatArray, motion: FloatArray, tracker: FloatArray) -> None:
+    """Keep the most recent extremum of a perfect sensor; tracker: seeking, extreme, amplitude, age."""
+    x = motion[0]
+    if tracker[0] == 0.0:
+        tracker[0] = 1.0 if motion[1] >= 0.0 else -1.0
+        tracker[1] = x
+        tracker[2] = max(abs(x), run[R_INITIAL_AMPLITUDE])
+    if tracker[0] * x > tracker[0] * tracker[1]:
+        tracker[1] = x
+    step = max(run[R_EXTREMUM_STEP], run[R_EXTREMUM_SHARE] * tracker[2])
+    if tracker[0] * (tracker[1] - x) > step:
+        tracker[2] = abs(tracker[1])
+        tracker[0] = -tracker[0]
+        tracker[1] = x
+        tracker[3] = 0.0
+    elif tracker[3] > run[R_MEMORY]:
+        tracker[2] = abs(tracker[1])
+        tracker[0] = 1.0 if motion[1] >= 0.0 else -1.0
+        tracker[1] = x
+        tracker[3] = 0.0
+    tracker[3] += run[R_DT]
+
+
+@njit(
+    void(
+        float64[:, ::1], float64[::1], float64[::1], float64[::1], float64, float64, float64[::1], float64[::1],
+    ),
+    cache=True,
+)  # fmt: skip
+def sense(
+    lower: FloatArray, gain: FloatArray, w: FloatArray, z: FloatArray, force: float, ground: float,
+    noise: FloatArray, measured: FloatArray,
+) -> None:  # fmt: skip
+    """Fill what the sensors say; `lower` is the transposed lower half of A, `gain` what a newton accelerates."""
+    n = w.shape[0]
+    floors = measured[MEASURED_FLOORS:]
+    multiply(lower, z, floors)
+    x, v, a = 0.0, 0.0, 0.0
+    for floor in range(n):
+        floors[floor] += gain[floor] * force
+        x += w[floor] * z[floor]
+        v += w[floor] * z[n + floor]
+        # difference of a floor's and the ground's accelerometer
+        a += w[floor] * (floors[floor] - ground)
+        floors[floor] += noise[MEASURED_FLOORS + floor]
+    measured[MEASURED_GROUND] = ground + noise[MEASURED_GROUND]
+    measured[MEASURED_DISPLACEMENT] = x + noise[MEASURED_DISPLACEMENT]
+    measured[MEASURED_VELOCITY] = v
+    measured[MEASURED_ACCELERATION] = a + noise[MEASURED_ACCELERATION]
+
+
+@njit(
+    void(float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64, float64[::1]),
+    cache=True,
+)  # fmt: skip
+def note(
+    lower: FloatArray, gain: FloatArray, M: FloatArray, K: FloatArray, z: FloatArray, force: float, row: FloatArray
+) -> None:
+    """Write state, absolute accelerations and stored energy into a row of the record."""
+    n = gain.shape[0]
+    for index in range(2 * n):
+        row[index] = z[index]
+    accelerations = row[2 * n : 3 * n]
+    multiply(lower, z, accelerations)
+    for floor in range(n):
+        accelerations[floor] += gain[floor] * force
+    row[3 * n + T_ENERGY] = 0.5 * (quadratic(M, z[n:]) + quadratic(K, z[:n]))
