@@ -101,19 +101,27 @@ def modal_coordinates(test: FrameTest, mode_shapes: FloatArray, angular_frequenc
     return result
 
 
-def decay_start(test: FrameTest) -> int:
-    """Return the sample at which the excitation has stopped; 0 where it never acted or was not recorded."""
+def decay_start(test: FrameTest, coordinate: FloatArray, omega: float) -> int:
+    """Return the sample at which the free decay begins; 0 where the record holds nothing but the decay.
+
+    The excitation near the mode tells where it stops. A resonance needs so little of it that it may stay below the
+    sensor's noise; but a decay never begins before the largest amplitude, so that counts as well.
+    """
+    rate = test.sampling_rate_hz
+    envelope = np.abs(signal.hilbert(_band_pass(coordinate, omega, rate)))
+    largest = int(np.argmax(envelope))
+    # a decay that begins with the record is largest at its beginning, but for the ringing of the filter
+    largest = 0 if largest < _edge_s(2.0 * np.pi / omega, coordinate.size / rate, True) * rate else largest
     if test.excitation is None:
-        return 0
-    width = max(3, int(0.25 * test.sampling_rate_hz))
-    centred = test.excitation - np.median(test.excitation)
-    level = np.sqrt(np.convolve(centred**2, np.full(width, 1.0 / width), mode="same"))
-    quiet = float(np.quantile(level, 0.05))
-    top = float(level.max())
-    if top < 4.0 * quiet:
-        return 0
-    # the moving window reaches half its width beyond the stop
-    return int(np.flatnonzero(level > max(0.1 * top, 2.0 * quiet))[-1]) + 1
+        return largest
+    width = max(3, round(max(2.0, 8.0 * np.pi / omega) * rate))
+    near = _band_pass(test.excitation - np.median(test.excitation), omega, rate)
+    power = np.convolve(near**2, np.full(width, 1.0 / width), mode="same")
+    quiet, top = float(np.quantile(power, 0.05)), float(power.max())
+    if top < 9.0 * quiet:
+        return largest
+    # filter and average are symmetric, so the power falls through its half where the excitation stops
+    return max(largest, int(np.flatnonzero(power > 0.5 * (quiet + top))[-1]) + 1)
 
 
 def _band_pass(coordinate: FloatArray, omega: float, rate: float) -> FloatArray:
@@ -225,11 +233,11 @@ def analyse_decay(
         Of all modes, shape (r,), from the forced tests; start of the fit.
     """
     rate = test.sampling_rate_hz
-    start = decay_start(test)
     coordinates = modal_coordinates(test, mode_shapes, angular_frequencies)
-    tail = coordinates[start:]
-    sizes = np.linalg.norm(mode_shapes, axis=0) * tail.std(axis=0)
+    sizes = np.linalg.norm(mode_shapes, axis=0) * coordinates.std(axis=0)
     mode = test.mode - 1 if 1 <= test.mode <= angular_frequencies.size else int(np.argmax(sizes))
+    start = decay_start(test, coordinates[:, mode], float(angular_frequencies[mode]))
+    tail = coordinates[start:]
     omega, zeta = float(angular_frequencies[mode]), float(damping_ratios[mode])
     period = 2.0 * np.pi / omega
     if tail.shape[0] / rate < 6.0 * period:

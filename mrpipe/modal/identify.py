@@ -9,7 +9,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
-from mrpipe.modal.checks import check_mode_matrix, orthogonal_shapes
+from mrpipe.modal.checks import LARGEST_COUPLING, check_mode_matrix, modal_coupling, orthogonal_shapes
 from mrpipe.modal.decay import DecayResult, Estimate, analyse_decay
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.records import FrameTest, FrameTests
@@ -33,6 +33,7 @@ from mrpipe.structures import (
 
 _NORMAL_95 = 1.959964
 _LEAST_COHERENCE = 0.5
+_ENOUGH_COHERENCE = 0.9
 _WIDEST_DECAY_INTERVAL = 0.02
 
 
@@ -92,7 +93,7 @@ class FrameIdentification:
     phase_scatter
         Shape (n,): largest imaginary part of a mode's residues over the largest residue.
     tests
-        The forced tests that were used.
+        The forced tests, those of the fit first; all are simulated for verification.
     band_hz
         Band of the fit.
     findings
@@ -123,7 +124,32 @@ def _one_place(tests: FrameTests) -> tuple[tuple[FrameTest, ...], list[str]]:
     wanted = Counter(keys).most_common(1)[0][0]
     chosen = tuple(test for test, key in zip(tests.forced, keys, strict=True) if key == wanted)
     left = [test.name for test, key in zip(tests.forced, keys, strict=True) if key != wanted]
-    return chosen, [f"test {name} is excited or measured elsewhere than the others and was left out" for name in left]
+    return _training_first(chosen), [
+        f"test {name} is excited or measured elsewhere than the others and was left out" for name in left
+    ]
+
+
+def _training_first(tests: tuple[FrameTest, ...]) -> tuple[FrameTest, ...]:
+    return tuple(sorted(tests, key=lambda test: test.role == "validation"))
+
+
+def _find(
+    forced: tuple[FrameTest, ...], tests: FrameTests, options: IdentificationOptions
+) -> tuple[MultiModeFit, tuple[float, float], list[str]]:
+    """Find the modes in the tests that are not for validation; in all of them where a mode is too weak in those."""
+    first = tuple(test for test in forced if test.role != "validation") or forced
+    arguments = (tests.floor_masses, options.band_low_hz, options.band_high_hz, tests.source)
+    if len(first) == len(forced):
+        return *find_modes(first, *arguments), []
+    try:
+        fit, band = find_modes(first, *arguments)
+        coupling = modal_coupling(np.real(fit.residues), np.diag(tests.floor_masses))
+        if fit.mode_coherence().min() >= _ENOUGH_COHERENCE and np.abs(np.triu(coupling, 1)).max() <= LARGEST_COUPLING:
+            return fit, band, []
+    except UserError:
+        pass
+    note = "a mode is weak in the training tests: those for validation were taken for the fit as well"
+    return *find_modes(forced, *arguments), [note]
 
 
 def _check_coherence(fit: MultiModeFit, tests: FrameTests) -> list[str]:
@@ -229,8 +255,8 @@ def identify_frame(
     if chosen.mode_matrix is not None:
         _check_given(chosen, mass, forced[0].floors)
     progress(0.05, "poles")
-    fit, band = find_modes(forced, tests.floor_masses, chosen.band_low_hz, chosen.band_high_hz, tests.source)
-    findings += _check_coherence(fit, tests)
+    fit, band, notes = _find(forced, tests, chosen)
+    findings += [*notes, *_check_coherence(fit, tests)]
     progress(0.4, "decays")
     decays, notes = _decays(tests, fit)
     findings += notes

@@ -35,8 +35,8 @@ def _stack(matrix: ComplexArray) -> FloatArray:
     return np.concatenate([matrix.real, matrix.imag], axis=0)
 
 
-def _reduced(spectra: Sequence[RecordSpectrum], order: int, step: float, output: int) -> FloatArray:
-    """Return the part of A(z) Y = B(z) U + T(z) that the denominator alone must explain, for one output.
+def _triangle(spectra: Sequence[RecordSpectrum], order: int, step: float, output: int) -> FloatArray:
+    """Return R of A(z) Y = B(z) U + T(z) for one output at the highest order: columns of B, of T a test, of A.
 
     T(z) takes up what the record holds of its beginning and end (no window, no leakage error); each test has its own.
     """
@@ -52,31 +52,48 @@ def _reduced(spectra: Sequence[RecordSpectrum], order: int, step: float, output:
         block[:, start : start + order + 1] = z / np.sqrt(item.omega.size)
         left.append(_stack(block))
         rows.append(_stack(z * (item.responses[:, output] / scale)[:, None]))
-    triangle: FloatArray = np.asarray(np.linalg.qr(np.hstack([np.vstack(left), np.vstack(rows)]), mode="r"))
-    return triangle[width:, width:]
+    return np.asarray(np.linalg.qr(np.hstack([np.vstack(left), np.vstack(rows)]), mode="r"), dtype=np.float64)
 
 
-def lscf_poles(spectra: Sequence[RecordSpectrum], order: int, high_rad_s: float) -> NDArray[np.complex128]:
-    """Return the poles [rad/s] with positive imaginary part of a common-denominator model.
+def _reduced(triangle: FloatArray, highest: int, order: int) -> FloatArray:
+    """Return the part that the denominator of a lower order alone must explain.
+
+    Lower orders take some columns of the highest one, and R of some columns of a matrix is R of those columns of its R:
+    the data are factored once for all orders.
+    """
+    blocks = triangle.shape[1] // (highest + 1)
+    columns = np.concatenate([block * (highest + 1) + np.arange(order + 1) for block in range(blocks)])
+    lower = np.asarray(np.linalg.qr(triangle[:, columns], mode="r"), dtype=np.float64)
+    width = (order + 1) * (blocks - 1)
+    return lower[width:, width:]
+
+
+def lscf_poles(
+    spectra: Sequence[RecordSpectrum], orders: Sequence[int], high_rad_s: float
+) -> list[NDArray[np.complex128]]:
+    """Return, for each order, the poles [rad/s] with positive imaginary part of a common-denominator model.
 
     Parameters
     ----------
     spectra
         Whole-record spectra of forced tests.
-    order
-        Order of the denominator in z = exp(-i omega step).
+    orders
+        Orders of the denominator in z = exp(-i omega step).
     high_rad_s
         Upper end of the band; it is put at 0.95 pi of the unit circle.
     """
     step = 0.95 * np.pi / high_rad_s
-    outputs = spectra[0].responses.shape[1]
-    stacked = np.vstack([_reduced(spectra, order, step, output) for output in range(outputs)])
-    # fixing the constant coefficient at one separates physical (stable) from numerical (unstable) poles
-    coefficients = np.linalg.lstsq(stacked[:, 1:], -stacked[:, 0], rcond=None)[0]
-    roots = np.roots(np.concatenate([coefficients[::-1], [1.0]]))
-    roots = roots[np.abs(roots) > 0.0]
-    poles = -np.log(roots) / step
-    return np.asarray(poles[(poles.imag > 0.0)], dtype=np.complex128)
+    highest = max(orders)
+    triangles = [_triangle(spectra, highest, step, output) for output in range(spectra[0].responses.shape[1])]
+    found = []
+    for order in orders:
+        stacked = np.vstack([_reduced(triangle, highest, order) for triangle in triangles])
+        # fixing the constant coefficient at one separates physical (stable) from numerical (unstable) poles
+        coefficients = np.linalg.lstsq(stacked[:, 1:], -stacked[:, 0], rcond=None)[0]
+        roots = np.roots(np.concatenate([coefficients[::-1], [1.0]]))
+        poles = -np.log(roots[np.abs(roots) > 0.0]) / step
+        found.append(np.asarray(poles[(poles.imag > 0.0)], dtype=np.complex128))
+    return found
 
 
 def stable_poles(
@@ -99,8 +116,8 @@ def stable_poles(
         What counts as physical, and as the same pole.
     """
     found: list[tuple[float, float, int]] = []
-    for order in orders:
-        for pole in lscf_poles(spectra, order, band_rad_s[1]):
+    for order, poles in zip(orders, lscf_poles(spectra, orders, band_rad_s[1]), strict=True):
+        for pole in poles:
             omega, zeta = float(abs(pole)), float(-pole.real / abs(pole))
             if 0.0 < zeta < largest_damping_ratio and band_rad_s[0] <= omega <= band_rad_s[1]:
                 found.append((omega, zeta, order))

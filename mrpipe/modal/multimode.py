@@ -100,7 +100,9 @@ class _Problem:
         self.rows = [item.omega.size for item in spectra]
         self.total = sum(self.rows)
         self.high = max(float(item.omega[-1]) for item in spectra)
-        self.scale = [float(np.linalg.norm(item.excitation)) / np.sqrt(item.omega.size) for item in spectra]
+        # one scale for all tests: what stands for the modes above the band is a property of the frame, not of a test
+        power = sum(float(np.linalg.norm(item.excitation)) ** 2 for item in spectra)
+        self.scale = float(np.sqrt(power / self.total))
         self.tests = len(spectra)
 
     def mode_columns(self, omega_r: float, zeta: float) -> ComplexArray:
@@ -131,7 +133,7 @@ class _Problem:
             part = slice(start, start + item.omega.size)
             ratio = 1j * item.omega / self.high
             direct = ratio[:, None] ** np.arange(_DIRECT_POWERS)
-            columns[part, :_DIRECT_POWERS] = direct * item.excitation[:, None] / self.scale[index]
+            columns[part, :_DIRECT_POWERS] = direct * item.excitation[:, None] / self.scale
             first = _DIRECT_POWERS + index * (_TRANSIENT_POWERS + 1)
             columns[part, first : first + _TRANSIENT_POWERS + 1] = ratio[:, None] ** np.arange(-1, _TRANSIENT_POWERS)
             start += item.omega.size

@@ -39,6 +39,8 @@ class FrameTest:
         Mode that a decay test is for, from 1; 0 where it was not told.
     displacements
         Floor (from 1) -> displacement [m], shape (m,), where lasers were there beside accelerometers.
+    role
+        training, validation or repeat; validation tests are kept for verification where there are others.
     """
 
     name: str
@@ -50,6 +52,7 @@ class FrameTest:
     shaker_floor: int = 0
     mode: int = 0
     displacements: tuple[tuple[int, FloatArray], ...] = ()
+    role: str = "training"
 
     @property
     def floors(self) -> int:
@@ -135,6 +138,7 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
         is_displacement=is_displacement,
         shaker_floor=shaker,
         mode=int(recording.details.get("mode") or 0),
+        role=recording.role,
         displacements=tuple((i, recording.channels[f"{DISPLACEMENT}_{i}"][part]) for i in sorted(displacements)),
     )
 

@@ -22,6 +22,7 @@ _LEAST_COHERENCE = 0.5
 _DIVERGED_DAMPING = 0.25
 _LARGEST_COUPLING = 0.15
 _SAME_SHAPE = 0.6
+_LAST_BAND = 1.25
 
 
 @dataclass(frozen=True)
@@ -218,16 +219,20 @@ def find_modes(
 
 
 def _only(found: _Found, keep: Sequence[int]) -> MultiModeFit:
-    """Fit once more with the frame's poles and those beyond them that are real peaks.
+    """Fit once more with the frame's poles and those beyond them that are real peaks, up to a little above the frame.
 
-    Without a support's peak its response would be blamed on the frame.
+    Without a support's peak its response would be blamed on the frame. A peak just beyond the band of the search is no
+    power series inside it, so the band ends well before what is not the frame's.
     """
     fit = found.fit
     strength = _strength(fit)
     level = 0.1 * min(strength[list(keep)])
     others = [i for i in _sound(fit) if i not in keep and strength[i] > level and fit.damping_ratios[i] < 0.1]
     both = sorted([*keep, *others])
-    refined = fit_modes(found.spectra, fit.angular_frequencies[both], fit.damping_ratios[both])
+    top = _LAST_BAND * float(fit.angular_frequencies[list(keep)].max())
+    refined = fit_modes(
+        [item.below(top) for item in found.spectra], fit.angular_frequencies[both], fit.damping_ratios[both]
+    )
     place = [int(np.argmin(np.abs(refined.angular_frequencies - fit.angular_frequencies[i]))) for i in keep]
     return refined.only(place)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,13 @@ class RecordSpectrum:
     shaker_floor: int
     dt: float
 
+    def below(self, omega: float) -> RecordSpectrum:
+        """Return the lines up to `omega` [rad/s]."""
+        inside = self.omega <= omega
+        return replace(
+            self, omega=self.omega[inside], excitation=self.excitation[inside], responses=self.responses[inside]
+        )
+
 
 def averaged_responses(test: FrameTest, segment_s: float) -> FrequencyResponses:
     """Return P_gi/P_gg (3.4) and coherence by Welch's method with Hann segments that overlap by three quarters.
@@ -107,27 +114,25 @@ def record_spectrum(test: FrameTest, band_hz: tuple[float, float]) -> RecordSpec
     )
 
 
-def excited_band(tests: tuple[FrameTest, ...], share: float = 0.01) -> tuple[float, float]:
+def excited_band(tests: tuple[FrameTest, ...], share: float = 0.03) -> tuple[float, float]:
     """Return the band [Hz] in which the excitation of all tests together has power.
 
-    The edges are where the smoothed power density falls below `share` of its median over the stretch that holds 98 %
-    of the excitation's power.
+    Its edges are where the averaged power density falls below `share` of its usual value (half of the power lies at
+    lines denser than that) or below four times the sensor's noise.
     """
     lows, highs = [], []
     for test in tests:
         if test.excitation is None:
             continue
         rate = test.sampling_rate_hz
-        length = int(min(16.0, 0.25 * test.duration_s) * rate)
+        length = int(min(8.0, 0.25 * test.duration_s) * rate)
         frequency, power = signal.welch(test.excitation, fs=rate, nperseg=length, detrend="constant")
-        # the power below the first lines is drift of the sensor
-        power[:1] = 0.0
-        total = np.cumsum(power) / np.sum(power)
-        core = (total >= 0.01) & (total <= 0.99)
-        level = share * np.median(power[core])
-        above = np.flatnonzero(power >= level)
-        lows.append(float(frequency[above[0]]))
-        centre = int(np.flatnonzero(core)[-1])
-        beyond = np.flatnonzero(power[centre:] < level)
-        highs.append(float(frequency[centre + beyond[0]] if beyond.size else frequency[-1]))
+        # the first lines hold the sensor's drift
+        power[:2] = 0.0
+        falling = np.sort(power)[::-1]
+        usual = falling[int(np.searchsorted(np.cumsum(falling), 0.5 * falling.sum()))]
+        floor = float(np.quantile(power[2:], 0.1))
+        inside = np.flatnonzero(power >= max(share * usual, min(4.0 * floor, 0.3 * usual)))
+        lows.append(float(frequency[inside[0]]))
+        highs.append(float(frequency[inside[-1]]))
     return max(min(lows), 1e-3), max(highs)

@@ -65,10 +65,10 @@ def random_test(frame, rng, rig):
     return FrameTest("random", "random", rig.rate, u, y, (False,) * y.shape[1])
 
 
-def decay_test(frame, rng, rig, mode):
+def decay_test(frame, rng, rig, mode, table=0.1):
     omega = natural_modes(frame).angular_frequencies[mode - 1]
     time = np.arange(int((15.0 + rig.decay_s) * rig.rate)) / rig.rate
-    u, y = measure(frame, rng, rig, np.where(time < 15.0, 0.1 * np.sin(omega * time), 0.0))
+    u, y = measure(frame, rng, rig, np.where(time < 15.0, table * np.sin(omega * time), 0.0))
     return FrameTest(f"decay-{mode}", "free-decay", rig.rate, u, y, (False,) * y.shape[1], mode=mode)
 
 
