@@ -12,6 +12,7 @@ The same chain serves the bench (:func:`run_chain` over recorded motion) and the
 :func:`advance` once a plant step). To try a step and take it back, copy `state` before and restore it after.
 """
 
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import warnings
@@ -115,7 +116,7 @@ class Chain:
 
     @property
     def arguments(self) -> tuple[Any, ...]:
-        """Return (functions, parameters, parameter_offsets, state_offsets) for :func:`advance` and :func:`run_chain`."""
+        """Return (functions, parameters, parameter_offsets, state_offsets), the first arguments of :func:`advance`."""
         return self.functions, self.parameters, self.parameter_offsets, self.state_offsets
 
 
