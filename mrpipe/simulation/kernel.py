@@ -61,7 +61,7 @@ from mrpipe.simulation.parts import (
 
 PLAIN_ITERATIONS = 12
 TOLERANCE_N = 1e-5
-CORRECTED_N = 1e-2
+CORRECTED_N = 2e-3
 
 _FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
 
@@ -237,7 +237,7 @@ def run_loop(
             if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
                 converged = True
                 break
-            if track == TRACK_DAMPER and abs(difference) <= CORRECTED_N + 1e-3 * abs(found):
+            if track == TRACK_DAMPER and abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
                 # so near that the slope of the step before leaves an error far below what matters
                 found = guess + difference / (1.0 - slope)
                 converged = True

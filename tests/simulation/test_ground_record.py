@@ -1,0 +1,50 @@
+"""Reading a recorded base acceleration."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mrpipe.errors import UserError
+from mrpipe.simulation.ground_record import read_ground_record
+
+
+@pytest.mark.golden
+def test_headers_separators_and_units(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("time, a\n0.0, 0.0\n0.02; 0.5\n0.04\t-0.25\n")
+    time, acceleration = read_ground_record(path, "g")
+    np.testing.assert_allclose(time, [0.0, 0.02, 0.04])
+    np.testing.assert_allclose(acceleration, np.array([0.0, 0.5, -0.25]) * 9.80665)
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(
+    ("text", "unit", "words"),
+    [
+        ("0 1\n0 2\n", "m/s^2", "row 2: time does not rise"),
+        ("0 1\n1\n", "m/s^2", "line 2: has no two numbers"),
+        ("a b\n", "m/s^2", "holds 0 rows"),
+        ("0 1\n1 2\n", "mm", "is no unit of acceleration"),
+        ("0 1\n1 nan\n", "m/s^2", "not finite"),
+    ],
+)
+def test_faults(tmp_path, text, unit, words):
+    path = tmp_path / "record.txt"
+    path.write_text(text)
+    with pytest.raises(UserError, match=words) as caught:
+        read_ground_record(path, unit)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.golden
+def test_missing_file(tmp_path):
+    with pytest.raises(UserError, match="no such file"):
+        read_ground_record(tmp_path / "none.txt", "g")
+
+
+@pytest.mark.real
+def test_el_centro(public_data):
+    path = public_data / "ground_motions" / "elcentro_NS.dat"
+    _, acceleration = read_ground_record(path, "g")
+    assert np.max(np.abs(acceleration)) == pytest.approx(0.349 * 9.80665, rel=1e-2)
