@@ -140,6 +140,7 @@ def sweep_axes(outcomes: Sequence[Outcome], centre: Candidate) -> Figure:
                 axis.plot(np.full(len(outcome.refined), place + 0.2), outcome.refined, ".", color=MODEL, markersize=4)
                 axis.plot([place + 0.2], [np.exp(np.mean(np.log(outcome.refined)))], "_", color=MODEL, markersize=14)
         axis.set_yscale("log")
+        axis.tick_params(axis="y", which="both", labelsize=7)
         axis.set_xticks(range(len(names)), names, rotation=45, fontsize=7)
         label(axis, "", "held-out NRMSE", title)
     return figure
@@ -156,6 +157,7 @@ def sweep_sizes(outcomes: Sequence[Outcome], chosen: Outcome) -> Figure:
     best = float(np.exp(np.mean(np.log(chosen.refined))))
     axis.plot([chosen.candidate.parameters], [best], "o", markersize=12, markerfacecolor="none", color=COLOURS[0])
     axis.set_yscale("log")
+    axis.tick_params(axis="y", which="both", labelsize=7)
     axis.legend(fontsize=7)
     label(axis, "parameters", "held-out NRMSE, mean over starts", chosen.candidate.label)
     return figure
