@@ -1,0 +1,194 @@
+"""The parts of the controller one by one: velocity, amplitude, clipping, inverse, switch, networks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mrpipe.artifacts import load_parameter_set
+from mrpipe.control import COMMAND_SIZE, ControllerOptions, Gains, build_controller, controller_step, inverse_table
+from mrpipe.control.calibration import THESIS_GAINS
+from mrpipe.control.kalman import continuous_kalman_gains, kalman_gains
+from mrpipe.control.kernel import (
+    COMMAND_AMPLITUDE,
+    COMMAND_DRIVE,
+    COMMAND_FORCE,
+    COMMAND_INVERSE,
+    COMMAND_UNCLIPPED,
+    COMMAND_VELOCITY,
+)
+from mrpipe.control.linearisation import equivalent_stiffness, friction_stiffness
+from mrpipe.control.neural import ReferenceOptions, network_force, train_reference
+from mrpipe.dampers.model import damper_from_parameter_set
+from mrpipe.errors import UserError
+from mrpipe.networks.network import lagged
+from tests.control.conftest import random_network
+
+SET_C = inverse_table(damper_from_parameter_set(load_parameter_set("dampers", "set-c")))
+
+
+def run(controller, displacement, acceleration, velocity=None):
+    state = controller.new_state()
+    commands = np.zeros((len(displacement), COMMAND_SIZE))
+    measured = np.zeros(controller.measured_size)
+    for index, command in enumerate(commands):
+        measured[0], measured[1] = displacement[index], acceleration[index]
+        measured[2] = 0.0 if velocity is None else velocity[index]
+        controller_step(controller.numbers, controller.layout, state, measured, command)
+    return commands
+
+
+def motion(rate, seconds, noise=None, omega=8.0, amplitude=0.009):
+    t = np.arange(int(seconds * rate)) / rate
+    x = amplitude * np.sin(omega * t)
+    a = -(omega**2) * x
+    if noise is not None:
+        x = x + 20e-6 * noise.standard_normal(len(t))
+        a = a + 0.1 * noise.standard_normal(len(t))
+    return t, x, a, amplitude * omega * np.cos(omega * t)
+
+
+@pytest.mark.literature
+def test_gains_of_the_kalman_filter():
+    k, l = continuous_kalman_gains(20e-6, 0.1)  # noqa: E741
+    assert (k, l) == (pytest.approx(100.0), pytest.approx(5000.0))
+    # sampled fast, the steady filter is the continuous one
+    np.testing.assert_allclose(kalman_gains(20e-6, 0.1, 1e-5)[:2] / 1e-5, [100.0, 5000.0], rtol=2e-3)
+
+
+@pytest.mark.literature
+def test_velocity_error_of_filter_and_difference():
+    rng = np.random.default_rng(2)
+    _, x, a, v = motion(1000.0, 20.0, rng)
+    errors = {}
+    for kind in ("kalman", "difference"):
+        controller = build_controller(
+            "vd", Gains(650.0), ControllerOptions(rate_hz=1000.0, velocity=kind), inverse=SET_C
+        )
+        found = run(controller, x, a)[:, COMMAND_VELOCITY]
+        errors[kind] = float(np.sqrt(np.mean((found - v)[1000:] ** 2)))
+    assert 0.4e-3 < errors["kalman"] < 0.8e-3
+    assert errors["difference"] > 16e-3
+
+
+@pytest.mark.literature
+def test_bias_costs_velocity_and_a_bias_state_removes_it():
+    _, x, a, v = motion(1000.0, 60.0)
+    found = {}
+    for drift in (0.0, 0.01):
+        controller = build_controller(
+            "vd", Gains(650.0), ControllerOptions(rate_hz=1000.0, bias_drift_m_s2=drift), inverse=SET_C
+        )
+        error = run(controller, x, a + 0.2)[:, COMMAND_VELOCITY] - v
+        found[drift] = float(np.mean(error[-20000:]))
+    assert found[0.0] == pytest.approx(0.2 * 100.0 / 5000.0, rel=0.06)
+    assert abs(found[0.01]) < 0.02 * found[0.0]
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("rate", [200.0, 500.0])
+def test_amplitude_is_the_most_recent_extremum_in_spite_of_noise(rate):
+    rng = np.random.default_rng(4)
+    t, x, a, _ = motion(rate, 12.0)
+    envelope = np.where(t < 6.0, 1.0, 0.5)
+    noisy = envelope * x + 20e-6 * rng.standard_normal(len(t))
+    controller = build_controller("fdns", Gains(alpha_n_m=3000.0), ControllerOptions(rate_hz=rate), inverse=SET_C)
+    amplitude = run(controller, noisy, envelope * a + 0.1 * rng.standard_normal(len(t)))[:, COMMAND_AMPLITUDE]
+    assert np.max(np.abs(amplitude[(t > 2.0) & (t < 6.0)] - 0.009)) < 0.02 * 0.009
+    assert np.max(np.abs(amplitude[t > 7.5] - 0.0045)) < 0.04 * 0.0045
+
+
+@pytest.mark.property
+def test_amplitude_of_a_stuck_damper_is_forgotten():
+    t, x, a, _ = motion(200.0, 6.0)
+    x, a = np.where(t < 2.945, x, x[589]), np.where(t < 2.945, a, 0.0)
+    x = np.where(t > 3.5, 0.001, x)
+    controller = build_controller("fdns", Gains(alpha_n_m=3000.0), ControllerOptions(), inverse=SET_C)
+    amplitude = run(controller, x, a)[:, COMMAND_AMPLITUDE]
+    assert amplitude[t > 5.0].max() < 0.0015 < amplitude[500]
+
+
+@pytest.mark.property
+@settings(max_examples=25, deadline=None)
+@given(law=st.sampled_from(["vd", "vdps", "vdns", "fdns"]), seed=st.integers(0, 1000), size=st.floats(1e-4, 0.05))
+def test_what_leaves_the_controller_is_dissipative_and_within_limits(law, seed, size):
+    rng = np.random.default_rng(seed)
+    x = size * np.cumsum(rng.standard_normal(300)) / 10.0
+    v = np.gradient(x) * 200.0
+    controller = build_controller(law, THESIS_GAINS[law], ControllerOptions(velocity="measured"), inverse=SET_C)
+    commands = run(controller, x, np.zeros(300), v)
+    assert np.all(commands[:, COMMAND_FORCE] * v >= 0.0)
+    assert np.all((commands[:, COMMAND_DRIVE] >= 0.0) & (commands[:, COMMAND_DRIVE] <= 4.0))
+    kept = commands[:, COMMAND_FORCE] != 0.0
+    assert np.all(commands[kept, COMMAND_FORCE] == commands[kept, COMMAND_UNCLIPPED])
+
+
+@pytest.mark.property
+@settings(max_examples=60, deadline=None)
+@given(speed=st.floats(0.0, 0.5), drive=st.floats(0.01, 3.99))
+def test_inverse_table_gives_the_drive_back(speed, drive):
+    model = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    force = float(model.quasi_static_force(max(speed, 1e-9), drive))
+    # the law asks for just this force at this velocity
+    gains = Gains(c_n_s_m=force / max(speed, 1e-9))
+    options = ControllerOptions(velocity="measured", residual_force_n=0.0, low_pass_hz=None)
+    controller = build_controller("vd", gains, options, inverse=SET_C)
+    velocity = np.full(3, max(speed, 1e-9))
+    asked = run(controller, np.zeros(3), np.zeros(3), velocity)[-1, COMMAND_INVERSE]
+    assert float(model.quasi_static_force(max(speed, 1e-9), asked)) == pytest.approx(force, rel=2e-3, abs=0.05)
+
+
+@pytest.mark.property
+def test_switch_and_low_pass():
+    _, x, a, v = motion(200.0, 4.0)
+    plain = {"velocity": "measured", "low_pass_hz": None}
+    with_switch = run(build_controller("vd", Gains(650.0), ControllerOptions(**plain), inverse=SET_C), x, a, v)
+    small = np.abs(with_switch[:, COMMAND_FORCE]) < 18.0
+    assert small.any() and np.all(with_switch[small, COMMAND_DRIVE] == 0.0)
+    options = ControllerOptions(velocity="measured", low_pass_hz=60.0, residual_force_n=0.0)
+    from scipy.signal import butter, lfilter
+
+    filtered = run(build_controller("vd", Gains(650.0), options, inverse=SET_C), x, a, v)
+    b, a_coefficients = butter(2, 60.0, fs=200.0)
+    expected = lfilter(b, a_coefficients, filtered[:, COMMAND_INVERSE])
+    np.testing.assert_allclose(filtered[:, COMMAND_DRIVE], np.clip(expected, 0.0, 4.0), atol=1e-12)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("rate", [200.0, 400.0, 500.0])
+def test_inverse_network_sees_its_own_lags_whatever_the_rate(rate):
+    """At 500 Hz the past values of a network of 200 Hz lie between samples."""
+    network = random_network(("velocity", "force"), "drive", 3, True)
+    _, x, a, v = motion(rate, 4.0)
+    options = ControllerOptions(rate_hz=rate, velocity="measured", residual_force_n=0.0)
+    asked = run(build_controller("vd", Gains(650.0), options, inverse=network), x, a, v)[:, COMMAND_INVERSE]
+    t = np.arange(0.0, 4.0, 1.0 / 200.0)
+    wanted = network.predict(lagged([0.072 * np.cos(8.0 * t), 650.0 * 0.072 * np.cos(8.0 * t)], 3, absolute=True))
+    both = np.interp(t[3:], np.arange(len(asked)) / rate, asked)
+    assert np.max(np.abs(both - wanted)[20:]) < (1e-9 if rate == 200.0 else 0.02)
+
+
+@pytest.mark.literature
+def test_neural_reference_imitates_friction_with_negative_stiffness():
+    amplitudes = tuple(0.0093 * np.geomspace(0.2, 2.0, 7))
+    frequencies = tuple(1.273 * np.geomspace(0.5, 1.6, 7))
+    trained = train_reference(ReferenceOptions(3000.0, amplitudes, frequencies), np.random.default_rng(1))
+    assert trained.network.architecture == "12-6-6-1"
+    assert trained.verification_nrmse < 0.12
+    for amplitude in (0.006, 0.009, 0.015):
+        H = equivalent_stiffness(lambda x, v: network_force(trained.network, x, v), amplitude, 8.0)
+        assert abs(H / friction_stiffness(3000.0) - 1.0) < 0.1
+
+
+@pytest.mark.golden
+def test_a_damper_without_control_has_no_inverse():
+    model = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    from dataclasses import replace
+
+    with pytest.raises(UserError, match="drive_limit"):
+        inverse_table(replace(model, drive_limit=float("inf")))
+    flat = {name: 0.0 if name[-2:] in ("_b", "_c", "_d") else value for name, value in model.parameters.items()}
+    with pytest.raises(UserError, match="does not rise with the drive"):
+        inverse_table(replace(model, parameters=flat))
