@@ -151,3 +151,26 @@ def closed_loop_poles(
     joint[n:, :n] = gain @ measured.C
     joint[n:, n:] = A - B @ feedback - gain @ measured.C
     return np.asarray(np.linalg.eigvals(joint), dtype=np.complex128)
+
+
+def sampled_loop_radius(A: FloatArray, B: FloatArray, controller: SampledController) -> float:
+    """Return the spectral radius of plant and sampled controller together; below 1 the loop is stable.
+
+    Parameters
+    ----------
+    A, B
+        Plant, forces that push.
+    controller
+        Its measurement sees the force of the sample before, as in a run.
+    """
+    n, k = B.shape
+    m = controller.step.shape[0]
+    step, pulse = discretise_zero_order(A, B, controller.interval_s)
+    joint = np.zeros((n + m + k, n + m + k))
+    joint[:n, :n] = step
+    joint[:n, n : n + m] = -pulse @ controller.feedback
+    joint[n : n + m, :n] = controller.gain @ controller.measure
+    joint[n : n + m, n : n + m] = controller.step
+    joint[n : n + m, n + m :] = -controller.step_force - controller.gain @ controller.measure_force
+    joint[n + m :, n : n + m] = controller.feedback
+    return float(np.abs(np.linalg.eigvals(joint)).max())

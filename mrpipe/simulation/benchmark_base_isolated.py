@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from joblib import Parallel, delayed
 
+from mrpipe.artifacts import FloatArray
 from mrpipe.control.benchmark_lqg import SampledController
 from mrpipe.errors import UserError
 from mrpipe.networks.network import Network

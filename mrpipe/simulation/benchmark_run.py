@@ -182,7 +182,7 @@ def _structure(modal: ModalModel, loads: FloatArray, dt: float) -> tuple[FloatAr
     n, classical = modal.modes, modal.classical
     A = modal.state_matrix()
     devices = modal.input_matrix(modal.devices)
-    blocks, pulses = np.zeros((n, 4)), np.zeros((n, 4))
+    blocks, pulses, load = np.zeros((n, 4)), np.zeros((n, 4)), modal.load
     dense, now, after = np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1))
     if classical:
         for mode in range(n):
@@ -194,12 +194,15 @@ def _structure(modal: ModalModel, loads: FloatArray, dt: float) -> tuple[FloatAr
         reaction = _classical_reaction(modal, dt)
         loads = loads @ modal.load.T
     else:
-        step, first, second = discretise_first_order(A, modal.input_matrix(modal.load), dt)
+        if load.shape[1] > n:
+            # fewer modal forces than loads: the loop then sums over modes
+            loads, load = loads @ load.T, np.eye(n)
+        step, first, second = discretise_first_order(A, modal.input_matrix(load), dt)
         dense, now, after = step.T, first.T, second.T
         reaction = discretise_zero_order(A, devices, dt)[1]
     compliance = np.vstack([modal.devices.T @ reaction[:n], modal.devices.T @ reaction[n:]])
     arrays = (
-        dense, now, after, blocks, pulses, reaction.T, modal.devices.T, compliance, modal.damping, modal.load.T, loads
+        dense, now, after, blocks, pulses, reaction.T, modal.devices.T, compliance, modal.damping, load.T, loads
     )  # fmt: skip
     return tuple(np.ascontiguousarray(item, dtype=np.float64) for item in arrays)
 

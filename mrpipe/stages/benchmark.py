@@ -10,6 +10,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 if TYPE_CHECKING:
     from mrpipe.simulation.benchmark_run import BinghamDevice, Response
     from mrpipe.structures.records import GroundMotion
+    from mrpipe.structures.wind import WindLoad
 
 
 def _motion(context: StageContext, settings: Any, components: int) -> GroundMotion:
@@ -160,6 +161,90 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     return {**summary, "motion_details": _motion_summary(motion), "inputs_digest": _digest(context)}
 
 
+def _wind_load(context: StageContext, settings: Any) -> WindLoad:
+    from pathlib import Path
+
+    from mrpipe.structures.benchmark_wind import FLOORS, HEIGHT_M, WIDTH_M
+    from mrpipe.structures.wind import WindClimate, read_wind, synthetic_wind
+
+    if settings.file != "synthetic":
+        return read_wind(Path(settings.file), FLOORS, unit=settings.unit, interval_s=settings.interval_s)
+    climate = WindClimate(
+        top_speed_m_s=settings.top_speed_m_s,
+        profile_exponent=settings.profile_exponent,
+        lift_coefficient=settings.lift_coefficient,
+        strouhal_number=settings.strouhal_number,
+        bandwidth=settings.bandwidth,
+        lateral_intensity=settings.lateral_intensity,
+        lateral_coefficient=settings.lateral_coefficient,
+        decay=settings.decay,
+    )
+    return synthetic_wind(
+        context.rng,
+        FLOORS,
+        HEIGHT_M,
+        WIDTH_M,
+        duration_s=settings.duration_s,
+        interval_s=settings.synthetic_interval_s,
+        climate=climate,
+    )
+
+
+def _wind(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.reporting import benchmark_wind as report
+    from mrpipe.simulation import benchmark_wind as bench
+    from mrpipe.simulation.benchmark_inverse import train_inverse
+    from mrpipe.simulation.benchmark_isolation_design import LqgWeights
+    from mrpipe.structures.benchmark_wind import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of
+
+    settings = context.settings.benchmark.wind
+    load = _wind_load(context, settings.load)
+    device = _bingham(settings.damper)
+    reference = tower_of(settings.model, settings.surrogate)
+    tower = place_device(
+        reference,
+        settings.position,
+        floor=settings.outrigger_floor,
+        arm_m=settings.outrigger_arm_m,
+        mass_kg=settings.tuned_mass_kg,
+        frequency_ratio=settings.tuned_frequency_ratio,
+    )
+    trained = None
+    if settings.neural_inverse:
+        context.progress(0.05, "neural inverse of the damper")
+        trained = train_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
+    weights = settings.lqg
+    study = bench.wind_study(
+        reference,
+        tower,
+        load,
+        device=device,
+        network=trained.network if trained else None,
+        stiffness_share=settings.stiffness_share,
+        tuned_mass_kg=settings.tuned_mass_kg,
+        lqg=LqgWeights(weights.displacement, weights.acceleration, weights.force_n, weights.interval_s),
+        modes=settings.modes,
+        time_step_s=settings.time_step_s,
+        dampers=settings.dampers or DEFAULT_DAMPERS[settings.position],
+    )
+    context.progress(0.2, f"{len(settings.laws)} laws")
+    cases = bench.run_wind_cases(study, settings.laws, context.jobs)
+    context.progress(0.7, "sensitivity to damper capacity")
+    law = settings.laws[0]
+    multiples = settings.capacities or DEFAULT_CAPACITIES[settings.position]
+    sweep = bench.wind_sensitivity(study, law, [study.dampers * item for item in multiples], context.jobs)
+    error = trained.starts[0].held_out_nrmse if trained else float("nan")
+    result = report.WindResult(study, cases, law, sweep, error)
+    summary = report.summary(result)
+    with context.write("benchmark-wind.h5") as artifact:
+        artifact.put_json("summary", {key: summary[key] for key in ("laws", "thesis", "sensitivity")})
+        for case in cases:
+            _write_response(artifact, f"responses/{case.law}", case.response)
+        artifact.attributes("/", model=tower.model.origin, source=tower.model.source)
+    report.describe(context.report, result)
+    return {**summary, "inputs_digest": _digest(context)}
+
+
 STAGES = (
     Stage(
         name="benchmark-ten-storey",
@@ -174,5 +259,12 @@ STAGES = (
         run=_base_isolated,
         settings=("benchmark.base_isolated", "benchmark.inputs_digest"),
         outputs=("benchmark-base-isolated.h5",),
+    ),
+    Stage(
+        name="benchmark-wind",
+        summary="The 76-storey tower in across-wind, dampers at the ground, on an outrigger or at a tuned mass.",
+        run=_wind,
+        settings=("benchmark.wind", "benchmark.inputs_digest"),
+        outputs=("benchmark-wind.h5",),
     ),
 )

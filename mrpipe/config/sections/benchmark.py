@@ -108,6 +108,79 @@ class BaseIsolatedSettings(Section):
     )
 
 
+class WindLoadSettings(Section):
+    """Across-wind forces on the floors."""
+
+    file: str = Field(
+        "synthetic",
+        description="`synthetic` (spectral representation, seeded) or a file of forces on the 76 floors (text, csv, "
+        "mat, npy; a row a sample, a clock may come first).",
+    )
+    unit: str = Field("kN", description="Unit of the forces in a file.")
+    interval_s: float | None = Field(None, gt=0.0, description="Sampling interval of a file without a clock [s].")
+    duration_s: float = Field(900.0, gt=10.0, description="Length of the synthetic load [s].")
+    synthetic_interval_s: float = Field(0.05, gt=0.0, le=0.2, description="Sampling of the synthetic load [s].")
+    top_speed_m_s: float = Field(47.25, gt=0.0, description="Mean wind at the top [m/s].")
+    profile_exponent: float = Field(0.365, ge=0.0, le=1.0, description="Of the power law of the mean wind.")
+    lift_coefficient: float = Field(0.27, ge=0.0, description="RMS lift coefficient of vortex shedding.")
+    strouhal_number: float = Field(0.1, gt=0.0, description="Shedding frequency times width over wind speed.")
+    bandwidth: float = Field(0.25, gt=0.0, description="Relative width of the shedding peak.")
+    lateral_intensity: float = Field(0.1, ge=0.0, description="RMS lateral turbulence at the top over the mean wind.")
+    lateral_coefficient: float = Field(1.0, ge=0.0, description="Side force for a wind angle, dC_L/da + C_D.")
+    decay: float = Field(10.0, ge=0.0, description="Decay constant of lateral turbulence with height.")
+
+
+class WindSettings(Section):
+    """The 76-storey tower of section 6.3."""
+
+    model: str | None = Field(
+        None,
+        description="Path of the published matrices (M76, C76, K76); `published` for those of the public data; null: "
+        "the surrogate of our own.",
+    )
+    surrogate: str = Field(
+        "wind-surrogate", description="Parameter set in configs/structures (or YAML file) of the surrogate."
+    )
+    load: WindLoadSettings = Field(WindLoadSettings(), description="The wind.")
+    laws: tuple[str, ...] = Field(
+        ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on"),
+        min_length=1,
+        description="Laws: vd, vdns, fdns (MR dampers), lqg (ideal actuator), lqg-clipped (MR dampers), passive-off, "
+        "passive-on.",
+    )
+    position: Literal["ground", "outrigger", "tuned-mass"] = Field(
+        "ground",
+        description="Where the damper works: `ground` (between ground and floor 1, as the thesis), `outrigger`, or "
+        "`tuned-mass` (between the top floor and a tuned mass, as the original benchmark).",
+    )
+    dampers: float | None = Field(
+        None, gt=0.0, description="1000 kN dampers side by side; null: 1 (ground), 8 (outrigger), 0.1 (tuned mass)."
+    )
+    outrigger_floor: int = Field(40, ge=2, le=75, description="Floor of the outrigger.")
+    outrigger_arm_m: float = Field(21.0, gt=0.0, description="From the core to the damper [m].")
+    tuned_mass_kg: float = Field(500e3, gt=0.0, description="Tuned mass on the top floor [kg].")
+    tuned_frequency_ratio: float = Field(0.99, gt=0.5, lt=1.5, description="Its frequency over the tower's first.")
+    damper: str = Field("bingham-1000kn", description="Bingham parameter set in configs/dampers.")
+    neural_inverse: bool = Field(
+        True, description="Voltage from a neural inverse of the damper, as the thesis; false: from the formula."
+    )
+    hidden_neurons: int = Field(6, ge=2, le=20, description="Neurons of both hidden layers of the neural inverse.")
+    stiffness_share: float = Field(
+        0.5, ge=0.0, lt=0.95, description="Share of the static stiffness at the damper that vdns takes away."
+    )
+    lqg: RegulatorWeights = Field(
+        RegulatorWeights(displacement=1000.0, acceleration=10.0, force_n=1e6, interval_s=0.001),
+        description="Weights of LQG; the force is that of one damper.",
+    )
+    modes: int = Field(23, ge=5, le=76, description="Modes kept of the tower: twice as many states.")
+    time_step_s: float = Field(0.001, gt=0.0, le=0.01, description="Longest time step [s].")
+    capacities: tuple[float, ...] | None = Field(
+        None,
+        description="Multiples of the dampers at which the sensitivity is computed; null: 1 to 100 at the ground, 0.25 "
+        "to 4 elsewhere.",
+    )
+
+
 class BenchmarkSettings(Section):
     """The benchmark structures of chapter 6 and paper P4."""
 
@@ -115,6 +188,7 @@ class BenchmarkSettings(Section):
     base_isolated: BaseIsolatedSettings = Field(
         BaseIsolatedSettings(), description="The base-isolated building of section 6.2."
     )
+    wind: WindSettings = Field(WindSettings(), description="The 76-storey tower of section 6.3.")
     inputs_digest: str = Field(
         "",
         description="Digest of the model and motion files that the command was given; the command sets it, so that a "
