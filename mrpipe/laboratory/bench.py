@@ -202,24 +202,49 @@ def record_bench(
         ]
     )
     files, disturbed, total = [], 0.0, 0.0
+    parts = _Shares(damper)
     for number, (test, motion) in enumerate(zip(tests, motions, strict=True)):
         response = respond(damper, motion)
+        parts.add(motion, response.force)
         file, error = _recorded(test, motion, response, rig, offsets, np.random.default_rng([seed, 2, number]))
         files.append(file)
         if test.role == "validation":
             disturbed += error
             total += float(np.sum(response.force[:: rig.fine_steps] ** 2))
         progress((number + 1) / len(tests), test.name)
-    shares = {item.name: effect_share(damper, index, motions) for index, item in enumerate(damper.effects)}
     truth = {
         "damper": damper.name,
         "parameters": damper.numbers(),
-        "effects": [{**item.described(), "share_of_force_rms": shares[item.name]} for item in damper.effects],
+        "effects": [
+            {**item.described(), "share_of_force_rms": share}
+            for item, share in zip(damper.effects, parts.shares(), strict=True)
+        ],
         "offsets": dict(zip(CHANNELS, offsets.tolist(), strict=True)),
         "noise_floor_nrmse": float(np.sqrt(disturbed / total)) if total > 0.0 else None,
         "seed": seed,
     }
     return BenchRecord(files, truth, damper)
+
+
+class _Shares:
+    """What each effect is of the force, summed up test by test."""
+
+    def __init__(self, damper: TrueDamper) -> None:
+        effects = damper.effects
+        self._without = [damper.with_effects(effects[:k] + effects[k + 1 :]) for k in range(len(effects))]
+        self._change = np.zeros(len(effects))
+        self._force = np.zeros(len(effects))
+
+    def add(self, motion: FineMotion, force: FloatArray) -> None:
+        """Add a test, whose force with all effects is `force`."""
+        for index, damper in enumerate(self._without):
+            plain = respond(damper, motion).force
+            self._change[index] += float(np.sum((force - plain) ** 2))
+            self._force[index] += float(np.sum(plain**2))
+
+    def shares(self) -> list[float]:
+        """Return RMS of each effect over the RMS of the force without it."""
+        return [float(value) for value in np.sqrt(self._change / np.maximum(self._force, 1e-300))]
 
 
 def calibrated(damper: TrueDamper, motions: Sequence[FineMotion]) -> TrueDamper:

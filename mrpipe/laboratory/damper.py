@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -191,7 +191,7 @@ def calibrate_strength(
         changed = damper.with_effects([*others[:index], effect.with_strength(strength), *others[index + 1 :]])
         return _share(changed, motions, reference)
 
-    strength = _solve(share_of, wanted, abs(effect.strength), effect.form.strongest, tolerance)
+    strength = solve_strength(share_of, wanted, abs(effect.strength), effect.form.strongest, tolerance)
     if strength is None:
         raise UserError(
             f"effect {effect.name} ({effect.form.form})",
@@ -202,14 +202,15 @@ def calibrate_strength(
     return damper.with_effects([*others[:index], effect.with_strength(strength), *others[index + 1 :]])
 
 
-def _solve(share_at: object, wanted: float, guess: float, strongest: float, tolerance: float) -> float | None:
+def solve_strength(
+    share_at: Callable[[float], float], wanted: float, guess: float, strongest: float, tolerance: float
+) -> float | None:
     """Return the strength by bracketing and regula falsi on logarithms; None where it is out of reach."""
-    assert callable(share_at)
     low, high = 0.0, 0.0
     low_share, high_share = 0.0, 0.0
     strength = min(guess, strongest) or 1e-6
     for _ in range(40):
-        share = float(share_at(strength))
+        share = share_at(strength)
         if abs(share / wanted - 1.0) < tolerance:
             return strength
         if share < wanted:

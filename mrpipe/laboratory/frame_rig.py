@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,12 @@ from scipy import signal
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.campaigns import TestFile
+from mrpipe.errors import UserError
+from mrpipe.laboratory.damper import solve_strength
+from mrpipe.laboratory.effects import Planted
 from mrpipe.laboratory.kernel import PARAMETERS
 from mrpipe.laboratory.motion import smooth_start
-from mrpipe.laboratory.structure import Assembled, TrueStructure, assemble
+from mrpipe.laboratory.structure import BRACE, CONTROLLER_DELAY, Assembled, TrueStructure, assemble
 from mrpipe.laboratory.structure_kernel import run_structure
 from mrpipe.structures import natural_modes
 
@@ -21,6 +24,7 @@ ACCELEROMETER_M_S2_PER_V = 9.81
 LASER_M_PER_V = 0.0109
 LOAD_CELL_N_PER_V = 50.0
 """Conversion factors of Table 3.2."""
+_CALIBRATION_S = 40.0
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class FrameRig:
     random_acceleration_m_s2: float = 0.15
     decay_acceleration_m_s2: float = 1.5
     sensitivity_error: float = 0.0
-    support_share: float = 0.15
+    support_share: float = 0.06
 
     @property
     def step_s(self) -> float:
@@ -243,6 +247,46 @@ def record_frame(
         "sensitivity": dict(zip(quantities, errors.tolist(), strict=True)),
     }
     return FrameRecord(tests, channels, dict(zip(quantities, units, strict=True)), truth)
+
+
+def calibrated_structure(structure: TrueStructure, rig: FrameRig) -> TrueStructure:
+    """Return the structure with all strengths that are given as shares solved for, in order.
+
+    The share is the RMS of the change of all floor accelerations over their RMS, on a short sweep to the third mode.
+
+    Raises
+    ------
+    UserError
+        If a share is out of reach, or belongs to an effect that shows with a damper only.
+    """
+    frequencies = natural_modes(structure.frame).frequencies_hz
+    short = replace(rig, sweep_s=_CALIBRATION_S)
+    top = float(frequencies[min(2, len(frequencies) - 1)])
+    ground = sweep_ground(short, 0.4 * float(frequencies[0]), 1.2 * top, float(frequencies[0]))
+
+    def response(effects: Sequence[Planted]) -> FloatArray:
+        return shake(assemble(structure.with_effects(effects), rig.step_s), ground, short)[1]
+
+    effects = list(structure.effects)
+    for index, effect in enumerate(effects):
+        wanted = effect.strength_share
+        if wanted is None:
+            continue
+        where = f"effect {effect.name} ({effect.form.form})"
+        if effect.form.code in (BRACE, CONTROLLER_DELAY):
+            raise UserError(where, "strength_share", "shows with a damper only", "give its parameters instead")
+        plain = response(effects[:index] + effects[index + 1 :])
+        scale = float(np.sqrt(np.mean(plain**2)))
+
+        def share_of(strength: float, index: int = index, plain: FloatArray = plain, scale: float = scale) -> float:
+            changed = response([*effects[:index], effects[index].with_strength(strength), *effects[index + 1 :]])
+            return float(np.sqrt(np.mean((changed - plain) ** 2))) / scale
+
+        strength = solve_strength(share_of, wanted, effect.strength, effect.form.strongest, 0.02)
+        if strength is None:
+            raise UserError(where, "strength_share", f"{wanted:g} is out of reach", "ask for less")
+        effects[index] = effect.with_strength(strength)
+    return structure.with_effects(effects)
 
 
 def floor_masses(structure: TrueStructure) -> Sequence[float]:

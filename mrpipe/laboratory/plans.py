@@ -7,7 +7,7 @@ from mrpipe.laboratory.motion import BenchTest, CurrentKind
 
 FREQUENCIES_HZ = (0.5, 1.0, 1.27, 1.8, 2.2)
 PLANS = ("table-2.1", "compact", "discriminating")
-SOFT_START_CYCLES = 2.0
+SOFT_START_CYCLES = 2.75
 
 
 def table_2_1(cycles: int = 10, frequencies_hz: tuple[float, ...] = FREQUENCIES_HZ) -> list[BenchTest]:

@@ -86,6 +86,7 @@ def _true_structure(context: StageContext) -> TrueStructure:
     import numpy as np
 
     from mrpipe.laboratory.effects import Planted
+    from mrpipe.laboratory.frame_rig import calibrated_structure
     from mrpipe.laboratory.structure import TrueStructure, find_frame_form, random_frame
     from mrpipe.structures import frame_from_parameter_set
 
@@ -99,7 +100,8 @@ def _true_structure(context: StageContext) -> TrueStructure:
         for declared, items in ((True, settings.declared_effects), (False, settings.hidden_effects))
         for item in items
     ]
-    return TrueStructure(frame, tuple(effects))
+    structure = TrueStructure(frame, tuple(effects))
+    return calibrated_structure(structure, _frame_rig(settings))
 
 
 def _frame_rig(settings: Any) -> FrameRig:

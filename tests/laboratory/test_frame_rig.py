@@ -11,7 +11,7 @@ import pytest
 from mrpipe.campaigns import load_campaign, write_campaign
 from mrpipe.errors import UserError
 from mrpipe.laboratory.effects import Planted
-from mrpipe.laboratory.frame_rig import FrameRig, decay_ground, record_frame, shake, sweep_ground
+from mrpipe.laboratory.frame_rig import FrameRig, calibrated_structure, decay_ground, record_frame, shake, sweep_ground
 from mrpipe.laboratory.sealing import write_scales
 from mrpipe.laboratory.structure import (
     FRAME_EFFECT_NAMES,
@@ -147,3 +147,22 @@ def test_every_effect_of_a_frame_can_be_drawn() -> None:
     assert {draw_frame_effect(rng).name for _ in range(100)} == set(FRAME_EFFECT_NAMES)
     with pytest.raises(UserError, match=r"known: joint-friction"):
         find_frame_form("ghosts")
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("effect", ["joint-friction", "cubic-stiffness", "impact", "base-rocking"])
+def test_strength_of_a_frame_effect_is_scaled_to_its_share(structure: TrueStructure, effect: str) -> None:
+    rig = replace(RIG, sweep_acceleration_m_s2=0.15)
+    hidden = structure.with_effects([Planted(find_frame_form(effect), {}, 0.10)])
+    found = calibrated_structure(hidden, rig)
+    frequencies = natural_modes(structure.frame).frequencies_hz
+    ground = sweep_ground(rig, 0.4 * frequencies[0], 1.2 * frequencies[2], frequencies[0])
+    plain, changed = (shake(assemble(item, rig.step_s), ground, rig)[1] for item in (structure, found))
+    assert np.sqrt(np.mean((changed - plain) ** 2) / np.mean(plain**2)) == pytest.approx(0.10, rel=0.05)
+
+
+@pytest.mark.golden
+def test_a_share_of_what_needs_a_damper_is_refused(structure: TrueStructure) -> None:
+    hidden = structure.with_effects([Planted(find_frame_form("controller-delay"), {}, 0.10)])
+    with pytest.raises(UserError, match=r"shows with a damper only"):
+        calibrated_structure(hidden, RIG)

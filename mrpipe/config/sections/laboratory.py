@@ -120,7 +120,7 @@ class FrameSettings(Section):
         0.0, ge=0.0, description="Standard deviation of the conversion factors' error [1]."
     )
     support_share: float = Field(
-        0.15, ge=0.0, description="Participation of a flexible-support mode above the band [1]; 0 leaves it out."
+        0.06, ge=0.0, description="Participation of a flexible-support mode above the band [1]; 0 leaves it out."
     )
 
 
