@@ -47,8 +47,8 @@ class ReferenceOptions:
     starts: int = 4
     iterations: int = 150
     rows: int = 6000
-    displacement_noise_m: float = 1e-5
-    velocity_noise_m_s: float = 5e-4
+    displacement_noise_m: float = 2e-5
+    velocity_noise_m_s: float = 1e-3
 
 
 @dataclass(frozen=True)

