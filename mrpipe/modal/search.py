@@ -48,13 +48,17 @@ def bands_to_try(tests: Sequence[FrameTest], low_hz: float, high_hz: float) -> l
     nyquist = 0.5 * min(item.sampling_rate_hz for item in tests)
     if high_hz > 0.0:
         return [(low_hz, min(high_hz, 0.95 * nyquist))]
-    top = min(excited_band(tuple(tests))[1], 0.9 * nyquist)
+    tops = sorted(min(excited_band((test,))[1], 0.9 * nyquist) for test in tests)
     bands = []
     high = _USUAL_HIGH_HZ / 2.0
-    while high < 0.8 * top and top > _USUAL_HIGH_HZ:
-        bands.append((low_hz, high))
+    while high < 0.8 * tops[-1] and tops[-1] > _USUAL_HIGH_HZ:
+        bands.append(high)
         high *= 2.0
-    return [*bands, (low_hz, top)]
+    # tests may reach differently far; where all that finds nothing, a narrower band resolves close modes better
+    for top in [*tops, 0.7 * tops[-1]]:
+        if all(abs(top - known) > 0.1 * known for known in bands):
+            bands.append(top)
+    return [(low_hz, high) for high in bands]
 
 
 def _strength(fit: MultiModeFit) -> FloatArray:
@@ -206,7 +210,7 @@ def find_modes(
         If a mode has no peak in the band.
     """
     bands = bands_to_try(tests, low_hz, high_hz)
-    span = f"between {bands[-1][0]:g} and {bands[-1][1]:.3g} Hz"
+    span = f"between {low_hz:g} and {max(high for _, high in bands):.3g} Hz"
     best: _Found | None = None
     for band in bands:
         found = _look(tuple(record_spectrum(test, band) for test in tests), floor_masses, band)

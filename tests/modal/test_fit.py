@@ -98,3 +98,20 @@ def test_the_true_frame_returns_what_was_measured_and_another_does_not(thesis):
     other = frame_from_parameter_set("geometry")
     assert verify_in_frequency(other, fit, (0.2, 10.0), test.is_displacement, 0).error.min() > 0.3
     assert verify_in_time(other, test, (0.2, 10.0)).fit_percent.max() < 50.0
+
+
+@pytest.mark.planted
+def test_tests_of_unlike_strength_share_what_lies_above_the_band(thesis):
+    """What modes above the band leave inside it belongs to the frame: ten times the motion must not change it."""
+    frame, _, _ = thesis
+    truth = natural_modes(frame)
+    rng = np.random.default_rng(3)
+    tests = [sweep_test(frame, rng, Rig(noise=0.01, rate=250.0, sweep_s=60.0, amplitude=size)) for size in (0.3, 3.0)]
+    spectra = [record_spectrum(test, (0.2, 8.6)) for test in tests]
+    together, alone = (
+        fit_modes(chosen, truth.angular_frequencies[:4], np.full(4, 0.002)) for chosen in (spectra, spectra[1:])
+    )
+    for mode in range(4):
+        largest = np.argmax(np.abs(truth.mode_shapes[:, mode]))
+        first, second = (fit.residues[:, mode].real / fit.residues[largest, mode].real for fit in (together, alone))
+        assert first == pytest.approx(second, abs=0.004)
