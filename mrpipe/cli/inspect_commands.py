@@ -69,7 +69,11 @@ def check(
         campaigns[rig] = f"{campaign.name}: {len(campaign.recordings)} tests"
     if explain:
         content = [
-            {"setting": name, "meaning": text, "value": _shown(setting_named(loaded.config, name))}
+            {
+                "setting": name,
+                "meaning": text,
+                "value": None if "[]" in name else _shown(setting_named(loaded.config, name)),
+            }
             for name, text, _ in all_options()
         ]
         if options.json:

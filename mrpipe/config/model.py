@@ -81,10 +81,10 @@ class Config(Section):
 
 
 def options(model: type[BaseModel] = Config, prefix: str = "") -> Iterator[tuple[str, str, Any]]:
-    """Yield (dotted name, description, default) of every setting, sections first."""
+    """Yield (dotted name, description, default) of every setting, sections first; `[]` marks the items of a list."""
     for name, field in model.model_fields.items():
         dotted = f"{prefix}{name}"
         yield dotted, field.description or "", field.get_default(call_default_factory=True)
         inner = model_in(field.annotation)
         if inner is not None:
-            yield from options(inner, f"{dotted}.")
+            yield from options(inner, f"{dotted}." if field.annotation is inner else f"{dotted}[].")

@@ -22,7 +22,7 @@ def _read_by(name: str) -> list[str]:
     return [
         stage.name
         for stage in all_stages().values()
-        if any(name == item or name.startswith(f"{item}.") for item in stage.settings)
+        if any(name == item or name.startswith((f"{item}.", f"{item}[")) for item in stage.settings)
     ]
 
 
