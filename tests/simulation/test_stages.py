@@ -1,0 +1,194 @@
+"""calibrate, simulate and export controller as stages: declared settings suffice, summaries hold what is promised."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, load_parameter_set, no_progress
+from mrpipe.config.model import Config
+from mrpipe.dampers.model import damper_from_parameter_set, write_damper
+from mrpipe.errors import UserError
+from mrpipe.networks.network import write_network
+from mrpipe.pipeline.runner import plain
+from mrpipe.pipeline.settings_view import SettingsView
+from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.stages import calibrate, export_controller
+from mrpipe.stages.simulate import STAGES
+from mrpipe.structures import frame_from_parameter_set, write_frame
+from tests.control.conftest import random_network
+
+SIMULATE = {stage.name: stage for stage in STAGES}
+CONTRACT = (
+    "law rms_x1_m rms_x5_m rms_x_top_m rms_a1_m_s2 rms_a5_m_s2 peak_x1_m peak_x5_m peak_a1_m_s2 peak_a5_m_s2 "
+    "damping_ratio force_tracking_nrmse residual_force_n real_time_factor"
+)
+
+
+SMALL = {"map_points": 5, "neural": {"starts": 1, "iterations": 30, "amplitudes": 3, "frequencies": 3}}
+
+
+class Sink:
+    def __init__(self) -> None:
+        self.parts: list[str] = []
+
+    def text(self, paragraph: str) -> None:
+        self.parts.append(paragraph)
+
+    def table(self, name: str, frame: Any, caption: str) -> None:
+        self.parts.append(f"table {name} {len(frame)}")
+
+    def figure(self, name: str, figure: Any, caption: str) -> None:
+        self.parts.append(f"figure {name}")
+
+
+Run = Callable[..., dict]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    directory: Path = tmp_path_factory.mktemp("run")
+    files = {
+        "identify-frame": "frame.h5",
+        "identify-damper": "damper.h5",
+        "train-inverse": "inverse.h5",
+        "calibrate": "control.h5",
+    }
+    with ArtifactWriter.create(directory / "frame.h5", Provenance("test")) as artifact:
+        write_frame(artifact, frame_from_parameter_set("thesis"))
+    with ArtifactWriter.create(directory / "damper.h5", Provenance("test")) as artifact:
+        write_damper(artifact, damper_from_parameter_set(load_parameter_set("dampers", "set-c")))
+    with ArtifactWriter.create(directory / "inverse.h5", Provenance("test")) as artifact:
+        write_network(artifact, "network", random_network(("velocity", "force"), "drive", 3, True))
+
+    def go(stage: Stage, settings: dict[str, Any] | None = None) -> dict:
+        context = StageContext(
+            stage=stage.name,
+            settings=SettingsView(Config.model_validate(settings or {}), stage.settings, stage.name),
+            inputs={name: directory / files[name] for name in stage.inputs},
+            run_directory=directory,
+            rng=np.random.default_rng(1),
+            seed=1,
+            jobs=1,
+            progress=no_progress,
+            report=Sink(),
+            log=logging.getLogger("test"),
+            provenance=Provenance(stage.name),
+        )
+        summary = plain(stage.run(context))
+        json.dumps(summary, allow_nan=False)
+        assert context.report.parts  # type: ignore[attr-defined]
+        return {**summary, "warnings": context.warnings, "directory": directory}
+
+    go(calibrate.STAGE, {"calibrate": SMALL})
+    return go
+
+
+@pytest.mark.literature
+def test_calibrate_tells_what_the_contract_says(run):
+    summary = run(calibrate.STAGE, {"calibrate": SMALL})
+    assert summary["omega_0"] == pytest.approx(8.0, rel=1e-3)
+    assert summary["nu"] == pytest.approx(1.5404e-4, rel=2e-3)
+    assert {"omega_inf", "u_0"} <= summary.keys()
+    for law in ("vd", "vdps", "vdns", "fdns", "nnc", "lqg"):
+        assert {"damping_ratio_estimate", "damping_ratio_exact"} <= summary["laws"][law].keys()
+    assert summary["laws"]["vd"]["c_n_s_m"] == 650.0
+    assert summary["laws"]["vd"]["damping_ratio_exact"] == pytest.approx(0.154, abs=5e-4)
+    assert summary["laws"]["vd"]["candidates"]["closed-form"]["c_n_s_m"] == pytest.approx(811.0, rel=5e-3)
+    assert summary["laws"]["nnc"]["architecture"] == "12-6-6-1"
+    assert any("static limit" in line for line in summary["warnings"])
+
+
+@pytest.mark.golden
+def test_gains_of_the_users_own_and_the_floor(run):
+    own = {"calibrate": {**SMALL, "gains": "exact", "vd": {"c_n_s_m": 700.0}}}
+    summary = run(calibrate.STAGE, own)
+    assert summary["laws"]["vd"]["c_n_s_m"] == 700.0
+    assert summary["laws"]["fdns"]["alpha_n_m"] == pytest.approx(3128.0, rel=5e-3)
+    with pytest.raises(UserError, match="the frame has 5 floors"):
+        run(calibrate.STAGE, {"calibrate": {"damper_floor": 6}})
+    run(calibrate.STAGE, {"calibrate": SMALL})
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("law", ["vd", "fdns", "nnc", "lqg", "passive-off"])
+def test_simulate_tells_what_the_contract_says(run, law):
+    settings = {"simulate": {"controller": {"inverse": "model"}, "excitation": {"cycles": 20, "settling_cycles": 10}}}
+    summary = run(SIMULATE[f"simulate-{law}"], settings)
+    assert set(CONTRACT.split()) <= summary.keys()
+    assert summary["law"] == law
+    assert summary["energy_balance_error"] < 5e-3
+    if law == "vd":
+        assert summary["rms_x_top_m"] == pytest.approx(0.0243, rel=0.02)
+    artifact = Artifact(summary["directory"] / f"response-{law}.h5")
+    assert artifact.unit("displacement") == "m" and artifact.unit("drive") == "A"
+    assert artifact.array("displacement").shape[1] == 5
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("kind", ["sweep", "recorded", "free-decay", "harmonic"])
+def test_other_excitations_and_settings(run, kind, tmp_path):
+    record = tmp_path / "record.txt"
+    t = np.arange(0.0, 6.0, 0.02)
+    np.savetxt(record, np.column_stack([t, np.sin(8.0 * t)]))
+    settings = {
+        "simulate": {
+            "tracking": "ideal" if kind == "harmonic" else "damper",
+            "frame": "thesis",
+            "damper": "set-c",
+            "accelerations": "absolute",
+            "excitation": {
+                "kind": kind,
+                "base_amplitude_m_s2": 0.5,
+                "sweep_s": 10.0,
+                "frequency_rad_s": None,
+                "cycles": 10,
+                "settling_cycles": 5,
+                "file": str(record),
+            },
+        }
+    }
+    summary = run(SIMULATE["simulate-vd"], settings)
+    assert summary["rms_x_top_m"] > 1e-4
+    assert (summary["damping_ratio"] is None) == (kind in {"sweep", "recorded"})
+
+
+@pytest.mark.golden
+def test_frame_of_other_floors_is_told(run, tmp_path):
+    path = tmp_path / "three.yaml"
+    path.write_text(
+        "name: three\nmodel: shear-frame\nsource: test\nparameters:\n"
+        "  floor_masses: {value: [6, 6, 6], unit: kg}\n"
+        "  storey_stiffnesses: {value: [5000, 5000, 5000], unit: N/m}\n"
+        "  damping_ratios: {value: [0.01, 0.01, 0.01], unit: '1'}\n"
+    )
+    with pytest.raises(UserError, match="has 3 floors; calibrated for 5"):
+        run(SIMULATE["simulate-vd"], {"simulate": {"frame": str(path)}})
+
+
+@pytest.mark.golden
+def test_a_law_without_calibration_is_told(run):
+    directory = run(calibrate.STAGE, {"calibrate": SMALL})["directory"]
+    import h5py
+
+    with h5py.File(directory / "control.h5", "a") as handle:
+        del handle["laws/vdps"]
+    try:
+        with pytest.raises(UserError, match="laws/vdps: this law is not calibrated; calibrated: vd, vdns"):
+            run(SIMULATE["simulate-vdps"])
+    finally:
+        run(calibrate.STAGE, {"calibrate": SMALL})
+
+
+@pytest.mark.golden
+def test_export_writes_a_folder(run):
+    summary = run(export_controller.STAGE, {"export": {"law": "vdns", "prefix": "rig"}})
+    folder = summary["directory"] / "controller"
+    assert {"controller.c", "controller.h", "controller.json", "README.md"} <= {item.name for item in folder.iterdir()}
+    assert json.loads((folder / "controller.json").read_text())["gains"]["k_n_m"] == -4500.0
