@@ -30,7 +30,7 @@ def overrides_of(
         If there is no such benchmark, a file is missing, or `--all` is asked where there are no seven motions.
     """
     if name not in NAMES:
-        from mrpipe.config.errors import nearest
+        from mrpipe.artifacts.yaml_source import nearest
 
         raise UserError("benchmark", name, "is no benchmark structure", nearest(name, list(NAMES)))
     section = f"benchmark.{NAMES[name]}"

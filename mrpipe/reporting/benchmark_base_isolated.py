@@ -61,7 +61,7 @@ def summary(result: IsolationResult) -> dict[str, Any]:
         "frequencies_hz": 1.0 / periods,
         "periods_s": periods,
         "fixed_base_periods_s": building.fixed_base_periods_s,
-        "isolation_period_s": building.isolation_period_s,
+        "isolated_period_s": building.isolation_period_s,
         "isolation_damping_ratio": building.isolation_damping_ratio,
         "total_mass_kg": building.model.total_mass_kg,
         "motion": result.motion.name,
@@ -130,6 +130,14 @@ def _top(result: IsolationResult, response: Response, axis: int) -> tuple[FloatA
     return histories.floor_acceleration_m_s2[:, -1, axis], x[:, 21 + axis] + x[:, 24 + axis]
 
 
+def _floor_peaks(result: IsolationResult, response: Response) -> tuple[FloatArray, FloatArray]:
+    """Return peak displacement to the base and absolute acceleration of the floors along x, shape (8,) each."""
+    histories = isolated_response(result.study.building, response)
+    displacement = np.cumsum(histories.drift[:, :, 0], axis=1)
+    acceleration = histories.floor_acceleration_m_s2[:, :, 0]
+    return np.asarray(np.abs(displacement).max(axis=0)), np.asarray(np.abs(acceleration).max(axis=0))
+
+
 def _histories(sink: figures.Sink, result: IsolationResult) -> None:
     time = result.uncontrolled.time_s
     for axis, letter in enumerate("xy"):
@@ -143,6 +151,11 @@ def _histories(sink: figures.Sink, result: IsolationResult) -> None:
             )
             sink.figure(f"top-{word}-{letter}", picture, f"Top floor {word} along {letter} (Figures 6.7, 6.8).")
     response = {case.law: case.response for case in result.cases}
+    peaks = {law: _floor_peaks(result, item) for law, item in {"uncontrolled": result.uncontrolled, **response}.items()}
+    picture = figures.floor_profiles(
+        range(1, 9), {law: pair[0] for law, pair in peaks.items()}, {law: pair[1] for law, pair in peaks.items()}
+    )
+    sink.figure("floors", picture, "Peaks of the floors along x: displacement to the base, absolute acceleration.")
     picture = figures.loops(
         {law: item.stroke()[:, 0] for law, item in response.items()},
         {law: item.rod_velocity()[:, 0] for law, item in response.items()},

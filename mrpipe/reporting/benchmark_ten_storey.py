@@ -94,6 +94,16 @@ def describe(sink: figures.Sink, studies: Studies, sweep: Mapping[float, Mapping
         until_s=min(30.0, motion.duration_s),
     )
     sink.figure("top-floor", picture, "Top floor displacement (P4 Figures 3 to 6), MR damper with the voltage filter.")
+    peaks = {
+        law: (np.abs(item.displacement()).max(axis=0), np.abs(item.acceleration() + item.loads).max(axis=0))
+        for law, item in (("uncontrolled", study.uncontrolled), *((case.law, case.response) for case in shown))
+    }
+    picture = figures.floor_profiles(
+        range(1, study.model.degrees_of_freedom + 1),
+        {law: pair[0] for law, pair in peaks.items()},
+        {law: pair[1] for law, pair in peaks.items()},
+    )
+    sink.figure("floors", picture, "Peaks of the floors: displacement to the ground, absolute acceleration.")
     picture = figures.loops(
         {case.law: case.response.stroke()[:, 0] for case in shown},
         {case.law: case.response.rod_velocity()[:, 0] for case in shown},

@@ -106,6 +106,13 @@ def describe(sink: figures.Sink, result: WindResult) -> None:
         )
         word = name.partition("_")[0]
         sink.figure(f"top-{word}", picture, f"Floor {WIND_FLOORS[place]} {word} (Figure 6.11).")
+    every = {"uncontrolled": free, **histories}
+    picture = figures.floor_profiles(
+        WIND_FLOORS,
+        {law: np.abs(item.displacement_m).max(axis=0) for law, item in every.items()},
+        {law: np.abs(item.acceleration_m_s2).max(axis=0) for law, item in every.items()},
+    )
+    sink.figure("floors", picture, "Peaks of the floors.")
     picture = figures.loops(
         {law: item.stroke_m for law, item in histories.items()},
         {law: item.device_velocity_m_s for law, item in histories.items()},

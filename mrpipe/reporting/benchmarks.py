@@ -92,6 +92,33 @@ def loops(
     return figure
 
 
+def floor_profiles(
+    floors: Sequence[int],
+    displacement: Mapping[str, FloatArray],
+    acceleration: Mapping[str, FloatArray],
+) -> Figure:
+    """Return peak displacement and acceleration of the floors, one line a law; `uncontrolled` in grey.
+
+    Parameters
+    ----------
+    floors
+        Floor numbers, shape (n,).
+    displacement, acceleration
+        Law -> peaks, shape (n,); m, m/s^2.
+    """
+    figure, axes = figure_with_axes(1, 2, width=8.0, height=3.6)
+    for axis, peaks, name in (
+        (axes[0, 0], displacement, "displacement [m]"),
+        (axes[0, 1], acceleration, "acceleration [m/s^2]"),
+    ):
+        for number, (law, values) in enumerate(peaks.items()):
+            colour = MEASURED if law == "uncontrolled" else COLOURS[(number - 1) % 8]
+            axis.plot(values, floors, color=colour, marker="o", markersize=2.5, linewidth=0.9, label=law)
+        label(axis, f"peak {name}", "floor")
+    axes[0, 0].legend(fontsize=7)
+    return figure
+
+
 def index_bars(indices: Mapping[str, Mapping[str, float]], thesis: Mapping[str, Mapping[str, float]]) -> Figure:
     """Return the indices of each law as bars, the thesis' as marks.
 

@@ -43,6 +43,18 @@ LAWS = ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on")
 """VD, VDNS, FDNS with MR dampers; LQG with ideal actuators, and clipped on the MR dampers; constant voltages."""
 
 
+def unknown_law(law: str) -> UserError:
+    """Return the error that tells of a law that is not in :data:`LAWS`."""
+    return UserError("--law", law, "is no law of the base-isolated building", f"known: {', '.join(LAWS)}")
+
+
+def check_laws(laws: Sequence[str]) -> None:
+    """Raise UserError if one of them is not in :data:`LAWS`."""
+    for law in laws:
+        if law not in LAWS:
+            raise unknown_law(law)
+
+
 @dataclass(frozen=True)
 class IsolationStudy:
     """The building, calibrated; see :func:`isolation_study`."""
@@ -79,7 +91,7 @@ class IsolationStudy:
         if law in ("passive-off", "passive-on"):
             volts = 0.0 if law == "passive-off" else self.device.highest_voltage
             return Controller("constant", "bingham", voltage=volts, device=self.device, dampers=self.dampers)
-        raise UserError("--law", law, "is no law of the base-isolated building", f"known: {', '.join(LAWS)}")
+        raise unknown_law(law)
 
     def ideal(self, law: str) -> Controller:
         """Return the law with dampers that give any dissipative force at once."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from joblib import Parallel, delayed
+
 from mrpipe.control.benchmark_gains import TwoComponent, exact_viscous, lowest_damping, two_component
 from mrpipe.dampers.plant import Chain
 from mrpipe.errors import UserError
@@ -79,6 +81,13 @@ def stiffness_share(law: str) -> float:
         remedy = "vd, kelvin-0.3, kelvin-0.7 (any share of the storey stiffness), passive-off or passive-on"
         raise UserError("--law", law, "is no law of the ten-storey frame", remedy)
     return value
+
+
+def check_laws(laws: Sequence[str]) -> None:
+    """Raise UserError if one of them is no law of the frame."""
+    for law in laws:
+        if law not in ("passive-off", "passive-on"):
+            stiffness_share(law)
 
 
 @dataclass(frozen=True)
@@ -172,18 +181,22 @@ class TenStoreyStudy:
         loads = self.motion.acceleration_m_s2[:, :1]
         return simulate(self.modal, loads, self.motion.interval_s, controller, ratio=ratio or self.ratio)
 
-    def cases(self, laws: Sequence[str], variants: Sequence[str] = VARIANTS) -> list[TenStoreyCase]:
-        """Run laws in variants; constant voltages have but one."""
-        return [
-            self.case(law, variant)
-            for law in laws
-            for variant in (variants[:1] if law.startswith("passive") else variants)
+    def cases(self, laws: Sequence[str], variants: Sequence[str] = VARIANTS, *, jobs: int = 1) -> list[TenStoreyCase]:
+        """Run laws in variants over threads; constant voltages have but one."""
+        wanted = [
+            (law, variant) for law in laws for variant in (variants[:1] if law.startswith("passive") else variants)
         ]
+        runner = Parallel(n_jobs=max(1, jobs), backend="threading")
+        return list(runner(delayed(self.case)(law, variant) for law, variant in wanted))
 
-    def sensitivity(self, laws: Sequence[str], dampers: Sequence[float]) -> dict[float, dict[str, float]]:
+    def sensitivity(
+        self, laws: Sequence[str], dampers: Sequence[float], *, jobs: int = 1
+    ) -> dict[float, dict[str, float]]:
         """Return the indices of the first law with gains, filtered MR dampers, for several numbers of dampers."""
         law = next((item for item in laws if not item.startswith("passive")), laws[0])
-        return {number: self.case(law, "filtered", number).indices for number in dampers}
+        runner = Parallel(n_jobs=max(1, jobs), backend="threading")
+        cases = runner(delayed(self.case)(law, "filtered", number) for number in dampers)
+        return {number: case.indices for number, case in zip(dampers, cases, strict=True)}
 
 
 def floors(response: Response, *, absolute: bool = False) -> FloorResponse:

@@ -80,6 +80,7 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.structures.benchmark_ten_storey import ten_storey
 
     settings = context.settings.benchmark.ten_storey
+    bench.check_laws(settings.laws)
     motion = _motion(context, settings.motion, 1)
     device = _bingham(settings.inverse)
     chain = damper_from_parameter_set(load_parameter_set("dampers", settings.damper)).chain()
@@ -94,9 +95,9 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
             time_step_s=settings.time_step_s,
             filter_rate=settings.filter_rate_1_s,
         )
-        studies[name] = (study, study.cases(settings.laws))
+        studies[name] = (study, study.cases(settings.laws, jobs=context.jobs))
     study, cases = studies[settings.structures[0]]
-    sweep = study.sensitivity(settings.laws, settings.dampers)
+    sweep = study.sensitivity(settings.laws, settings.dampers, jobs=context.jobs)
     summary = report.summary(studies, sweep)
     with context.write("benchmark-ten-storey.h5") as artifact:
         artifact.put_json("summary", {key: summary[key] for key in ("laws", "variants", "thesis")})
@@ -117,6 +118,7 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.structures.benchmark_motion import SEVEN_MOTIONS, load_motion
 
     settings = context.settings.benchmark.base_isolated
+    bench.check_laws(settings.laws)
     motion = _motion(context, settings.motion, 2)
     device = _bingham(settings.damper)
     building = building_of(
@@ -198,6 +200,7 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.structures.benchmark_wind import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of
 
     settings = context.settings.benchmark.wind
+    bench.check_laws(settings.laws)
     load = _wind_load(context, settings.load)
     device = _bingham(settings.damper)
     reference = tower_of(settings.model, settings.surrogate)
