@@ -21,6 +21,9 @@ SETTLING_SHARE = 0.3
 STEADY_OFFSET_SHARE = 0.03
 """Displacement offsets that spread by less than this share of the stroke are taken as one of the whole campaign."""
 
+MOST_SAMPLES = 50_000
+"""Of long campaigns only so many samples are used, the same time of every test."""
+
 ACCELERATION_CUTOFF_HZ = 40.0
 """Least cut-off of a measured acceleration."""
 
@@ -154,6 +157,7 @@ def record_tests(
     trusted = offsets[periodic] if periodic.any() else offsets
     one = bool(np.std(trusted) < STEADY_OFFSET_SHARE * stroke)
     shared = float(np.median(trusted))
+    longest_s = min(longest_s, max(MOST_SAMPLES / (rate_hz * len(tests)), 4.0))
     rows = [
         _one_test(test, rate_hz, cutoff_hz, shared if one else test.displacement_offset_m, longest_s) for test in tests
     ]
@@ -183,6 +187,28 @@ def record_tests(
         period_s=numbers("period_s"),
         cutoff_hz=numbers("cutoff_hz"),
     )
+
+
+def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[PreparedTest]:
+    """Return the tests, long ones cut into pieces where they are too few to leave some out in turn."""
+    found = list(tests)
+    while 0 < len(found) < fewest:
+        longest = max(range(len(found)), key=lambda k: len(found[k].force_n))
+        test = found.pop(longest)
+        middle = len(test.force_n) // 2
+        for part, piece in ((1, slice(0, middle)), (2, slice(middle, None))):
+            cut = {
+                name: getattr(test, name)[piece]
+                for name in (
+                    "time_s", "displacement_m", "velocity_m_s", "acceleration_m_s2", "drive", "force_n",
+                    "displacement_raw_m", "force_raw_n",
+                )
+            }  # fmt: skip
+            inside = test.cycles[
+                (test.cycles >= (piece.start or 0)) & (test.cycles < (piece.stop or len(test.force_n)))
+            ]
+            found.append(replace(test, name=f"{test.name}-{part}", cycles=inside - (piece.start or 0), **cut))
+    return found
 
 
 def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: float, longest_s: float) -> dict[str, Any]:

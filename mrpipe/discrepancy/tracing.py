@@ -18,7 +18,7 @@ from mrpipe.discrepancy.errors import Score, campaign_offset, measured_force, sc
 from mrpipe.discrepancy.nuisances import observation_window, record_gains
 from mrpipe.discrepancy.offsets import OffsetFinding, offset_between_tests
 from mrpipe.discrepancy.problem import Term
-from mrpipe.discrepancy.recordings import Recordings, record_tests
+from mrpipe.discrepancy.recordings import Recordings, enough_tests, record_tests
 from mrpipe.discrepancy.select import Selection, forward_selection
 from mrpipe.discrepancy.structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.discrepancy.testability import untestable
@@ -28,6 +28,16 @@ from mrpipe.signals.prepared import PreparedTest
 
 MODEL_ERROR_CHI_SQUARE = 6.0
 """Where the best composite leaves this many times the noise, sensors' noise is no measure: weights by force RMS."""
+
+UNATTRIBUTED: dict[str, Any] = {
+    "name": "unattributed",
+    "form": "boosted-trees-on-lagged-states",
+    "parameters": {},
+    "confidence": 0.0,
+    "tied_with": [],
+    "physics": "A flexible model of what no named effect explains; it stands for no physics.",
+    "remedy": "Make the tests that `depends_on` suggests.",
+}
 
 FLEXIBLE_SHARE = 0.15
 """A flexible model that recovers less than this share of the excess finds no structure in it."""
@@ -93,7 +103,7 @@ def trace_campaign(
         Effects that the campaign declares: part of the baseline.
     """
     rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
-    training = record_tests([t for t in tests if t.role != "validation"], rate_hz=rate, cutoff_hz=cutoff)
+    training = record_tests(enough_tests([t for t in tests if t.role != "validation"]), rate_hz=rate, cutoff_hz=cutoff)
     validation = record_tests([t for t in tests if t.role == "validation"], rate_hz=rate, cutoff_hz=cutoff)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
@@ -255,14 +265,21 @@ class _Report:
         score_before, score_after = score(validation, measured, shifted), score(validation, measured, after)
         states = states_of(selection.base, training)
         p_value = structure_p_value(selection.base.residual, states)
-        ceiling, after_ceiling = self._ceilings(measured, before, after)
+        ceiling, after_ceiling, flexible = self._ceilings(measured, before, after)
         structured = selection.structured or self.offsets is not None
-        if not named and structured and ceiling > score_before.nrmse * np.sqrt(1.0 - FLEXIBLE_SHARE):
-            structured = p_value < 1e-3 and ceiling < 0.97 * score_before.nrmse
+        if not named and structured and not self.baseline.repeats:
+            # without repeats coloured noise looks like an excess: it is one only where something can be learnt of it
+            blind = ceiling > score_before.nrmse * np.sqrt(1.0 - FLEXIBLE_SHARE)
+            structured = not blind or p_value < 1e-6
         floor = self._noise_floor()
         left = max(selection.chosen.chi_square - selection.noise, 0.0)
         excess = max(selection.base.chi_square - selection.noise, 1e-12)
         final_states = states_of(selection.chosen, training)
+        effects_found = [item.as_json() for item in named]
+        if options.unattributed and structured and after_ceiling < score_after.nrmse:
+            after = after + flexible
+            score_after = score(validation, measured, after)
+            effects_found.append(UNATTRIBUTED)
         still = structured and left > max(0.2 * selection.noise, 0.1 * excess if named else 0.0)
         best = min(ceiling, after_ceiling, score_after.nrmse if named else ceiling)
         gain = score_before.nrmse**2 - best**2
@@ -291,7 +308,7 @@ class _Report:
                     name: float(v) for name, v in zip(training.names, selection.chosen.test_offsets, strict=True)
                 },
             },
-            "effects": [item.as_json() for item in named],
+            "effects": effects_found,
             "verdict": self.reason if not named else _verdict(named, selection, options.rules),
             "candidates": ranking(selection, self._candidate_errors(measured)),
             "untestable": dict(untested),
@@ -318,8 +335,8 @@ class _Report:
             score_before, score_after,
         )  # fmt: skip
 
-    def _ceilings(self, measured: FloatArray, before: FloatArray, after: FloatArray) -> tuple[float, float]:
-        """Return the NRMSE of the base and of the composite, each with a flexible model of its residual."""
+    def _ceilings(self, measured: FloatArray, before: FloatArray, after: FloatArray) -> tuple[float, float, FloatArray]:
+        """Return the NRMSE of base and composite with a flexible model of the residual, and the latter's force."""
         found = []
         for fitted, simulated in ((self.selection.base, before), (self.selection.chosen, after)):
             root = fitted.problem.root_weight
@@ -327,8 +344,8 @@ class _Report:
             extra = flexible_residual(fitted, self.training, residual, self.validation)
             found.append(score(self.validation, measured, simulated + extra).nrmse)
             if self.selection.base is self.selection.chosen:
-                return found[0], found[0]
-        return found[0], found[1]
+                break
+        return found[0], found[-1], extra
 
     def _noise_floor(self) -> float:
         fitted = self.selection.chosen

@@ -7,7 +7,17 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import ACCELERATION, DISPLACEMENT, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.plant import (
+    ACCELERATION,
+    CURRENT,
+    DISPLACEMENT,
+    DRIVE,
+    FIRST,
+    STEP_SIGNATURE,
+    VELOCITY,
+    Phase,
+    Step,
+)
 from mrpipe.effects.contract import Effect, EffectForm, Values, strength
 
 
@@ -17,6 +27,35 @@ def shift_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: 
     skew = parameters[0]
     wire[DISPLACEMENT] += skew * wire[VELOCITY] + 0.5 * skew * skew * wire[ACCELERATION]
     wire[VELOCITY] += skew * wire[ACCELERATION]
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def late_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: time [s] by which the force lies behind displacement and drive. State: ring of drives, its place.
+
+    The force is late by as much as motion and drive are taken from before.
+    """
+    skew = max(parameters[0], 0.0)
+    wire[DISPLACEMENT] += -skew * wire[VELOCITY] + 0.5 * skew * skew * wire[ACCELERATION]
+    wire[VELOCITY] -= skew * wire[ACCELERATION]
+    size = state.shape[0] - 1
+    if wire[FIRST] > 0.5:
+        for index in range(size):
+            state[index] = wire[DRIVE]
+        state[size] = 0.0
+    at = int(state[size])
+    state[at] = wire[DRIVE]
+    back = min(skew / dt, size - 2.0)
+    whole = int(back)
+    part = back - whole
+    late = (1.0 - part) * state[(at - whole + size) % size] + part * state[(at - whole - 1 + size) % size]
+    state[size] = (at + 1) % size
+    wire[DRIVE] = late
+    wire[CURRENT] = late
+
+
+def _late(values: Values) -> list[Step]:
+    return [Step("late-force", Phase.MOTION, late_force_step, np.array([values["skew"]]), 129)]
 
 
 def _shift(values: Values) -> list[Step]:
@@ -36,6 +75,12 @@ EFFECT = Effect(
             "x(t + T)",
             (strength("skew", "s", "time that displacement lies behind force", "one", -0.03, 0.03, 0.0005),),
             _shift,
+        ),
+        EffectForm(
+            "late-force",
+            "F(t - T)",
+            (strength("skew", "s", "time that force lies behind displacement and drive", "one", 0.0, 0.03, 0.0005),),
+            _late,
         ),
     ),
     sensor=True,

@@ -18,7 +18,7 @@ def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     """Parameters: gain, length [m] or time [s] or width [A], kind, time [s]. State: memory, last effective drive.
 
     Kinds: 0 the memory follows a rising drive at once and decays with slip; 1 with time; 2 largest drive so far; 3 play
-    of a width; 4 Bouc-Wen like memory that follows the direction of change of the drive; 5 to 7 time and slip together.
+    of a width; 4 Bouc-Wen like memory that follows the direction of change of the drive; 5 to 9 time and slip together.
     """
     u = wire[CURRENT]
     gain, size, kind = parameters[0], parameters[1], parameters[2]
@@ -30,7 +30,7 @@ def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
         state[0] = max(u, u + (state[0] - u) * math.exp(-path / size))
         wire[CURRENT] = u + gain * (state[0] - u)
     elif kind >= 5.0:
-        # a memory that time and slip break together: of what lies above the drive (5), or down to nothing (6, 7)
+        # a memory that time and slip break together: of what lies above the drive (5), or down to nothing (6 to 9)
         path = abs(wire[VELOCITY]) * dt / size + dt / parameters[3]
         floor = u if kind == 5.0 else 0.0
         state[0] = max(u, floor + (state[0] - floor) * math.exp(-path))
@@ -38,6 +38,10 @@ def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
             wire[CURRENT] = u + gain * (state[0] - u)
         elif kind == 6.0:
             wire[CURRENT] = max(u, gain * state[0])
+        elif kind == 8.0:
+            wire[CURRENT] = u + gain * state[0]
+        elif kind == 9.0:
+            wire[CURRENT] = math.sqrt(u * u + (gain * state[0]) ** 2)
         else:
             wire[CURRENT] = u + gain * (state[0] - u) * state[0] / (state[0] + abs(u) + 1e-12)
     elif kind == 2.0:
@@ -116,6 +120,8 @@ EFFECT = Effect(
         EffectForm("relaxing", "u + g (m - u), m decays to u over L and tau", (_GAIN, _LENGTH, _TIME), _together(5.0)),
         EffectForm("fading", "max(u, g m), m decays to 0 over L and tau", (_GAIN, _LENGTH, _TIME), _together(6.0)),
         EffectForm("fading-field", "u + g (m - u) m/(m + u), m decays to 0", (_GAIN, _LENGTH, _TIME), _together(7.0)),
+        EffectForm("fading-sum", "u + g m, m decays to 0 over L and tau", (_GAIN, _LENGTH, _TIME), _together(8.0)),
+        EffectForm("fading-root", "sqrt(u^2 + (g m)^2), m decays to 0", (_GAIN, _LENGTH, _TIME), _together(9.0)),
         EffectForm("past-maximum", "u + g (max u - u)", (_GAIN,), _past),
         EffectForm(
             "play",
