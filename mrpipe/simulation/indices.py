@@ -16,6 +16,9 @@ from mrpipe.simulation.loop import Response
 SMALLEST_PEAK = 0.02
 """Peaks of a decay below this share of the first are left out."""
 
+FLOWING = 0.05
+"""Share of the drive limit above which current counts as flowing."""
+
 QUICK = 0.45
 """A decay whose second extremum is below this share of the first is over within a period: the two give its damping."""
 
@@ -138,7 +141,7 @@ def indices(
         "rms_force_n": _rms(response.force[steady]),
     }
     if math.isfinite(excitation.decay_from_s):
-        decay = decay_damping(response, excitation.decay_from_s, 0.01 * drive_limit)
+        decay = decay_damping(response, excitation.decay_from_s, FLOWING * drive_limit)
         result["damping_ratio"] = None if math.isnan(decay.mean) else decay.mean
         result["damping_ratio_point_to_point"] = [float(value) for value in decay.point_to_point[:12]]
     else:

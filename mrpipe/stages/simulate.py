@@ -256,7 +256,7 @@ def _report(
     import numpy as np
 
     from mrpipe.reporting import simulation as figures
-    from mrpipe.simulation.indices import decay_damping
+    from mrpipe.simulation.indices import FLOWING, decay_damping
 
     context.report.text(_words(law, excitation, values))
     context.report.table("indices", _table(law, values, viscous), "Indices beside vd and what is printed (SI).")
@@ -290,7 +290,7 @@ def _report(
         f"Energies; the balance closes to {values['energy_balance_error']:.1e}.",
     )
     if np.isfinite(excitation.decay_from_s):
-        decay = decay_damping(response, excitation.decay_from_s, 0.01 * rig.damper.drive_limit)
+        decay = decay_damping(response, excitation.decay_from_s, FLOWING * rig.damper.drive_limit)
         after = response.time_s >= excitation.decay_from_s
         context.report.figure(
             "decay",
