@@ -139,17 +139,29 @@ def _find(
     """Find the modes in the tests that are not for validation; in all of them where a mode is too weak in those."""
     first = tuple(test for test in forced if test.role != "validation") or forced
     arguments = (tests.floor_masses, options.band_low_hz, options.band_high_hz, tests.source)
-    if len(first) == len(forced):
-        return *find_modes(first, *arguments), []
-    try:
-        fit, band = find_modes(first, *arguments)
-        coupling = modal_coupling(np.real(fit.residues), np.diag(tests.floor_masses))
-        if fit.mode_coherence().min() >= _ENOUGH_COHERENCE and np.abs(np.triu(coupling, 1)).max() <= LARGEST_COUPLING:
-            return fit, band, []
-    except UserError:
-        pass
-    note = "a mode is weak in the training tests: those for validation were taken for the fit as well"
-    return *find_modes(forced, *arguments), [note]
+    sets = [first]
+    # sweeps put more into each mode than random motion, and fewer tests are fitted sooner
+    for more in (tuple(test for test in forced if test.kind == "sweep"), forced):
+        if len(more) > len(sets[-1]):
+            sets.append(more)
+    notes: list[str] = []
+    for chosen in sets[:-1]:
+        try:
+            fit, band = find_modes(chosen, *arguments)
+        except UserError:
+            fit = None
+        if fit is not None and _sound(fit, tests.floor_masses):
+            return fit, band, notes
+        notes = ["a mode is weak in the training tests: tests for validation were taken for the fit as well"]
+    return *find_modes(sets[-1], *arguments), notes
+
+
+def _sound(fit: MultiModeFit, floor_masses: FloatArray) -> bool:
+    """Return whether every mode stands out and the shapes are orthogonal to the mass."""
+    coupling = modal_coupling(np.real(fit.residues), np.diag(floor_masses))
+    return bool(
+        fit.mode_coherence().min() >= _ENOUGH_COHERENCE and np.abs(np.triu(coupling, 1)).max() <= LARGEST_COUPLING
+    )
 
 
 def _check_coherence(fit: MultiModeFit, tests: FrameTests) -> list[str]:

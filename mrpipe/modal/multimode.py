@@ -217,13 +217,14 @@ class _Fit:
 
     def compressed(self, theta: FloatArray) -> FloatArray:
         """Triangle R of [J e]: a problem of a few rows with the same norm, gradient and J'J (exact compression)."""
-        both = np.column_stack([self.jacobian(theta), self.residual(theta)])
-        gram = both.T @ both
+        jacobian, residual = self.jacobian(theta), self.residual(theta)
+        cross = jacobian.T @ residual
+        gram = np.block([[jacobian.T @ jacobian, cross[:, None]], [cross[None, :], np.array([[residual @ residual]])]])
         scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         try:
             return np.asarray(np.linalg.cholesky(gram / np.outer(scale, scale)).T * scale)
         except np.linalg.LinAlgError:
-            return np.asarray(np.linalg.qr(both, mode="r"))
+            return np.asarray(np.linalg.qr(np.column_stack([jacobian, residual]), mode="r"))
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
         return np.vstack([state.jacobian for state in self.states(theta)])

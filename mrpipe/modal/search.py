@@ -55,7 +55,8 @@ def bands_to_try(tests: Sequence[FrameTest], low_hz: float, high_hz: float) -> l
         bands.append(high)
         high *= 2.0
     # tests may reach differently far; where all that finds nothing, a narrower band resolves close modes better
-    for top in [*tops, 0.7 * tops[-1]]:
+    narrower = [0.7 * tops[-1]] if len(tests) > 1 else []
+    for top in [*tops, *narrower]:
         if all(abs(top - known) > 0.1 * known for known in bands):
             bands.append(top)
     return [(low_hz, high) for high in bands]
