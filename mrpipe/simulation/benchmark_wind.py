@@ -71,6 +71,7 @@ class WindStudy:
     time_step_s: float
     dampers: float
     lqg_force_n: float
+    filter_rate: float = 0.0
 
     @property
     def gains(self) -> WindGains:
@@ -94,7 +95,14 @@ class WindStudy:
             If there is no such law.
         """
         gains = self.gains
-        mr = Controller("kelvin", "bingham", device=self.device, network=self.network, dampers=self.dampers)
+        mr = Controller(
+            "kelvin",
+            "bingham",
+            device=self.device,
+            network=self.network,
+            dampers=self.dampers,
+            filter_rate=self.filter_rate,
+        )
         if law == "vd":
             return replace(mr, viscous=gains.viscous)
         if law == "vdns":
@@ -167,6 +175,7 @@ def wind_study(
     modes: int = len(REDUCED_FLOORS),
     time_step_s: float = 0.001,
     dampers: float = 1.0,
+    filter_rate: float = 31.4,
 ) -> WindStudy:
     """Reduce the tower and calibrate all laws.
 
@@ -190,6 +199,8 @@ def wind_study(
         Longest step [s].
     dampers
         Dampers side by side.
+    filter_rate
+        lambda of the voltage filter P4 (24) [1/s]; 0 for none.
     """
     kept = modes + (1 if tower.position == "tuned-mass" else 0)
     modal = modal_model(tower.model, kept)
@@ -197,7 +208,9 @@ def wind_study(
     observer, force_n = wind_lqg(modal, replace(lqg, force_n=lqg.force_n * dampers), load)
     plain = modal_model(reference.model, modes)
     free = run_tower(plain, load, None, time_step_s)
-    return WindStudy(tower, modal, plain, optimum, device, network, observer, load, free, time_step_s, dampers, force_n)
+    return WindStudy(
+        tower, modal, plain, optimum, device, network, observer, load, free, time_step_s, dampers, force_n, filter_rate
+    )
 
 
 @dataclass(frozen=True)

@@ -229,6 +229,7 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
         modes=settings.modes,
         time_step_s=settings.time_step_s,
         dampers=settings.dampers or DEFAULT_DAMPERS[settings.position],
+        filter_rate=settings.filter_rate_1_s,
     )
     context.progress(0.2, f"{len(settings.laws)} laws")
     cases = bench.run_wind_cases(study, settings.laws, context.jobs)

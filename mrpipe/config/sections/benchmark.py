@@ -165,6 +165,9 @@ class WindSettings(Section):
         True, description="Voltage from a neural inverse of the damper, as the thesis; false: from the formula."
     )
     hidden_neurons: int = Field(6, ge=2, le=20, description="Neurons of both hidden layers of the neural inverse.")
+    filter_rate_1_s: float = Field(
+        31.4, ge=0.0, description="Rate of the voltage filter, (24) of P4 [1/s]; 0: none, and voltages then jump."
+    )
     stiffness_share: float = Field(
         0.5, ge=0.0, lt=0.95, description="Share of the static stiffness at the damper that vdns takes away."
     )
