@@ -79,9 +79,7 @@ class ArtifactWriter:
             attributes["config"] = provenance.config[:60000]
             yield cls(handle)
 
-    def put(
-        self, name: str, values: ArrayLike, *, unit: str, dims: Sequence[str] = (), description: str = ""
-    ) -> None:
+    def put(self, name: str, values: ArrayLike, *, unit: str, dims: Sequence[str] = (), description: str = "") -> None:
         """Store an array (any path of groups as `name`), its unit and the names of its axes.
 
         Raises
@@ -140,13 +138,9 @@ class Artifact:
             with h5py.File(self.path, "r") as handle:
                 self.root: dict[str, Any] = {key: _plain(value) for key, value in handle.attrs.items()}
         except OSError as error:
-            raise UserError(
-                self.path, "", "not a readable HDF5 file", "build it again with --force"
-            ) from error
+            raise UserError(self.path, "", "not a readable HDF5 file", "build it again with --force") from error
         if self.root.get("schema") != SCHEMA:
-            raise UserError(
-                self.path, "attribute schema", f"is {self.root.get('schema')!r}", f"{SCHEMA!r} expected"
-            )
+            raise UserError(self.path, "attribute schema", f"is {self.root.get('schema')!r}", f"{SCHEMA!r} expected")
 
     @property
     def stage(self) -> str:

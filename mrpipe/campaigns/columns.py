@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.campaigns.source import nearest
+from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.errors import UserError
 
 _INDEXED = re.compile(r"^(?P<name>.*?)\s*\[(?P<index>[^\]]*)\]$")

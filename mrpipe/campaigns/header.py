@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from mrpipe.artifacts.yaml_source import read_yaml
 from mrpipe.campaigns.schema import CampaignEntry
-from mrpipe.campaigns.source import read_yaml
 from mrpipe.campaigns.writing import CAMPAIGN_FILE
 from mrpipe.errors import UserError
 

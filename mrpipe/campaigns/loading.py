@@ -10,6 +10,7 @@ import numpy as np
 
 from mrpipe import units
 from mrpipe.artifacts import FloatArray, public_data_directory
+from mrpipe.artifacts.yaml_source import Place, YamlSource, nearest, read_yaml
 from mrpipe.campaigns.checks import find_clipping, find_dropouts, force_sign, require_finite, require_roles
 from mrpipe.campaigns.clock import build_clock
 from mrpipe.campaigns.columns import DataFile
@@ -24,7 +25,6 @@ from mrpipe.campaigns.schema import (
     known_channels,
     quantity_of,
 )
-from mrpipe.campaigns.source import Place, YamlSource, nearest, read_yaml
 from mrpipe.campaigns.writing import CAMPAIGN_FILE
 from mrpipe.errors import UserError
 

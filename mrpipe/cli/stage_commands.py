@@ -87,7 +87,7 @@ def simulate(
     ],
 ) -> None:
     """Run the closed loop under a control law."""
-    from mrpipe.config.errors import nearest
+    from mrpipe.artifacts.yaml_source import nearest
     from mrpipe.stages.registry import all_stages
 
     known = [name.removeprefix("simulate-") for name in all_stages() if name.startswith("simulate-")]

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.errors import UserError
-
-
-def nearest(word: str, known: list[str]) -> str:
-    """Return a remedy that names the nearest known word, or all of them where none is near."""
-    matches = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    if matches:
-        return f"did you mean {matches[0]}?"
-    return f"known: {', '.join(sorted(known))}"
 
 
 def section_of(model: type[BaseModel], path: tuple[str | int, ...]) -> type[BaseModel] | None:

@@ -11,12 +11,11 @@ import yaml
 from pydantic import ValidationError
 
 from mrpipe.artifacts import config_directory
-from mrpipe.config.errors import explain, nearest, section_of
+from mrpipe.artifacts.yaml_source import nearest, read_yaml
+from mrpipe.config.errors import explain, section_of
 from mrpipe.config.model import Config
 from mrpipe.config.sections.campaigns import LABORATORY, CampaignsSettings
 from mrpipe.errors import UserError
-
-KeyPath = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,8 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> LoadedConfig:
         If the file is missing, no YAML, has a key twice, an unknown key or a wrong value.
     """
     path = _locate(path)
-    content, lines = read_yaml_with_lines(path)
+    source = read_yaml(path)
+    content, lines = source.content, source.lines
     content.setdefault("name", path.stem)
     for override in overrides:
         _apply(content, override)
@@ -86,50 +86,7 @@ def _locate(path: Path) -> Path:
     raise UserError(path, "", "no such configuration", f"give a YAML file, or one of {', '.join(known)}")
 
 
-def read_yaml_with_lines(path: Path) -> tuple[dict[str, Any], dict[KeyPath, int]]:
-    """Return the mapping in a YAML file and the line of each key."""
-    try:
-        text = path.read_text(encoding="utf-8")
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        content = yaml.safe_load(text)
-    except UnicodeDecodeError as error:
-        raise UserError(path, "", "is not UTF-8 text", "save it as UTF-8") from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"line {mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or str(error)
-        raise UserError(path, where, f"not valid YAML ({problem})", "mend the syntax") from error
-    if content is None:
-        return {}, {}
-    if not isinstance(content, dict):
-        raise UserError(path, "line 1", "is no mapping", "write `key: value` lines")
-    lines: dict[KeyPath, int] = {}
-    _collect_lines(node, (), lines, path)
-    return content, lines
-
-
-def _collect_lines(node: Any, prefix: KeyPath, lines: dict[KeyPath, int], path: Path) -> None:
-    if isinstance(node, yaml.MappingNode):
-        for key_node, value_node in node.value:
-            place = (*prefix, key_node.value)
-            line = key_node.start_mark.line + 1
-            if place in lines:
-                dotted = ".".join(str(part) for part in place)
-                raise UserError(
-                    path,
-                    f"line {line}, {dotted}",
-                    f"stands already in line {lines[place]}",
-                    "keep one of the two",
-                )
-            lines[place] = line
-            _collect_lines(value_node, place, lines, path)
-    elif isinstance(node, yaml.SequenceNode):
-        for index, item in enumerate(node.value):
-            lines[(*prefix, index)] = item.start_mark.line + 1
-            _collect_lines(item, (*prefix, index), lines, path)
-
-
-def _override_path(override: str) -> KeyPath:
+def _override_path(override: str) -> tuple[str, ...]:
     return tuple(override.partition("=")[0].strip().split("."))
 
 

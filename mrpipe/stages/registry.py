@@ -47,7 +47,7 @@ def stage_named(name: str) -> Stage:
     UserError
         If there is no such stage; the nearest name is given.
     """
-    from mrpipe.config.errors import nearest
+    from mrpipe.artifacts.yaml_source import nearest
 
     stages = all_stages()
     if name not in stages:

@@ -25,7 +25,7 @@ BACKWARDS = motion() | {"t": motion()["t"][::-1]}
         (NAN, {}, "row 9: is NaN"),
         (None, {"sampling_rate_hz": 250}, "the clock runs at 1000 Hz"),
         (None, {"tests": content()["tests"][:1]}, "no validation test"),
-        (None, {"chanels": {}}, "did you mean 'channels'?"),
+        (None, {"chanels": {}}, "did you mean channels?"),
     ],
 )
 def test_each_fault_is_one_line_and_exit_2(

@@ -189,7 +189,7 @@ def test_damaged_files_are_told_in_a_line(tmp_path: Path, name: str, content: by
 @pytest.mark.parametrize(
     ("column", "expected"),
     [
-        ("x_G[:,2]", "no column 'x_G[:,2]'; did you mean 'x_F'?"),
+        ("x_G[:,2]", "no column 'x_G[:,2]'; did you mean x_F?"),
         ("x_F", "is no vector (500 x 3); pick one column, as in x_F[:,0]"),
         ("x_F[:,3]", "lies outside an array of 500 x 3; count from 0"),
         ("x_F[:,a]", "index [:,a] is not understood"),

@@ -22,7 +22,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
     words = sorted(known)
     close = difflib.get_close_matches(str(word), words, n=1, cutoff=0.5)
     if close:
-        return f"did you mean {close[0]!r}?"
+        return f"did you mean {close[0]}?"
     return f"known: {', '.join(words)}" if words else "there are none"
 
 
@@ -81,19 +81,19 @@ def read_yaml(path: Path) -> YamlSource:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise UserError(path, "", "cannot be read", "name a campaign.yaml or the directory that holds it") from error
+        raise UserError(path, "", "cannot be read", "name a YAML file that is there") from error
     except UnicodeDecodeError as error:
-        raise UserError(path, "", "is no UTF-8 text", "save it as UTF-8") from error
+        raise UserError(path, "", "is not UTF-8 text", "save it as UTF-8") from error
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         content = yaml.safe_load(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or "not valid YAML"
-        raise UserError(path, where, str(problem), "mend the YAML syntax") from error
+        problem = getattr(error, "problem", None) or str(error)
+        raise UserError(path, where, f"not valid YAML ({problem})", "mend the syntax") from error
     if not isinstance(content, dict):
-        raise UserError(path, "", "holds no mapping", "write campaign:, rig:, channels: and tests:")
+        raise UserError(path, "line 1", "is no mapping", "write `key: value` lines")
     lines: dict[Place, int] = {}
     _collect_lines(node, (), lines, Path(path))
     return YamlSource(Path(path), content, lines)
@@ -105,7 +105,9 @@ def _collect_lines(node: Any, place: Place, lines: dict[Place, int], path: Path)
             inner = (*place, str(key.value))
             line = key.start_mark.line + 1
             if inner in lines:
-                raise UserError(path, f"line {line}, {key.value}", "stands here twice", "leave one of the two")
+                dotted = ".".join(str(part) for part in inner)
+                problem = f"stands already in line {lines[inner]}"
+                raise UserError(path, f"line {line}, {dotted}", problem, "keep one of the two")
             lines[inner] = line
             _collect_lines(value, inner, lines, path)
     elif isinstance(node, yaml.SequenceNode):
