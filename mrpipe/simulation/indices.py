@@ -19,8 +19,9 @@ SMALLEST_PEAK = 0.02
 FLOWING = 0.05
 """Share of the drive limit above which current counts as flowing."""
 
-QUICK = 0.45
-"""A decay whose second extremum is below this share of the first is over within a period: the two give its damping."""
+QUICK = 0.55
+"""Where the extrema after the stop show less than this share of the first half period's damping, the decay was over
+within a period: what follows swings about the place where the damper stuck, and the first half period counts."""
 
 SMALLEST_FITTED_PEAK = 0.15
 """Peaks below this share of the first are no decay under control any more: residual force or a locked damper."""
@@ -91,10 +92,13 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     large = np.abs(x[peaks]) >= SMALLEST_FITTED_PEAK * np.abs(x[peaks[0]])
     ends = np.flatnonzero(~(large & (flows if flows[1:].any() else large)))
     used = np.arange(1, max(int(ends[0]) if len(ends) else len(peaks), 3))
-    if len(peaks) == 2 or abs(x[peaks[1]]) < QUICK * abs(x[peaks[0]]):
-        used = np.arange(2)
-    slope = np.polyfit(used, sizes[used], 1)[0]
-    return Decay(float(_ratio(np.array([-slope]))[0]), ratios, t[peaks], x[peaks], flows)
+    if len(peaks) > 2:
+        slope = np.polyfit(used, sizes[used], 1)[0]
+        mean = float(_ratio(np.array([-slope]))[0])
+        mean = mean if mean >= QUICK * ratios[0] else float(ratios[0])
+    else:
+        mean = float(ratios[0])
+    return Decay(mean, ratios, t[peaks], x[peaks], flows)
 
 
 def _ratio(decrement: FloatArray) -> FloatArray:
