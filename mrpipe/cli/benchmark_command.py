@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -50,6 +51,59 @@ def overrides_of(
     return [*result, f"benchmark.inputs_digest={json.dumps(digest)}"] if digest else result
 
 
+def table_of(name: str, summary: Mapping[str, Any]) -> list[str]:
+    """Return the lines that a person reads: the structure, and the indices beside the thesis' in brackets."""
+    periods = ", ".join(f"{value:.4g}" for value in summary["periods_s"][:5])
+    lines = [
+        f"{name}: {summary['model']} model, {summary['total_mass_kg'] / 1e3:.6g} t, periods {periods} .. s",
+        f"source: {summary['source']}",
+        *_more_facts(summary),
+        f"largest energy balance error {summary['energy_balance_error']:.1e}",
+        "",
+    ]
+    laws, thesis = summary["laws"], summary["thesis"]
+    lines.append(f"{'':6}" + "".join(f"{law:>19}" for law in laws) + f"    [thesis]  {summary['model']} model")
+    for index in next(iter(laws.values())):
+        cells = []
+        for law, values in laws.items():
+            printed = thesis.get(law, {}).get(index)
+            cells.append(f"{values[index]:.4g}" + (f" [{printed:g}]" if printed is not None else ""))
+        lines.append(f"{index:6}" + "".join(f"{cell:>19}" for cell in cells))
+    further = {
+        **{
+            f"{structure}, {variant}": table
+            for structure, variants in summary.get("variants", {}).items()
+            for variant, table in variants.items()
+        },
+        **summary.get("motions", {}),
+    }
+    for title, table in further.items():
+        lines += ["", f"{title} ({summary['model']} model)"]
+        for law, values in table.items():
+            row = " ".join(f"{key} {value:.3g}" for key, value in values.items() if key.startswith("J"))
+            lines.append(f"  {law:12} {row}")
+    return [*lines, "", f"why ours differ: {summary['why_different']}"]
+
+
+def _more_facts(summary: Mapping[str, Any]) -> list[str]:
+    lines = []
+    if "fixed_base_periods_s" in summary:
+        fixed = ", ".join(f"{value:.4g}" for value in summary["fixed_base_periods_s"][:3])
+        isolated = summary["isolated_period_s"]
+        lines.append(f"fixed base {fixed} s; rigid building on its bearings {isolated:.4g} s")
+    if "motion_details" in summary:
+        details = summary["motion_details"]
+        peaks = ", ".join(f"{value:.4g}" for value in details["peaks_m_s2"])
+        lines.append(
+            f"motion {summary['motion']}: peaks {peaks} m/s^2, {details['duration_s']:.4g} s at "
+            f"{details['interval_s']:g} s, unit in the file {details['unit_in_file']} ({details['unit_from']})"
+        )
+        lines += [f"  {note}" for note in details["notes"]]
+    else:
+        lines.append(f"{summary['motion']}; device: {summary['position']}, {summary['dampers']:g} dampers")
+    return lines
+
+
 def _file(option: str, value: str, needs_file: bool = False) -> str:
     """Return an absolute path where the value is a file, else the value: the name of something that comes along."""
     path = Path(value)
@@ -86,7 +140,20 @@ def benchmark(
 ) -> None:
     """Run a benchmark structure and print its indices beside the thesis' figures."""
     extra = overrides_of(name, model, motion, law, everything)
-    build_and_print([f"benchmark-{name}"], replace(options, overrides=[*extra, *options.overrides]))
+    chosen = replace(options, overrides=[*extra, *options.overrides])
+    if options.json:
+        build_and_print([f"benchmark-{name}"], chosen)
+        return
+    from mrpipe.cli.session import session
+
+    with session(chosen) as pipeline:
+        if options.force:
+            pipeline.force = frozenset([f"benchmark-{name}"])
+        outcome = pipeline.build(f"benchmark-{name}")
+    print("\n".join(table_of(name, outcome.manifest.summary)))
+    for warning in outcome.manifest.warnings:
+        print(f"warning: {warning}")
+    print(f"in {pipeline.run_directory}")
 
 
 def register(app: typer.Typer) -> None:

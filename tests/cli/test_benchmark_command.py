@@ -10,7 +10,7 @@ import pytest
 
 from mrpipe.artifacts import Artifact
 from mrpipe.cli import run
-from mrpipe.cli.benchmark_command import overrides_of
+from mrpipe.cli.benchmark_command import overrides_of, table_of
 from mrpipe.errors import UserError
 
 
@@ -103,3 +103,19 @@ def test_json_of_the_contract(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     artifact = Artifact(tmp_path / "run" / "benchmark-ten-storey.h5")
     assert artifact.unit("responses/vd/force") == "N"
     assert artifact.attributes("/")["model"] == "published"
+
+
+@pytest.mark.golden
+def test_table_puts_the_thesis_beside_ours() -> None:
+    summary = {
+        "model": "surrogate", "total_mass_kg": 1e6, "periods_s": [3.0, 2.0], "source": "built", "energy_balance_error": 1e-7,
+        "laws": {"vd": {"J1": 0.5}, "passive-on": {"J1": 0.7}}, "thesis": {"vd": {"J1": 0.63}}, "why_different": "reasons",
+        "motion": "wind synthetic", "position": "ground", "dampers": 1.0,
+        "motions": {"kobe": {"vd": {"J1": 0.4, "energy_balance_error": 1e-9}}},
+    }  # fmt: skip
+    text = "\n".join(table_of("wind", summary))
+    assert "surrogate model" in text
+    row = next(line for line in text.splitlines() if line.startswith("J1"))
+    assert row.split() == ["J1", "0.5", "[0.63]", "0.7"]
+    assert "kobe (surrogate model)" in text
+    assert "why ours differ: reasons" in text

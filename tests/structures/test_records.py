@@ -175,3 +175,18 @@ def test_public_motions() -> None:
     np.testing.assert_allclose(peaks["elcentro"], [3.07, 2.11], rtol=2e-3)
     assert load_motion("jiji", rng).duration_s == pytest.approx(90.0, abs=0.02)
     assert load_motion("elcentro-ns", rng).peaks_m_s2[0] == pytest.approx(0.349 * GRAVITY, rel=2e-3)
+
+
+@pytest.mark.golden
+def test_two_files_make_two_components(tmp_path: Path) -> None:
+    first = at2(tmp_path / "h1.at2")
+    second = at2(tmp_path / "h2.at2")
+    motion = load_motion(str(first), np.random.default_rng(0), second_file=str(second))
+    assert motion.components == 2
+    np.testing.assert_array_equal(motion.acceleration_m_s2[:, 0], motion.acceleration_m_s2[:, 1])
+    other = at2(tmp_path / "h3.at2", head="NPTS= {n}, DT= .0050 SEC")
+    with pytest.raises(UserError, match="not 0.01 s as the first"):
+        load_motion(str(first), np.random.default_rng(0), second_file=str(other))
+    alone = read_motion(first).in_components(2)
+    assert alone.peaks_m_s2[1] == 0.0
+    assert "the others are zero" in alone.notes[-1]

@@ -141,7 +141,7 @@ class WindSettings(Section):
     surrogate: str = Field(
         "wind-surrogate", description="Parameter set in configs/structures (or YAML file) of the surrogate."
     )
-    load: WindLoadSettings = Field(WindLoadSettings(), description="The wind.")
+    load: WindLoadSettings = Field(WindLoadSettings(), description="The across-wind load on the floors.")
     laws: tuple[str, ...] = Field(
         ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on"),
         min_length=1,
