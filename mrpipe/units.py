@@ -85,9 +85,7 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
     return float((1.0 * parsed).to_base_units().magnitude)
 
 
-def to_si(
-    values: ArrayLike, unit: str, *, where: str = "", quantity: str | None = None
-) -> NDArray[np.float64]:
+def to_si(values: ArrayLike, unit: str, *, where: str = "", quantity: str | None = None) -> NDArray[np.float64]:
     """Return `values` in SI (see :func:`conversion`)."""
     return np.asarray(values, dtype=np.float64) * conversion(unit, where=where, quantity=quantity)
 

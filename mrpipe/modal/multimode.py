@@ -312,9 +312,8 @@ def _coherence(
         half = max(4.0 * ratio * peak, 6.0 * float(np.median(np.diff(omega))))
         near = np.abs(omega - peak) <= half
         error = np.sum(np.abs(measured[near] - steady[near]) ** 2, axis=0)
-        result[:, index] = np.clip(
-            1.0 - error / np.maximum(np.sum(np.abs(measured[near]) ** 2, axis=0), 1e-300), 0.0, 1.0
-        )
+        power = np.maximum(np.sum(np.abs(measured[near]) ** 2, axis=0), 1e-300)
+        result[:, index] = np.clip(1.0 - error / power, 0.0, 1.0)
     return result
 
 
@@ -385,8 +384,7 @@ def _collect(fit: _Fit, spectra: Sequence[RecordSpectrum], theta: FloatArray) ->
         noise[own] = 2.0 * fit.sigma[index] ** 2
     edges = np.cumsum([item.omega.size for item in spectra])[:-1]
     line = np.concatenate([item.omega for item in spectra])
-    order = np.argsort(omega)
-    both = np.concatenate([order, modes + order])
+    both = np.concatenate([order := np.argsort(omega), modes + order])
     return MultiModeFit(
         angular_frequencies=omega[order],
         damping_ratios=zeta[order],
