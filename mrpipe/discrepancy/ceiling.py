@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingRegressor
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.discrepancy.engine import Fit
 from mrpipe.discrepancy.recordings import Recordings
 from mrpipe.discrepancy.structure import states_of
@@ -47,9 +47,19 @@ def flexible_residual(
     -------
     Shape (m,) [N].
     """
-    rows = np.flatnonzero(training.used)
-    rows = rows[:: max(1, -(-len(rows) // MOST_ROWS))]
-    trees = HistGradientBoostingRegressor(
+    rows = _rows(training.used)
+    trees = _trees(seed, iterations)
+    trees.fit(lagged_states(found, training)[rows], residual[rows])
+    return np.asarray(trees.predict(lagged_states(found, validation)), dtype=np.float64)
+
+
+def _rows(used: BoolArray) -> IntArray:
+    rows = np.flatnonzero(used)
+    return np.asarray(rows[:: max(1, -(-len(rows) // MOST_ROWS))], dtype=np.int64)
+
+
+def _trees(seed: int, iterations: int) -> HistGradientBoostingRegressor:
+    return HistGradientBoostingRegressor(
         max_iter=iterations,
         learning_rate=0.08,
         max_leaf_nodes=24,
@@ -58,5 +68,22 @@ def flexible_residual(
         random_state=seed,
         early_stopping=False,
     )
-    trees.fit(lagged_states(found, training)[rows], residual[rows])
-    return np.asarray(trees.predict(lagged_states(found, validation)), dtype=np.float64)
+
+
+def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations: int = 120) -> float:
+    """Return the mean square that a flexible model leaves of a fit's weighted residual, on whole tests left out."""
+    problem = found.problem
+    used = problem.root_weight > 0.0
+    features, target = lagged_states(found, problem.recordings), found.residual
+    total = 0.0
+    for fold in range(folds):
+        out = problem.recordings.test % folds == fold
+        rows = _rows(used & ~out)
+        judged = np.flatnonzero(used & out)
+        if not len(rows) or not len(judged):
+            total += float(np.sum(target[judged] ** 2))
+            continue
+        trees = _trees(seed, iterations)
+        trees.fit(features[rows], target[rows])
+        total += float(np.sum((target[judged] - trees.predict(features[judged])) ** 2))
+    return total / max(int(np.count_nonzero(used)), 1)

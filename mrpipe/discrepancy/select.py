@@ -74,6 +74,14 @@ class Selection:
         """Whether anything is missing at all."""
         return self.recoverable > NOTHING_MISSING * self.noise
 
+    def with_floor(self, floor: float) -> Selection:
+        """Return the same with another estimate of what cannot be recovered; shares follow."""
+        rounds = tuple(
+            tuple(replace(item, share=share_of(self.base, item.fit, floor)) for item in candidates)
+            for candidates in self.rounds
+        )
+        return replace(self, noise=floor, rounds=rounds)
+
     def share(self, found: Fit) -> float:
         """Return the share of the recoverable residual that a fit recovers."""
         return share_of(self.base, found, self.noise)
@@ -165,10 +173,17 @@ def forward_selection(
     *,
     most: int = 3,
     refits: int = 8,
+    second_share: float = SECOND_SHARE,
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Selection:
-    """Add effects one after another while each recovers a fair share."""
+    """Add effects one after another while each recovers a fair share.
+
+    Parameters
+    ----------
+    second_share
+        Share of what is left that a further effect must recover; small where noise is far below any model's error.
+    """
     rounds: list[tuple[Candidate, ...]] = []
     chosen = base
     excess = max(base.chi_square - noise, 0.0)
@@ -185,7 +200,7 @@ def forward_selection(
         best = able[0]
         gain = chosen.chi_square - best.fit.chi_square
         left = chosen.chi_square - noise
-        if len(rounds) > 1 and (gain < SECOND_GAIN * excess or gain < SECOND_SHARE * left):
+        if len(rounds) > 1 and (gain < SECOND_GAIN * excess or gain < second_share * left):
             break
         chosen = best.fit
         if chosen.chi_square - noise < max(NOTHING_MISSING * noise, SECOND_GAIN * excess):

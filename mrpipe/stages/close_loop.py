@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.discrepancy.tracing import Tracing
+    from mrpipe.discrepancy.summary import Tracing
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
-    from mrpipe.discrepancy.tracing import TracingOptions, trace_campaign
+    from mrpipe.discrepancy.summary import TracingOptions
+    from mrpipe.discrepancy.tracing import trace_campaign
     from mrpipe.discrepancy.verdict import Rules
     from mrpipe.effects.library import damper_effects, effects_named
     from mrpipe.signals.prepared import read_prepared
@@ -55,13 +56,35 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 
 def _closed_loop(context: StageContext, traced: Tracing) -> dict[str, Any]:
-    needed = ("calibrate", "identify-frame")
-    lacking = [name for name in needed if name not in context.inputs]
+    """Replay the closed-loop recordings with the damper before and after; the inverse follows the damper."""
+    needed = ["campaign:closed-loop", "identify-frame", "calibrate"]
+    if context.settings.simulate.controller.inverse == "network":
+        needed.append("train-inverse")
+    lacking = [name.removeprefix("campaign:") for name in needed if name not in context.inputs]
     if lacking:
-        reason = f"skipped: no {' and no '.join(lacking)}"
-        context.log.info("close-loop: closed-loop part %s", reason)
-        return {"status": reason}
-    return {"status": "skipped: the closed-loop part needs a calibrated frame", "effects": len(traced.named)}
+        return {"status": f"skipped: no {' and no '.join(lacking)}"}
+    from mrpipe.campaigns import load_campaign
+    from mrpipe.control.controller import Controller, Gains
+    from mrpipe.discrepancy.closed_loop import MeasuredRun, compare_laws, damper_of, measured_runs, plant_chain
+    from mrpipe.simulation.loop import LoopOptions
+    from mrpipe.stages.simulate import controller
+    from mrpipe.structures import read_frame
+
+    runs = measured_runs(load_campaign(context.inputs["campaign:closed-loop"]))
+    if not runs:
+        return {"status": "skipped: no closed-loop recording names its law and floor displacements"}
+    frame = read_frame(context.artifact("identify-frame"))
+    damper = damper_of(traced.selection.base, traced.drive_unit)
+
+    def make(run: MeasuredRun) -> Controller:
+        # the rig ran with the controller as calibrated: what the effect changes is the plant
+        gains = Gains(**run.gains) if run.gains else None
+        return controller(context, run.law, frame, damper, gains)
+
+    chains = {"before": plant_chain(traced.selection.base), "after": plant_chain(traced.selection.chosen)}
+    position = context.artifact("calibrate").array("position")
+    context.progress(0.95, "closed loop before and after")
+    return compare_laws(runs, frame, chains, {"before": make, "after": make}, position, LoopOptions())
 
 
 def _write(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
@@ -98,6 +121,8 @@ def _report(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) 
     )
 
     context.report.text(in_plain_words(summary))
+    for name, reason in summary["untestable"].items():
+        context.report.text(f"Effect {name}: {reason}.")
     base = traced.selection.base
     used = base.problem.root_weight > 0.0
     residual = base.residual[used] / base.problem.root_weight[used]
@@ -139,7 +164,31 @@ def _report(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) 
         "errors", errors_per_test(summary["tests"], summary["noise_floor_nrmse"]), "Error of each validation test."
     )
     context.report.table("tests", pd.DataFrame(summary["tests"]), "Error of each validation test, before and after.")
-    context.report.text(f"Closed loop: {summary['closed_loop']['status']}.")
+    _report_closed_loop(context, summary["closed_loop"])
+
+
+def _report_closed_loop(context: StageContext, found: Mapping[str, Any]) -> None:
+    import pandas as pd
+
+    if "tests" not in found:
+        context.report.text(f"Closed loop: {found['status']}.")
+        return
+    rows = []
+    for item in found["tests"]:
+        row = {"test": item["test"], "law": item["law"]}
+        for when in ("measured", "before", "after"):
+            row |= {
+                f"{name}_{when}": value for name, value in item[when].items() if name.startswith(("rms_x", "nrmse"))
+            }
+        rows.append(row)
+    context.report.table("closed-loop", pd.DataFrame(rows), "Closed loop: measured, and predicted before and after.")
+    errors, changes = found["nrmse_x_top"], "changes" if found["ranking_changes"] else "does not change"
+    context.report.text(
+        f"Closed loop, {found['status']} with the measured ground motion: error of the top floor's displacement "
+        f"{errors['before']:.3f} before and {errors['after']:.3f} after (RMS over RMS). The ranking of the laws "
+        f"{changes}: measured {', '.join(found['ranking']['measured'])}; "
+        f"predicted {', '.join(found['ranking']['after'])}."
+    )
 
 
 def _gain(row: Mapping[str, Any]) -> float:
@@ -152,6 +201,6 @@ STAGE = Stage(
     run=_run,
     inputs=("prepare", "campaign:bench"),
     optional_inputs=("identify-frame", "calibrate", "train-inverse", "campaign:closed-loop"),
-    settings=("close_loop",),
+    settings=("close_loop", "simulate.controller"),
     outputs=("close-loop.h5", "close-loop.json"),
 )
