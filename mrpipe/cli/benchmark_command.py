@@ -37,7 +37,7 @@ def overrides_of(
     section = f"benchmark.{NAMES[name]}"
     result = []
     if model is not None:
-        value = _file("--model", model, needs_file=name != "ten-storey")
+        value = _file("--model", model, needs_file=name != "ten-storey" and model != "published")
         result.append(f"{section}.{_MODEL_KEY[name]}={json.dumps([value] if name == 'ten-storey' else value)}")
     if motion is not None:
         result.append(f"{section}.{_MOTION_KEY[name]}={json.dumps(_file('--motion', motion))}")

@@ -27,8 +27,8 @@ IMPOSSIBLE_PEAK = 3.0 * GRAVITY
 
 _UNITS = (
     (re.compile(r"units?\s+of\s+g\b|\(g\)|\[g\]|\bin\s+g\b|,\s*g\s*$|^\s*g\s*$", re.IGNORECASE | re.MULTILINE), "g"),
-    (re.compile(r"cm/s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)|\bgals?\b", re.IGNORECASE), "cm/s^2"),
-    (re.compile(r"(?<![a-z])m/s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)", re.IGNORECASE), "m/s^2"),
+    (re.compile(r"cm[/_]s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)|\bgals?\b", re.IGNORECASE), "cm/s^2"),
+    (re.compile(r"(?<![a-z])m[/_]s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)", re.IGNORECASE), "m/s^2"),
 )
 _POINTS = re.compile(r"NPTS\s*[=:]\s*(\d+)", re.IGNORECASE)
 _INTERVAL = re.compile(r"\bDT\s*[=:]\s*([0-9.]+(?:E[-+]?\d+)?)", re.IGNORECASE)

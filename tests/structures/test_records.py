@@ -57,6 +57,26 @@ def test_two_columns_in_every_unit_give_the_same_motion(tmp_path: Path, unit: st
 
 
 @pytest.mark.golden
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("t_s,a_m_s2", "m/s^2"),
+        ("time,acceleration cm/sec/sec", "cm/s^2"),
+        ("t,acc in g", "g"),
+        ("t,a (gal)", "cm/s^2"),
+        ("t,a [m/s**2]", "m/s^2"),
+    ],
+)
+def test_units_in_headers(tmp_path: Path, header: str, unit: str) -> None:
+    factor = {"g": 1.0, "cm/s^2": 100.0 * GRAVITY, "m/s^2": GRAVITY}[unit]
+    rows = "\n".join(f"{t:.4f},{a:.9g}" for t, a in zip(TIME, SIGNAL * factor, strict=True))
+    path = tmp_path / "record.csv"
+    path.write_text(f"{header}\n{rows}\n")
+    motion = read_motion(path)
+    assert (motion.unit, motion.unit_from) == (unit, "header")
+
+
+@pytest.mark.golden
 def test_matlab_rows_of_time_and_acceleration(tmp_path: Path) -> None:
     savemat(tmp_path / "a.mat", {"record": np.stack([TIME, SIGNAL * GRAVITY])})
     motion = read_motion(tmp_path / "a.mat")
@@ -185,7 +205,7 @@ def test_two_files_make_two_components(tmp_path: Path) -> None:
     assert motion.components == 2
     np.testing.assert_array_equal(motion.acceleration_m_s2[:, 0], motion.acceleration_m_s2[:, 1])
     other = at2(tmp_path / "h3.at2", head="NPTS= {n}, DT= .0050 SEC")
-    with pytest.raises(UserError, match="not 0.01 s as the first"):
+    with pytest.raises(UserError, match="first component"):
         load_motion(str(first), np.random.default_rng(0), second_file=str(other))
     alone = read_motion(first).in_components(2)
     assert alone.peaks_m_s2[1] == 0.0
