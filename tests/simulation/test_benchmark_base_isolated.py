@@ -10,6 +10,7 @@ import pytest
 
 from mrpipe.artifacts import FloatArray, public_data_directory
 from mrpipe.control.benchmark_gains import damped_modes
+from mrpipe.control.benchmark_lqg import observer_gain, output_regulator_gain, sampled_loop_radius
 from mrpipe.errors import UserError
 from mrpipe.simulation.benchmark_base_isolated import (
     LAWS,
@@ -20,7 +21,7 @@ from mrpipe.simulation.benchmark_base_isolated import (
 )
 from mrpipe.simulation.benchmark_indices import IsolatedResponse, base_isolated_indices
 from mrpipe.simulation.benchmark_inverse import inverse_validation, train_inverse
-from mrpipe.simulation.benchmark_isolation_design import LqgWeights
+from mrpipe.simulation.benchmark_isolation_design import LqgWeights, isolation_outputs
 from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, Response
 from mrpipe.structures.benchmark_base_isolated import (
     IsolatedBuilding,
@@ -256,3 +257,27 @@ def test_ideal_actuator_is_a_linear_dashpot(study: IsolationStudy, motion: Groun
     expected = replace(study, modal=inside).run(motion).displacement()
     ours = study.run(motion, Controller("kelvin", "active", viscous=c)).displacement()
     assert np.abs(ours - expected).max() < 1e-3 * np.abs(expected).max()
+
+
+@pytest.mark.oracle
+def test_lqg_of_the_building_agrees_with_python_control(study: IsolationStudy) -> None:
+    """Appendix E on the 54 states of this building, output weighting with feedthrough, to 1e-9."""
+    import control
+
+    modal, weights = study.modal, LqgWeights()
+    A, B = modal.state_matrix(), modal.input_matrix(modal.devices)
+    regulated, measured = isolation_outputs(study.building, modal)
+    Q = np.diag([weights.displacement] * 2 + [weights.acceleration] * 4)
+    R = np.eye(2) / weights.force_n**2
+    ours = output_regulator_gain(A, B, regulated, Q, R)
+    state, cost = regulated.C.T @ Q @ regulated.C, regulated.D.T @ Q @ regulated.D + R
+    cross = regulated.C.T @ Q @ regulated.D
+    theirs, _, _ = control.lqr(A, B, 0.5 * (state + state.T), 0.5 * (cost + cost.T), cross)
+    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
+    np.testing.assert_allclose(study.observer.feedback, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
+    E, Sw, Sv = modal.input_matrix(modal.load), 0.1 * np.eye(2), 1e-6 * np.eye(8)
+    disturbance = E @ Sw @ E.T
+    filtered, _, _ = control.lqe(A, np.eye(54), measured.C, 0.5 * (disturbance + disturbance.T), Sv)
+    gain = observer_gain(A, E, measured, Sw, Sv)
+    np.testing.assert_allclose(gain, filtered, rtol=1e-9, atol=1e-9 * np.abs(filtered).max())
+    assert sampled_loop_radius(A, B, study.observer) < 1.0
