@@ -278,7 +278,7 @@ def _settings(controller: Controller, dt: float, ratio: int, save: int, every: i
         packed.VISCOSITY_B: device.viscosity_per_volt,
         packed.HIGHEST_VOLTAGE: device.highest_voltage,
         packed.NEURAL: float(controller.network is not None),
-        packed.CHAIN_COUNT: 5.0,
+        packed.CHAIN_COUNT: 3.0,
     }  # fmt: skip
     for place, value in entries.items():
         settings[place] = value
