@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingRegressor
+from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.discrepancy.engine import Fit
@@ -11,7 +12,7 @@ from mrpipe.discrepancy.recordings import Recordings
 from mrpipe.discrepancy.structure import states_of
 
 LAGS_S = (0.01, 0.03, 0.1, 0.3)
-MOST_ROWS = 20_000
+MOST_ROWS = 15_000
 
 
 def lagged_states(found: Fit, recordings: Recordings) -> FloatArray:
@@ -32,7 +33,7 @@ def flexible_residual(
     validation: Recordings,
     *,
     seed: int = 0,
-    iterations: int = 150,
+    iterations: int = 100,
 ) -> FloatArray:
     """Return what a flexible model, fitted to the residual [N] of the training tests, predicts on the validation tests.
 
@@ -49,7 +50,8 @@ def flexible_residual(
     """
     rows = _rows(training.used)
     trees = _trees(seed, iterations)
-    trees.fit(lagged_states(found, training)[rows], residual[rows])
+    with threadpool_limits(1):
+        trees.fit(lagged_states(found, training)[rows], residual[rows])
     return np.asarray(trees.predict(lagged_states(found, validation)), dtype=np.float64)
 
 
@@ -70,7 +72,7 @@ def _trees(seed: int, iterations: int) -> HistGradientBoostingRegressor:
     )
 
 
-def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations: int = 120) -> float:
+def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations: int = 80) -> float:
     """Return the mean square that a flexible model leaves of a fit's weighted residual, on whole tests left out."""
     problem = found.problem
     used = problem.root_weight > 0.0
@@ -84,6 +86,7 @@ def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations
             total += float(np.sum(target[judged] ** 2))
             continue
         trees = _trees(seed, iterations)
-        trees.fit(features[rows], target[rows])
+        with threadpool_limits(1):
+            trees.fit(features[rows], target[rows])
         total += float(np.sum((target[judged] - trees.predict(features[judged])) ** 2))
     return total / max(int(np.count_nonzero(used)), 1)

@@ -174,6 +174,7 @@ def forward_selection(
     most: int = 3,
     refits: int = 8,
     second_share: float = SECOND_SHARE,
+    second_gain: float = SECOND_GAIN,
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Selection:
@@ -183,6 +184,8 @@ def forward_selection(
     ----------
     second_share
         Share of what is left that a further effect must recover; small where noise is far below any model's error.
+    second_gain
+        Share of what the base lacked that it must recover.
     """
     rounds: list[tuple[Candidate, ...]] = []
     chosen = base
@@ -200,7 +203,7 @@ def forward_selection(
         best = able[0]
         gain = chosen.chi_square - best.fit.chi_square
         left = chosen.chi_square - noise
-        if len(rounds) > 1 and (gain < SECOND_GAIN * excess or gain < second_share * left):
+        if len(rounds) > 1 and (gain < second_gain * excess or gain < second_share * left):
             break
         chosen = best.fit
         if chosen.chi_square - noise < max(NOTHING_MISSING * noise, SECOND_GAIN * excess):

@@ -198,7 +198,7 @@ class Summary:
     def _noise_floor(self) -> float:
         fitted = self.selection.chosen
         used = fitted.problem.root_weight > 0.0
-        deviation = np.sqrt(self.selection.noise) / fitted.problem.root_weight[used]
+        deviation = np.sqrt(self.baseline.noise) / fitted.problem.root_weight[used]
         return float(np.sqrt(np.mean(deviation**2))) / self.training.force_rms
 
     def _candidate_errors(self, measured: FloatArray) -> dict[str, float]:

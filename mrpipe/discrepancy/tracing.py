@@ -16,7 +16,7 @@ from mrpipe.discrepancy.nuisances import observation_window
 from mrpipe.discrepancy.offsets import OffsetFinding, offset_between_tests
 from mrpipe.discrepancy.problem import Term
 from mrpipe.discrepancy.recordings import Recordings, enough_tests, record_tests
-from mrpipe.discrepancy.select import SECOND_SHARE, Selection, forward_selection
+from mrpipe.discrepancy.select import SECOND_GAIN, SECOND_SHARE, Selection, forward_selection
 from mrpipe.discrepancy.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions
 from mrpipe.discrepancy.testability import untestable
 from mrpipe.discrepancy.verdict import Named, confidence_of, parameter_table, tied, unnamed_reason
@@ -25,6 +25,9 @@ from mrpipe.signals.prepared import PreparedTest
 
 MODEL_ERROR_CHI_SQUARE = 6.0
 """Where the best composite leaves this many times the noise, sensors' noise is no measure: weights by force RMS."""
+
+REAL_SECOND_GAIN = 0.02
+"""Share of the base's own error that it must recover there."""
 
 REAL_SECOND_SHARE = 0.06
 """Share of what is left that a further effect must recover where weights go by force RMS."""
@@ -57,7 +60,7 @@ def trace_campaign(
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
     baseline, selection = _select(training, able, declared, options, jobs, progress)
-    window, selection = _with_window(selection, training, able, options, jobs)
+    window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
     reason = unnamed_reason(selection, options.rules)
     if reason:
@@ -98,6 +101,7 @@ def _select(
             most=options.most_effects,
             refits=options.refits,
             second_share=REAL_SECOND_SHARE if floor > 0.0 else SECOND_SHARE,
+            second_gain=REAL_SECOND_GAIN if floor > 0.0 else SECOND_GAIN,
             jobs=jobs,
         )
         excess = selection.chosen.chi_square / max(baseline.noise, 1e-12)
@@ -124,18 +128,34 @@ def _judged_by_trees(selection: Selection) -> Selection:
 
 
 def _with_window(
-    selection: Selection, training: Recordings, effects: Mapping[str, Effect], options: TracingOptions, jobs: int
+    selection: Selection,
+    noise: float,
+    training: Recordings,
+    effects: Mapping[str, Effect],
+    options: TracingOptions,
+    jobs: int,
 ) -> tuple[float, Selection]:
     """Look for a moving average that the records went through, where something is left to explain."""
-    left = selection.chosen.chi_square - selection.noise
-    if not options.observation_filter or left < 0.2 * selection.noise or not bool(np.all(training.period_s > 0.0)):
+    left = selection.chosen.chi_square - noise
+    if not options.observation_filter or left < 0.2 * noise or not bool(np.all(training.period_s > 0.0)):
         return 0.0, selection
     share, filtered = observation_window(selection.chosen)
     if share == 0.0:
         return 0.0, selection
     base = observation_window(selection.base, (share,))[1]
     terms = [Term(effect, form) for effect in effects.values() for form in effect.forms]
-    again = forward_selection(base, selection.noise, terms, most=options.most_effects, refits=options.refits, jobs=jobs)
+    again = forward_selection(
+        base,
+        noise,
+        terms,
+        most=options.most_effects,
+        refits=options.refits,
+        second_share=REAL_SECOND_SHARE,
+        second_gain=REAL_SECOND_GAIN,
+        jobs=jobs,
+    )
+    if noise < selection.noise:
+        again = _judged_by_trees(again)
     if again.chosen.chi_square > filtered.chi_square:
         again = replace(again, chosen=filtered, rounds=selection.rounds)
     return share, again
