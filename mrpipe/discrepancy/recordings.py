@@ -189,6 +189,12 @@ def record_tests(
     )
 
 
+def drive_jumps(tests: Sequence[PreparedTest]) -> bool:
+    """Return whether the drive of any test changes by a tenth of its range from one sample to the next."""
+    largest = max(float(np.max(np.abs(test.drive))) for test in tests)
+    return any(float(np.max(np.abs(np.diff(test.drive)))) > 0.1 * largest > 0.0 for test in tests)
+
+
 def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[PreparedTest]:
     """Return the tests, long ones cut into pieces where they are too few to leave some out in turn."""
     found = list(tests)

@@ -15,7 +15,7 @@ from mrpipe.discrepancy.crossvalidation import Gain, gain_of, intervals, left_ou
 from mrpipe.discrepancy.nuisances import observation_window
 from mrpipe.discrepancy.offsets import OffsetFinding, offset_between_tests
 from mrpipe.discrepancy.problem import Term
-from mrpipe.discrepancy.recordings import Recordings, enough_tests, record_tests
+from mrpipe.discrepancy.recordings import Recordings, drive_jumps, enough_tests, record_tests
 from mrpipe.discrepancy.select import SECOND_GAIN, SECOND_SHARE, Selection, forward_selection
 from mrpipe.discrepancy.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions
 from mrpipe.discrepancy.testability import untestable
@@ -25,6 +25,9 @@ from mrpipe.signals.prepared import PreparedTest
 
 MODEL_ERROR_CHI_SQUARE = 6.0
 """Where the best composite leaves this many times the noise, sensors' noise is no measure: weights by force RMS."""
+
+JUMP_RATE_HZ = 500.0
+"""Least rate of the fits where the drive jumps from one sample to the next."""
 
 REAL_SECOND_GAIN = 0.02
 """Share of the base's own error that it must recover there."""
@@ -55,6 +58,9 @@ def trace_campaign(
         Effects that the campaign declares: part of the baseline.
     """
     rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
+    if drive_jumps(tests):
+        # between two samples a drive is taken to run straight: a jump must not be smeared by thinning
+        rate = max(rate, JUMP_RATE_HZ)
     training = record_tests(enough_tests([t for t in tests if t.role != "validation"]), rate_hz=rate, cutoff_hz=cutoff)
     validation = record_tests([t for t in tests if t.role == "validation"], rate_hz=rate, cutoff_hz=cutoff)
     progress(0.05, "baseline")
