@@ -38,9 +38,9 @@ class MeasuredRun:
     ground_acceleration
         Shape (m,) [m/s^2].
     displacement
-        Of the floors relative to the ground, shape (m, n) [m].
+        Of the floors that were measured, relative to the ground, lowest first, shape (m, p) [m].
     absolute_acceleration
-        Of the floors, shape (m, n) [m/s^2]; empty where not recorded.
+        Of the floors that were measured, lowest first, shape (m, q) [m/s^2]; empty where not recorded.
     damper_force
         Shape (m,) [N]; empty where not recorded.
     """
@@ -60,11 +60,11 @@ def measured_runs(campaign: Campaign) -> list[MeasuredRun]:
     runs = []
     for item in campaign.recordings:
         law = str(item.details.get("law", ""))
-        floors = [name for name in item.channels if name.startswith("floor_displacement_")]
-        if item.kind != "closed-loop" or not law or not floors or "ground_acceleration" not in item.channels:
+        if item.kind != "closed-loop" or not law or "ground_acceleration" not in item.channels:
             continue
-        count = len(floors)
-        accelerations = [item.channels.get(f"floor_acceleration_{k + 1}") for k in range(count)]
+        displacement = _floors(item.channels, "floor_displacement_")
+        if not displacement.size:
+            continue
         given = item.details.get("gains") or {}
         runs.append(
             MeasuredRun(
@@ -73,14 +73,18 @@ def measured_runs(campaign: Campaign) -> list[MeasuredRun]:
                 {str(name): float(value) for name, value in given.items()},
                 item.time_s - item.time_s[0],
                 item.channels["ground_acceleration"],
-                np.column_stack([item.channels[f"floor_displacement_{k + 1}"] for k in range(count)]),
-                np.column_stack([a for a in accelerations if a is not None])
-                if all(a is not None for a in accelerations)
-                else np.zeros((0, 0)),
+                displacement,
+                _floors(item.channels, "floor_acceleration_"),
                 item.channels.get("damper_force", np.zeros(0)),
             )
         )
     return runs
+
+
+def _floors(channels: Mapping[str, FloatArray], stem: str) -> FloatArray:
+    """Return the channels of the floors that were measured, lowest first, shape (m, p); empty where there is none."""
+    names = sorted((name for name in channels if name.startswith(stem)), key=lambda name: int(name.removeprefix(stem)))
+    return np.column_stack([channels[name] for name in names]) if names else np.zeros((0, 0))
 
 
 def damper_of(found: Fit, drive_unit: str) -> DamperModel:
