@@ -10,7 +10,7 @@ _WIDEST = 8
 
 def print_json(content: Any) -> None:
     """Print one strict JSON document."""
-    from mrpipe.pipeline.runner import to_json
+    from mrpipe.artifacts.plain import to_json
 
     print(to_json(content))
 

@@ -21,6 +21,9 @@ SETTLING_SHARE = 0.3
 STEADY_OFFSET_SHARE = 0.03
 """Displacement offsets that spread by less than this share of the stroke are taken as one of the whole campaign."""
 
+MOST_TESTS = 48
+"""Of campaigns with more training tests every second, third, ... is used."""
+
 MOST_SAMPLES = 50_000
 """Of long campaigns only so many samples are used, the same time of every test."""
 
@@ -193,6 +196,18 @@ def drive_jumps(tests: Sequence[PreparedTest]) -> bool:
     """Return whether the drive of any test changes by a tenth of its range from one sample to the next."""
     largest = max(float(np.max(np.abs(test.drive))) for test in tests)
     return any(float(np.max(np.abs(np.diff(test.drive)))) > 0.1 * largest > 0.0 for test in tests)
+
+
+def spread_tests(tests: Sequence[PreparedTest], most: int = MOST_TESTS) -> list[PreparedTest]:
+    """Return the tests, or every second, third, ... of a campaign of very many; repeats are all kept.
+
+    A few seconds of each of a hundred tests tell less of slow effects than twice as long of half of them.
+    """
+    kept = [test for test in tests if test.role == "repeat"]
+    others = [test for test in tests if test.role != "repeat"]
+    step = -(-len(others) // max(most, 1))
+    chosen = {id(test) for test in [*kept, *others[:: max(step, 1)]]}
+    return [test for test in tests if id(test) in chosen]
 
 
 def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[PreparedTest]:

@@ -15,7 +15,7 @@ from mrpipe.discrepancy.crossvalidation import Gain, gain_of, intervals, left_ou
 from mrpipe.discrepancy.nuisances import observation_window
 from mrpipe.discrepancy.offsets import OffsetFinding, offset_between_tests
 from mrpipe.discrepancy.problem import Term
-from mrpipe.discrepancy.recordings import Recordings, drive_jumps, enough_tests, record_tests
+from mrpipe.discrepancy.recordings import Recordings, drive_jumps, enough_tests, record_tests, spread_tests
 from mrpipe.discrepancy.select import SECOND_GAIN, SECOND_SHARE, Selection, forward_selection
 from mrpipe.discrepancy.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions
 from mrpipe.discrepancy.testability import untestable
@@ -61,7 +61,8 @@ def trace_campaign(
     if drive_jumps(tests):
         # between two samples a drive is taken to run straight: a jump must not be smeared by thinning
         rate = max(rate, JUMP_RATE_HZ)
-    training = record_tests(enough_tests([t for t in tests if t.role != "validation"]), rate_hz=rate, cutoff_hz=cutoff)
+    usable = spread_tests(enough_tests([t for t in tests if t.role != "validation"]))
+    training = record_tests(usable, rate_hz=rate, cutoff_hz=cutoff)
     validation = record_tests([t for t in tests if t.role == "validation"], rate_hz=rate, cutoff_hz=cutoff)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)

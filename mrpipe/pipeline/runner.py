@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
-import math
 import shutil
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mrpipe.artifacts import Provenance, atomic_write_text
+from mrpipe.artifacts.plain import plain
 from mrpipe.config.loader import LoadedConfig
 from mrpipe.config.sections.campaigns import LABORATORY
 from mrpipe.errors import StageSkipped
@@ -298,25 +296,3 @@ class Pipeline:
 def seed_of(seed: int, name: str) -> list[int]:
     """Return the entropy of a stage's generator: run's seed and stage's name, so that stages do not share draws."""
     return [seed, int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")]
-
-
-def plain(value: Any) -> Any:
-    """Return numpy scalars, arrays and tuples as plain JSON-able Python; what is not finite becomes None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(inner) for key, inner in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(inner) for inner in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Path):
-        return str(value)
-    return value
-
-
-def to_json(value: Any) -> str:
-    """Return strict JSON of a summary."""
-    return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -89,6 +88,7 @@ def _closed_loop(context: StageContext, traced: Tracing) -> dict[str, Any]:
 
 def _write(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
     from mrpipe.artifacts import atomic_write_text
+    from mrpipe.artifacts.plain import to_json
 
     validation = traced.validation
     with context.write("close-loop.h5") as artifact:
@@ -105,7 +105,7 @@ def _write(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
             artifact.put(f"validation/{name}", values, unit=unit, dims=("sample",))
         artifact.put("validation/starts", validation.starts, unit="1", dims=("test",))
         artifact.put_json("validation/names", list(validation.names))
-    atomic_write_text(context.run_directory / "close-loop.json", json.dumps(summary, indent=1) + "\n")
+    atomic_write_text(context.run_directory / "close-loop.json", to_json(summary) + "\n")
 
 
 def _report(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:

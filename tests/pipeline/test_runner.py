@@ -11,11 +11,11 @@ import h5py
 import pytest
 
 from mrpipe.artifacts import Artifact
+from mrpipe.artifacts.plain import plain, to_json
 from mrpipe.errors import UserError
 from mrpipe.pipeline.fingerprint import code_version, digest_of_artifact
 from mrpipe.pipeline.lock import run_lock
 from mrpipe.pipeline.manifest import Manifest
-from mrpipe.pipeline.runner import plain, to_json
 from mrpipe.pipeline.stage import StageContext
 
 from .conftest import CALLS, MakePipeline, with_run
