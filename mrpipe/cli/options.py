@@ -72,7 +72,7 @@ def with_common_options(*left_out: str) -> Callable[[Callable[..., None]], Calla
 
         @functools.wraps(function)
         def command(**values: Any) -> None:
-            common = {name: values.pop(name) for name in _COMMON if name in values}
+            common = {name: values.pop(name) for name in _COMMON if name not in left_out}
             common["overrides"] = common.get("overrides") or []
             function(options=CommonOptions(**common), **values)
 

@@ -11,6 +11,7 @@ from scipy import stats
 from mrpipe.artifacts import FloatArray
 from mrpipe.discrepancy.engine import Fit, centred, fit, jacobian_of, predict, regressors, weighting
 from mrpipe.discrepancy.problem import Problem
+from mrpipe.discrepancy.recordings import Recordings
 from mrpipe.discrepancy.structure import BLOCK_S
 
 
@@ -35,12 +36,25 @@ class Gain:
         return self.interval[0] > 0.0
 
 
+def folds_of(recordings: Recordings, folds: int) -> list[list[int]]:
+    """Return the tests of each fold: every k-th in the order of drive level, then stroke.
+
+    A campaign steps through its drive levels in turn; folds in its own order could take all of one level away, and
+    what is then learnt of the others says nothing of it.
+    """
+    keys = [
+        (round(float(np.mean(np.abs(recordings.drive[part]))), 2), float(np.ptp(recordings.displacement[part])))
+        for part in (recordings.test == index for index in range(recordings.tests))
+    ]
+    order = sorted(range(recordings.tests), key=lambda index: keys[index])
+    return [sorted(order[k::folds]) for k in range(folds)]
+
+
 def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
     """Return the weighted residual of every training test by a fit that has not seen it, shape (n,)."""
     problem = found.problem
     recordings = problem.recordings
-    # folds of every k-th test: neighbours in a campaign are alike
-    parts = [[t for t in range(recordings.tests) if t % folds == k] for k in range(folds)]
+    parts = folds_of(recordings, folds)
 
     def one(part: list[int]) -> tuple[list[int], FloatArray]:
         keep = [t for t in range(recordings.tests) if t not in part]

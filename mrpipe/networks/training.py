@@ -153,9 +153,13 @@ class TrainingData:
         return (self.spec.width, *hidden, 1)
 
     def relative(self, mean_square: float, *, held: bool = False) -> float:
-        """Turn a mean squared normalised error into RMS error over RMS of the target."""
+        """Turn a mean squared normalised error into RMS error over RMS of the target.
+
+        Where the held-out records have no drive at all, the fitted ones say what the target's size is.
+        """
         target = self.held_rows.target if held else self.fit_rows.target
         size = float(np.sqrt(np.mean(target**2))) if len(target) else float("nan")
+        size = size or float(np.sqrt(np.mean(self.fit_rows.target**2))) or 1.0
         return float(np.sqrt(mean_square)) * self.scaling.output_scale / size
 
 

@@ -119,19 +119,33 @@ class Pipeline:
         missing = ""
         for item in stage.inputs:
             missing = missing or self._provide(item)
+        together = all(self._can_be_had(item) for item in stage.optional_inputs)
         for item in stage.optional_inputs:
-            if self._wanted(item):
+            if self._wanted(item, together):
                 self._provide(item)
         outcome = self._skip(stage, missing) if missing else self._run_or_reuse(stage)
         self.outcomes[name] = outcome
         self._hashes.save()
         return outcome
 
-    def _wanted(self, name: str) -> bool:
+    def _can_be_had(self, name: str) -> bool:
+        """Return whether the campaigns that an input hangs on are configured."""
+        provider = self.provider(name)
+        if provider is None:
+            return self.input_path(name) is not None
+        return all(self._can_be_had(item) for item in self.stages[provider].inputs)
+
+    def _wanted(self, name: str, together: bool) -> bool:
+        """Return whether to bring an optional input up to date: they serve together, so one that lacks spares all.
+
+        What is there and up to date is used in any case.
+        """
         provider = self.provider(name)
         if provider is None or provider in self.outcomes:
             return True
-        return not (self.campaign_given and self.needs_laboratory(name)) or self._is_fresh(provider)
+        if not together or (self.campaign_given and self.needs_laboratory(name)):
+            return self._is_fresh(provider)
+        return True
 
     def _provide(self, name: str) -> str:
         """Build an input; return why it cannot be had, or nothing."""

@@ -44,8 +44,10 @@ def _datasets(path: Path) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"name": name, "shape": list(item.shape), "unit": str(item.attrs.get("unit", ""))}
         row["dims"] = [str(name) for name in np.atleast_1d(item.attrs.get("dims", "")) if str(name)]
         if item.size and np.issubdtype(item.dtype, np.number):
-            values = item[()]
-            row["minimum"], row["maximum"] = float(np.nanmin(values)), float(np.nanmax(values))
+            values = np.asarray(item[()], dtype=np.float64)
+            finite = values[np.isfinite(values)]
+            if finite.size:
+                row["minimum"], row["maximum"] = float(finite.min()), float(finite.max())
         rows.append(row)
 
     with h5py.File(path, "r") as handle:

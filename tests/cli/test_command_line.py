@@ -84,6 +84,13 @@ def test_check_prints_one_json_document(capsys: pytest.CaptureFixture[str]) -> N
     assert json.loads(capsys.readouterr().out)["valid"] is True
 
 
+def test_check_reads_the_configuration_that_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("campaigns: {bench: null, frame: null, closed_loop: null}\n", encoding="utf-8")
+    assert run(["check", str(path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["config"] == str(path)
+
+
 def test_explain_lists_settings_with_values(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["check", "thesis", "--explain", "--set", "prepare.cutoff_hz=77"]) == 0
     assert "prepare.cutoff_hz = 77" in capsys.readouterr().out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from mrpipe.pipeline.lock import run_lock
 from mrpipe.pipeline.manifest import Manifest
 from mrpipe.pipeline.stage import StageContext
 
-from .conftest import CALLS, MakePipeline, with_run
+from .conftest import CALLS, STAGES, MakePipeline, with_run
 
 
 def test_builds_what_is_missing_and_nothing_else(make_pipeline: MakePipeline) -> None:
@@ -107,6 +108,12 @@ def test_stage_without_campaign_is_skipped_with_all_after_it(make_pipeline: Make
 def test_optional_input_is_used_where_it_is_there(make_pipeline: MakePipeline) -> None:
     assert make_pipeline().build("third").what == "built"
     assert CALLS == ["first", "second", "third"]
+
+
+def test_optional_inputs_serve_together_so_one_that_lacks_spares_all(make_pipeline: MakePipeline) -> None:
+    stages = {**STAGES, "third": replace(STAGES["third"], optional_inputs=("second", "campaign:frame"))}
+    assert make_pipeline(stages).build("third").what == "skipped"
+    assert CALLS == ["third"]
 
 
 def test_undeclared_setting_is_refused(make_pipeline: MakePipeline) -> None:
