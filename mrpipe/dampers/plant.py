@@ -155,11 +155,12 @@ def build_chain(steps: Sequence[Step]) -> Chain:
     )
 
 
-_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
+CHAIN_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
+"""The compiled type of a chain's functions, for the signatures of kernels that run it."""
 
 
 @njit(
-    void(_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64),
+    void(CHAIN_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64),
     cache=True,
 )
 def advance(
@@ -209,7 +210,7 @@ def advance(
 
 @njit(
     void(
-        _FUNCTIONS,
+        CHAIN_FUNCTIONS,
         float64[::1],
         int64[::1],
         int64[::1],

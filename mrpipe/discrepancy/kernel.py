@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import float64, int64, njit, types, void
+from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.plant import (
     ACCELERATION,
-    CHAIN_LENGTH,
+    CHAIN_FUNCTIONS,
     CURRENT,
     DISPLACEMENT,
     DRIVE,
@@ -23,7 +23,6 @@ from mrpipe.dampers.plant import (
     RATE_YIELD,
     SINCE_REVERSAL,
     SLIP,
-    STEP_SIGNATURE,
     TIME,
     VELOCITY,
     VISCOSITY,
@@ -40,12 +39,10 @@ CURRENT_AT, VELOCITY_AT, HYSTERESIS_AT, YIELD_AT, VISCOSITY_AT, FORCE_AT, WORK_A
 """Rows of what :func:`run_recordings` returns: effective drive, velocity and displacement of the damper, z, factors by
 which effects change yield force and viscosity, force, work."""
 
-_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
-
 
 @njit(
     void(
-        _FUNCTIONS,
+        CHAIN_FUNCTIONS,
         float64[::1],
         int64[::1],
         int64[::1],

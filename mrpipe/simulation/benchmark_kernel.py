@@ -14,12 +14,11 @@ from numba import float64, int64, njit, types, void
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
     ACCELERATION,
-    CHAIN_LENGTH,
+    CHAIN_FUNCTIONS,
     DISPLACEMENT,
     DRIVE,
     FIRST,
     FORCE,
-    STEP_SIGNATURE,
     VELOCITY,
     WIRE_SIZE,
     advance,
@@ -66,7 +65,7 @@ _M = float64[:, ::1]
 _STRUCTURE = types.UniTuple(_M, 11)
 _CONTROL = types.UniTuple(_M, 8)
 _NETWORK = types.Tuple((_M, _V, _M, _V, _V, _V))
-_CHAIN = types.Tuple((types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH), _V, int64[::1], int64[::1]))
+_CHAIN = types.Tuple((CHAIN_FUNCTIONS, _V, int64[::1], int64[::1]))
 _RESULT = types.UniTuple(_M, 5)
 
 

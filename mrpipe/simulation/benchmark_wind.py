@@ -10,10 +10,10 @@ from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.benchmark_lqg import SampledController
-from mrpipe.errors import UserError
 from mrpipe.networks.network import Network
 from mrpipe.simulation.benchmark_indices import WIND_FLOORS, WindResponse, wind_indices
 from mrpipe.simulation.benchmark_isolation_design import LqgWeights
+from mrpipe.simulation.benchmark_laws import require_known, unknown_law
 from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, Response, simulate
 from mrpipe.simulation.benchmark_wind_design import WindGains, wind_gains, wind_lqg
 from mrpipe.structures.benchmark_model import ModalModel, modal_model
@@ -39,20 +39,13 @@ REASON = (
 )
 """Why our figures differ from the printed ones."""
 
-LAWS = ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on")
-"""VD, VDNS, FDNS with MR dampers; LQG with an ideal actuator, and clipped on MR dampers; constant voltages."""
-
-
-def unknown_law(law: str) -> UserError:
-    """Return the error that tells of a law that is not in :data:`LAWS`."""
-    return UserError("--law", law, "is no law of the tower", f"known: {', '.join(LAWS)}")
+STRUCTURE = "the tower"
+"""What messages call it."""
 
 
 def check_laws(laws: Sequence[str]) -> None:
-    """Raise UserError if one of them is not in :data:`LAWS`."""
-    for law in laws:
-        if law not in LAWS:
-            raise unknown_law(law)
+    """Raise UserError if one of them is not in :data:`~mrpipe.simulation.benchmark_laws.LAWS`."""
+    require_known(laws, STRUCTURE)
 
 
 @dataclass(frozen=True)
@@ -87,7 +80,7 @@ class WindStudy:
         return self.optimum.within(self.dampers * force, velocity, displacement)
 
     def controller(self, law: str) -> Controller:
-        """Return the controller of a law of :data:`LAWS`.
+        """Return the controller of a law of :data:`~mrpipe.simulation.benchmark_laws.LAWS`.
 
         Raises
         ------
@@ -116,7 +109,7 @@ class WindStudy:
         if law in ("passive-off", "passive-on"):
             volts = 0.0 if law == "passive-off" else self.device.highest_voltage
             return Controller("constant", "bingham", voltage=volts, device=self.device, dampers=self.dampers)
-        raise unknown_law(law)
+        raise unknown_law(law, STRUCTURE)
 
     def run(self, controller: Controller, *, refine: int = 1) -> Response:
         """Run the tower with its device; `refine` shortens the step."""

@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import float64, int64, njit, types, void
+from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.kernel import (
@@ -23,12 +23,11 @@ from mrpipe.control.kernel import (
 )
 from mrpipe.dampers.plant import (
     ACCELERATION,
-    CHAIN_LENGTH,
+    CHAIN_FUNCTIONS,
     DISPLACEMENT,
     DRIVE,
     FIRST,
     FORCE,
-    STEP_SIGNATURE,
     TIME,
     VELOCITY,
     WIRE_SIZE,
@@ -63,13 +62,11 @@ PLAIN_ITERATIONS = 12
 TOLERANCE_N = 1e-5
 CORRECTED_N = 2e-3
 
-_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
-
 
 @njit(
     float64(
-        _FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64[::1], float64, float64,
-        float64, float64, float64, float64,
+        CHAIN_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64[::1],
+        float64, float64, float64, float64, float64, float64,
     ),
     cache=True,
 )  # fmt: skip
@@ -93,7 +90,7 @@ def _damper_force(
     void(
         int64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1],
         float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1],
-        _FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1],
+        CHAIN_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1],
         float64[::1], int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1],
     ),
     cache=True,

@@ -13,7 +13,6 @@ from mrpipe.control.benchmark_gains import damped_modes
 from mrpipe.control.benchmark_lqg import observer_gain, output_regulator_gain, sampled_loop_radius
 from mrpipe.errors import UserError
 from mrpipe.simulation.benchmark_base_isolated import (
-    LAWS,
     IsolationStudy,
     capacity_sensitivity,
     isolation_study,
@@ -22,6 +21,7 @@ from mrpipe.simulation.benchmark_base_isolated import (
 from mrpipe.simulation.benchmark_indices import IsolatedResponse, base_isolated_indices
 from mrpipe.simulation.benchmark_inverse import inverse_validation, train_inverse
 from mrpipe.simulation.benchmark_isolation_design import LqgWeights, isolation_outputs
+from mrpipe.simulation.benchmark_laws import LAWS
 from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, Response
 from mrpipe.structures.benchmark_base_isolated import (
     IsolatedBuilding,

@@ -10,8 +10,9 @@ import pytest
 from mrpipe.errors import UserError
 from mrpipe.simulation.benchmark_indices import WIND_FLOORS, WindResponse, wind_indices
 from mrpipe.simulation.benchmark_isolation_design import LqgWeights
+from mrpipe.simulation.benchmark_laws import LAWS
 from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, simulate
-from mrpipe.simulation.benchmark_wind import LAWS, WindStudy, wind_response, wind_sensitivity, wind_study
+from mrpipe.simulation.benchmark_wind import WindStudy, wind_response, wind_sensitivity, wind_study
 from mrpipe.structures.benchmark_wind import HEIGHT_M, WIDTH_M, Tower, place_device, surrogate_tower
 from mrpipe.structures.dynamics import discretise_first_order
 from mrpipe.structures.wind import WindLoad, synthetic_wind
