@@ -17,6 +17,7 @@ from mrpipe.dampers.plant import (
     STEP_SIGNATURE,
     VISCOSITY,
     YIELD_FORCE,
+    Chain,
     Phase,
     Step,
 )
@@ -61,6 +62,18 @@ def polynomial_step(wire: FloatArray, state: FloatArray, parameters: FloatArray,
 def driver_lag(eta: float) -> Step:
     """Return the driver's lag (2.4), eta in 1/s."""
     return Step("driver-lag", Phase.CURRENT, lag_step, np.array([float(eta)]), state_size=2)
+
+
+def command_place(chain: Chain) -> int:
+    """Return where the state of a chain keeps the command of the step before; -1 where it has no lag (2.4).
+
+    Write the present command there where it jumps at the beginning of a step and is held over it, as that of a sampled
+    controller; the lag takes it as straight between the ends of a step otherwise.
+    """
+    for function, at in zip(chain.functions, chain.state_offsets, strict=False):
+        if function is lag_step:
+            return int(at) + 1
+    return -1
 
 
 def polynomial_coefficients(yield_force: Sequence[float] | FloatArray, viscosity: Sequence[float] | FloatArray) -> Step:

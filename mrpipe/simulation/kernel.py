@@ -34,6 +34,7 @@ from mrpipe.dampers.plant import (
     advance,
 )
 from mrpipe.simulation.parts import (
+    I_COMMAND,
     I_DELAY,
     I_PER_SAMPLE,
     I_RECORD,
@@ -49,6 +50,7 @@ from mrpipe.simulation.parts import (
     T_WORK_FRAME,
     T_WORK_IN,
     TRACK_DAMPER,
+    TRACK_HELD,
     TRACK_LAW,
     amplitude,
     ideal_force,
@@ -155,12 +157,12 @@ def run_loop(
         motion[1] += w[floor] * z[n + floor]
         for column in range(n):
             pushed += M[floor, column] * z[column]
-    motion[0] = x
+    motion[0], v = x, motion[1]
     amplitude(run, motion, tracker)
     state = before[:size]
     sample, active, written = -1, -1, 0
     to_sample, to_output, to_record = 0, 0, 0
-    wanted, asked = 0.0, 0.0
+    wanted, asked, jumped = 0.0, 0.0, False
     for step in range(counts[I_STEPS] + 1):
         # counters in place of remainders: integer division costs as much as the rest of the bookkeeping
         if to_sample == 0:
@@ -174,6 +176,7 @@ def run_loop(
                 active += 1
                 to_output = per_sample
                 wanted, asked = commands[active, COMMAND_FORCE], commands[active, COMMAND_DRIVE]
+                jumped = True
             to_output -= 1
         elif step == 0:
             asked = commands[0, COMMAND_DRIVE]
@@ -208,6 +211,13 @@ def run_loop(
         if step == counts[I_STEPS]:
             break
         # --- plant: all but the force at the end of the step
+        if jumped:
+            # the controller holds its output: it changes now, and not along the step
+            if track == TRACK_HELD:
+                force = wanted if wanted * v >= 0.0 else 0.0
+            elif run[R_LAG] == 1.0 and counts[I_COMMAND] >= 0:
+                damper[counts[I_COMMAND]] = asked
+            jumped = False
         drive += run[R_LAG] * (asked - drive)
         before[size], before[size + 1], before[size + 2] = ground[step], ground[step + 1], force
         multiply(step_matrix, before, after)
@@ -266,7 +276,7 @@ def run_loop(
         work_damper += 0.5 * (force + found) * (after[size] - x)
         work_in -= 0.5 * (ground[step] + ground[step + 1]) * (after[size + 3] - pushed)
         work_frame += 0.5 * (loss + loss_end) * dt
-        loss, x, pushed = loss_end, after[size], after[size + 3]
+        loss, x, v, pushed = loss_end, after[size], after[size + 1], after[size + 3]
         force_before, force = force, found
         for index in range(size):
             before[index] = after[index]

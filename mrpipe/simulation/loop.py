@@ -18,6 +18,7 @@ from mrpipe.control.kernel import (
     MEASURED_FLOORS,
     MEASURED_GROUND,
 )
+from mrpipe.dampers.drive import command_place
 from mrpipe.dampers.plant import Chain, build_chain, new_state
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import kernel, parts
@@ -198,6 +199,7 @@ def simulate_law(
     ground = np.ascontiguousarray(excitation.at(dt * np.arange(steps + 1, dtype=np.float64)))
     every = max(1, round(1.0 / (dt * options.record_rate_hz)))
     counts, run = _run_numbers(controller, options, steps, per_sample, every, dt)
+    counts[parts.I_COMMAND] = command_place(chain)
     samples = steps // per_sample + 1
     commands = np.zeros((samples, COMMAND_SIZE))
     record = np.zeros((steps // every + 1, 3 * n + parts.T_SIZE))

@@ -37,7 +37,8 @@ I_PER_SAMPLE = 1
 I_DELAY = 2
 I_TRACK = 3
 I_RECORD = 4  # plant steps between records
-I_SIZE = 5
+I_COMMAND = 5  # where the damper's state keeps the command of the step before; -1: nowhere
+I_SIZE = 6
 
 # --- columns of the record after the 2n of the state and the n absolute accelerations ---
 T_FORCE = 0
