@@ -95,9 +95,9 @@ class ControllerOptions:
     low_pass_hz: float | None = 60.0
     drive_limit: float | None = None
     dead_band_m_s: float = 0.0
-    friction_rounding_m_s: float = 0.005
+    friction_rounding_m_s: float = 0.0125
     extremum_step_m: float = 1e-4
-    extremum_share: float = 0.2
+    extremum_share: float = 0.1
     extremum_memory_s: float = 0.6
 
 

@@ -33,6 +33,12 @@ class ReferenceOptions:
         Of the training.
     rows
         Rows of the training set.
+    rounding_m_s
+        Speed over which the friction of the law changes its sign; 0: the jump of (4.18).
+    disturbances_rad_s, disturbance_share
+        Frequencies of other modes that ride on the loops, and their speed over that of the loop (deviation of a normal
+        distribution). Floor 1 does not move harmonically in the closed loop: a network that has seen harmonic motion
+        only answers to the rest of it at random, and the loop hunts.
     displacement_noise_m, velocity_noise_m_s
         Noise on the inputs in training. Lagged samples of a smooth motion are nearly collinear, and a network trained
         without noise lives on their tiny differences: the noise of an estimator would then drown the force.
@@ -47,8 +53,11 @@ class ReferenceOptions:
     starts: int = 4
     iterations: int = 150
     rows: int = 6000
+    rounding_m_s: float = 0.0
+    disturbances_rad_s: tuple[float, ...] = ()
+    disturbance_share: float = 0.2
     displacement_noise_m: float = 2e-5
-    velocity_noise_m_s: float = 1e-3
+    velocity_noise_m_s: float = 3e-3
 
 
 @dataclass(frozen=True)
@@ -61,13 +70,29 @@ class ReferenceNetwork:
     iterations: int
 
 
-def loop(alpha: float, amplitude_m: float, frequency_hz: float, rate_hz: float) -> tuple[FloatArray, ...]:
-    """Return displacement, velocity and force of two cycles of FDNS in harmonic motion, each of shape (n,)."""
+CYCLES = 4
+"""Cycles of a loop."""
+
+
+def loop(
+    options: ReferenceOptions, amplitude_m: float, frequency_hz: float, rng: np.random.Generator | None = None
+) -> tuple[FloatArray, ...]:
+    """Return displacement, velocity and force of some cycles of FDNS in harmonic motion, each of shape (n,).
+
+    With a generator other modes ride on the motion, at random strength and phase; X of the law stays that of the loop.
+    """
     omega = 2.0 * np.pi * frequency_hz
-    t = np.arange(int(2.0 * rate_hz / frequency_hz)) / rate_hz
+    t = np.arange(int(CYCLES * options.rate_hz / frequency_hz)) / options.rate_hz
     x = amplitude_m * np.sin(omega * t)
     v = amplitude_m * omega * np.cos(omega * t)
-    return x, v, alpha * (np.sign(v) * amplitude_m - x)
+    if rng is not None:
+        for other in options.disturbances_rad_s:
+            speed = options.disturbance_share * amplitude_m * omega * rng.standard_normal()
+            phase = other * t + rng.uniform(0.0, 2.0 * np.pi)
+            x = x + speed / other * np.sin(phase)
+            v = v + speed * np.cos(phase)
+    side = np.tanh(v / options.rounding_m_s) if options.rounding_m_s > 0.0 else np.sign(v)
+    return x, v, options.alpha_n_m * (side * np.maximum(amplitude_m, np.abs(x)) - x)
 
 
 def train_reference(
@@ -79,7 +104,7 @@ def train_reference(
     hence the many amplitudes and frequencies.
     """
     spec = FeatureSpec(("displacement", "velocity"), options.past_values, False, options.rate_hz, "force")
-    history = _with_noise(_history(options, options.amplitudes_m, options.frequencies_hz), options, rng)
+    history = _with_noise(_history(options, options.amplitudes_m, options.frequencies_hz, rng), options, rng)
     trained = train(
         history,
         spec,
@@ -124,9 +149,14 @@ def network_force(network: Network, x: FloatArray, v: FloatArray) -> FloatArray:
     return network.predict(np.stack(columns, axis=1))
 
 
-def _history(options: ReferenceOptions, amplitudes: tuple[float, ...], frequencies: tuple[float, ...]) -> History:
+def _history(
+    options: ReferenceOptions,
+    amplitudes: tuple[float, ...],
+    frequencies: tuple[float, ...],
+    rng: np.random.Generator | None = None,
+) -> History:
     pairs = [(a, f) for a in amplitudes for f in frequencies]
-    loops = [loop(options.alpha_n_m, a, f, options.rate_hz) for a, f in pairs]
+    loops = [loop(options, a, f, rng) for a, f in pairs]
     names = ("displacement", "velocity", "force")
     channels = {name: np.concatenate([item[index] for item in loops]) for index, name in enumerate(names)}
     return History(

@@ -62,12 +62,14 @@ def write_calibration(
     position: FloatArray,
     weights: Weights,
     reference: ReferenceNetwork,
+    friction_rounding_m_s: float,
 ) -> None:
-    """Write modes, gains, regulator and the network of nnc."""
+    """Write modes, gains, regulator, the network of nnc, and the speed over which friction changes its sign [m/s]."""
     modes = calibration.modes
     for name, unit in (("omega_0", "rad/s"), ("omega_inf", "rad/s"), ("nu", "m/N"), ("u_0", "kg^-1/2"), ("kappa", "1")):
         artifact.put(name, getattr(modes, name), unit=unit)
     artifact.put("static_stiffness", calibration.static_stiffness_n_m, unit="N/m")
+    artifact.put("friction_rounding", friction_rounding_m_s, unit="m/s")
     artifact.put("position", position, unit="1", dims=("floor",))
     artifact.put("shape_0", modes.shape_0, unit="kg^-1/2", dims=("floor",))
     artifact.put("shape_inf", modes.shape_inf, unit="kg^-1/2", dims=("floor",))

@@ -50,9 +50,8 @@ from mrpipe.simulation.parts import (
     T_WORK_FRAME,
     T_WORK_IN,
     TRACK_DAMPER,
-    TRACK_HELD,
     TRACK_LAW,
-    amplitude,
+    TRACK_SAMPLED,
     ideal_force,
     multiply,
     note,
@@ -145,20 +144,17 @@ def run_loop(
     trial = np.zeros(damper.shape[0])
     before = np.zeros(size + 3)
     after = np.zeros(size + 4)
-    motion, tracker = np.zeros(2), np.zeros(4)
     velocities = after[n:size]
     drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
     work_in, work_damper, work_frame = 0.0, 0.0, 0.0
     loss = quadratic(C, z[n:])
-    x, pushed = 0.0, 0.0
+    x, v, pushed = 0.0, 0.0, 0.0
     for floor in range(n):
         before[floor], before[n + floor] = z[floor], z[n + floor]
         x += w[floor] * z[floor]
-        motion[1] += w[floor] * z[n + floor]
+        v += w[floor] * z[n + floor]
         for column in range(n):
             pushed += M[floor, column] * z[column]
-    motion[0], v = x, motion[1]
-    amplitude(run, motion, tracker)
     state = before[:size]
     sample, active, written = -1, -1, 0
     to_sample, to_output, to_record = 0, 0, 0
@@ -186,15 +182,24 @@ def run_loop(
             wire[FIRST] = 1.0
             if track == TRACK_DAMPER:
                 force = _damper_force(
-                    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, motion[1],
+                    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, v,
                     measured[MEASURED_ACCELERATION] - noise[0, MEASURED_ACCELERATION], drive, dt,
                 )  # fmt: skip
                 for index in range(damper.shape[0]):
                     damper[index] = trial[index]
             elif track == TRACK_LAW:
-                force = ideal_force(run, tracker[2], x, motion[1])
+                force = ideal_force(run, x, v)
+            else:
+                force = wanted
             force_before = force
             wire[FIRST] = 0.0
+        if jumped and step > 0:
+            # the controller holds its output: it changes now, and not along the step
+            if track == TRACK_SAMPLED:
+                force = wanted
+            elif run[R_LAG] == 1.0 and counts[I_COMMAND] >= 0:
+                damper[counts[I_COMMAND]] = asked
+        jumped = False
         if to_record == 0:
             to_record = every
             row = record[written]
@@ -211,13 +216,6 @@ def run_loop(
         if step == counts[I_STEPS]:
             break
         # --- plant: all but the force at the end of the step
-        if jumped:
-            # the controller holds its output: it changes now, and not along the step
-            if track == TRACK_HELD:
-                force = wanted if wanted * v >= 0.0 else 0.0
-            elif run[R_LAG] == 1.0 and counts[I_COMMAND] >= 0:
-                damper[counts[I_COMMAND]] = asked
-            jumped = False
         drive += run[R_LAG] * (asked - drive)
         before[size], before[size + 1], before[size + 2] = ground[step], ground[step + 1], force
         multiply(step_matrix, before, after)
@@ -237,9 +235,9 @@ def run_loop(
                     a_free + end_a * guess, drive, dt,
                 )  # fmt: skip
             elif track == TRACK_LAW:
-                found = ideal_force(run, tracker[2], x_end, v_end)
+                found = ideal_force(run, x_end, v_end)
             else:
-                found = wanted if wanted * v_end >= 0.0 else 0.0
+                found = wanted
             difference = found - guess
             if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
                 converged = True
@@ -276,15 +274,12 @@ def run_loop(
         work_damper += 0.5 * (force + found) * (after[size] - x)
         work_in -= 0.5 * (ground[step] + ground[step + 1]) * (after[size + 3] - pushed)
         work_frame += 0.5 * (loss + loss_end) * dt
-        loss, x, v, pushed = loss_end, after[size], after[size + 1], after[size + 3]
+        loss, x, pushed = loss_end, after[size], after[size + 3]
         force_before, force = force, found
         for index in range(size):
             before[index] = after[index]
         if track == TRACK_DAMPER:
             for index in range(damper.shape[0]):
                 damper[index] = trial[index]
-        elif track == TRACK_LAW:
-            motion[0], motion[1] = after[size], after[size + 1]
-            amplitude(run, motion, tracker)
     for index in range(size):
         z[index] = before[index]

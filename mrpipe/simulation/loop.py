@@ -25,9 +25,9 @@ from mrpipe.simulation import kernel, parts
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
-Tracking = Literal["damper", "ideal"]
+Tracking = Literal["damper", "ideal", "continuous"]
 
-_LINEAR_OR_FRICTION = ("vd", "vdps", "vdns", "fdns")
+_WITHOUT_MEMORY = ("vd", "vdps", "vdns")
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,10 @@ class LoopOptions:
     plant_rate_hz
         Steps of the plant a second; raised to the next multiple of the controller's rate.
     tracking
-        `damper`: the chain gives the force. `ideal`: the damper gives the clipped desired force; laws with gains are
-        then evaluated at every plant step with the true motion, nnc and lqg hold the controller's force.
+        `damper`: the chain gives the force. `ideal`: the damper gives the clipped desired force of the controller and
+        holds it from sample to sample, as errata section B has it. `continuous`: the law acts on the true motion at
+        every instant and its force is never active, which is for vd, vdps and vdns only: the others have a memory,
+        and no step is small enough for what fdns then does (docs/numerics.md).
     delay_s
         From sampling to output of the controller.
     driver_time_constant_s
@@ -68,9 +70,6 @@ class LoopOptions:
         Of the sensors.
     record_rate_hz
         Rate of the histories in the response.
-    ideal_rounding_m_s
-        Speed over which the friction of a perfect damper changes its sign, tanh(v/v0); 0: a jump. With a jump the loop
-        of fdns has no steady state that a smaller step would not change (docs/numerics.md).
     """
 
     plant_rate_hz: float = 2000.0
@@ -79,7 +78,6 @@ class LoopOptions:
     driver_time_constant_s: float = 0.0
     noise: SensorNoise = field(default_factory=SensorNoise)
     record_rate_hz: float = 1000.0
-    ideal_rounding_m_s: float = 0.02
 
 
 @dataclass(frozen=True)
@@ -260,7 +258,13 @@ def _run_numbers(
         raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
     track = parts.TRACK_DAMPER
     if options.tracking == "ideal":
-        track = parts.TRACK_LAW if controller.law in _LINEAR_OR_FRICTION else parts.TRACK_HELD
+        track = parts.TRACK_SAMPLED
+    elif options.tracking == "continuous":
+        if controller.law not in _WITHOUT_MEMORY:
+            raise UserError(
+                "simulate", "tracking", f"law {controller.law} cannot run in continuous time", "give ideal or damper"
+            )
+        track = parts.TRACK_LAW
     counts = np.zeros(parts.I_SIZE, dtype=np.int64)
     counts[parts.I_STEPS], counts[parts.I_PER_SAMPLE], counts[parts.I_RECORD] = steps, per_sample, every
     counts[parts.I_DELAY] = round(options.delay_s / dt)
@@ -270,12 +274,6 @@ def _run_numbers(
     lag = options.driver_time_constant_s
     run[parts.R_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
     run[parts.R_C], run[parts.R_K] = controller.gains.c_n_s_m, controller.gains.k_n_m
-    run[parts.R_ALPHA] = controller.gains.alpha_n_m
-    run[parts.R_ROUNDING] = options.ideal_rounding_m_s
-    # the perfect damper's tracker needs no room for noise
-    run[parts.R_EXTREMUM_STEP] = 1e-6
-    run[parts.R_EXTREMUM_SHARE] = controller.options.extremum_share
-    run[parts.R_MEMORY] = controller.options.extremum_memory_s
     return counts, run
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from numba import float64, njit, void
 
 from mrpipe.artifacts import FloatArray
@@ -16,20 +14,14 @@ from mrpipe.control.kernel import (
 )
 
 # --- how the desired force becomes a force ---
-TRACK_DAMPER, TRACK_LAW, TRACK_HELD = 0, 1, 2
+TRACK_DAMPER, TRACK_LAW, TRACK_SAMPLED = 0, 1, 2
 
 # --- numbers of the run ---
 R_DT = 0
 R_LAG = 1  # share of the way to the command that the driver goes in a step, 1 without lag
 R_C = 2
 R_K = 3
-R_ALPHA = 4
-R_EXTREMUM_STEP = 5
-R_EXTREMUM_SHARE = 6
-R_INITIAL_AMPLITUDE = 7
-R_ROUNDING = 8  # speed over which the friction of a perfect damper turns round [m/s]; 0: a jump
-R_MEMORY = 9  # how long an extremum counts [s]
-R_SIZE = 10
+R_SIZE = 4
 
 # --- integers of the run ---
 I_STEPS = 0
@@ -52,14 +44,9 @@ T_ENERGY = 7
 T_SIZE = 8
 
 
-@njit(float64(float64[::1], float64, float64, float64), cache=True)
-def ideal_force(run: FloatArray, amplitude: float, x: float, v: float) -> float:
-    """Return the force of a perfect damper: law (4.14) or (4.18), clipped by P2 (22). It never falls with v."""
-    if run[R_ALPHA] > 0.0:
-        largest = max(amplitude, abs(x))
-        side = math.tanh(v / run[R_ROUNDING]) if run[R_ROUNDING] > 0.0 else (1.0 if v > 0.0 else -1.0)
-        force = run[R_ALPHA] * (side * largest - x)
-        return force if force * v >= 0.0 else 0.0
+@njit(float64(float64[::1], float64, float64), cache=True)
+def ideal_force(run: FloatArray, x: float, v: float) -> float:
+    """Return the force of a perfect damper: law (4.14), clipped by P2 (22). It never falls with v."""
     force = run[R_C] * v + run[R_K] * x
     return force if force * v >= 0.0 else 0.0
 
@@ -85,30 +72,6 @@ def quadratic(A: FloatArray, z: FloatArray) -> float:
             part += A[row, column] * z[column]
         total += part * z[row]
     return total
-
-
-@njit(void(float64[::1], float64[::1], float64[::1]), cache=True)
-def amplitude(run: FloatArray, motion: FloatArray, tracker: FloatArray) -> None:
-    """Keep the most recent extremum of a perfect sensor; tracker: seeking, extreme, amplitude, age."""
-    x = motion[0]
-    if tracker[0] == 0.0:
-        tracker[0] = 1.0 if motion[1] >= 0.0 else -1.0
-        tracker[1] = x
-        tracker[2] = max(abs(x), run[R_INITIAL_AMPLITUDE])
-    if tracker[0] * x > tracker[0] * tracker[1]:
-        tracker[1] = x
-    step = max(run[R_EXTREMUM_STEP], run[R_EXTREMUM_SHARE] * tracker[2])
-    if tracker[0] * (tracker[1] - x) > step:
-        tracker[2] = abs(tracker[1])
-        tracker[0] = -tracker[0]
-        tracker[1] = x
-        tracker[3] = 0.0
-    elif tracker[3] > run[R_MEMORY]:
-        tracker[2] = abs(tracker[1])
-        tracker[0] = 1.0 if motion[1] >= 0.0 else -1.0
-        tracker[1] = x
-        tracker[3] = 0.0
-    tracker[3] += run[R_DT]
 
 
 @njit(

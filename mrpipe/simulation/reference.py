@@ -114,17 +114,15 @@ class ReferenceDamper:
     model: DamperModel
     zeta: float = 0.0
     current: float = 0.0
-    command: float = 0.0
 
     def moved(self, increment: float, velocity: float, command: float, dt: float) -> tuple[float, ReferenceDamper]:
         """Return the force after a step, and the damper then."""
         numbers = self.model.parameters
         zeta = _hysteresis(self.zeta, increment, numbers["yield_displacement"], numbers["gamma_share"])
-        rate = numbers["eta"] * dt
-        slope = (command - self.command) / rate
-        current = command - slope + (self.current - self.command + slope) * np.exp(-rate)
+        # the command is held over the step
+        current = command + (self.current - command) * np.exp(-numbers["eta"] * dt)
         force = self.model.yield_force(current) * zeta + self.model.viscosity(current) * velocity
-        return float(force), ReferenceDamper(self.model, zeta, float(current), command)
+        return float(force), ReferenceDamper(self.model, zeta, float(current))
 
 
 def _hysteresis(zeta: float, increment: float, yield_displacement: float, gamma_share: float) -> float:
@@ -186,7 +184,7 @@ def reference_loop(
             relative = w @ (space.A[n:] @ z + space.B[n:] @ [acceleration, force])
             drive, _ = controller.step(float(w @ z[:n]), float(relative))
             if step == 0:
-                device = ReferenceDamper(damper, 0.0, drive, drive)
+                device = ReferenceDamper(damper, 0.0, drive)
         states.append(z[:n].copy())
         forces.append(force)
         drives.append(drive)

@@ -15,6 +15,14 @@ if TYPE_CHECKING:
     from mrpipe.structures import Frame
 
 
+FREQUENCIES = (0.625, 1.6)
+"""Lowest and highest frequency that nnc learns, over that of the free mode, which lies in their middle: a network that
+cannot tell a slow large motion from a quick small one answers for the middle."""
+
+INPUT_NOISE = (0.002, 0.04)
+"""Noise on displacement and velocity in the training of nnc, over the expected amplitude of each."""
+
+
 def _run(context: StageContext) -> Mapping[str, Any]:
     import numpy as np
 
@@ -39,9 +47,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         calibration, amplitude_m=amplitude, residual_force_n=float(forces[0]), largest_force_n=float(forces[1])
     ):
         context.warn(line)
-    reference = _train_reference(context, calibration)
+    rounding = settings.friction_rounding_share * speed
+    reference = _train_reference(context, calibration, frame, rounding)
     with context.write("control.h5") as artifact:
-        write_calibration(artifact, calibration, position, options.weights, reference)
+        write_calibration(artifact, calibration, position, options.weights, reference, rounding)
     summary = calibration_to_json(calibration)
     summary["laws"]["nnc"] |= _neural_summary(calibration, reference, amplitude)
     summary |= {"residual_force_n": float(forces[0]), "largest_force_n": float(forces[1])}
@@ -93,23 +102,34 @@ def _weights(regulator: Any) -> Weights:
     )
 
 
-def _train_reference(context: StageContext, calibration: Calibration) -> ReferenceNetwork:
+def _train_reference(
+    context: StageContext, calibration: Calibration, frame: Frame, rounding_m_s: float
+) -> ReferenceNetwork:
     import numpy as np
 
     from mrpipe.control.neural import ReferenceOptions, train_reference
+    from mrpipe.structures import natural_modes
 
     settings = context.settings.calibrate
     neural = settings.neural
-    free = calibration.modes.omega_0 / (2.0 * np.pi)
+    amplitude, omega = settings.expected_amplitude_m, calibration.modes.omega_0
+    free = omega / (2.0 * np.pi)
+    others = np.delete(natural_modes(frame).angular_frequencies, settings.target_mode - 1)
     options = ReferenceOptions(
         alpha_n_m=calibration.laws["nnc"].gains.alpha_n_m,
-        amplitudes_m=tuple(settings.expected_amplitude_m * np.geomspace(0.2, 2.0, neural.amplitudes)),
-        frequencies_hz=tuple(free * np.geomspace(0.5, 1.6, neural.frequencies)),
+        amplitudes_m=tuple(amplitude * np.geomspace(0.2, 2.0, neural.amplitudes)),
+        frequencies_hz=tuple(free * np.geomspace(*FREQUENCIES, neural.frequencies)),
         rate_hz=neural.rate_hz,
         past_values=neural.past_values,
         hidden=neural.hidden,
         starts=neural.starts,
         iterations=neural.iterations,
+        rounding_m_s=rounding_m_s,
+        # what lies above a quarter of the rate is no motion to the network
+        disturbances_rad_s=tuple(others[others < 0.5 * np.pi * neural.rate_hz]),
+        disturbance_share=neural.disturbance_share,
+        displacement_noise_m=INPUT_NOISE[0] * amplitude,
+        velocity_noise_m_s=INPUT_NOISE[1] * amplitude * omega,
     )
     return train_reference(options, context.rng, lambda f, text="": context.progress(0.3 + 0.6 * f, f"nnc {text}"))
 

@@ -16,6 +16,15 @@ if TYPE_CHECKING:
     from mrpipe.simulation.loop import LoopOptions, Response
     from mrpipe.structures import Frame
 
+RATES_HZ = (200.0, 500.0)
+"""The two rates of the controller that the thesis prints: with the damper, and for a perfect one."""
+
+RECORD_RATE_HZ = 1000.0
+"""Of the histories, where settings do not say; all plant steps with a perfect damper, whose force jumps."""
+
+PERFECT_ROUNDING = 1.5
+"""Rounding of friction for a perfect damper over that with a damper, whose yielding rounds it besides."""
+
 LAWS = ("vd", "vdps", "vdns", "fdns", "nnc", "lqg", "passive-off", "passive-on")
 
 
@@ -49,7 +58,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
 
     settings = context.settings.simulate
     rig = _rig(context)
-    control = controller(context, law, rig.frame, rig.damper)
+    control = controller(context, law, rig.frame, rig.damper, perfect=rig.options.tracking == "ideal")
     excitation, viscous = _excitation(context, rig)
     context.progress(0.4, f"loop under {law}")
     response = simulate_law(
@@ -103,24 +112,41 @@ def _rig(context: StageContext) -> Rig:
             "simulate.frame", settings.frame, f"has {frame.floors} floors", f"calibrated for {len(position)}"
         )
     sensors = settings.sensors
+    perfect = settings.tracking != "damper"
+    noise = SensorNoise(sensors.displacement_noise_m, sensors.acceleration_noise_m_s2, sensors.acceleration_bias_m_s2)
     options = LoopOptions(
         plant_rate_hz=settings.plant_rate_hz,
         tracking=settings.tracking,
         delay_s=settings.controller.delay_s,
         driver_time_constant_s=settings.driver_time_constant_s,
-        noise=SensorNoise(
-            sensors.displacement_noise_m, sensors.acceleration_noise_m_s2, sensors.acceleration_bias_m_s2
-        ),
-        record_rate_hz=settings.record_rate_hz,
-        ideal_rounding_m_s=settings.ideal_rounding_m_s,
+        noise=SensorNoise() if perfect else noise,
+        record_rate_hz=settings.record_rate_hz or (settings.plant_rate_hz if perfect else RECORD_RATE_HZ),
     )
     return Rig(frame, damper, position, options)
 
 
 def controller(
-    context: StageContext, law: str, frame: Frame, damper: DamperModel, gains: Gains | None = None
+    context: StageContext,
+    law: str,
+    frame: Frame,
+    damper: DamperModel,
+    gains: Gains | None = None,
+    *,
+    perfect: bool = False,
 ) -> Controller:
-    """Return the controller of a law as the settings of simulate.controller say; `gains` in place of the calibrated."""
+    """Return the controller of a law as the settings of simulate.controller say.
+
+    Parameters
+    ----------
+    context
+        Of the stage.
+    law, frame, damper
+        What it controls.
+    gains
+        In place of the calibrated.
+    perfect
+        For a perfect damper and perfect sensors: it reads the velocity, and at 500 Hz where the rate is not given.
+    """
     import math
 
     from mrpipe.control.controller import PASSIVE, ControllerOptions, Gains, build_controller
@@ -131,9 +157,16 @@ def controller(
 
     settings = context.settings.simulate.controller
     calibrated = context.artifact("calibrate")
+    rounding = settings.friction_rounding_m_s
+    if rounding is None:
+        rounding = calibrated.scalar("friction_rounding")
+    if perfect:
+        given = context.settings.simulate.ideal_rounding_m_s
+        rounding = PERFECT_ROUNDING * rounding if given is None else given
+    rate = settings.rate_hz or RATES_HZ[perfect]
     options = ControllerOptions(
-        rate_hz=settings.rate_hz,
-        velocity=settings.velocity,
+        rate_hz=rate,
+        velocity="measured" if perfect else settings.velocity,
         displacement_noise_m=settings.kalman_displacement_noise_m,
         acceleration_noise_m_s2=settings.kalman_acceleration_noise_m_s2,
         bias_drift_m_s2=settings.kalman_bias_drift_m_s2,
@@ -142,7 +175,7 @@ def controller(
         drive_limit=settings.drive_limit or damper.drive_limit,
         dead_band_m_s=settings.dead_band_m_s,
         extremum_step_m=settings.extremum_step_m,
-        friction_rounding_m_s=settings.friction_rounding_m_s,
+        friction_rounding_m_s=rounding,
         extremum_share=settings.extremum_share,
         extremum_memory_s=settings.extremum_memory_periods * 2.0 * math.pi / calibrated.scalar("omega_0"),
     )
@@ -154,7 +187,7 @@ def controller(
         gains = Gains() if law in PASSIVE else read_gains(calibrated, law)
     observer = None
     if law == "lqg":
-        observer = lqg_observer(frame, calibrated.array("position"), read_weights(calibrated), 1.0 / settings.rate_hz)
+        observer = lqg_observer(frame, calibrated.array("position"), read_weights(calibrated), 1.0 / rate)
     return build_controller(
         law,
         gains,
@@ -207,9 +240,12 @@ def _adjusted(
     from mrpipe.simulation.loop import SensorNoise
 
     settings = context.settings.simulate.excitation
-    with_damper = settings.adjust_with == "damper" and context.settings.simulate.tracking == "damper"
-    options = replace(rig.options, noise=SensorNoise(), tracking="damper" if with_damper else "ideal")
-    viscous = controller(context, "vd", rig.frame, rig.damper, Gains(c_n_s_m=settings.reference_c_n_s_m))
+    tracking = rig.options.tracking
+    if settings.adjust_with == "ideal" and tracking == "damper":
+        tracking = "ideal"
+    options = replace(rig.options, noise=SensorNoise(), tracking=tracking)
+    gains = Gains(c_n_s_m=settings.reference_c_n_s_m)
+    viscous = controller(context, "vd", rig.frame, rig.damper, gains, perfect=tracking == "ideal")
     amplitude, response = adjusted_amplitude(
         rig.frame,
         rig.damper.chain(),

@@ -38,6 +38,7 @@ def test_what_can_be_asserted_holds(claims: list[Claim]) -> None:
     asserted = ["B1", "B2", "B3", "B4", "B5", "B6", "B7", "B8", "B9", "B10", "A9d", "A10b", "A11a", "A11b", "A11c"]
     asserted += ["A11d", "A11e", "B11", "B12", "B13", "B14", "B15", "C0", "C1", "C2", "C3", "C4", "A3c", "A4c", "A8b"]
     asserted += [f"B-ideal-{law}" for law in ("vd", "vdps", "vdns", "fdns")]
+    asserted += [f"B-ideal-{law}-a1" for law in ("vd", "vdps", "vdns")]
     asserted += [f"B-set-c-{law}" for law in ("vd", "vdps", "vdns", "fdns")]
     assert {name: known[name].why for name in asserted if known[name].verdict != "holds"} == {}
 

@@ -15,10 +15,10 @@ from mrpipe.control.lqg import Weights, lqg_observer
 from mrpipe.control.neural import ReferenceOptions, train_reference
 from mrpipe.dampers.model import DamperModel, damper_from_parameter_set
 from mrpipe.networks.network import Network
-from mrpipe.simulation import Excitation, LoopOptions, Response, amplitude_for, harmonic, simulate_law
+from mrpipe.simulation import Excitation, LoopOptions, Response, harmonic, simulate_law
 from mrpipe.simulation.adjustment import adjusted_amplitude
 from mrpipe.simulation.indices import indices
-from mrpipe.structures import Frame, frame_from_parameter_set
+from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,10 @@ class Rig:
         return harmonic(amplitude, 8.0, cycles=cycles, settling_cycles=cycles // 2, decay_s=decay_s)
 
     def run(self, law: str, options: LoopOptions, factor: float = 1.0, **controller: Any) -> tuple[Response, dict]:
-        amplitude = self.ideal_amplitude if options.tracking == "ideal" else self.adjusted_amplitude
+        amplitude = self.adjusted_amplitude if options.tracking == "damper" else self.ideal_amplitude
+        if options.tracking == "ideal":
+            perfect: dict[str, Any] = {"rate_hz": 500.0, "velocity": "measured", "friction_rounding_m_s": 0.019}
+            controller = perfect | controller
         excitation = self.excitation(factor * amplitude)
         response = simulate_law(
             self.frame,
@@ -64,10 +67,12 @@ def rig() -> Rig:
     damper = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
     position = np.eye(5)[0]
     amplitudes = tuple(0.0093 * np.geomspace(0.2, 2.0, 7))
-    frequencies = tuple(8.0 / (2.0 * np.pi) * np.geomspace(0.5, 1.6, 7))
-    reference = train_reference(
-        ReferenceOptions(3000.0, amplitudes, frequencies, starts=2), np.random.default_rng(1)
-    ).network
+    frequencies = tuple(8.0 / (2.0 * np.pi) * np.geomspace(0.625, 1.6, 7))
+    others = tuple(natural_modes(frame).angular_frequencies[1:])
+    options = ReferenceOptions(
+        3000.0, amplitudes, frequencies, starts=2, rounding_m_s=0.0125, disturbances_rad_s=others
+    )
+    reference = train_reference(options, np.random.default_rng(1)).network
     inverse = inverse_table(damper)
     viscous = build_controller("vd", Gains(650.0), ControllerOptions(), inverse=inverse)
     adjusted, _ = adjusted_amplitude(
@@ -79,5 +84,5 @@ def rig() -> Rig:
         position=position,
         rms_top_m=0.0243,
     )
-    ideal = amplitude_for(frame, position, 650.0, 8.0, 0.0243)
+    ideal = 0.788  # as the errata has it
     return Rig(frame, damper, position, inverse, reference, ideal, adjusted)

@@ -9,8 +9,9 @@ from mrpipe.control import LAWS
 from mrpipe.simulation import LoopOptions, SensorNoise
 from mrpipe.simulation.printed import PRINTED
 
-IDEAL = LoopOptions(tracking="ideal")
+IDEAL = LoopOptions(tracking="ideal", record_rate_hz=2000.0)
 WITH_DAMPER = LoopOptions()
+SENSORS = SensorNoise(2e-5, 0.1)
 
 
 @pytest.fixture(scope="module")
@@ -20,34 +21,50 @@ def with_damper(rig):
 
 @pytest.fixture(scope="module")
 def ideal(rig):
-    return {law: rig.run(law, IDEAL)[1] for law in ("vd", "vdps", "vdns", "fdns")}
+    return {law: rig.run(law, IDEAL)[1] for law in ("vd", "vdps", "vdns", "fdns", "nnc", "lqg")}
+
+
+@pytest.mark.literature
+@pytest.mark.parametrize("law", ["vd", "vdps", "vdns"])
+def test_errata_rows_of_the_perfect_damper(ideal, law):
+    """All four columns at once: the errata's controller samples at 500 Hz and its force is held."""
+    for key in ("rms_x5_m", "rms_x1_m", "rms_a5_m_s2", "rms_a1_m_s2"):
+        assert ideal[law][key] == pytest.approx(PRINTED[law]["ideal"][key], rel=0.025), key
 
 
 @pytest.mark.literature
 @pytest.mark.parametrize("law,share", [("vd", 0.05), ("vdps", 0.05), ("vdns", 0.15), ("fdns", 0.15)])
-def test_errata_rows(rig, ideal, with_damper, law, share):
-    assert rig.ideal_amplitude == pytest.approx(0.788, rel=5e-3)
-    for found, source in ((ideal[law], "ideal"), (with_damper[law], "set C")):
-        for key in ("rms_x5_m", "rms_x1_m"):
-            assert found[key] == pytest.approx(PRINTED[law][source][key], rel=share)
-    for key in ("rms_a5_m_s2", "rms_a1_m_s2"):
-        if law != "fdns":
-            assert with_damper[law][key] == pytest.approx(PRINTED[law]["set C"][key], rel=share)
+def test_errata_rows_of_the_damper(rig, with_damper, law, share):
+    assert rig.adjusted_amplitude == pytest.approx(0.768, rel=5e-3)
+    for key, value in PRINTED[law]["set C"].items():
+        assert with_damper[law][key] == pytest.approx(value, rel=share), key
 
 
 @pytest.mark.literature
 def test_ranges_of_fdns(ideal, with_damper):
-    assert 0.85 * 14.5e-3 < ideal["fdns"]["rms_x5_m"] < 17.3e-3
+    assert 14.5e-3 < ideal["fdns"]["rms_x5_m"] < 17.3e-3
     assert 8.0e-3 < ideal["fdns"]["rms_x1_m"] < 9.7e-3
     assert 18.2e-3 < with_damper["fdns"]["rms_x5_m"] < 19.5e-3
     assert 7.3e-3 < with_damper["fdns"]["rms_x1_m"] < 7.9e-3
 
 
+@pytest.mark.property
+@pytest.mark.parametrize("law", ["vdps", "vdns"])
+def test_a_law_in_continuous_time_jerks_less(rig, ideal, law):
+    """Held over a sample that ends after the turn, the force of the sampled law is active and shakes floor 1."""
+    values = rig.run(law, LoopOptions(tracking="continuous"))[1]
+    for key in ("rms_x5_m", "rms_x1_m", "rms_a5_m_s2"):
+        assert values[key] == pytest.approx(ideal[law][key], rel=0.05), key
+    assert values["rms_a1_m_s2"] < 0.8 * ideal[law]["rms_a1_m_s2"]
+
+
 @pytest.mark.literature
-def test_ordering(with_damper):
+def test_ordering(ideal, with_damper):
     top = {law: item["rms_x5_m"] for law, item in with_damper.items()}
     assert top["fdns"] < top["vdns"] < top["vd"] < top["vdps"]
     assert top["fdns"] < top["nnc"] < top["vd"]
+    perfect = {law: item["rms_x5_m"] for law, item in ideal.items()}
+    assert perfect["vdns"] < perfect["fdns"] < perfect["nnc"] < perfect["vd"] < perfect["vdps"]
     assert top["lqg"] < top["vd"]
     a1 = {law: item["rms_a1_m_s2"] for law, item in with_damper.items()}
     assert a1["vdns"] > a1["vd"] and a1["fdns"] > a1["vd"]
@@ -68,31 +85,40 @@ def test_free_decay(ideal, with_damper):
     assert with_damper["fdns"]["damping_ratio"] > 0.25
 
 
-@pytest.mark.property
-@pytest.mark.parametrize("law", ["vd", "vdps", "vdns", "lqg", "passive-off", "passive-on"])
-def test_halving_the_step_changes_no_index(rig, with_damper, law):
-    halved = rig.run(law, LoopOptions(plant_rate_hz=4000.0))[1]
-    for key, value in with_damper[law].items():
-        if key.startswith(("rms_x", "rms_a", "peak_")) or (key == "damping_ratio" and law != "vdns"):
-            assert value == pytest.approx(halved[key], rel=5e-3), key
+def changes(first, second):
+    """Return by how much every index differs: of its size, and of the whole for shares of time."""
+    found = {}
+    for key, value in first.items():
+        if not isinstance(value, float) or key in {"energy_balance_error", "real_time_factor"}:
+            continue
+        scale = 1.0 if key.endswith("_share") else max(abs(value), 1e-9)
+        found[key] = abs(second[key] - value) / scale
+    return found
 
 
 @pytest.mark.property
-@pytest.mark.parametrize(
-    ("law", "keys"),
-    [("fdns", ("rms_x1_m", "rms_x5_m", "rms_a5_m_s2", "rms_a1_m_s2")), ("nnc", ("rms_x1_m", "rms_x5_m"))],
-)
-def test_halving_the_step_changes_no_rms_of_the_friction_laws(rig, with_damper, law, keys):
-    """Their single peaks, and the accelerations of nnc, hang on which sample sees the velocity turn."""
-    halved = rig.run(law, LoopOptions(plant_rate_hz=4000.0))[1]
-    for key in keys:
-        assert with_damper[law][key] == pytest.approx(halved[key], rel=5e-3), key
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("noise", [SensorNoise(), SENSORS], ids=["quiet", "noisy"])
+def test_halving_the_step_changes_no_index(rig, law, noise):
+    """Noise is drawn for a controller sample, so that both runs see the same."""
+    whole, half = (rig.run(law, LoopOptions(plant_rate_hz=rate, noise=noise))[1] for rate in (2000.0, 4000.0))
+    worst = max(changes(whole, half).items(), key=lambda item: item[1])
+    assert worst[1] < 5e-3, worst
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("law", ["vd", "vdps", "vdns", "fdns", "nnc", "lqg"])
+def test_halving_the_step_changes_no_index_of_the_perfect_damper(rig, law):
+    options = (LoopOptions(tracking="ideal", plant_rate_hz=rate) for rate in (2000.0, 4000.0))
+    whole, half = (rig.run(law, item)[1] for item in options)
+    worst = max(changes(whole, half).items(), key=lambda item: item[1])
+    assert worst[1] < 5e-3, worst
 
 
 @pytest.mark.property
 @pytest.mark.parametrize("law", LAWS)
 def test_energy_balance_closes(rig, law):
-    response, values = rig.run(law, LoopOptions(noise=SensorNoise(2e-5, 0.1)))
+    response, values = rig.run(law, LoopOptions(noise=SENSORS))
     assert values["energy_balance_error"] < 5e-3
     assert values["energy_damper_j"] > 0.0 and values["energy_frame_j"] > 0.0
     # a passive damper only takes energy out, but for what its hysteresis stores
@@ -100,9 +126,9 @@ def test_energy_balance_closes(rig, law):
 
 
 @pytest.mark.property
-@pytest.mark.parametrize("law", ["vdps", "vdns", "fdns"])
+@pytest.mark.parametrize("law", ["vdps", "vdns"])
 def test_perfect_damper_only_dissipates(rig, law):
-    response, _ = rig.run(law, IDEAL)
+    response, _ = rig.run(law, LoopOptions(tracking="continuous"))
     assert np.min(response.force * response.damper_velocity) > -1e-6
 
 

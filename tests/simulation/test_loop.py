@@ -44,7 +44,7 @@ def test_undamped_frame_without_damper_swings_as_the_cosine(rig):
 def test_viscous_damper_decays_as_the_matrix_exponential(rig):
     controller = build_controller("vd", Gains(650.0), ControllerOptions())
     start = np.concatenate([0.03 * np.array([0.35, 0.6, 0.77, 0.92, 1.0]), np.zeros(5)])
-    options = LoopOptions(tracking="ideal", plant_rate_hz=8000.0)
+    options = LoopOptions(tracking="continuous", plant_rate_hz=8000.0)
     response = simulate_law(rig.frame, None, controller, at_rest(3.0), options, initial_state=start)
     damped = Frame(rig.frame.mass, rig.frame.damping + 650.0 * np.outer(*[rig.position] * 2), rig.frame.stiffness)
     A = state_space(damped).A
@@ -56,7 +56,7 @@ def test_viscous_damper_decays_as_the_matrix_exponential(rig):
 def test_viscous_damper_under_harmonic_motion_reaches_its_frequency_response(rig):
     controller = build_controller("vd", Gains(650.0), ControllerOptions())
     excitation = harmonic(rig.ideal_amplitude, 8.0, cycles=60, settling_cycles=50)
-    options = LoopOptions(tracking="ideal", plant_rate_hz=8000.0)
+    options = LoopOptions(tracking="continuous", plant_rate_hz=8000.0)
     response = simulate_law(rig.frame, None, controller, excitation, options)
     damped = Frame(rig.frame.mass, rig.frame.damping + 650.0 * np.outer(*[rig.position] * 2), rig.frame.stiffness)
     gain = np.abs(frequency_response(damped, [8.0], absolute_acceleration=False)[0])
@@ -167,6 +167,8 @@ def test_bad_input_is_told_in_one_line(rig):
         (lambda: simulate_law(singular, nothing(), viscous, rest), "frame mine: mass: is singular"),
         (lambda: simulate_law(rig.frame, nothing(), viscous, rest, position=np.ones(3)), "has 3 entries"),
         (lambda: simulate_law(rig.frame, nothing(), viscous, rest, LoopOptions(delay_s=-1.0)), "is negative"),
+        (lambda: simulate_law(rig.frame, None, rig.controller("fdns"), rest, LoopOptions(tracking="continuous")),
+            "law fdns cannot run in continuous time"),
         (lambda: build_controller("vdx", Gains(), ControllerOptions()), "is no control law"),
         (lambda: build_controller("fdns", Gains(), ControllerOptions()), "fdns: has no gains; calibrate it first"),
         (lambda: build_controller("nnc", Gains(), ControllerOptions()), "nnc: has no trained network"),

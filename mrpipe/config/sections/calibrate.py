@@ -26,9 +26,14 @@ class NeuralReferenceSettings(Section):
     amplitudes: int = Field(
         7, ge=2, description="Loops of how many amplitudes, from a fifth to twice the expected one."
     )
-    frequencies: int = Field(7, ge=2, description="Of how many frequencies, from half to 1.6 times the free frequency.")
+    frequencies: int = Field(
+        7, ge=2, description="Of how many frequencies, 0.625 to 1.6 times the free frequency."
+    )
     starts: int = Field(4, ge=1, description="Random starts of the training.")
     iterations: int = Field(150, ge=1, description="Most Levenberg-Marquardt iterations of a start.")
+    disturbance_share: float = Field(
+        0.2, ge=0.0, description="Speed of the frame's other modes, put on the loops, over that of the loop."
+    )
 
 
 class RegulatorSettings(Section):
@@ -62,6 +67,12 @@ class CalibrateSettings(Section):
     fdns: GivenGains = Field(GivenGains(), description="Gains of your own for fdns, and for nnc which imitates it.")
     expected_amplitude_m: float = Field(
         0.0093, gt=0.0, description="Damper amplitude at which forces are judged and around which nnc learns."
+    )
+    friction_rounding_share: float = Field(
+        1.0 / 6.0,
+        ge=0.0,
+        description="Speed over which the friction of fdns and nnc changes its sign, over the damper's peak speed at "
+        "the expected amplitude; 0: the jump of (4.18).",
     )
     map_points: int = Field(25, ge=5, le=200, description="Points along each axis of the damping maps.")
     neural: NeuralReferenceSettings = Field(NeuralReferenceSettings(), description="The neural reference controller.")

@@ -44,7 +44,11 @@ class ExcitationSettings(Section):
 class ControllerSettings(Section):
     """The real-time controller of Figure 5.3."""
 
-    rate_hz: float = Field(200.0, gt=0.0, description="Sampling rate; the thesis prints 200 and 500.")
+    rate_hz: float | None = Field(
+        None,
+        gt=0.0,
+        description="Sampling rate; null: as printed, 200 Hz, and 500 Hz for a perfect damper.",
+    )
     delay_s: float = Field(0.0, ge=0.0, description="From sampling to output.")
     velocity: Literal["kalman", "difference", "measured"] = Field(
         "kalman", description="Kinematic Kalman filter, backward difference, or a perfect velocity sensor."
@@ -65,14 +69,16 @@ class ControllerSettings(Section):
     low_pass_hz: float | None = Field(60.0, gt=0.0, description="Butterworth low-pass on the drive; null: none.")
     drive_limit: float | None = Field(None, gt=0.0, description="Largest drive; null: that of the damper.")
     dead_band_m_s: float = Field(0.0, ge=0.0, description="Speed below which the direction of motion is kept.")
-    friction_rounding_m_s: float = Field(
-        0.005, ge=0.0, description="Speed over which the friction of fdns changes its sign; 0: the jump of (4.18)."
+    friction_rounding_m_s: float | None = Field(
+        None,
+        ge=0.0,
+        description="Speed over which friction of fdns changes its sign; 0: the jump of (4.18); null: as calibrated.",
     )
     extremum_memory_periods: float = Field(
         0.75, gt=0.0, description="Free periods after which a pending extremum counts though nothing came back from it."
     )
     extremum_step_m: float = Field(1e-4, gt=0.0, description="Way back that makes an extremum count (X of fdns).")
-    extremum_share: float = Field(0.2, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
+    extremum_share: float = Field(0.1, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
 
 
 class SensorSettings(Section):
@@ -88,13 +94,20 @@ class SimulateSettings(Section):
 
     frame: str = Field("identified", description="Frame: `identified`, or a set of configs/frames or its YAML file.")
     damper: str = Field("identified", description="Damper: `identified`, or a set of configs/dampers or its YAML file.")
-    tracking: Literal["damper", "ideal"] = Field(
-        "damper", description="The damper gives the force, or the clipped desired force acts as it is."
+    tracking: Literal["damper", "ideal", "continuous"] = Field(
+        "damper",
+        description="The damper gives the force; `ideal`: the controller has perfect sensors and its clipped force is "
+        "held from sample to sample (errata section B); `continuous`: vd, vdps, vdns at every instant, never active.",
     )
     plant_rate_hz: float = Field(2000.0, ge=100.0, description="Steps of the plant a second.")
-    record_rate_hz: float = Field(1000.0, gt=0.0, description="Rate of the histories in the artifact.")
-    ideal_rounding_m_s: float = Field(
-        0.02, ge=0.0, description="Speed over which the friction of a perfect damper changes its sign; 0: a jump."
+    record_rate_hz: float | None = Field(
+        None, gt=0.0, description="Rate of the histories; null: 1000 Hz, and every plant step with a perfect damper."
+    )
+    ideal_rounding_m_s: float | None = Field(
+        None,
+        ge=0.0,
+        description="Speed over which the friction of a perfect damper changes its sign; 0: a jump; null: half as much "
+        "again as calibrated, since no yielding rounds it besides.",
     )
     driver_time_constant_s: float = Field(
         0.0, ge=0.0, description="Lag of the current driver besides the damper's own."
