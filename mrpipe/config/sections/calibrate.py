@@ -26,9 +26,7 @@ class NeuralReferenceSettings(Section):
     amplitudes: int = Field(
         7, ge=2, description="Loops of how many amplitudes, from a fifth to twice the expected one."
     )
-    frequencies: int = Field(
-        7, ge=2, description="Of how many frequencies, 0.625 to 1.6 times the free frequency."
-    )
+    frequencies: int = Field(7, ge=2, description="Of how many frequencies, 0.625 to 1.6 times the free frequency.")
     starts: int = Field(4, ge=1, description="Random starts of the training.")
     iterations: int = Field(150, ge=1, description="Most Levenberg-Marquardt iterations of a start.")
     disturbance_share: float = Field(
