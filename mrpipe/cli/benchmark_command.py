@@ -89,8 +89,8 @@ def _more_facts(summary: Mapping[str, Any]) -> list[str]:
     lines = []
     if "fixed_base_periods_s" in summary:
         fixed = ", ".join(f"{value:.4g}" for value in summary["fixed_base_periods_s"][:3])
-        isolated = summary["isolated_period_s"]
-        lines.append(f"fixed base {fixed} s; rigid building on its bearings {isolated:.4g} s")
+        isolated, ratio = summary["isolated_period_s"], summary["isolated_damping_ratio"]
+        lines.append(f"fixed base {fixed} s; isolated {isolated:.4g} s at {ratio:.1%} (rigid building on its bearings)")
     if "motion_details" in summary:
         details = summary["motion_details"]
         peaks = ", ".join(f"{value:.4g}" for value in details["peaks_m_s2"])

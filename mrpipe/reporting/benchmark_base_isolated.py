@@ -62,7 +62,8 @@ def summary(result: IsolationResult) -> dict[str, Any]:
         "periods_s": periods,
         "fixed_base_periods_s": building.fixed_base_periods_s,
         "isolated_period_s": building.isolation_period_s,
-        "isolation_damping_ratio": building.isolation_damping_ratio,
+        "isolated_damping_ratio": building.isolation_damping_ratio,
+        "rigid_isolated_periods_s": building.rigid_isolation_periods_s,
         "total_mass_kg": building.model.total_mass_kg,
         "motion": result.motion.name,
         "laws": {case.law: case.indices for case in result.cases},
@@ -86,16 +87,20 @@ def summary(result: IsolationResult) -> dict[str, Any]:
     }
 
 
+def _listed(periods_s: FloatArray) -> str:
+    return ", ".join(f"{period:.3f}" for period in periods_s)
+
+
 def describe(sink: figures.Sink, result: IsolationResult) -> None:
     """Write the part of the report."""
     building = result.study.building
     origin, name = building.model.origin, result.motion.name
     sink.text(f"Model: **{origin}**. {building.model.source}. {REASON}")
     sink.text(
-        f"The rigid building swings on its bearings in {building.isolation_period_s:.3f} s; with the superstructure's "
-        "flexibility and the eccentricity of the bearings the three isolation modes have "
-        + ", ".join(f"{period:.3f}" for period in natural_periods(building.model)[:3])
-        + " s."
+        f"The rigid building swings on its bearings in {building.isolation_period_s:.3f} s, damping ratio "
+        f"{building.isolation_damping_ratio:.3f}. The bearings' centre lies off the centre of mass, so that in the plane "
+        f"the rigid building has {_listed(building.rigid_isolation_periods_s)} s; with the flexibility of the "
+        f"superstructure the three isolation modes have {_listed(natural_periods(building.model)[:3])} s."
     )
     laws = {case.law: case.indices for case in result.cases}
     sink.table(

@@ -1,8 +1,8 @@
 """What a device in a benchmark structure does in one step: laws, inverses and the implicit Bingham force.
 
 A force that is constant over a step does exactly the work f (x+ - x), so the energy balance closes to rounding for the
-device however it jumps. It is found from the velocity in the middle of the step (second order); where that would stick,
-from the velocity at its end, which then is exactly zero.
+device however it jumps. It is found from the velocity in the middle of the step (second order); where the rod turns round
+within the step it is the mean of what acts before and after, and where it then sticks its velocity at the end is zero.
 """
 
 from __future__ import annotations
@@ -47,6 +47,16 @@ VOLTAGE = 3  # of a constant drive
 GAINS = 4
 
 
+@njit(float64(float64, float64, float64, float64, float64), cache=True)
+def sliding_force(direction: float, offset: float, viscosity: float, velocity: float, limit: float) -> float:
+    """Return the force [N] while the rod slides one way (`direction` 1 or -1): `offset` [N] and a viscous part.
+
+    It only resists, and not beyond the limit.
+    """
+    resisting = direction * (offset + viscosity * velocity)
+    return direction * min(max(resisting, 0.0), limit)
+
+
 @njit(float64(float64, float64, float64, float64, float64, float64, float64), cache=True)
 def dissipative_force(
     push: float, pull: float, viscosity: float, limit: float, velocity: float, free: float, compliance: float
@@ -54,7 +64,9 @@ def dissipative_force(
     """Return the mean force of a step of a device that can only resist.
 
     Moving forward it resists with max(0, push + viscosity v), backward with min(0, -pull + viscosity v), at rest with
-    anything between.
+    anything between. Where the velocity passes zero within the step the force is that before the reversal for the part
+    of the step up to it, and after it what holds the rod, or resists it on its way back: reversals do not wait for the
+    end of a step, so that what they do depends little on its length.
 
     Parameters
     ----------
@@ -65,19 +77,28 @@ def dissipative_force(
     compliance
         Velocity lost at the end of the step for each newton [m/s/N].
     """
-    middle = 0.5 * (velocity + free)
-    half = 0.5 * compliance
-    offset = push if middle > 0.0 else -pull
-    force = (offset + viscosity * middle) / (1.0 + viscosity * half)
-    force = min(max(force, -limit), limit)
-    if force * middle <= 0.0:
-        return 0.0
-    if abs(half * force) <= abs(middle):
+    direction = 1.0 if (velocity if velocity != 0.0 else free) > 0.0 else -1.0
+    offset = push if direction > 0.0 else -pull
+    change = free - velocity
+    damped = 1.0 + 0.5 * viscosity * compliance
+    # the mean velocity of the step, with the force in it: v + (change - compliance f)/2
+    middle = (velocity + 0.5 * (change - compliance * offset)) / damped
+    force = sliding_force(direction, offset, viscosity, middle, limit)
+    if direction * (free - compliance * force) >= 0.0:
         return force
-    # slipping all the way would turn the motion round: it comes to rest within the step
-    stop = free / compliance
+    force = sliding_force(direction, offset, viscosity, 0.5 * velocity, limit)
+    rate = change - compliance * force
+    share = min(max(-velocity / rate, 0.0), 1.0) if rate * velocity < 0.0 else 0.0
+    rest = 1.0 - share
     low, high = -min(max(pull, 0.0), limit), min(max(push, 0.0), limit)
-    return min(max(stop, low), high)
+    after = change / compliance
+    if after < low or after > high:
+        # nothing holds it: it slides on, or back
+        way = 1.0 if after > high else -1.0
+        offset = push if way > 0.0 else -pull
+        middle = 0.5 * rest * (change - compliance * offset) / (1.0 + 0.5 * rest * viscosity * compliance)
+        after = sliding_force(way, offset, viscosity, middle, limit)
+    return share * force + rest * after
 
 
 @njit(float64(float64, float64, float64[::1]), cache=True)

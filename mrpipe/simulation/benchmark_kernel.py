@@ -60,6 +60,9 @@ from mrpipe.simulation.benchmark_devices import (
     update_amplitude,
 )
 
+REST = 1e-12
+"""Velocity below which a rod is at rest [m/s]."""
+
 _V = float64[::1]
 _M = float64[:, ::1]
 _STRUCTURE = types.UniTuple(_M, 11)
@@ -202,6 +205,8 @@ def command(
         return 0.0, 0.0
     if law == CONSTANT:
         return 0.0, gains[VOLTAGE]
+    if abs(v) < REST:
+        v = 0.0  # a rod that its damper holds: what is left of its velocity is rounding, and so is its sign
     desired = wanted if law == LQG else desired_force(law, gains, x, v, amplitude)
     if settings[REALISATION] < BINGHAM:
         return desired, 0.0
@@ -295,8 +300,11 @@ def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain:
     now, after = np.zeros(loads.shape[1]), np.zeros(loads.shape[1])
     x, v, xf, vf = np.zeros(devices), np.zeros(devices), np.zeros(devices), np.zeros(devices)
     force, desired, volts, wanted = np.zeros(devices), np.zeros(devices), np.zeros(devices), np.zeros(devices)
-    target, every = np.zeros(devices), int(settings[CONTROL_EVERY])
-    smoothing = 1.0 - np.exp(-settings[FILTER_RATE] * settings[DT]) if settings[FILTER_RATE] > 0.0 else 1.0
+    target, steady, every = np.zeros(devices), np.zeros(devices), int(settings[CONTROL_EVERY])
+    passed = settings[FILTER_RATE] * settings[DT]
+    # what the voltage filter leaves of a gap at the end of a step, and on the mean of it
+    left, mean = (np.exp(-passed), (1.0 - np.exp(-passed)) / passed) if passed > 0.0 else (0.0, 0.0)
+    sampling = settings[REALISATION] >= BINGHAM
     amplitude, estimate, energy = np.zeros((devices, 2)), np.zeros(control[1].shape[0]), np.zeros(3)
     memory, trial, wire = np.zeros(chain[3][-1] + 5), np.zeros(chain[3][-1] + 5), np.zeros(WIRE_SIZE)
     wire[FIRST] = 1.0
@@ -311,10 +319,12 @@ def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain:
         if law == LQG and sampled:
             observe(control, sample, state, force, estimate, wanted)
         for d in range(devices):
-            update_amplitude(amplitude[d], x[d], v[d])
+            if (sampled or not sampling) and abs(v[d]) > REST:
+                update_amplitude(amplitude[d], x[d], v[d])
             if sampled:
                 desired[d], target[d] = command(settings, gains[d], wanted[d], x[d], v[d], amplitude[d, 0], network)
-            volts[d] += smoothing * (target[d] - volts[d])
+            steady[d] = target[d] + mean * (volts[d] - target[d])
+            volts[d] = target[d] + left * (volts[d] - target[d])
         for _ in range(1 if devices == 1 else 3):
             for d in range(devices):
                 free_x, free_v = xf[d], vf[d]
@@ -328,7 +338,7 @@ def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain:
                     start = (force[d], before, volts[d])
                     force[d] = chain_force(settings, chain, memory, trial, wire, start, motion, own)
                 else:
-                    drive = (desired[d], volts[d], amplitude[d, 0])
+                    drive = (desired[d], steady[d], amplitude[d, 0])
                     force[d] = device_force(settings, gains[d], drive, motion, compliance[devices + d, d])
         if chained:
             memory[:], before = trial, settings[COUNT] * wire[FORCE]

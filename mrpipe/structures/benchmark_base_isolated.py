@@ -13,9 +13,10 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.linalg import block_diag, eigh
 
-from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set, public_data_directory
+from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set
 from mrpipe.errors import UserError
 from mrpipe.structures.benchmark_model import BenchmarkModel, Origin
+from mrpipe.structures.public_files import named_file
 
 FLOORS = 8
 BEARINGS = 92
@@ -60,7 +61,7 @@ class IsolatedBuilding:
 
     @property
     def isolation_period_s(self) -> float:
-        """Period of the rigid building on its bearings along x, 2 pi sqrt(M/k)."""
+        """Period of the rigid building on its bearings along x, 2 pi sqrt(M/k): the published `isolated period`."""
         return float(2.0 * np.pi * np.sqrt(self.model.total_mass_kg / self.isolation_stiffness[0, 0]))
 
     @property
@@ -68,6 +69,17 @@ class IsolatedBuilding:
         """Damping ratio of the rigid building on its bearings along x."""
         k, c = self.isolation_stiffness[0, 0], self.isolation_damping[0, 0]
         return float(c / (2.0 * np.sqrt(k * self.model.total_mass_kg)))
+
+    @property
+    def rigid_isolation_periods_s(self) -> FloatArray:
+        """Periods of the rigid building on its bearings in the plane (x, y, rotation), longest first, shape (3,).
+
+        Equal bearings leave the translation towards their centre free of rotation, so that one of the three is
+        :attr:`isolation_period_s`. By Rayleigh's principle each mode of the flexible building is slower than these;
+        by Dunkerley's the slowest has T^2 below the sum of its rigid T^2 and that of the fixed base.
+        """
+        squared = eigh(self.isolation_stiffness, self.model.mass[-3:, -3:], eigvals_only=True)
+        return np.asarray(2.0 * np.pi / np.sqrt(squared))
 
     @property
     def corners_m(self) -> FloatArray:
@@ -284,10 +296,5 @@ def building_of(
     """
     if model is None:
         return surrogate_building(surrogate)
-    path = Path(model)
-    if model == "published":
-        folder = public_data_directory()
-        if folder is None:
-            raise UserError("--model", model, "the public data are not there", "set MRPIPE_DATA, or give STRUC.mat")
-        path = folder / "asce_base_isolated" / "STRUC.mat"
+    path = named_file("--model", model, {"published": "asce_base_isolated/STRUC.mat"})
     return published_building(path, bearing_stiffness=bearing_stiffness, bearing_viscosity=bearing_viscosity)

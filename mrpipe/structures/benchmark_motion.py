@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from scipy.signal import lfilter
 
-from mrpipe.artifacts import FloatArray, public_data_directory
-from mrpipe.errors import UserError
+from mrpipe.artifacts import FloatArray
+from mrpipe.structures.public_files import named_file
 from mrpipe.structures.records import GRAVITY, GroundMotion, read_motion
 
 SEVEN_MOTIONS = ("elcentro", "erzikan", "jiji", "kobe", "newhall", "rinaldi", "sylmar")
@@ -145,24 +143,6 @@ def spectrum_compatible_motion(
     return GroundMotion("synthetic", values, interval_s, "m/s^2", "given", notes)
 
 
-def motion_path(name: str) -> Path:
-    """Return the file of a record: a path, or the name of a public one.
-
-    Raises
-    ------
-    UserError
-        If it is the name of a public record and the public data are not there.
-    """
-    if name not in PUBLIC_MOTIONS or Path(name).is_file():
-        return Path(name)
-    folder = public_data_directory()
-    if folder is None:
-        raise UserError(
-            "--motion", name, "the public data are not there", "set MRPIPE_DATA to their folder, or give a file"
-        )
-    return folder / PUBLIC_MOTIONS[name]
-
-
 def load_motion(
     file: str,
     rng: np.random.Generator,
@@ -198,8 +178,12 @@ def load_motion(
         motion = spectrum_compatible_motion(rng, peak_ground_g=peak_ground_g, duration_s=duration_s)
     else:
         motion = read_motion(
-            motion_path(file), unit=unit, interval_s=interval_s, fallback_interval_s=BENCHMARK_INTERVAL_S
+            named_file("--motion", file, PUBLIC_MOTIONS),
+            unit=unit,
+            interval_s=interval_s,
+            fallback_interval_s=BENCHMARK_INTERVAL_S,
         )
     if second_file is not None:
-        motion = motion.with_second(read_motion(motion_path(second_file), unit=unit, interval_s=interval_s))
+        other = named_file("second_file", second_file, PUBLIC_MOTIONS)
+        motion = motion.with_second(read_motion(other, unit=unit, interval_s=interval_s))
     return motion if resampled_interval_s is None else motion.resampled(resampled_interval_s)

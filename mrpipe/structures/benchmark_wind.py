@@ -11,9 +11,10 @@ from scipy.io import loadmat
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 
-from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set, public_data_directory
+from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set
 from mrpipe.errors import UserError
 from mrpipe.structures.benchmark_model import BenchmarkModel, ModalModel, Origin
+from mrpipe.structures.public_files import named_file
 
 FLOORS = 76
 HEIGHT_M, WIDTH_M = 306.1, 42.0
@@ -224,13 +225,7 @@ def tower_of(model: str | None, surrogate: str) -> Tower:
     """
     if model is None:
         return surrogate_tower(surrogate)
-    path = Path(model)
-    if model == "published":
-        folder = public_data_directory()
-        if folder is None:
-            raise UserError("--model", model, "the public data are not there", "set MRPIPE_DATA, or give the matrices")
-        path = folder / "tall76" / "76dof_MKC_matrix.mat"
-    return published_tower(path)
+    return published_tower(named_file("--model", model, {"published": "tall76/76dof_MKC_matrix.mat"}))
 
 
 def with_outrigger(tower: Tower, floor: int, arm_m: float) -> Tower:

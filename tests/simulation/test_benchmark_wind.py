@@ -97,6 +97,16 @@ def test_energy_on_the_outrigger(outrigger: WindStudy, law: str) -> None:
     assert outrigger.indices(response)["J3"] < 0.95, "here dampers matter"
 
 
+@pytest.mark.property
+@pytest.mark.parametrize("law", ["vdns", "fdns", "lqg-clipped"])
+def test_step_halving_on_the_outrigger(outrigger: WindStudy, law: str) -> None:
+    """Here the damper holds its rod at each reversal, and the sign of what is left of its velocity is rounding."""
+    controller = outrigger.controller(law)
+    coarse, finer = (outrigger.indices(outrigger.run(controller, refine=refine)) for refine in (1, 2))
+    for name, value in coarse.items():
+        assert finer[name] == pytest.approx(value, rel=5e-3), name
+
+
 @pytest.mark.planted
 def test_more_dampers_on_the_outrigger_matter_more(outrigger: WindStudy) -> None:
     sweep = wind_sensitivity(outrigger, "passive-on", (2.0, 4.0, 8.0))

@@ -1,0 +1,34 @@
+"""Models and records by name: those of the public data stand under names of their own, all others are paths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from mrpipe.artifacts import public_data_directory
+from mrpipe.errors import UserError
+
+
+def named_file(option: str, value: str, public: Mapping[str, str]) -> Path:
+    """Return the file that a name of the public data or a path stands for; a file here goes before a public name.
+
+    Parameters
+    ----------
+    option
+        Where the value was given, for the message.
+    value
+        Name or path.
+    public
+        Name -> path within the folder of public data.
+
+    Raises
+    ------
+    UserError
+        If it is a public name and the public data are not there.
+    """
+    if value not in public or Path(value).is_file():
+        return Path(value)
+    folder = public_data_directory()
+    if folder is None:
+        raise UserError(option, value, "the public data are not there", "set MRPIPE_DATA to their folder, or a file")
+    return folder / public[value]
