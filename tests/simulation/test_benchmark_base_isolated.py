@@ -94,7 +94,7 @@ def test_published_building_has_the_poles_of_the_authors_state_matrix() -> None:
     struc = loadmat(public_model())["STRUC"][0, 0]
     M, K, C, m, R, H = (np.asarray(struc[key], dtype=np.float64) for key in ("M", "K", "C", "m", "R", "H"))
     k, c = 919.422 * H, 27.717 * H
-    # absolute base motion b and motion s relative to it: M (s'' + R b'') = -K s - C s',  m b'' = R'(K s + C s') - k b - c b'
+    # base b, floors s on it: M (s'' + R b'') = -K s - C s',  m b'' = R'(K s + C s') - k b - c b'
     on_base = np.linalg.solve(m, np.hstack([R.T @ K, R.T @ C, -k, -c]))
     on_floors = np.linalg.solve(M, np.hstack([-K, -C, np.zeros((24, 6))])) - R @ on_base
     A = np.zeros((54, 54))
