@@ -96,11 +96,12 @@ def describe(sink: figures.Sink, result: IsolationResult) -> None:
     building = result.study.building
     origin, name = building.model.origin, result.motion.name
     sink.text(f"Model: **{origin}**. {building.model.source}. {REASON}")
+    rigid, flexible = building.rigid_isolation_periods_s, natural_periods(building.model)[:3]
     sink.text(
         f"The rigid building swings on its bearings in {building.isolation_period_s:.3f} s, damping ratio "
-        f"{building.isolation_damping_ratio:.3f}. The bearings' centre lies off the centre of mass, so that in the plane "
-        f"the rigid building has {_listed(building.rigid_isolation_periods_s)} s; with the flexibility of the "
-        f"superstructure the three isolation modes have {_listed(natural_periods(building.model)[:3])} s."
+        f"{building.isolation_damping_ratio:.3f}. The bearings' centre lies off the centre of mass, so that in the "
+        f"plane it has {_listed(rigid)} s; with the flexibility of the superstructure the three isolation modes have "
+        f"{_listed(flexible)} s."
     )
     laws = {case.law: case.indices for case in result.cases}
     sink.table(

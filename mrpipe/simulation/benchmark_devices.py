@@ -1,8 +1,8 @@
 """What a device in a benchmark structure does in one step: laws, inverses and the implicit Bingham force.
 
 A force that is constant over a step does exactly the work f (x+ - x), so the energy balance closes to rounding for the
-device however it jumps. It is found from the velocity in the middle of the step (second order); where the rod turns round
-within the step it is the mean of what acts before and after, and where it then sticks its velocity at the end is zero.
+device however it jumps. It is found from the velocity in the middle of the step (second order); where the rod turns
+round within the step it is the mean of what acts before and after, and where it then sticks it ends at rest.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ VISCOSITY_B = 13
 HIGHEST_VOLTAGE = 14
 NEURAL = 15  # 1: inverse by network, 0: by formula
 CHAIN_COUNT = 16  # iterations of the predictor-corrector with a damper chain
+FADE = 17  # m/s below which the commanded force fades with the velocity, 0: nowhere
 SETTINGS = 20
 
 # laws

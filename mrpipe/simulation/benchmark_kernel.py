@@ -35,6 +35,7 @@ from mrpipe.simulation.benchmark_devices import (
     CONTROL_EVERY,
     COUNT,
     DT,
+    FADE,
     FILTER_RATE,
     FORCE_A,
     FORCE_B,
@@ -185,9 +186,15 @@ def observe(
 
 @njit(cache=True)
 def voltage_of(settings: FloatArray, desired: float, velocity: float, network: Any) -> float:
-    """Return the voltage for a desired force, by formula or network; nothing where the force would push."""
+    """Return the voltage for a desired force, by formula or network; nothing where the force would push.
+
+    Close to rest the force fades with the velocity: a command that jumps with the sign of a velocity makes the run hang
+    on which sample a reversal happens to fall between.
+    """
     if desired * velocity <= 0.0:
         return 0.0
+    if abs(velocity) < settings[FADE]:
+        desired *= abs(velocity) / settings[FADE]
     if settings[NEURAL] < 0.5:
         return inverse_bingham(desired, velocity, settings)
     force = abs(desired) / settings[COUNT]

@@ -73,6 +73,9 @@ class Controller:
         Dampers side by side at each position.
     filter_rate
         lambda of the voltage filter P4 (24) [1/s]; 0 for none.
+    fade_velocity
+        Rod velocity [m/s] below which the force that a voltage is commanded for fades to nothing; 0: a command jumps at
+        reversals.
     interval_s
         Sample of the controller that commands voltages [s]; that of LQG is the observer's.
     device
@@ -96,6 +99,7 @@ class Controller:
     capacity: float = 1e30
     dampers: float = 1.0
     filter_rate: float = 0.0
+    fade_velocity: float = 0.0
     interval_s: float = 0.001
     device: BinghamDevice = field(default_factory=BinghamDevice)
     chain: Chain | None = None
@@ -279,6 +283,7 @@ def _settings(controller: Controller, dt: float, ratio: int, save: int, every: i
         packed.HIGHEST_VOLTAGE: device.highest_voltage,
         packed.NEURAL: float(controller.network is not None),
         packed.CHAIN_COUNT: 3.0,
+        packed.FADE: controller.fade_velocity,
     }  # fmt: skip
     for place, value in entries.items():
         settings[place] = value

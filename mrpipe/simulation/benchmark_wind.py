@@ -39,6 +39,9 @@ REASON = (
 )
 """Why our figures differ from the printed ones."""
 
+FADE_SHARE = 0.01
+"""Of the uncontrolled rod's peak velocity: commands fade below it. Not at a tuned mass, whose rod always moves."""
+
 STRUCTURE = "the tower"
 """What messages call it."""
 
@@ -67,12 +70,18 @@ class WindStudy:
     filter_rate: float = 0.0
 
     @property
+    def rod_velocity_m_s(self) -> float:
+        """Peak velocity of the rod in the uncontrolled tower [m/s]; 0 for a tuned mass, which that has not."""
+        if self.tower.position == "tuned-mass":
+            return 0.0
+        return float(np.abs(self.uncontrolled.velocity(self.tower.model.devices.T)).max())
+
+    @property
     def gains(self) -> WindGains:
         """Return the gains within what the dampers can give in this wind (a tuned mass': the optimum)."""
         if self.tower.position == "tuned-mass":
             return self.optimum
-        device, shapes = self.device, self.tower.model.devices.T
-        velocity = float(np.abs(self.uncontrolled.velocity(shapes)).max())
+        device, shapes, velocity = self.device, self.tower.model.devices.T, self.rod_velocity_m_s
         displacement = float(np.abs(self.uncontrolled.displacement(shapes)).max())
         volts = device.highest_voltage
         force = device.force + device.force_per_volt * volts
@@ -95,6 +104,7 @@ class WindStudy:
             network=self.network,
             dampers=self.dampers,
             filter_rate=self.filter_rate,
+            fade_velocity=FADE_SHARE * self.rod_velocity_m_s,
         )
         if law == "vd":
             return replace(mr, viscous=gains.viscous)

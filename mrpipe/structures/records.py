@@ -30,6 +30,12 @@ _UNITS = (
     (re.compile(r"cm[/_]s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)|\bgals?\b", re.IGNORECASE), "cm/s^2"),
     (re.compile(r"(?<![a-z])m[/_]s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)", re.IGNORECASE), "m/s^2"),
 )
+_UNIT_COLUMN = re.compile(r"[\[(]\s*([^\[\]()]*/\s*s(?:ec)?(?![a-z])[^\[\]()]*)[\])]", re.IGNORECASE)
+"""A bracketed unit per second or per second squared: of a column that is not time."""
+_OTHER_QUANTITY = re.compile(r"\b(velocity|displacement)\b[^\n]*\bunits?\s+of\b", re.IGNORECASE)
+_FOREIGN = (".json", ".xlsx", ".xls", ".h5", ".hdf5", ".zip", ".pdf", ".png", ".jpg", ".npz", ".npy")
+_CLOCK_NAME = re.compile(r"^\W*(t|time|zeit)\b", re.IGNORECASE)
+_ADVICE = "give its unit, as --set benchmark.base_isolated.motion.unit=g (or ten_storey)"
 _POINTS = re.compile(r"NPTS\s*[=:]\s*(\d+)", re.IGNORECASE)
 _INTERVAL = re.compile(r"\bDT\s*[=:]\s*([0-9.]+(?:E[-+]?\d+)?)", re.IGNORECASE)
 _OLD_HEADER = re.compile(r"^\s*(\d+)\s+([0-9.]+(?:E[-+]?\d+)?)\s+NPTS\s*,\s*DT", re.IGNORECASE | re.MULTILINE)
@@ -151,18 +157,28 @@ def read_motion(
         raw = _read_at2(path)
     elif path.suffix.lower() == ".mat":
         raw = _read_mat(path)
+    elif path.suffix.lower() in _FOREIGN:
+        raise UserError(path, "", f"a {path.suffix} file is no ground-motion record", "use .at2, .txt, .csv or .mat")
     else:
         raw = _read_text(path)
     _check_finite(path, raw.values)
     interval, notes = _interval(path, raw, interval_s, fallback_interval_s)
+    if not np.any(raw.values):
+        raise UserError(path, "", "all samples are zero", "give a record that moves")
     found, how = _unit(path, raw, unit)
     values = to_si(raw.values, found, where=str(path), quantity="acceleration")
     _check_peaks(path, values, found)
     return GroundMotion(path.stem, values, interval, found, how, (*raw.notes, *notes))
 
 
+def _text(path: Path) -> str:
+    """Return a text file, whatever its encoding, its superscripts written out."""
+    return path.read_text(encoding="latin-1").replace("\u00c2\u00b2", "^2").replace("\u00b2", "^2")
+
+
 def _numbers(line: str) -> list[float] | None:
-    fields = line.replace(",", " ").replace(";", " ").split()
+    # between semicolons a comma is a decimal one
+    fields = (line.replace(",", ".") if ";" in line else line.replace(",", " ")).replace(";", " ").split()
     try:
         return [float(field) for field in fields]
     except ValueError:
@@ -170,7 +186,7 @@ def _numbers(line: str) -> list[float] | None:
 
 
 def _read_at2(path: Path) -> _Raw:
-    lines = path.read_text(encoding="latin-1").splitlines()
+    lines = _text(path).splitlines()
     first = next((i for i, line in enumerate(lines) if _numbers(line) and i >= 2), len(lines))
     header = "\n".join(lines[:first])
     old = _OLD_HEADER.search(header)
@@ -201,11 +217,13 @@ def _read_mat(path: Path) -> _Raw:
     arrays = {
         key: np.asarray(value, dtype=np.float64)
         for key, value in content.items()
-        if not key.startswith("__") and np.issubdtype(np.asarray(value).dtype, np.number) and np.size(value) > 2
+        if not key.startswith("__") and np.asarray(value).dtype.kind in "fiu" and np.size(value) > 2
     }
     if not arrays:
-        raise UserError(path, "", "holds no numeric array", "store time and acceleration in one matrix")
+        raise UserError(path, "", "holds no array of real numbers", "store time and acceleration in one matrix")
     values = max(arrays.values(), key=np.size)
+    if values.ndim > 2:
+        raise UserError(path, "", f"holds an array of shape {values.shape}", "rows or columns of time and acceleration")
     values = np.atleast_2d(values)
     if values.shape[0] < values.shape[1]:
         values = values.T
@@ -215,7 +233,7 @@ def _read_mat(path: Path) -> _Raw:
 def _read_text(path: Path) -> _Raw:
     rows: list[list[float]] = []
     header: list[str] = []
-    for number, line in enumerate(path.read_text(encoding="latin-1").splitlines(), start=1):
+    for number, line in enumerate(_text(path).splitlines(), start=1):
         text = line.strip()
         if not text:
             continue
@@ -234,7 +252,7 @@ def _read_text(path: Path) -> _Raw:
 
 
 def _split_clock(path: Path, values: FloatArray, header: str) -> _Raw:
-    """Tell a clock in the first column from a component: it rises all the way."""
+    """Tell a clock in the first column from a component: the header names it, or it rises (or falls) nearly always."""
     points = _POINTS.search(header)
     if points and int(points.group(1)) != len(values):
         raise UserError(
@@ -243,9 +261,17 @@ def _split_clock(path: Path, values: FloatArray, header: str) -> _Raw:
     said = _INTERVAL.search(header)
     interval = float(said.group(1)) if said else None
     first = values[:, 0]
-    if values.shape[1] < 2 or len(first) < 3 or not np.all(np.isfinite(first)) or np.mean(np.diff(first) > 0) < 0.95:
+    if values.shape[1] < 2 or len(first) < 3 or not np.all(np.isfinite(first)):
         return _Raw(values, interval, header)
     steps = np.diff(first)
+    named = bool(_CLOCK_NAME.match(header.splitlines()[-1])) if header else False
+    if not named and 0.2 <= np.mean(steps > 0) < 0.8:
+        return _Raw(values, interval, header)
+    back = np.flatnonzero(steps <= 0)
+    if len(back):
+        row = int(back[0]) + 2
+        told = f"the clock goes from {first[row - 2]:g} to {first[row - 1]:g} s"
+        raise UserError(path, f"row {row}", told, "times must rise from row to row")
     bad = np.flatnonzero(~(np.abs(steps - np.median(steps)) < 0.02 * np.median(steps)))
     if len(bad):
         raise UserError(path, f"row {int(bad[0]) + 2}", "the clock is not uniform", "resample to equal intervals first")
@@ -274,7 +300,12 @@ def _interval(path: Path, raw: _Raw, given: float | None, fallback: float | None
     if found is None and fallback is not None:
         found, notes = fallback, (f"no interval in the file: {fallback:g} s assumed",)
     if found is None:
-        raise UserError(path, "DT", "neither a clock nor a DT in the header", "give benchmark.motion_interval_s")
+        raise UserError(
+            path,
+            "DT",
+            "neither a clock nor a DT in the header",
+            "give it, as --set benchmark.base_isolated.motion.interval_s=0.01 (or ten_storey)",
+        )
     if not 1e-5 <= found <= 0.2:
         raise UserError(path, "DT", f"is {found:g} s", "a ground motion is sampled every 0.00001 to 0.2 s")
     return found, notes
@@ -283,9 +314,16 @@ def _interval(path: Path, raw: _Raw, given: float | None, fallback: float | None
 def _unit(path: Path, raw: _Raw, given: str | None) -> tuple[str, str]:
     if given:
         return given, "given"
-    said = {name for pattern, name in _UNITS if pattern.search(raw.header)}
+    if _OTHER_QUANTITY.search(raw.header):
+        raise UserError(path, "header", "says that this is no acceleration", "give the acceleration record")
+    bracketed = {text.strip() for text in _UNIT_COLUMN.findall(raw.header)}
+    further = {text for text in bracketed if not any(pattern.search(text) for pattern, _ in _UNITS)}
+    for text in further:
+        # a unit that nobody knows, or one of another quantity, is told here
+        to_si(np.zeros(1), text, where=f"{path}: header", quantity="acceleration")
+    said = {name for pattern, name in _UNITS if pattern.search(raw.header)} | further
     if len(said) > 1:
-        raise UserError(path, "header", f"names the units {', '.join(sorted(said))}", "give benchmark.motion_unit")
+        raise UserError(path, "header", f"names the units {', '.join(sorted(said))}", f"bring all to one; {_ADVICE}")
     if said:
         return said.pop(), "header"
     peak = float(np.abs(raw.values).max())
@@ -296,14 +334,12 @@ def _unit(path: Path, raw: _Raw, given: str | None) -> tuple[str, str]:
     ]
     if len(plausible) != 1:
         which = " or ".join(plausible) or "no unit that fits"
-        raise UserError(path, "unit", f"not said, and the peak {peak:g} could be {which}", "give benchmark.motion_unit")
+        raise UserError(path, "unit", f"not said, and the peak {peak:g} could be {which}", _ADVICE)
     return plausible[0], "peak"
 
 
 def _check_peaks(path: Path, values: FloatArray, unit: str) -> None:
     peaks = np.abs(values).max(axis=0)
-    if peaks.max() == 0.0:
-        raise UserError(path, "", "all samples are zero", "give a record that moves")
     if peaks.max() > IMPOSSIBLE_PEAK:
         told = f"peak {peaks.max() / GRAVITY:.3g} g in {unit}"
         raise UserError(path, "unit", f"{told} is no ground motion", "the unit is wrong: g, cm/s^2 or m/s^2?")

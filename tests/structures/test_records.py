@@ -65,6 +65,8 @@ def test_two_columns_in_every_unit_give_the_same_motion(tmp_path: Path, unit: st
         ("t,acc in g", "g"),
         ("t,a (gal)", "cm/s^2"),
         ("t,a [m/s**2]", "m/s^2"),
+        ("t [s],a [m/s\u00b2]", "m/s^2"),
+        ("t [s],a [cm/sec2] (NW/SE)", "cm/s^2"),
     ],
 )
 def test_units_in_headers(tmp_path: Path, header: str, unit: str) -> None:
@@ -74,6 +76,16 @@ def test_units_in_headers(tmp_path: Path, header: str, unit: str) -> None:
     path.write_text(f"{header}\n{rows}\n")
     motion = read_motion(path)
     assert (motion.unit, motion.unit_from) == (unit, "header")
+
+
+@pytest.mark.golden
+def test_further_units_and_decimal_commas(tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    rows = "\n".join(f"{t:.4f};{a * 1e3 * GRAVITY:.6f}".replace(".", ",") for t, a in zip(TIME, SIGNAL, strict=True))
+    path.write_text(f"Zeit [s];a [mm/s^2]\n{rows}\n")
+    motion = read_motion(path)
+    assert (motion.unit, motion.unit_from) == ("mm/s^2", "header")
+    np.testing.assert_allclose(motion.acceleration_m_s2[:, 0], SIGNAL * GRAVITY, rtol=1e-4, atol=1e-8)
 
 
 @pytest.mark.golden
@@ -99,6 +111,28 @@ def spoilt(kind: str, folder: Path) -> Path:
         rows[12] += " 0.1"
     elif kind == "clock":
         rows[200] = f"{TIME[200] + 0.004:.4f} 0.0"
+    elif kind == "backwards":
+        rows = [*rows[:300], *rows[250:]]
+    elif kind == "shuffled":
+        rows = ["t,a [g]", *[row.replace(" ", ",") for row in np.random.default_rng(0).permutation(rows)]]
+    elif kind == "unknown-unit":
+        rows = ["t [s],a [blah/s^2]", *[row.replace(" ", ",") for row in rows]]
+    elif kind == "velocity":
+        path = at2(folder / "velocity.at2")
+        path.write_text(
+            path.read_text().replace("ACCELERATION TIME SERIES IN UNITS OF G", "VELOCITY TIME SERIES IN UNITS OF CM/S")
+        )
+        return path
+    elif kind == "no-header":
+        path = at2(folder / "bare.at2")
+        path.write_text("\n".join(path.read_text().splitlines()[4:]) + "\n")
+        return path
+    elif kind in ("no-array", "complex", "cube"):
+        content = {"no-array": "text", "complex": np.stack([TIME, SIGNAL + 1j]), "cube": np.ones((3, 40, 2))}[kind]
+        savemat(folder / f"{kind}.mat", {"record": content})
+        return folder / f"{kind}.mat"
+    elif kind == "suffix":
+        path = folder / "record.json"
     elif kind == "units":
         rows = ["% cm/s^2 and g, in units of g", *rows]
     elif kind == "two-units":
@@ -134,6 +168,15 @@ def spoilt(kind: str, folder: Path) -> Path:
         ("flat", "all samples are zero"),
         ("ambiguous", "could be g or m/s^2"),
         ("missing", "no such record"),
+        ("backwards", "the clock goes from 2.99 to 2.5 s"),
+        ("shuffled", "the clock goes from"),
+        ("unknown-unit", "is not a unit"),
+        ("velocity", "this is no acceleration"),
+        ("no-header", "has no NPTS and DT"),
+        ("no-array", "no array of real numbers"),
+        ("complex", "no array of real numbers"),
+        ("cube", "shape (3, 40, 2)"),
+        ("suffix", "a .json file is no ground-motion record"),
     ],
 )
 def test_bad_records_get_one_line(tmp_path: Path, kind: str, words: str) -> None:
