@@ -21,6 +21,8 @@ from mrpipe.control.kernel import (
     MEASURED_FLOORS,
     controller_step,
 )
+from mrpipe.dampers.drive import advance_lag
+from mrpipe.dampers.hysteresis import advance_hysteresis
 from mrpipe.dampers.plant import (
     ACCELERATION,
     CHAIN_FUNCTIONS,
@@ -34,12 +36,20 @@ from mrpipe.dampers.plant import (
     advance,
 )
 from mrpipe.simulation.parts import (
+    D_COMMAND,
+    D_CURRENT,
     I_COMMAND,
     I_DELAY,
     I_PER_SAMPLE,
     I_RECORD,
     I_STEPS,
     I_TRACK,
+    P_ETA,
+    P_EXPONENT,
+    P_GAMMA_SHARE,
+    P_VISCOSITY,
+    P_YIELD,
+    P_YIELD_DISPLACEMENT,
     R_DT,
     R_LAG,
     T_DESIRED,
@@ -49,6 +59,7 @@ from mrpipe.simulation.parts import (
     T_WORK_DAMPER,
     T_WORK_FRAME,
     T_WORK_IN,
+    TRACK_BOUC_WEN,
     TRACK_DAMPER,
     TRACK_LAW,
     TRACK_SAMPLED,
@@ -137,6 +148,7 @@ def run_loop(
     n = w.shape[0]
     size = 2 * n
     track, per_sample, every = counts[I_TRACK], counts[I_PER_SAMPLE], counts[I_RECORD]
+    real = track in (TRACK_DAMPER, TRACK_BOUC_WEN)
     dt = run[R_DT]
     end_x, end_v, end_a = at_end[size], at_end[size + 1], at_end[size + 2]
     wire = np.zeros(WIRE_SIZE)
@@ -146,6 +158,17 @@ def run_loop(
     after = np.zeros(size + 4)
     velocities = after[n:size]
     drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
+    # the plain chain in numbers of its own: reading arrays through its function pointers takes longer than its sums
+    u, yielding, viscous, zeta, hysteretic, rod, rod_end = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    eta_dt, yield_displacement, gamma_share, exponent = 0.0, 1.0, 0.5, 2.0
+    y0, y1, y2, y3, v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if track == TRACK_BOUC_WEN:
+        eta_dt = parameters[P_ETA] * dt
+        y0, y1, y2, y3 = parameters[P_YIELD], parameters[P_YIELD + 1], parameters[P_YIELD + 2], parameters[P_YIELD + 3]
+        v0, v1 = parameters[P_VISCOSITY], parameters[P_VISCOSITY + 1]
+        v2, v3 = parameters[P_VISCOSITY + 2], parameters[P_VISCOSITY + 3]
+        yield_displacement, gamma_share = parameters[P_YIELD_DISPLACEMENT], parameters[P_GAMMA_SHARE]
+        exponent = parameters[P_EXPONENT]
     work_in, work_damper, work_frame = 0.0, 0.0, 0.0
     loss = quadratic(C, z[n:])
     x, v, pushed = 0.0, 0.0, 0.0
@@ -180,13 +203,14 @@ def run_loop(
             # all lags start in equilibrium with the first command
             drive = asked
             wire[FIRST] = 1.0
-            if track == TRACK_DAMPER:
+            if real:
                 force = _damper_force(
                     functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, v,
                     measured[MEASURED_ACCELERATION] - noise[0, MEASURED_ACCELERATION], drive, dt,
                 )  # fmt: skip
                 for index in range(damper.shape[0]):
                     damper[index] = trial[index]
+                rod, hysteretic = x, 0.0
             elif track == TRACK_LAW:
                 force = ideal_force(run, x, v)
             else:
@@ -222,14 +246,24 @@ def run_loop(
         x_free, v_free, a_free = after[size], after[size + 1], after[size + 2]
         # --- the force at the end of the step, with the motion there
         time = (step + 1) * dt
-        guess = 2.0 * force - force_before if track == TRACK_DAMPER else force
+        guess = 2.0 * force - force_before if real else force
+        if track == TRACK_BOUC_WEN:
+            # the command is known: only motion and hysteresis are not
+            u = advance_lag(damper[D_CURRENT], damper[D_COMMAND], drive, eta_dt)
+            yielding = y0 + u * (y1 + u * (y2 + u * y3))
+            viscous = v0 + u * (v1 + u * (v2 + u * v3))
+            damper[D_CURRENT], damper[D_COMMAND] = u, drive
         found = guess
         last_guess, last_found = 0.0, 0.0
         converged = False
         low, high = -math.inf, math.inf
         for iteration in range(60):
             x_end, v_end = x_free + end_x * guess, v_free + end_v * guess
-            if track == TRACK_DAMPER:
+            if track == TRACK_BOUC_WEN:
+                zeta = advance_hysteresis(hysteretic, x_end - rod, yield_displacement, gamma_share, exponent)
+                found = yielding * zeta + viscous * v_end
+                rod_end = x_end
+            elif track == TRACK_DAMPER:
                 found = _damper_force(
                     functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, time, x_end, v_end,
                     a_free + end_a * guess, drive, dt,
@@ -242,7 +276,7 @@ def run_loop(
             if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
                 converged = True
                 break
-            if track == TRACK_DAMPER and abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
+            if real and abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
                 # so near that the slope of the step before leaves an error far below what matters
                 found = guess + difference / (1.0 - slope)
                 converged = True
@@ -278,7 +312,9 @@ def run_loop(
         force_before, force = force, found
         for index in range(size):
             before[index] = after[index]
-        if track == TRACK_DAMPER:
+        if track == TRACK_BOUC_WEN:
+            hysteretic, rod = zeta, rod_end
+        elif real:
             for index in range(damper.shape[0]):
                 damper[index] = trial[index]
     for index in range(size):

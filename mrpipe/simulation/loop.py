@@ -198,6 +198,8 @@ def simulate_law(
     every = max(1, round(1.0 / (dt * options.record_rate_hz)))
     counts, run = _run_numbers(controller, options, steps, per_sample, every, dt)
     counts[parts.I_COMMAND] = command_place(chain)
+    if options.tracking == "damper" and chain.names == parts.BOUC_WEN:
+        counts[parts.I_TRACK] = parts.TRACK_BOUC_WEN
     samples = steps // per_sample + 1
     commands = np.zeros((samples, COMMAND_SIZE))
     record = np.zeros((steps // every + 1, 3 * n + parts.T_SIZE))
@@ -303,8 +305,9 @@ def _response(
         velocity=record[:, n : 2 * n],
         acceleration=absolute - ground[:, None],
         absolute_acceleration=absolute,
-        damper_displacement=record[:, :n] @ w,
-        damper_velocity=record[:, n : 2 * n] @ w,
+        # not by BLAS, whose second thread spins on after a product of this length
+        damper_displacement=np.einsum("tf,f->t", record[:, :n], w),
+        damper_velocity=np.einsum("tf,f->t", record[:, n : 2 * n], w),
         force=tail[:, parts.T_FORCE],
         drive=tail[:, parts.T_DRIVE],
         desired_force=tail[:, parts.T_DESIRED],

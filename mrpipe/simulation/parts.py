@@ -15,6 +15,7 @@ from mrpipe.control.kernel import (
 
 # --- how the desired force becomes a force ---
 TRACK_DAMPER, TRACK_LAW, TRACK_SAMPLED = 0, 1, 2
+TRACK_BOUC_WEN = 3  # as TRACK_DAMPER, for the plain chain of (2.1) to (2.4) without its function pointers
 
 # --- numbers of the run ---
 R_DT = 0
@@ -49,6 +50,12 @@ def ideal_force(run: FloatArray, x: float, v: float) -> float:
     """Return the force of a perfect damper: law (4.14), clipped by P2 (22). It never falls with v."""
     force = run[R_C] * v + run[R_K] * x
     return force if force * v >= 0.0 else 0.0
+
+
+# parameters and state of the plain chain: lag, polynomials, hysteresis, sum
+P_ETA, P_YIELD, P_VISCOSITY, P_YIELD_DISPLACEMENT, P_GAMMA_SHARE, P_EXPONENT = 0, 1, 5, 9, 10, 11
+D_CURRENT, D_COMMAND = 0, 1
+BOUC_WEN = ("driver-lag", "polynomial-coefficients", "hysteresis", "sum")
 
 
 @njit(void(float64[:, ::1], float64[::1], float64[::1]), cache=True)

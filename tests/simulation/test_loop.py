@@ -9,9 +9,10 @@ from scipy.linalg import expm
 
 from mrpipe.control import ControllerOptions, Gains, build_controller
 from mrpipe.control.calibration import THESIS_GAINS
-from mrpipe.dampers.plant import build_chain
+from mrpipe.dampers.plant import Phase, Step, build_chain, idle_step
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import LoopOptions, SensorNoise, at_rest, harmonic, recorded, simulate_law, sweep
+from mrpipe.simulation.parts import BOUC_WEN
 from mrpipe.simulation.reference import ReferenceController, reference_loop
 from mrpipe.structures import Frame, frequency_response, natural_modes, state_space
 from tests.control.conftest import random_network
@@ -112,6 +113,22 @@ def test_compiled_loop_equals_the_plain_one(rig, law):
     np.testing.assert_allclose(ours.drive[1:], drive[:-1], atol=1e-3 * rig.damper.drive_limit)
     np.testing.assert_allclose(ours.displacement, displacement, atol=2e-5 * np.max(np.abs(displacement)))
     np.testing.assert_allclose(ours.force[1:], force[1:], atol=1e-3 * np.max(np.abs(force)))
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("driver_lag_s", [0.0, 0.004])
+def test_the_plain_damper_runs_as_any_chain(rig, driver_lag_s):
+    """Its loop has no function pointers: a chain with a step that does nothing takes the common way."""
+    damper = rig.damper
+    steps = [step for step in damper.steps() if step.name != "sum"]
+    common = build_chain([*steps, Step("nothing", Phase.FORCE_EFFECT, idle_step, np.zeros(0))])
+    assert damper.chain().names == BOUC_WEN and common.names != BOUC_WEN
+    options = LoopOptions(driver_time_constant_s=driver_lag_s)
+    ours, theirs = (
+        simulate_law(rig.frame, chain, rig.controller("vdns"), rig.excitation(0.7, 6), options)
+        for chain in (damper.chain(), common)
+    )
+    np.testing.assert_allclose(ours.force, theirs.force, atol=1e-9 * np.max(np.abs(theirs.force)))
 
 
 @pytest.mark.property
