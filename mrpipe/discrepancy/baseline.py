@@ -150,8 +150,11 @@ def noise_level_of(found: Fit) -> tuple[float, int]:
     return sensors, 0
 
 
-def ladder(found: Fit, rate_forms: Effect | None) -> dict[str, Fit]:
-    """Return fits of the ladder of base forms: declared, exponent free, Dahl, rate-dependent yield."""
+def ladder(found: Fit, rate_forms: Effect | None, rate_fit: Fit | None = None) -> dict[str, Fit]:
+    """Return fits of the ladder of base forms: declared, exponent free, Dahl, rate-dependent yield.
+
+    `rate_fit` is the last where the selection has fitted it already.
+    """
     problem = found.problem
     base = problem.base
     fits = {base.name: found}
@@ -165,5 +168,5 @@ def ladder(found: Fit, rate_forms: Effect | None) -> dict[str, Fit]:
         dahl = replace(problem, base=other)
         fits["dahl"] = fit(dahl, start_of(dahl, found.base_values, found.term_values), iterations=8)
     if rate_forms is not None and all(term.effect.name != rate_forms.name for term in problem.terms):
-        fits[rate_forms.name] = _with_declared(found, rate_forms)
+        fits[rate_forms.name] = rate_fit or _with_declared(found, rate_forms)
     return fits

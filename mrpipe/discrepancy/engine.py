@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,10 @@ from mrpipe.discrepancy.kernel import (
 )
 from mrpipe.discrepancy.problem import Problem
 from mrpipe.discrepancy.recordings import Recordings
+
+
+OLDEST_JACOBIAN = 3
+"""After so many steps the Jacobian is taken by differences again."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,6 @@ class Fit:
     residual: FloatArray
     at_bound: tuple[str, ...] = ()
     iterations: int = 0
-    jacobian: FloatArray | None = field(default=None, repr=False)
 
     @property
     def chi_square(self) -> float:
@@ -237,13 +240,14 @@ def fit(problem: Problem, start: FloatArray, *, iterations: int = 15, tolerance:
     theta = np.clip(start, low, high)
     residual, linear, means, fixed = solve(problem, theta, w)
     cost = float(residual @ residual)
-    damping, done, jacobian = 1e-3, 0, None
+    damping, done, jacobian, age = 1e-3, 0, np.zeros((len(theta), len(residual))), OLDEST_JACOBIAN
     for done in range(1, iterations + 1):  # noqa: B007 - counted for the report
-        jacobian = jacobian_of(problem, theta, residual, w, low, high)
+        if age >= OLDEST_JACOBIAN:
+            jacobian, age = jacobian_of(problem, theta, residual, w, low, high), 0
         gram, gradient = jacobian @ jacobian.T, jacobian @ residual
         diagonal = np.maximum(np.diag(gram), 1e-12 * max(float(np.max(np.diag(gram))), 1e-300))
         before, improved = cost, False
-        for _ in range(5):
+        for _ in range(5 if age == 0 else 2):
             free = ~(((theta <= low) & (gradient > 0)) | ((theta >= high) & (gradient < 0)))
             step = np.zeros(len(theta))
             if free.any():
@@ -253,14 +257,22 @@ def fit(problem: Problem, start: FloatArray, *, iterations: int = 15, tolerance:
             found = solve(problem, trial, w)
             new = float(found[0] @ found[0])
             if new < cost:
+                moved = trial - theta
+                missed = found[0] - residual - moved @ jacobian
+                # a run for every parameter is dear: between two Jacobians by differences Broyden's update will do
+                jacobian += np.outer(moved / max(float(moved @ moved), 1e-300), missed)
                 theta, cost, improved = trial, new, True
                 residual, linear, means, fixed = found
                 damping = max(damping * 0.2, 1e-9)
                 break
             damping *= 8.0
-        if not improved or before - cost < tolerance * before:
+        if improved and before - cost >= tolerance * before:
+            age += 1
+        elif age == 0:
             break
-    return _finish(problem, theta, w, (residual, linear, means, fixed), done, jacobian)
+        else:
+            age = OLDEST_JACOBIAN
+    return _finish(problem, theta, w, (residual, linear, means, fixed), done)
 
 
 def jacobian_of(
@@ -285,7 +297,6 @@ def _finish(
     w: Weighting,
     found: tuple[FloatArray, FloatArray, FloatArray, BoolArray],
     iterations: int,
-    jacobian: FloatArray | None,
 ) -> Fit:
     residual, linear, means, fixed = found
     low, high = problem.bounds()
@@ -304,7 +315,7 @@ def _finish(
         offsets[np.unique(w.test)] = means
     else:
         offsets[:] = means[0]
-    return Fit(problem, theta, linear, offsets, float(residual @ residual), full, tuple(names), iterations, jacobian)
+    return Fit(problem, theta, linear, offsets, float(residual @ residual), full, tuple(names), iterations)
 
 
 def predict(found: Fit, recordings: Recordings) -> FloatArray:

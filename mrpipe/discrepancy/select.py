@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
+from mrpipe.discrepancy.crossvalidation import folds_of
 from mrpipe.discrepancy.engine import Fit, fit, start_of
 from mrpipe.discrepancy.problem import Term
 from mrpipe.discrepancy.screen import Screened, screen
@@ -21,8 +25,20 @@ SECOND_SHARE = 0.5
 """... and at least this share of what the effects before it left."""
 
 
+DRAFT_SAMPLES = 12_000
+"""Of this many samples, or a little more, the drafts of all forms are made ..."""
+
+MOST_PARTS = 3
+"""... but of no smaller share of the tests than one in three."""
+
+CONTENDER_SHARE = 0.3
+"""Forms that leave more than the best draft by this share of what the best takes are not fitted on all tests."""
+
 FURTHER = 0.15
 """Where less than this share is left, a further effect is looked for only if the screening promises its share."""
+
+
+_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True)
@@ -93,12 +109,32 @@ def share_of(base: Fit, found: Fit, noise: float) -> float:
     return float(min(1.0, (base.chi_square - found.chi_square) / excess))
 
 
-def refit(before: Fit, screened: Screened, *, iterations: int = 15) -> Fit:
+def draft(found: Fit) -> Fit:
+    """Return the fit on a share of its tests that still holds every drive level: enough to screen and to rank forms."""
+    recordings = found.problem.recordings
+    parts = min(-(-len(recordings.force) // DRAFT_SAMPLES), MOST_PARTS, recordings.tests // 4)
+    if parts < 2:
+        return found
+    keep = folds_of(recordings, parts)[0]
+    within = np.isin(recordings.test, keep)
+    problem = replace(
+        found.problem, recordings=recordings.subset(keep), root_weight=found.problem.root_weight[within]
+    )
+    return fit(problem, found.theta, iterations=4)
+
+
+def refit(before: Fit, screened: Screened, *, iterations: int = 7) -> Fit:
     """Fit the terms of `before` and a screened one jointly."""
     problem = replace(before.problem, terms=(*before.problem.terms, screened.term))
     start = start_of(problem, before.base_values, [*before.term_values, screened.values])
     start[: len(before.theta)] = before.theta
     return fit(problem, start, iterations=iterations)
+
+
+def on_all(before: Fit, drafted: Fit, *, iterations: int) -> Fit:
+    """Fit the terms of a draft on all tests of `before`, from where the draft ended."""
+    terms = (*before.problem.terms, drafted.problem.terms[-1])
+    return fit(replace(before.problem, terms=terms), drafted.theta, iterations=iterations)
 
 
 def candidates_after(
@@ -111,32 +147,45 @@ def candidates_after(
     jobs: int,
     progress: Progress = no_progress,
 ) -> list[Candidate]:
-    """Screen all terms after a fit and refit the families that promise most; best first."""
+    """Screen all terms after a fit and refit the families that promise most; best first.
+
+    Forms are tried on a share of the tests; those that may win are fitted on all of them.
+    """
     present = {term.effect.name for term in before.problem.terms}
-    ranked = screen(before, [term for term in terms if term.effect.name not in present], jobs=jobs)
+    small = draft(before)
+    ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
     families: dict[str, list[Screened]] = {}
     for item in ranked:
         families.setdefault(item.term.effect.name, []).append(item)
-    chosen = list(families.items())[:refits]
-    work = [(name, item) for name, items in chosen for item in items[:2]]
-    fits = _refit_all(before, work, jobs)
-    done = {item.term.key for _, item in work}
+    chosen = list(families)[:refits]
+    drafts = _each(lambda item: refit(small, item), [item for name in chosen for item in families[name][:2]], jobs)
     # the families in front get all their forms: a name is judged by the form that suits it best
-    best = sorted({name: min(f.chi_square for n, f in fits if n == name) for name, _ in chosen}.items(), key=_second)
-    more = [(name, item) for name, _ in best[:3] for item in families[name] if item.term.key not in done]
-    progress(0.7, f"{len(work)} forms refitted")
-    fits += _refit_all(before, more, jobs)
+    front = sorted(chosen, key=lambda name: min(item.cost for item in drafts if _name(item) == name))[:3]
+    drafts += _each(lambda item: refit(small, item), [item for name in front for item in families[name][2:]], jobs)
+    progress(0.7, f"{len(drafts)} forms tried")
+    own = {name: sorted((item for item in drafts if _name(item) == name), key=_penalised) for name in chosen}
+    least = min(items[0].chi_square for items in own.values())
+    within = least + CONTENDER_SHARE * max(small.chi_square - least, 0.0)
+    contenders = [item for items in own.values() for item in items[:3] if item.chi_square <= within]
+    others = [items[0] for items in own.values() if items[0].chi_square > within]
+    fits = _each(lambda item: on_all(before, item, iterations=10), contenders, jobs)
+    fits += _each(lambda item: on_all(before, item, iterations=0), others, jobs)
+    already = share_of(base, before, noise)
     found = []
-    for name, _ in chosen:
-        own = [item for n, item in fits if n == name]
-        winner = min(own, key=_penalised)
-        shares = {item.problem.terms[-1].form.name: share_of(base, item, noise) for item in own}
+    for name in chosen:
+        winner = min((item for item in fits if _name(item) == name), key=_penalised)
+        shares = {_form(item): already + (1.0 - already) * share_of(small, item, noise) for item in own[name]}
+        shares |= {_form(item): share_of(base, item, noise) for item in fits if _name(item) == name}
         found.append(Candidate(name, winner, share_of(base, winner, noise), shares))
     return sorted(found, key=lambda item: item.fit.chi_square)
 
 
-def _second(item: tuple[str, float]) -> float:
-    return item[1]
+def _name(found: Fit) -> str:
+    return found.problem.terms[-1].effect.name
+
+
+def _form(found: Fit) -> str:
+    return found.problem.terms[-1].form.name
 
 
 def _penalised(found: Fit) -> float:
@@ -145,16 +194,16 @@ def _penalised(found: Fit) -> float:
     return found.chi_square * (1.0 + 0.01 * searched)
 
 
-def _refit_all(before: Fit, work: Sequence[tuple[str, Screened]], jobs: int) -> list[tuple[str, Fit]]:
+def _each(work: Callable[[_Item], Fit], items: Sequence[_Item], jobs: int) -> list[Fit]:
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        fits = list(pool.map(lambda item: refit(before, item[1]), work))
-    return [(name, found) for (name, _), found in zip(work, fits, strict=True)]
+        return list(pool.map(work, items))
 
 
 def _nothing_more(before: Fit, terms: Sequence[Term], excess: float, jobs: int) -> bool:
     present = {term.effect.name for term in before.problem.terms}
-    ranked = screen(before, [term for term in terms if term.effect.name not in present], jobs=jobs)
-    return ranked[0].gain * before.chi_square < SECOND_GAIN * excess
+    small = draft(before)
+    ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
+    return ranked[0].gain * small.chi_square < SECOND_GAIN * excess
 
 
 def admissible(found: Fit) -> bool:

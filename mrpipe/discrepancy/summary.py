@@ -211,7 +211,9 @@ class Summary:
 
     def _ladder(self, options: TracingOptions, measured: FloatArray, rate_forms: Effect | None) -> dict[str, Any]:
         base = self.selection.base
-        fits = ladder(base, rate_forms)
+        first = self.selection.rounds[0] if self.selection.rounds else ()
+        known = [item.fit for item in first if rate_forms is not None and item.name == rate_forms.name]
+        fits = ladder(base, rate_forms, known[0] if known else None)
         errors = {name: score(self.validation, measured, predict(f, self.validation)).nrmse for name, f in fits.items()}
         if options.model not in errors:
             errors[options.model] = errors[next(iter(fits))]

@@ -3,41 +3,70 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from scipy import ndimage
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.discrepancy.engine import Fit, chain_of
-from mrpipe.discrepancy.kernel import CURRENT_AT, HYSTERESIS_AT, run_recordings
+from mrpipe.dampers.plant import build_chain
+from mrpipe.discrepancy.engine import Fit
+from mrpipe.discrepancy.kernel import FORCE_AT, run_recordings
 from mrpipe.discrepancy.recordings import Recordings
+from mrpipe.signals.filters import butterworth_lowpass
 
 LEAST_SHARE = 0.002
 """No sample is trusted better than this share of the force RMS: model error below it is of no interest."""
 
+AVERAGED_S = 0.02
+"""Time over which simulated effects of noise are averaged."""
 
-def sensor_deviation(found: Fit, recordings: Recordings) -> FloatArray:
+
+def sensor_deviation(found: Fit, recordings: Recordings, *, draws: int = 3, seed: int = 0) -> FloatArray:
     """Return the standard deviation of the force that the sensors' noise explains [N], shape (n,).
 
-    sigma^2 = sigma_F^2 + (dF/dx sigma_x)^2 + (dF/dv sigma_v)^2: at a reversal the force rises by hundreds of newtons
-    for each millimetre, and micrometres of displacement noise become newtons.
+    sigma^2 = sigma_F^2 + (F(x + noise) - F(x))^2, the latter from simulations and averaged over a short while. At a
+    reversal the force rises by hundreds of newtons for each millimetre, and micrometres of displacement noise become
+    newtons; where the rod rests or creeps they turn the hysteresis back and forth, and what it then makes of the next
+    motion is as uncertain: no formula in the present slope sees that.
+
+    Parameters
+    ----------
+    draws, seed
+        Number of noise records simulated, and what they are drawn from.
     """
-    problem = found.problem
-    wires = run_recordings(chain_of(problem, found.theta)[0], recordings)
-    yield_force, viscosity = found.polynomials
-    u = wires[CURRENT_AT]
-    values = found.base_values
-    share = values.get("gamma_share", problem.base.gamma_share)
-    y = np.sign(recordings.velocity) * wires[HYSTERESIS_AT]
-    fall = np.where(y >= 0.0, np.abs(y) ** 2, (1.0 - 2.0 * share) * np.abs(y) ** 2)
-    slope = np.polynomial.polynomial.polyval(u, yield_force) * (1.0 - fall) / values["yield_displacement"]
-    drag = np.polynomial.polynomial.polyval(u, viscosity)
-    test = recordings.test
-    variance = (
-        recordings.force_noise[test] ** 2
-        + (slope * recordings.displacement_noise[test]) ** 2
-        + (drag * recordings.velocity_noise[test]) ** 2
-    )
-    return np.asarray(np.sqrt(variance), dtype=np.float64)
+    chain = build_chain(found.problem.base.steps(found.base_values, *found.polynomials))
+    rng = np.random.default_rng(seed)
+    calm = run_recordings(chain, recordings)[FORCE_AT]
+    spread = np.zeros(len(calm))
+    for _ in range(draws):
+        displacement, velocity = _noisy_motion(recordings, rng)
+        noisy = run_recordings(chain, replace(recordings, displacement=displacement, velocity=velocity))[FORCE_AT]
+        spread += np.square(noisy - calm)
+    averaged = _locally_averaged(spread / draws, recordings)
+    return np.asarray(np.sqrt(recordings.force_noise[recordings.test] ** 2 + averaged), dtype=np.float64)
+
+
+def _noisy_motion(recordings: Recordings, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    displacement, velocity = recordings.displacement.copy(), recordings.velocity.copy()
+    for test in range(recordings.tests):
+        piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
+        dt = recordings.dt[test]
+        white = rng.standard_normal(piece.stop - piece.start)
+        filtered = butterworth_lowpass(white, recordings.cutoff_hz[test], 1.0 / dt)
+        noise = recordings.displacement_noise[test] * filtered / max(float(np.std(filtered)), 1e-12)
+        displacement[piece] += noise
+        velocity[piece] += np.gradient(noise, dt)
+    return displacement, velocity
+
+
+def _locally_averaged(values: FloatArray, recordings: Recordings) -> FloatArray:
+    result = np.empty_like(values)
+    for test in range(recordings.tests):
+        piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
+        width = 2 * max(1, round(0.5 * AVERAGED_S / recordings.dt[test])) + 1
+        result[piece] = ndimage.uniform_filter1d(values[piece], width, mode="nearest")
+    return result
 
 
 def force_deviation(found: Fit, recordings: Recordings, model_error_share: float = 0.0) -> FloatArray:

@@ -3,6 +3,9 @@
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 from numba import njit
 
@@ -18,7 +21,7 @@ from mrpipe.dampers.plant import (
     Phase,
     Step,
 )
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude
+from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -38,6 +41,26 @@ def asymmetry_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     else:
         force = abs(wire[VELOCITY])
     wire[FORCE] += parameters[0] * force
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def direction_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: amplitude, transition velocity [m/s], kind (0 yield, 1 both).
+
+    The flow's direction decides, not that of the force: after a reversal the two differ until it yields.
+    """
+    v = wire[VELOCITY]
+    direction = v / math.sqrt(v * v + parameters[1] * parameters[1])
+    force = wire[HYSTERETIC_FORCE] if parameters[2] == 0.0 else wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]
+    wire[FORCE] += parameters[0] * force * direction
+
+
+def _direction(kind: float) -> Callable[[Values], list[Step]]:
+    def steps(values: Values) -> list[Step]:
+        numbers = np.array([values["share"], values["transition_velocity"], kind])
+        return [Step("asymmetry", Phase.FORCE_EFFECT, direction_step, numbers)]
+
+    return steps
 
 
 def _one(value: float, kind: float) -> Step:
@@ -61,6 +84,9 @@ def _own(values: Values) -> list[Step]:
 
 
 _SHARE = amplitude("share", "1", "half the difference of the two directions over their mean", "one", -0.9, 0.9)
+_TRANSITION = shape(
+    "transition_velocity", "m/s", "speed over which the direction changes", "speed", 1e-4, 0.5, (0.004, 0.06)
+)
 
 EFFECT = Effect(
     name="asymmetry",
@@ -73,6 +99,20 @@ EFFECT = Effect(
         EffectForm("yield", "F + s |alpha z|", (_SHARE,), _yield, {"share": 0}),
         EffectForm("viscous", "F + s |c v|", (_SHARE,), _viscous, {"share": 0}),
         EffectForm("both", "F + s |alpha z + c v|", (_SHARE,), _both, {"share": 0}),
+        EffectForm(
+            "yield-by-direction",
+            "F + s alpha z v/sqrt(v^2 + v_t^2)",
+            (_SHARE, _TRANSITION),
+            _direction(0.0),
+            {"share": 0},
+        ),
+        EffectForm(
+            "both-by-direction",
+            "F + s (alpha z + c v) v/sqrt(v^2 + v_t^2)",
+            (_SHARE, _TRANSITION),
+            _direction(1.0),
+            {"share": 0},
+        ),
         EffectForm(
             "own-coefficients",
             "F + |z| (a + b u) + c |v|",

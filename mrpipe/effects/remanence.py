@@ -38,8 +38,6 @@ def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
             wire[CURRENT] = u + gain * (state[0] - u)
         elif kind == 6.0:
             wire[CURRENT] = max(u, gain * state[0])
-        elif kind == 8.0:
-            wire[CURRENT] = u + gain * state[0]
         elif kind == 9.0:
             wire[CURRENT] = math.sqrt(u * u + (gain * state[0]) ** 2)
         else:
@@ -60,6 +58,44 @@ def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     state[1] = u
 
 
+@njit(STEP_SIGNATURE, cache=True)
+def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: gain, length [m], time [s], exponent or width or limit, drive of reference, kind. State: m, peak, path.
+
+    The memory m fades with time and slip together, fast at first and ever slower: it falls by m^2 (kind 0), as
+    peak/(1 + path) (1) or exponentially (2). What it holds up is what the drive itself does not do: the larger of the
+    two, with a rounded corner (0); the same, the remanence limited (1); beside the drive, less the larger that is (2).
+    """
+    u = wire[CURRENT]
+    gain, size, kind = parameters[0], parameters[3], parameters[5]
+    if wire[FIRST] > 0.5:
+        state[0] = max(u, 0.0)
+        state[1] = state[0]
+        state[2] = 0.0
+    path = abs(wire[VELOCITY]) * dt / parameters[1] + dt / parameters[2]
+    if kind == 0.0:
+        state[0] = state[0] / (1.0 + path * state[0] / parameters[4])
+    elif kind == 1.0:
+        state[2] += path
+        state[0] = state[1] / (1.0 + state[2])
+    else:
+        state[0] = state[0] * math.exp(-path)
+    if u >= state[0]:
+        state[0] = u
+        state[1] = u
+        state[2] = 0.0
+    held = gain * state[0]
+    if u < 0.0 or held <= 0.0:
+        return
+    if kind == 0.0:
+        larger, ratio = max(u, held), min(u, held) / max(u, held)
+        wire[CURRENT] = larger * (1.0 + ratio**size) ** (1.0 / size) if u > 0.0 else held
+    elif kind == 1.0:
+        wire[CURRENT] = max(u, size * math.tanh(held / size))
+    else:
+        wire[CURRENT] = u + held * math.exp(-u / size)
+
+
 def _step(gain: float, size: float, kind: float) -> list[Step]:
     return [Step("remanence", Phase.CURRENT_EFFECT, remanence_step, np.array([gain, size, kind]), 2)]
 
@@ -68,6 +104,17 @@ def _together(kind: float) -> Callable[[Values], list[Step]]:
     def steps(values: Values) -> list[Step]:
         numbers = np.array([values["gain"], values["slip_length"], kind, values["relaxation_time"]])
         return [Step("remanence", Phase.CURRENT_EFFECT, remanence_step, numbers, 2)]
+
+    return steps
+
+
+def _field(kind: float, name: str) -> Callable[[Values], list[Step]]:
+    def steps(values: Values) -> list[Step]:
+        reference = values.get("reference_drive", 1.0)
+        numbers = np.array(
+            [values["gain"], values["slip_length"], values["relaxation_time"], values[name], reference, kind]
+        )
+        return [Step("remanence", Phase.CURRENT_EFFECT, remanent_field_step, numbers, 3)]
 
     return steps
 
@@ -94,6 +141,9 @@ def _loop(values: Values) -> list[Step]:
 
 _GAIN = strength("gain", "1", "share of the surplus of the past drive that stays", "one", 0.0, 1.0, 0.03)
 
+_HELD = strength("gain", "1", "share of the past drive that stays", "one", 0.0, 1.0, 0.3)
+"""A remanence that acts only where it is the larger shows nothing at a small gain: the search starts at a fair one."""
+
 _LENGTH = shape("slip_length", "m", "path that breaks it", "stroke", 0.05, 100.0, (2.0, 8.0))
 _TIME = shape("relaxation_time", "s", "time that breaks it", "time", 0.008, 12.0, (0.06, 0.3))
 
@@ -118,9 +168,32 @@ EFFECT = Effect(
             _time,
         ),
         EffectForm("relaxing", "u + g (m - u), m decays to u over L and tau", (_GAIN, _LENGTH, _TIME), _together(5.0)),
-        EffectForm("fading", "max(u, g m), m decays to 0 over L and tau", (_GAIN, _LENGTH, _TIME), _together(6.0)),
+        EffectForm("fading", "max(u, g m), m decays to 0 over L and tau", (_HELD, _LENGTH, _TIME), _together(6.0)),
         EffectForm("fading-field", "u + g (m - u) m/(m + u), m decays to 0", (_GAIN, _LENGTH, _TIME), _together(7.0)),
-        EffectForm("fading-sum", "u + g m, m decays to 0 over L and tau", (_GAIN, _LENGTH, _TIME), _together(8.0)),
+        EffectForm(
+            "fading-rounded",
+            "(u^p + (g m)^p)^(1/p), dm = -m^2/u_0 (|dx|/L + dt/tau)",
+            (
+                _HELD,
+                _LENGTH,
+                _TIME,
+                shape("exponent", "1", "sharpness of the corner", "one", 2.0, 20.0, (7.0,)),
+                shape("reference_drive", "drive", "drive that L and tau belong to", "drive", 0.999, 1.001, (1.0,)),
+            ),
+            _field(0.0, "exponent"),
+        ),
+        EffectForm(
+            "fading-limited",
+            "max(u, s tanh(g m/s)), m = peak/(1 + slip/L + t/tau)",
+            (_HELD, _LENGTH, _TIME, shape("limit", "drive", "largest remanence", "drive", 0.005, 1.0, (0.2,))),
+            _field(1.0, "limit"),
+        ),
+        EffectForm(
+            "fading-beside",
+            "u + g m exp(-u/w), m decays to 0 over L and tau",
+            (_GAIN, _LENGTH, _TIME, shape("width", "drive", "drive that outdoes it", "drive", 0.01, 2.0, (0.08,))),
+            _field(2.0, "width"),
+        ),
         EffectForm("fading-root", "sqrt(u^2 + (g m)^2), m decays to 0", (_GAIN, _LENGTH, _TIME), _together(9.0)),
         EffectForm("past-maximum", "u + g (max u - u)", (_GAIN,), _past),
         EffectForm(
