@@ -1,8 +1,8 @@
 """How often planted effects are found: `make bench-tracing`, or `python -m benchmarks.tracing --preset core`.
 
-Every campaign is drawn and recorded by the virtual laboratory, goes through prepare and the tracing as `close-loop` runs them, and
-its truth is read only after the verdict. Each case is a line of a results file (JSON), so that an interrupted run is taken
-up where it ended; `benchmarks.tracing_table` makes the tables of docs/tracing-benchmark.md of it.
+Every campaign is drawn and recorded by the virtual laboratory and goes through prepare and the tracing as `close-loop`
+runs them; its truth is read only after the verdict. Each case is a line of a results file (JSON), so that an
+interrupted run is taken up where it ended; `benchmarks.tracing_table` makes docs/tracing-benchmark.md of it.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def run_case(case: Case, *, duration_s: float = 4.0, keep: Path | None = None) -
         with tempfile.TemporaryDirectory() as temporary:
             campaign = record(case, keep or Path(temporary), duration_s)
             return {"key": case.key, **asdict(case), **trace(campaign, case.seed), "error": ""}
-    except Exception:  # noqa: BLE001 - a failed case is a row of the table, not the end of the run
+    except Exception:
         return {"key": case.key, **asdict(case), "right": False, "error": traceback.format_exc(limit=-2)}
 
 

@@ -21,7 +21,6 @@ from mrpipe.discrepancy.kernel import (
 from mrpipe.discrepancy.problem import Problem
 from mrpipe.discrepancy.recordings import Recordings
 
-
 OLDEST_JACOBIAN = 3
 """After so many steps the Jacobian is taken by differences again."""
 

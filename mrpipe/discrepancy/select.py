@@ -24,6 +24,12 @@ SECOND_GAIN = 0.05
 SECOND_SHARE = 0.5
 """... and at least this share of what the effects before it left."""
 
+TERM_SHARE = 0.25
+"""A term that recovers this share of what is left improves the model; unless it is proven, no cause is named for it."""
+
+PROVEN_LEAD = 1.25
+"""A further effect is named where every other family leaves at least so many times what it leaves."""
+
 
 DRAFT_SAMPLES = 12_000
 """Of this many samples, or a little more, the drafts of all forms are made ..."""
@@ -73,12 +79,15 @@ class Selection:
         Candidates of each round, best first.
     chosen
         The fit kept (the base where none was).
+    proven
+        How many of the rounds name a cause; terms of later rounds improve the model, their cause is not proven.
     """
 
     base: Fit
     noise: float
     rounds: tuple[tuple[Candidate, ...], ...]
     chosen: Fit
+    proven: int = 3
 
     @property
     def recoverable(self) -> float:
@@ -117,9 +126,7 @@ def draft(found: Fit) -> Fit:
         return found
     keep = folds_of(recordings, parts)[0]
     within = np.isin(recordings.test, keep)
-    problem = replace(
-        found.problem, recordings=recordings.subset(keep), root_weight=found.problem.root_weight[within]
-    )
+    problem = replace(found.problem, recordings=recordings.subset(keep), root_weight=found.problem.root_weight[within])
     return fit(problem, found.theta, iterations=4)
 
 
@@ -215,6 +222,15 @@ def admissible(found: Fit) -> bool:
     return any(values[item.name] != 0.0 for item in term.form.parameters if item.role != "shape")
 
 
+@dataclass(frozen=True)
+class Thresholds:
+    """What a further effect must recover: of what the base lacked, and of what is left; the latter to be named."""
+
+    gain: float = SECOND_GAIN
+    term_share: float = TERM_SHARE
+    named_share: float = SECOND_SHARE
+
+
 def forward_selection(
     base: Fit,
     noise: float,
@@ -222,22 +238,17 @@ def forward_selection(
     *,
     most: int = 3,
     refits: int = 8,
-    second_share: float = SECOND_SHARE,
-    second_gain: float = SECOND_GAIN,
+    thresholds: Thresholds = Thresholds(),
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Selection:
     """Add effects one after another while each recovers a fair share.
 
-    Parameters
-    ----------
-    second_share
-        Share of what is left that a further effect must recover; small where noise is far below any model's error.
-    second_gain
-        Share of what the base lacked that it must recover.
+    A further term is a cause of its own only where it recovers much of what is left and leads the other families;
+    else it may as well mend the form of the effect before it, and so may all that follow.
     """
     rounds: list[tuple[Candidate, ...]] = []
-    chosen = base
+    chosen, proven, sure = base, 0, True
     excess = max(base.chi_square - noise, 0.0)
     if excess <= NOTHING_MISSING * noise or most == 0:
         return Selection(base, noise, (), base)
@@ -245,16 +256,26 @@ def forward_selection(
         if rounds and chosen.chi_square - noise < FURTHER * excess and _nothing_more(chosen, terms, excess, jobs):
             break
         found = candidates_after(chosen, base, noise, terms, refits=refits, jobs=jobs, progress=progress)
-        rounds.append(tuple(found))
         able = [item for item in found if admissible(item.fit)]
+        rounds.append(tuple(able + [item for item in found if item not in able]))
         if not able:
             break
         best = able[0]
         gain = chosen.chi_square - best.fit.chi_square
         left = chosen.chi_square - noise
-        if len(rounds) > 1 and (gain < second_gain * excess or gain < second_share * left):
-            break
+        if len(rounds) > 1:
+            if gain < thresholds.gain * excess or gain < thresholds.term_share * left:
+                break
+            sure = sure and gain >= thresholds.named_share * left and _leads(rounds[-1], noise)
+        proven += int(sure)
         chosen = best.fit
         if chosen.chi_square - noise < max(NOTHING_MISSING * noise, SECOND_GAIN * excess):
             break
-    return Selection(base, noise, tuple(rounds), chosen)
+    return Selection(base, noise, tuple(rounds), chosen, proven)
+
+
+def _leads(candidates: Sequence[Candidate], noise: float) -> bool:
+    if len(candidates) < 2:
+        return True
+    best, second = (max(item.fit.chi_square - noise, 0.0) + 0.05 * noise for item in candidates[:2])
+    return second >= PROVEN_LEAD * best

@@ -19,6 +19,7 @@ from mrpipe.discrepancy.recordings import Recordings
 from mrpipe.discrepancy.select import Selection
 from mrpipe.discrepancy.structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.discrepancy.verdict import Named, Rules, ranking
+from mrpipe.discrepancy.weights import sensor_deviation
 from mrpipe.effects.contract import Effect
 
 UNATTRIBUTED: dict[str, Any] = {
@@ -89,14 +90,17 @@ class Summary:
         self,
         options: TracingOptions,
         named: tuple[Named, ...],
+        further: tuple[Named, ...],
         untested: Mapping[str, str],
         window: float,
         declared: list[str],
         effects: Mapping[str, Effect],
-        jobs: int,
     ) -> Tracing:
-        """Return the tracing with all that is printed; `untested` are the effects that no test shows, and why."""
-        del jobs
+        """Return the tracing with all that is printed.
+
+        `further` are terms that improve the model, their cause not proven; `untested` the effects that no test shows,
+        and why.
+        """
         selection, training, validation = self.selection, self.training, self.validation
         before, after = predict(selection.base, validation), predict(selection.chosen, validation)
         shared = campaign_offset(selection.chosen.test_offsets, training.force_rms)
@@ -119,7 +123,7 @@ class Summary:
             # without repeats coloured noise looks like an excess: it is one only where something can be learnt of it
             blind = ceiling > score_before.nrmse * np.sqrt(1.0 - FLEXIBLE_SHARE)
             structured = not blind or p_value < 1e-6
-        floor = self._noise_floor()
+        floor = self._noise_floor(measured)
         left = max(selection.chosen.chi_square - selection.noise, 0.0)
         excess = max(selection.base.chi_square - selection.noise, 1e-12)
         final_states = states_of(selection.chosen, training)
@@ -157,6 +161,7 @@ class Summary:
                 },
             },
             "effects": effects_found,
+            "further_terms": [item.as_json() for item in further],
             "verdict": self.reason if not named else _verdict(named, selection, options.rules),
             "candidates": ranking(selection, self._candidate_errors(measured)),
             "untestable": dict(untested),
@@ -195,11 +200,14 @@ class Summary:
                 break
         return found[0], found[-1], extra
 
-    def _noise_floor(self) -> float:
-        fitted = self.selection.chosen
-        used = fitted.problem.root_weight > 0.0
-        deviation = np.sqrt(self.baseline.noise) / fitted.problem.root_weight[used]
-        return float(np.sqrt(np.mean(deviation**2))) / self.training.force_rms
+    def _noise_floor(self, measured: FloatArray) -> float:
+        """Return the NRMSE that noise alone leaves on the validation tests, beyond the sensors as much as in training."""
+        fitted, used = self.selection.chosen, self.validation.used
+        root = fitted.problem.root_weight
+        expected = root * sensor_deviation(fitted, self.training)
+        excess = self.baseline.noise / max(float(np.mean(expected[root > 0.0] ** 2)), 1e-12)
+        deviation = sensor_deviation(fitted, self.validation)[used] * np.sqrt(excess)
+        return float(np.sqrt(np.mean(deviation**2)) / max(np.sqrt(np.mean(measured[used] ** 2)), 1e-12))
 
     def _candidate_errors(self, measured: FloatArray) -> dict[str, float]:
         if not self.selection.rounds:

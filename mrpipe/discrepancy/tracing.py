@@ -9,17 +9,18 @@ from dataclasses import replace
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
-from mrpipe.discrepancy.baseline import Baseline, base_form, fit_baseline
+from mrpipe.discrepancy.baseline import Baseline, base_form, fit_baseline, noise_level_of
 from mrpipe.discrepancy.ceiling import flexible_chi_square
 from mrpipe.discrepancy.crossvalidation import Gain, gain_of, intervals, left_out_residual
+from mrpipe.discrepancy.engine import Fit
 from mrpipe.discrepancy.nuisances import observation_window
-from mrpipe.discrepancy.offsets import OffsetFinding, offset_between_tests
+from mrpipe.discrepancy.offsets import offset_between_tests
 from mrpipe.discrepancy.problem import Term
 from mrpipe.discrepancy.recordings import Recordings, drive_jumps, enough_tests, record_tests, spread_tests
-from mrpipe.discrepancy.select import SECOND_GAIN, SECOND_SHARE, Selection, forward_selection
+from mrpipe.discrepancy.select import Selection, Thresholds, forward_selection
 from mrpipe.discrepancy.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions
 from mrpipe.discrepancy.testability import untestable
-from mrpipe.discrepancy.verdict import Named, confidence_of, parameter_table, tied, unnamed_reason
+from mrpipe.discrepancy.verdict import Named, clear_lead, confidence_of, parameter_table, tied, unnamed_reason
 from mrpipe.effects.contract import Effect
 from mrpipe.signals.prepared import PreparedTest
 
@@ -29,11 +30,8 @@ MODEL_ERROR_CHI_SQUARE = 6.0
 JUMP_RATE_HZ = 500.0
 """Least rate of the fits where the drive jumps from one sample to the next."""
 
-REAL_SECOND_GAIN = 0.02
-"""Share of the base's own error that it must recover there."""
-
-REAL_SECOND_SHARE = 0.06
-"""Share of what is left that a further effect must recover where weights go by force RMS."""
+REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25)
+"""What a further effect must recover where weights go by force RMS: noise is far below any model's error."""
 
 
 def trace_campaign(
@@ -79,8 +77,13 @@ def trace_campaign(
         else None
     )
     report = Summary(selection, baseline, training, validation, offsets, reason)
-    named = _named(selection, gains, len(declared), offsets, options)
-    return report.build(options, named, reasons, window, [item.name for item in declared], effects, jobs)
+    named = _named(selection, gains, len(declared), options, rng)
+    causes = [*named[: selection.proven], *([offsets.named()] if offsets is not None else [])]
+    if offsets is not None and any(item.effect.name == "offset" for item in named[: selection.proven]):
+        causes.pop()
+    return report.build(
+        options, tuple(causes), named[selection.proven :], reasons, window, [item.name for item in declared], effects
+    )
 
 
 def _select(
@@ -107,20 +110,27 @@ def _select(
             terms,
             most=options.most_effects,
             refits=options.refits,
-            second_share=REAL_SECOND_SHARE if floor > 0.0 else SECOND_SHARE,
-            second_gain=REAL_SECOND_GAIN if floor > 0.0 else SECOND_GAIN,
+            thresholds=REAL_THRESHOLDS if floor > 0.0 else Thresholds(),
             jobs=jobs,
         )
         excess = selection.chosen.chi_square / max(baseline.noise, 1e-12)
         if floor > 0.0:
             return baseline, _judged_by_trees(selection)
         if excess < MODEL_ERROR_CHI_SQUARE:
-            return baseline, selection
+            return _with_noise_of(selection.chosen, baseline, selection)
         # what is left on the force's own scale becomes the yardstick of the second pass
         chosen = selection.chosen
         used = chosen.problem.root_weight > 0.0
         left = chosen.residual[used] / chosen.problem.root_weight[used]
         floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
+
+
+def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tuple[Baseline, Selection]:
+    """Take the noise from the repeats' residuals of the chosen fit: a poor model's errors do not all cancel in them."""
+    noise = noise_level_of(chosen)[0]
+    if not baseline.repeats or noise >= baseline.noise:
+        return baseline, selection
+    return replace(baseline, noise=noise), selection.with_floor(noise)
 
 
 def _judged_by_trees(selection: Selection) -> Selection:
@@ -157,8 +167,7 @@ def _with_window(
         terms,
         most=options.most_effects,
         refits=options.refits,
-        second_share=REAL_SECOND_SHARE,
-        second_gain=REAL_SECOND_GAIN,
+        thresholds=REAL_THRESHOLDS,
         jobs=jobs,
     )
     if noise < selection.noise:
@@ -193,7 +202,7 @@ def _cross_validated(
 
 
 def _named(
-    selection: Selection, gains: Sequence[Gain], declared: int, offsets: OffsetFinding | None, options: TracingOptions
+    selection: Selection, gains: Sequence[Gain], declared: int, options: TracingOptions, rng: np.random.Generator
 ) -> tuple[Named, ...]:
     chosen = selection.chosen
     named = []
@@ -202,21 +211,19 @@ def _named(
     for place, index in enumerate(range(declared, len(chosen.problem.terms))):
         term = chosen.problem.terms[index]
         candidates = selection.rounds[place] if place < len(selection.rounds) else ()
-        rivals = tied(candidates, options.rules.lead) if candidates and candidates[0].name == term.effect.name else ()
-        best = candidates[0].share if candidates else total
-        lead = best - max((item.share for item in candidates[1:]), default=0.0) if candidates else 0.0
+        rivals: tuple[str, ...] = ()
+        if candidates and candidates[0].name == term.effect.name:
+            rivals = tied(candidates, selection.noise, options.rules, draws=options.bootstrap_draws, rng=rng)
         gain = gains[place] if place < len(gains) else None
         named.append(
             Named(
                 term.effect,
                 term.form.name,
                 parameter_table(chosen, index, limits[index], options.drive_unit),
-                confidence_of(total, lead, gain, options.rules),
+                confidence_of(total, clear_lead(candidates, selection.noise), gain, options.rules),
                 rivals,
                 {name: term.effect.separated_by[name] for name in rivals if name in term.effect.separated_by},
                 gain,
             )
         )
-    if offsets is not None and all(item.effect.name != "offset" for item in named):
-        named.append(offsets.named())
     return tuple(named)

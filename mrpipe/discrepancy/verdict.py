@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from mrpipe.discrepancy.crossvalidation import Gain
+import numpy as np
+
+from mrpipe.discrepancy.crossvalidation import Gain, gain_of
 from mrpipe.discrepancy.engine import Fit
 from mrpipe.discrepancy.select import Candidate, Selection, share_of
 from mrpipe.effects.contract import Effect
@@ -23,12 +25,12 @@ class Rules:
     least_share
         Share below which the cause is unknown.
     lead
-        Lead in share over other families; within it they are tied.
+        A family that leaves at most this share more than the best leaves is tied with it.
     """
 
     named_share: float = 0.9
     least_share: float = 0.5
-    lead: float = 0.1
+    lead: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -62,12 +64,37 @@ class Named:
         return found
 
 
-def tied(candidates: Sequence[Candidate], lead: float) -> tuple[str, ...]:
-    """Return the families within `lead` of the best of a round."""
+def tied(
+    candidates: Sequence[Candidate], noise: float, rules: Rules, *, draws: int, rng: np.random.Generator
+) -> tuple[str, ...]:
+    """Return the families that cannot be told from the best of a round.
+
+    Told apart is one that leaves clearly more than the best does (see :class:`Rules`), in a difference that holds when
+    the blocks of the residual are drawn again, in pairs.
+    """
     if not candidates:
         return ()
-    best = candidates[0]
-    return tuple(item.name for item in candidates[1:] if item.share > best.share - lead)
+    best = candidates[0].fit
+    rivals = []
+    for item in candidates[1:]:
+        alike = left_of(item.fit, noise) <= (1.0 + rules.lead) * left_of(best, noise)
+        if not alike:
+            alike = not gain_of(item.fit.residual, best.residual, best.problem, draws=draws, rng=rng).significant
+        if alike:
+            rivals.append(item.name)
+    return tuple(rivals)
+
+
+def left_of(found: Fit, noise: float) -> float:
+    """Return the excess of the chi-square over noise, and a tenth of the noise: differences below it tell nothing."""
+    return max(found.chi_square - noise, 0.0) + 0.1 * noise
+
+
+def clear_lead(candidates: Sequence[Candidate], noise: float) -> float:
+    """Return 0..1: by how much the best leaves less than the next family does."""
+    if len(candidates) < 2:
+        return 1.0
+    return max(0.0, 1.0 - left_of(candidates[0].fit, noise) / left_of(candidates[1].fit, noise))
 
 
 def unnamed_reason(selection: Selection, rules: Rules) -> str:
@@ -82,9 +109,9 @@ def unnamed_reason(selection: Selection, rules: Rules) -> str:
 
 
 def confidence_of(share: float, lead: float, gain: Gain | None, rules: Rules) -> float:
-    """Return a confidence 0..1: high for a large share, a clear lead and a gain that holds on left-out tests."""
+    """Return a confidence 0..1: high for a large share, a clear lead (0..1) and a gain that holds on left-out tests."""
     proven = min(1.0, share / rules.named_share)
-    clear = min(1.0, max(0.0, lead) / rules.lead) if rules.lead > 0.0 else 1.0
+    clear = min(1.0, 2.0 * lead)
     held = 1.0 if gain is None or gain.significant else 0.4
     return round(float(proven * (0.5 + 0.5 * clear) * held * 0.99), 3)
 

@@ -60,7 +60,9 @@ def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
 
 @njit(STEP_SIGNATURE, cache=True)
 def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: gain, length [m], time [s], exponent or width or limit, drive of reference, kind. State: m, peak, path.
+    """Parameters: gain, length [m], time [s], exponent or width or limit, drive of reference, kind.
+
+    State: m, peak, path.
 
     The memory m fades with time and slip together, fast at first and ever slower: it falls by m^2 (kind 0), as
     peak/(1 + path) (1) or exponentially (2). What it holds up is what the drive itself does not do: the larger of the

@@ -32,7 +32,11 @@ class CloseLoopSettings(Section):
     least_share: float = Field(
         0.5, gt=0.0, lt=1.0, description="Share of the recoverable residual below which the cause is unknown."
     )
-    lead: float = Field(0.1, ge=0.0, lt=1.0, description="Lead in share over other families that a name needs.")
+    lead: float = Field(
+        0.3,
+        ge=0.0,
+        description="Families that leave at most this share more than the best one leaves are tied with it.",
+    )
     record_gain: bool = Field(False, description="Fit a gain for each record of the validation tests (weak sessions).")
     observation_filter: bool = Field(
         True, description="Look for a moving average that the records went through, in shares of a period."
