@@ -201,7 +201,7 @@ class Summary:
         return found[0], found[-1], extra
 
     def _noise_floor(self, measured: FloatArray) -> float:
-        """Return the NRMSE that noise alone leaves on the validation tests, beyond the sensors as much as in training."""
+        """Return the NRMSE that noise leaves on the validation tests, beyond the sensors as much as in training."""
         fitted, used = self.selection.chosen, self.validation.used
         root = fitted.problem.root_weight
         expected = root * sensor_deviation(fitted, self.training)
