@@ -10,7 +10,7 @@ import typer
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
 
-_NOT_FOR_FILES = ("config", "run", "overrides", "campaign", "jobs", "seed", "force", "quiet")
+_NOT_FOR_FILES = ("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force", "quiet")
 
 
 @with_common_options(*_NOT_FOR_FILES)
@@ -56,7 +56,7 @@ def check(
     from mrpipe.pipeline.settings_view import setting_named
     from mrpipe.stages.registry import stage_named
 
-    loaded = load_config(config or default_config_path(), options.overrides)
+    loaded = load_config(config or default_config_path(), options.overrides, options.settings)
     for name in loaded.config.stages:
         if name != "report":
             stage_named(name)

@@ -19,6 +19,7 @@ class CommonOptions:
     config: Path | None = None
     run: Path | None = None
     overrides: list[str] = field(default_factory=list)
+    settings: list[Path] = field(default_factory=list)
     campaign: Path | None = None
     jobs: int | None = None
     seed: int | None = None
@@ -40,6 +41,17 @@ _COMMON: dict[str, tuple[Any, Any]] = {
         Annotated[
             list[str] | None,
             typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Change one setting; may be given several times."),
+        ],
+        None,
+    ),
+    "settings": (
+        Annotated[
+            list[Path] | None,
+            typer.Option(
+                metavar="FILE",
+                help="YAML file with some settings, laid over the configuration; such as next-tests.yaml and "
+                "corrections.yaml, which close-loop writes. May be given several times.",
+            ),
         ],
         None,
     ),
@@ -74,6 +86,7 @@ def with_common_options(*left_out: str) -> Callable[[Callable[..., None]], Calla
         def command(**values: Any) -> None:
             common = {name: values.pop(name) for name in _COMMON if name not in left_out}
             common["overrides"] = common.get("overrides") or []
+            common["settings"] = common.get("settings") or []
             function(options=CommonOptions(**common), **values)
 
         signature = own.replace(parameters=sorted(parameters, key=lambda item: item.kind))

@@ -25,7 +25,7 @@ def load(options: CommonOptions) -> LoadedConfig:
         overrides.append(f"seed={options.seed}")
     if options.campaign is not None:
         overrides.append(f"campaigns.{rig_key(options.campaign)}={_absolute(options.campaign)!r}")
-    return load_config(options.config or default_config_path(), overrides)
+    return load_config(options.config or default_config_path(), overrides, options.settings)
 
 
 def _absolute(path: Path) -> str:

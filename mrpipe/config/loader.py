@@ -11,7 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from mrpipe.artifacts import config_directory
-from mrpipe.artifacts.yaml_source import nearest, read_yaml
+from mrpipe.artifacts.yaml_source import YamlSource, nearest, read_yaml
 from mrpipe.config.errors import explain, section_of
 from mrpipe.config.model import Config
 from mrpipe.config.sections.campaigns import LABORATORY, CampaignsSettings
@@ -37,7 +37,7 @@ def default_config_path() -> Path:
     return here if here.is_file() else config_directory() / "thesis.yaml"
 
 
-def load_config(path: Path, overrides: Sequence[str] = ()) -> LoadedConfig:
+def load_config(path: Path, overrides: Sequence[str] = (), overlays: Sequence[Path] = ()) -> LoadedConfig:
     """Read and validate a configuration.
 
     Parameters
@@ -45,7 +45,9 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> LoadedConfig:
     path
         YAML file; a bare name such as `utfsm` means the file of that name that comes with the program.
     overrides
-        `section.key=value`, the value in YAML.
+        `section.key=value`, the value in YAML; they count last.
+    overlays
+        YAML files with some settings, laid over the configuration one after another.
 
     Raises
     ------
@@ -54,17 +56,38 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> LoadedConfig:
     """
     path = _locate(path)
     source = read_yaml(path)
-    content, lines = source.content, source.lines
+    content = source.content
     content.setdefault("name", path.stem)
+    laid = [(overlay, _read_overlay(overlay)) for overlay in overlays]
+    for _, over in laid:
+        _lay_over(content, over.content)
     for override in overrides:
         _apply(content, override)
     try:
         config = Config.model_validate(content)
     except ValidationError as error:
         at = tuple(error.errors()[0]["loc"])
-        from_option = any(_override_path(item) == at[: len(_override_path(item))] for item in overrides)
-        raise explain(error, Config, "--set" if from_option else path, {} if from_option else lines) from error
+        if any(_override_path(item) == at[: len(_override_path(item))] for item in overrides):
+            raise explain(error, Config, "--set", {}) from error
+        origin = next((item for item in reversed(laid) if at in item[1].lines), (path, source))
+        raise explain(error, Config, origin[0], origin[1].lines) from error
     return LoadedConfig(_with_absolute_campaigns(config, path.resolve().parent), path.resolve(), tuple(overrides))
+
+
+def _read_overlay(path: Path) -> YamlSource:
+    if not path.is_file():
+        raise UserError("--settings", str(path), "no such file", "name a YAML file with settings")
+    return read_yaml(path)
+
+
+def _lay_over(content: dict[str, Any], over: dict[str, Any]) -> None:
+    """Put settings over those that are there, section by section; lists are replaced."""
+    for key, value in over.items():
+        there = content.get(key)
+        if isinstance(there, dict) and isinstance(value, dict):
+            _lay_over(there, value)
+        else:
+            content[key] = value
 
 
 def _with_absolute_campaigns(config: Config, base: Path) -> Config:

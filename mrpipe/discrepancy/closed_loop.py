@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -11,21 +12,22 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns import Campaign
 from mrpipe.control.controller import Controller
-from mrpipe.dampers.model import DamperModel
-from mrpipe.dampers.plant import Chain, build_chain
-from mrpipe.discrepancy.engine import Fit
+from mrpipe.dampers.plant import Chain
 from mrpipe.errors import DivergedError
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions, simulate_law
 from mrpipe.structures import Frame
 
-STEADY_FROM = 0.5
-"""Share of a record after which the response is taken as steady."""
+ALIKE = 0.01
+"""Laws whose responses differ by less than this share have no order."""
+
+STATIONARY = 0.08
+"""Where the energy of the base's motion grows this evenly, the first half of it is left out as settling."""
 
 
 @dataclass(frozen=True)
-class MeasuredRun:
-    """A closed-loop recording.
+class LoopRun:
+    """A closed-loop test: recorded, or the same base motion under a law that was not recorded.
 
     Attributes
     ----------
@@ -38,7 +40,8 @@ class MeasuredRun:
     ground_acceleration
         Shape (m,) [m/s^2].
     displacement
-        Of the floors that were measured, relative to the ground, lowest first, shape (m, p) [m].
+        Of the floors that were measured, relative to the ground, lowest first, shape (m, p) [m]; empty where the run
+        was not recorded.
     absolute_acceleration
         Of the floors that were measured, lowest first, shape (m, q) [m/s^2]; empty where not recorded.
     damper_force
@@ -54,8 +57,21 @@ class MeasuredRun:
     absolute_acceleration: FloatArray
     damper_force: FloatArray
 
+    @property
+    def recorded(self) -> bool:
+        """Whether there is a response to compare with."""
+        return bool(self.displacement.size)
 
-def measured_runs(campaign: Campaign) -> list[MeasuredRun]:
+
+@dataclass(frozen=True)
+class Arrangement:
+    """One way of running the loop: which damper, and what makes the controller of a run."""
+
+    chain: Chain
+    controller: Callable[[LoopRun], Controller]
+
+
+def measured_runs(campaign: Campaign) -> list[LoopRun]:
     """Return the closed-loop recordings of a frame campaign that name their law."""
     runs = []
     for item in campaign.recordings:
@@ -67,12 +83,12 @@ def measured_runs(campaign: Campaign) -> list[MeasuredRun]:
             continue
         given = item.details.get("gains") or {}
         runs.append(
-            MeasuredRun(
+            LoopRun(
                 item.name,
                 law,
                 {str(name): float(value) for name, value in given.items()},
                 item.time_s - item.time_s[0],
-                item.channels["ground_acceleration"],
+                item.channels["ground_acceleration"] - np.mean(item.channels["ground_acceleration"]),
                 displacement,
                 _floors(item.channels, "floor_acceleration_"),
                 item.channels.get("damper_force", np.zeros(0)),
@@ -87,68 +103,82 @@ def _floors(channels: Mapping[str, FloatArray], stem: str) -> FloatArray:
     return np.column_stack([channels[name] for name in names]) if names else np.zeros((0, 0))
 
 
-def damper_of(found: Fit, drive_unit: str) -> DamperModel:
-    """Return the base of a fit as a damper model, as controllers and their inverse want it."""
-    values = found.base_values
-    base = found.problem.base
-    yield_force, viscosity = found.polynomials
-    numbers = {
-        "yield_displacement": values["yield_displacement"],
-        "gamma_share": values.get("gamma_share", base.gamma_share),
-        "exponent": values.get("exponent", base.exponent),
-        "eta": values.get("eta", 100.0),
-    }
-    numbers |= {f"yield_force_{letter}": float(v) for letter, v in zip("abcd", yield_force, strict=False)}
-    numbers |= {f"c0_{letter}": float(v) for letter, v in zip("abcd", viscosity, strict=False)}
-    return DamperModel(base.name, numbers, drive_unit, found.problem.scales.drive)
+def with_unrecorded(runs: Sequence[LoopRun], laws: Sequence[str]) -> list[LoopRun]:
+    """Return the recordings, and for every law that has none the base motions of the first law that has."""
+    there = {run.law for run in runs}
+    first = [run for run in runs if run.law == runs[0].law]
+    empty = np.zeros((0, 0))
+    added = [
+        replace(
+            run, name=f"{law}, as {run.name}", law=law, gains={}, displacement=empty, absolute_acceleration=empty,
+            damper_force=np.zeros(0),
+        )
+        for law in laws
+        if law not in there
+        for run in first
+    ]  # fmt: skip
+    return [*runs, *added]
 
 
-def plant_chain(found: Fit) -> Chain:
-    """Return the chain for the closed loop; faults of sensors stay out of the plant, a lag unknown is left out."""
-    problem = found.problem
-    steps = problem.base.steps(found.base_values, *found.polynomials)
-    for term, values in zip(problem.terms, found.term_values, strict=True):
-        if not term.effect.sensor:
-            steps.extend(term.form.steps(values))
-    return build_chain(steps)
+def simulated_runs(excitation: Excitation, laws: Sequence[str], rate_hz: float = 1000.0) -> list[LoopRun]:
+    """Return runs of every law under one excitation, none of them recorded."""
+    time = np.arange(round(excitation.duration_s * rate_hz) + 1) / rate_hz
+    ground, empty = excitation.at(time), np.zeros((0, 0))
+    return [LoopRun(law, law, {}, time, ground, empty, empty, np.zeros(0)) for law in laws]
+
+
+def judged_span(time: FloatArray, ground: FloatArray) -> tuple[float, float]:
+    """Return from when to when [s] responses are judged: the second half of a steady motion, else all of it."""
+    energy = np.cumsum(ground**2)
+    if energy[-1] <= 0.0:
+        return float(time[0]), float(time[-1])
+    share = energy / energy[-1]
+    first, half, last = (float(time[np.searchsorted(share, level)]) for level in (0.05, 0.5, 0.98))
+    inside = (time >= first) & (time <= last)
+    straight = np.interp(time[inside], [first, last], [0.05, 0.98])
+    steady = float(np.max(np.abs(share[inside] - straight))) < STATIONARY
+    return (half, last) if steady else (float(time[np.searchsorted(share, 0.005)]), last)
 
 
 def predicted(
-    run: MeasuredRun, frame: Frame, chain: Chain, control: Controller, position: FloatArray, options: LoopOptions
+    run: LoopRun, frame: Frame, way: Arrangement, position: FloatArray, options: LoopOptions, seed: int
 ) -> dict[str, float]:
-    """Return the indices of a run simulated with the measured ground acceleration, and its error of the top floor.
+    """Return the indices of a run simulated with its ground acceleration, and its error of the top floor.
 
     Raises
     ------
     DivergedError
         If the response grows without bound.
     """
-    time, ground = run.time_s, run.ground_acceleration - np.mean(run.ground_acceleration)
+    time, ground = run.time_s, run.ground_acceleration
 
     def at(moments: FloatArray) -> FloatArray:
         return np.asarray(np.interp(moments, time, ground), dtype=np.float64)
 
-    duration = float(time[-1])
+    span = judged_span(time, ground)
     response = simulate_law(
         frame,
-        chain,
-        control,
-        Excitation(duration, at, (STEADY_FROM * duration, duration)),
+        way.chain,
+        way.controller(run),
+        Excitation(float(time[-1]), at, span),
         options,
         position=position,
+        # every way and law meets the same noise
+        rng=np.random.default_rng(seed),
     )
-    found = run_indices(response.time_s, response.displacement, response.absolute_acceleration, response.force)
-    top = np.interp(time, response.time_s, response.displacement[:, -1])
-    measured = run.displacement[:, -1] - np.mean(run.displacement[:, -1])
-    found["nrmse_x_top"] = float(np.sqrt(np.mean((top - measured) ** 2) / max(np.mean(measured**2), 1e-30)))
+    found = run_indices(response.time_s, span, response.displacement, response.absolute_acceleration, response.force)
+    if run.recorded:
+        top = np.interp(time, response.time_s, response.displacement[:, -1])
+        measured = run.displacement[:, -1] - np.mean(run.displacement[:, -1])
+        found["nrmse_x_top"] = float(np.sqrt(np.mean((top - measured) ** 2) / max(np.mean(measured**2), 1e-30)))
     return found
 
 
 def run_indices(
-    time: FloatArray, displacement: FloatArray, acceleration: FloatArray, force: FloatArray
+    time: FloatArray, span: tuple[float, float], displacement: FloatArray, acceleration: FloatArray, force: FloatArray
 ) -> dict[str, float]:
-    """Return RMS of first and top floor over the steady part, SI."""
-    steady = time >= STEADY_FROM * time[-1]
+    """Return RMS of first and top floor and of the damper force over the span that is judged, SI."""
+    steady = (time >= span[0]) & (time <= span[1])
     found = {}
     for label, values in (("x", displacement), ("a", acceleration)):
         if values.size:
@@ -163,61 +193,100 @@ def run_indices(
 
 
 def compare_laws(
-    runs: Sequence[MeasuredRun],
+    runs: Sequence[LoopRun],
     frame: Frame,
-    chains: Mapping[str, Chain],
-    controllers: Mapping[str, Callable[[MeasuredRun], Controller]],
+    ways: Mapping[str, Arrangement],
     position: FloatArray,
     options: LoopOptions,
+    seed: int,
 ) -> dict[str, Any]:
-    """Return measured and predicted indices of every run before and after, errors, and the ranking of the laws.
+    """Return measured and predicted indices of every run and law, errors, and the ranking of the laws.
 
     Parameters
     ----------
-    chains, controllers
-        Dampers and what makes a controller for a run, by `before` and `after`.
+    ways
+        `before`: controller as it ran, damper without the effect; `after`: the same with the effect; `recalibrated`:
+        controller made for the damper with the effect. The last may be missing.
     """
     rows = []
     for run in runs:
-        row: dict[str, Any] = {
-            "test": run.name,
-            "law": run.law,
-            "measured": run_indices(run.time_s, run.displacement, run.absolute_acceleration, run.damper_force),
-        }
-        for when, chain in chains.items():
+        row: dict[str, Any] = {"test": run.name, "law": run.law, "recorded": run.recorded}
+        if run.recorded:
+            row["measured"] = run_indices(
+                run.time_s,
+                judged_span(run.time_s, run.ground_acceleration),
+                run.displacement,
+                run.absolute_acceleration,
+                run.damper_force,
+            )
+        for when, way in ways.items():
             try:
-                row[when] = predicted(run, frame, chain, controllers[when](run), position, options)
+                row[when] = predicted(run, frame, way, position, options, seed)
             except DivergedError as error:
                 row[when] = {"diverged": str(error)}
         rows.append(row)
-    rankings = {when: _ranking(rows, when) for when in ("measured", *chains)}
-    errors = {when: _error(rows, when) for when in chains}
-    return {
-        "status": f"{len(rows)} recordings replayed",
-        "tests": rows,
-        "ranking": rankings,
-        "ranking_changes": rankings.get("before") != rankings.get("after"),
-        "nrmse_x_top": errors,
-        "rms_x_top_error": {when: _index_error(rows, when) for when in chains},
-    }
+    recorded = [row for row in rows if row["recorded"]]
+    found: dict[str, Any] = {"tests": rows, "laws": law_rows(rows, ("measured", *ways))}
+    rankings = {when: ranking(rows, when) for when in ways}
+    swapped = reversed_pairs(rows, "before", "after") if "after" in ways else []
+    found |= {"ranking": rankings, "ranking_changes": bool(swapped), "reversed_pairs": swapped}
+    if recorded:
+        rankings["measured"] = ranking(recorded, "measured")
+        found["ranking_agrees_with_measured"] = {when: not reversed_pairs(recorded, "measured", when) for when in ways}
+        found["nrmse_x_top"] = {when: _error(recorded, when) for when in ways if when != "recalibrated"}
+        found["rms_x_top_error"] = {when: _index_error(recorded, when) for when in ways if when != "recalibrated"}
+    return found
 
 
-def _ranking(rows: Sequence[Mapping[str, Any]], when: str) -> list[str]:
+def law_rows(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> list[dict[str, Any]]:
+    """Return one row a law: its indices, the mean over its runs, by column."""
+    found = []
+    for law in dict.fromkeys(row["law"] for row in rows):
+        own = [row for row in rows if row["law"] == law]
+        entry: dict[str, Any] = {"law": law, "recorded": own[0]["recorded"], "runs": len(own)}
+        for when in columns:
+            given = [row[when] for row in own if when in row and "diverged" not in row[when]]
+            if given:
+                entry[when] = {key: float(np.mean([item[key] for item in given])) for key in given[0]}
+            elif any("diverged" in row.get(when, {}) for row in own):
+                entry[when] = {"diverged": own[0][when]["diverged"]}
+        found.append(entry)
+    return found
+
+
+def _means(rows: Sequence[Mapping[str, Any]], when: str) -> dict[str, float]:
     by_law: dict[str, list[float]] = {}
     for row in rows:
-        if "rms_x_top_m" in row[when]:
+        if "rms_x_top_m" in row.get(when, {}):
             by_law.setdefault(row["law"], []).append(row[when]["rms_x_top_m"])
-    return sorted(by_law, key=lambda law: float(np.mean(by_law[law])))
+    return {law: float(np.mean(values)) for law, values in by_law.items()}
 
 
-def _error(rows: Sequence[Mapping[str, Any]], when: str) -> float:
+def ranking(rows: Sequence[Mapping[str, Any]], when: str) -> list[str]:
+    """Return the laws by RMS of the top displacement, the best first."""
+    means = _means(rows, when)
+    return sorted(means, key=lambda law: means[law])
+
+
+def reversed_pairs(rows: Sequence[Mapping[str, Any]], first: str, second: str) -> list[list[str]]:
+    """Return the pairs of laws whose order differs, the better by `second` first; alike ones have no order."""
+    one, other = _means(rows, first), _means(rows, second)
+    found = []
+    for a, b in combinations([law for law in one if law in other], 2):
+        changes = (np.log(one[a] / one[b]), np.log(other[a] / other[b]))
+        if changes[0] * changes[1] < 0.0 and min(abs(float(change)) for change in changes) > ALIKE:
+            found.append([a, b] if changes[1] < 0.0 else [b, a])
+    return found
+
+
+def _error(rows: Sequence[Mapping[str, Any]], when: str) -> float | None:
     values = [row[when]["nrmse_x_top"] for row in rows if "nrmse_x_top" in row[when]]
-    return float(np.sqrt(np.mean(np.square(values)))) if values else float("nan")
+    return float(np.sqrt(np.mean(np.square(values)))) if values else None
 
 
-def _index_error(rows: Sequence[Mapping[str, Any]], when: str) -> float:
+def _index_error(rows: Sequence[Mapping[str, Any]], when: str) -> float | None:
     """Return the RMS over runs of the relative error of the top floor's RMS."""
     values = [
         row[when]["rms_x_top_m"] / row["measured"]["rms_x_top_m"] - 1.0 for row in rows if "rms_x_top_m" in row[when]
     ]
-    return float(np.sqrt(np.mean(np.square(values)))) if values else float("nan")
+    return float(np.sqrt(np.mean(np.square(values)))) if values else None

@@ -29,7 +29,8 @@ UNATTRIBUTED: dict[str, Any] = {
     "confidence": 0.0,
     "tied_with": [],
     "physics": "A flexible model of what no named effect explains; it stands for no physics.",
-    "remedy": "Make the tests that `depends_on` suggests.",
+    "remedy": "Make the tests that `next_tests` lists.",
+    "corrected_in": "nowhere: it is a model of the record and cannot run in a loop",
 }
 
 FLEXIBLE_SHARE = 0.15
@@ -128,14 +129,15 @@ class Summary:
         excess = max(selection.base.chi_square - selection.noise, 1e-12)
         final_states = states_of(selection.chosen, training)
         effects_found = [item.as_json() for item in named]
+        still = structured and left > max(0.2 * selection.noise, 0.1 * excess if named else 0.0)
+        best = min(ceiling, after_ceiling, score_after.nrmse if named else ceiling)
+        gain = score_before.nrmse**2 - best**2
+        # what the named effects recover: the flexible model, where it is asked for, comes after
+        recovered = (score_before.nrmse**2 - score_after.nrmse**2) / gain if gain > 1e-12 else 0.0
         if options.unattributed and structured and after_ceiling < score_after.nrmse:
             after = after + flexible
             score_after = score(validation, measured, after)
             effects_found.append(UNATTRIBUTED)
-        still = structured and left > max(0.2 * selection.noise, 0.1 * excess if named else 0.0)
-        best = min(ceiling, after_ceiling, score_after.nrmse if named else ceiling)
-        gain = score_before.nrmse**2 - best**2
-        recovered = (score_before.nrmse**2 - score_after.nrmse**2) / gain if gain > 1e-12 else 0.0
         summary = {
             "model": options.model,
             "declared_effects": declared,

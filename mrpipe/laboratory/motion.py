@@ -51,6 +51,7 @@ class BenchTest:
     duration_s: float = 0.0
     repeat_of: str = ""
     pause_s: float = 0.4
+    middle_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def displacement_of(test: BenchTest, servo: Servo, time: FloatArray, rng: np.ran
         angle = 2.0 * np.pi * test.frequency_hz * np.cumsum(speed) * fine
         x = test.amplitude_m * np.sin(angle + rng.uniform(0.0, 2.0 * np.pi))
     fine = float(time[1] - time[0])
-    return np.asarray(gaussian_filter1d(x * start, servo.smoothing_s / fine, mode="nearest"))
+    return np.asarray(gaussian_filter1d((x + test.middle_m) * start, servo.smoothing_s / fine, mode="nearest"))
 
 
 def current_of(

@@ -1,14 +1,67 @@
-"""Figures of the tracing: residual maps, ranking, loops before and after, errors per test; and a paragraph in words."""
+"""Figures of the tracing: where the residual lives, ranking, loops before and after, errors per test."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
+
+AFTER = COLOURS[0]
+"""Colour of the model with the effects."""
+
+MOST_BARS = 24
+"""Of more tests those with the largest errors are drawn."""
+
+_PARTS = {
+    "cycle": ("stage of the cycle", {"pre_yield": "pre-yield", "post_yield": "post-yield", "reversal": "reversal"}),
+    "drive": ("drive", {"rising": "rising", "falling": "falling", "constant": "constant"}),
+    "direction": ("direction", {"positive": "out (v > 0)", "negative": "in (v < 0)"}),
+    "time": ("third of the test", {"first": "first", "second": "second", "third": "last"}),
+}
+
+
+@dataclass(frozen=True)
+class ShownTest:
+    """A validation test as it is drawn; SI, each of shape (n,)."""
+
+    name: str
+    time: FloatArray
+    displacement: FloatArray
+    velocity: FloatArray
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+    error_before: float
+    error_after: float
+
+
+def residual_location(location: Mapping[str, Mapping[str, float]]) -> Figure:
+    """Draw which share of the residual's sum of squares lies where: in the cycle, by drive, direction and time."""
+    groups = [name for name in _PARTS if name in location]
+    figure, axes = figure_with_axes(1, 1, height=0.55 * len(groups) + 0.7)
+    axis = axes[0, 0]
+    for row, name in enumerate(groups):
+        left = 0.0
+        for index, (key, text) in enumerate(_PARTS[name][1].items()):
+            share = float(location[name].get(key, 0.0))
+            axis.barh(-row, share, 0.62, left=left, color=COLOURS[index], alpha=0.85)
+            if share > 0.09:
+                axis.text(
+                    left + 0.5 * share, -row, f"{text} {100.0 * share:.0f} %", ha="center", va="center", fontsize=8,
+                    color="white",
+                )  # fmt: skip
+            left += share
+    axis.set_yticks([-row for row in range(len(groups))], [_PARTS[name][0] for name in groups])
+    axis.set_xlim(0.0, 1.0)
+    axis.grid(visible=False)
+    label(axis, "share of the residual's sum of squares [1]", "")
+    return figure
 
 
 def residual_maps(
@@ -25,74 +78,100 @@ def residual_maps(
     """
     columns = min(2, len(maps))
     rows = -(-len(maps) // columns)
-    figure = Figure(figsize=(5.2 * columns, 3.8 * rows), layout="constrained")
-    limit = float(np.quantile(np.abs(residual), 0.98)) or 1.0
-    for place, (x_label, y_label, x, y) in enumerate(maps, start=1):
-        axes = figure.add_subplot(rows, columns, place)
+    figure, axes = figure_with_axes(rows, columns, width=10.0, height=3.6)
+    drawn = []
+    for axis, (x_label, y_label, x, y) in zip(axes.ravel(), maps, strict=False):
         edges = [np.linspace(float(np.quantile(v, 0.002)), float(np.quantile(v, 0.998)), 41) for v in (x, y)]
+        label(axis, x_label, y_label)
+        axis.grid(visible=False)
         if any(edge[-1] <= edge[0] for edge in edges):
-            axes.text(0.5, 0.5, "does not vary", ha="center", va="center", transform=axes.transAxes)
+            axis.text(0.5, 0.5, "does not vary", ha="center", va="center", transform=axis.transAxes, fontsize=9)
             continue
         total, *_ = np.histogram2d(x, y, bins=edges, weights=residual)
         count, *_ = np.histogram2d(x, y, bins=edges)
-        mean = np.where(count > 2, total / np.maximum(count, 1), np.nan)
-        image = axes.pcolormesh(*edges, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit, rasterized=True)
-        figure.colorbar(image, ax=axes, label=f"mean residual [{unit}]")
-        axes.set_xlabel(x_label)
-        axes.set_ylabel(y_label)
+        drawn.append((axis, edges, np.where(count > 2, total / np.maximum(count, 1), np.nan)))
+    values = np.concatenate([np.abs(mean[np.isfinite(mean)]) for _, _, mean in drawn]) if drawn else np.zeros(0)
+    limit = float(np.quantile(values, 0.98)) if values.size else 1.0
+    for axis, edges, mean in drawn:
+        image = axis.pcolormesh(*edges, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit, rasterized=True)
+    if drawn:
+        bar = figure.colorbar(image, ax=axes, shrink=0.7, extend="both")
+        bar.set_label(f"mean of measured less model [{unit}]", fontsize=8)
+        bar.ax.tick_params(labelsize=8)
     return figure
 
 
-def candidate_ranking(candidates: Sequence[Mapping[str, Any]]) -> Figure:
+def candidate_ranking(candidates: Sequence[Mapping[str, Any]], named_share: float, least_share: float) -> Figure:
     """Draw the share of the recoverable residual that each family recovers, best at the top."""
-    figure = Figure(figsize=(7.0, 0.42 * max(len(candidates), 3) + 1.2), layout="constrained")
-    axes = figure.add_subplot()
-    names = [f"{item['name']} ({item['form']})" for item in candidates]
-    place = np.arange(len(names))[::-1]
-    axes.barh(place, [max(float(item["share"]), 0.0) for item in candidates], color="#3b6ea5")
-    axes.set_yticks(place, names)
-    axes.axvline(0.9, color="k", lw=0.8, ls="--")
-    axes.axvline(0.5, color="k", lw=0.8, ls=":")
-    axes.set_xlim(0, 1.02)
-    axes.set_xlabel("share of the recoverable residual")
+    figure, axes = figure_with_axes(1, 1, height=0.34 * max(len(candidates), 3) + 0.9)
+    axis = axes[0, 0]
+    place = np.arange(len(candidates))[::-1]
+    shares = [max(float(item["share"]), 0.0) for item in candidates]
+    bound = [bool(item.get("at_bound")) for item in candidates]
+    axis.barh(place, shares, 0.7, color=[COLOURS[7] if stuck else AFTER for stuck in bound])
+    for y, share, item, stuck in zip(place, shares, candidates, bound, strict=True):
+        note = f" {100.0 * share:.0f} %, NRMSE {item['nrmse']:.3g}{', at a bound' if stuck else ''}"
+        inside = share > 0.6
+        axis.text(share, y, note + " ", va="center", ha="right" if inside else "left", fontsize=8,
+                  color="white" if inside else "black")  # fmt: skip
+    axis.set_yticks(place, [f"{item['name']} ({item['form']})" for item in candidates])
+    axis.axvline(named_share, color="k", lw=0.8, ls="--", label=f"proves a name ({named_share:g})")
+    axis.axvline(least_share, color="k", lw=0.8, ls=":", label=f"least share ({least_share:g})")
+    axis.set_xlim(0, 1.02)
+    axis.grid(axis="y", visible=False)
+    axis.legend(fontsize=7, loc="lower right")
+    label(axis, "share of the recoverable residual [1]", "")
     return figure
 
 
-def loops_before_and_after(
-    tests: Sequence[tuple[str, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]],
-) -> Figure:
-    """Draw loops and histories: (name, time, displacement, measured, before, after), SI, each of shape (n,)."""
-    figure = Figure(figsize=(10.0, 3.2 * len(tests)), layout="constrained")
-    for row, (name, time, displacement, measured, before, after) in enumerate(tests):
-        loop = figure.add_subplot(len(tests), 2, 2 * row + 1)
-        history = figure.add_subplot(len(tests), 2, 2 * row + 2)
-        for values, label, colour, width in (
-            (measured, "measured", "k", 1.4),
-            (before, "before", "#c44e52", 1.0),
-            (after, "after", "#3b6ea5", 1.0),
-        ):
-            loop.plot(1e3 * displacement, values, label=label, color=colour, lw=width)
-            history.plot(time, values, label=label, color=colour, lw=width)
-        loop.set_xlabel("displacement [mm]")
-        loop.set_ylabel("force [N]")
-        loop.set_title(name, fontsize=9)
-        history.set_xlabel("time [s]")
-        if row == 0:
-            history.legend(fontsize=8)
+def loops_before_and_after(tests: Sequence[ShownTest]) -> Figure:
+    """Draw force over displacement, over velocity and over time: measured, before and after."""
+    figure, axes = figure_with_axes(len(tests), 3, width=11.0, height=2.9)
+    for row, test in enumerate(tests):
+        window = _window(test.time)
+        curves = (
+            (test.measured, "measured", MEASURED, 1.6),
+            (test.before, "before", MODEL, 0.9),
+            (test.after, "after", AFTER, 0.9),
+        )
+        for values, name, colour, width in curves:
+            axes[row, 0].plot(1e3 * test.displacement[window], values[window], color=colour, lw=width, label=name)
+            axes[row, 1].plot(1e3 * test.velocity[window], values[window], color=colour, lw=width)
+            axes[row, 2].plot(test.time[window], values[window], color=colour, lw=width)
+        errors = f"NRMSE {test.error_before:.3f} before, {test.error_after:.3f} after"
+        label(axes[row, 0], "displacement [mm]", "force [N]", test.name)
+        label(axes[row, 1], "velocity [mm/s]", "", "")
+        label(axes[row, 2], "time [s]", "", errors)
+    handles, names = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper center", ncols=3, fontsize=8, frameon=False)
     return figure
+
+
+def _window(time: FloatArray) -> slice:
+    """Return at most six seconds from the middle of a test."""
+    length = float(time[-1] - time[0])
+    if length <= 6.0:
+        return slice(None)
+    first, last = np.searchsorted(time, [time[0] + 0.5 * length - 3.0, time[0] + 0.5 * length + 3.0])
+    return slice(int(first), int(last))
 
 
 def errors_per_test(rows: Sequence[Mapping[str, Any]], noise_floor: float) -> Figure:
-    """Draw the NRMSE of every validation test before and after."""
-    figure = Figure(figsize=(8.0, 0.28 * max(len(rows), 4) + 1.2), layout="constrained")
-    axes = figure.add_subplot()
-    place = np.arange(len(rows))[::-1]
-    axes.barh(place + 0.2, [row["nrmse_before"] for row in rows], 0.38, label="before", color="#c44e52")
-    axes.barh(place - 0.2, [row["nrmse_after"] for row in rows], 0.38, label="after", color="#3b6ea5")
-    axes.axvline(noise_floor, color="k", lw=0.8, ls="--", label="noise")
-    axes.set_yticks(place, [row["name"] for row in rows], fontsize=7)
-    axes.set_xlabel("NRMSE")
-    axes.legend(fontsize=8)
+    """Draw the NRMSE of the validation tests before and after, the largest first."""
+    shown = sorted(rows, key=lambda row: -row["nrmse_before"])[:MOST_BARS]
+    figure, axes = figure_with_axes(1, 1, height=0.22 * max(len(shown), 6) + 1.0)
+    axis = axes[0, 0]
+    place = np.arange(len(shown))[::-1]
+    before, after = ([row[f"nrmse_{when}"] for row in shown] for when in ("before", "after"))
+    axis.hlines(place, after, before, color="#bbbbbb", lw=1.5, zorder=1)
+    axis.scatter(before, place, s=22, color=MODEL, label="before", zorder=2)
+    axis.scatter(after, place, s=22, color=AFTER, label="after", zorder=2)
+    axis.axvline(noise_floor, color="k", lw=0.8, ls="--", label="noise floor")
+    axis.set_yticks(place, [row["name"] for row in shown], fontsize=7)
+    axis.set_xlim(left=0.0)
+    axis.grid(axis="y", visible=False)
+    axis.legend(fontsize=8, loc="lower right")
+    label(axis, "NRMSE [1]", "")
     return figure
 
 
@@ -102,27 +181,56 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     model, floor = summary["model"], summary["noise_floor_nrmse"]
     start = (
         f"On validation tests, which no fit has seen, the model {model} misses the measured force by "
-        f"{100 * before:.1f} % (RMS over RMS); sensor noise alone is {100 * floor:.1f} %."
+        f"{_percent(before)} (RMS of the error over RMS of the force); the noise floor, from "
+        f"{summary.get('noise_from', 'the sensors')}, is {_percent(floor)}."
     )
-    effects = summary["effects"]
+    effects = [item for item in summary["effects"] if item["name"] != "unattributed"]
+    flexible = len(effects) < len(summary["effects"])
+    added = (
+        f" As asked for, a flexible model is added as the effect `unattributed`, with which the error is "
+        f"{_percent(after)}: it stands for no physics and does not run in the closed loop."
+        if flexible
+        else ""
+    )
     if not summary["residual"]["structured"]:
         return f"{start} What is left is noise: nothing is missing."
     if not effects:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
-        depends = f" It varies with {', '.join(states)}." if states else ""
-        return f"{start} Something is missing, but no known effect explains it.{depends}"
-    parts = []
-    for effect in effects:
-        numbers = ", ".join(
-            f"{name.replace('_', ' ')} {value['value']:.4g} {value['unit']}".removesuffix(" 1")
-            for name, value in effect["parameters"].items()
-        )
-        parts.append(f"{effect['name']} ({effect['form']}: {numbers}). {effect['physics']} Remedy: {effect['remedy']}")
-        if effect["tied_with"]:
-            tests = "; ".join(f"{k}: {v}" for k, v in effect.get("separating_tests", {}).items())
-            parts.append(f"Not to be told apart from {', '.join(effect['tied_with'])} by these tests ({tests}).")
+        depends = f" It varies with {_listed(states)}." if states else ""
+        return f"{start} Something is missing, but no known effect explains it.{depends}{added}"
+    parts = [_effect_in_words(effect) for effect in effects]
     share = summary["ceiling"]["recovered"]
-    end = f"With it the error is {100 * after:.1f} %, {100 * share:.0f} % of what is recoverable."
+    end = (
+        f"With {'it' if len(effects) == 1 else 'them'}{'' if flexible else f' the error is {_percent(after)}, and'} "
+        f"{100 * share:.0f} % of what a flexible model could recover is recovered."
+    )
     if summary["unexplained"]["structured"]:
-        end += " Something is still unexplained."
-    return f"{start} The model lacks {' '.join(parts)} {end}"
+        states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
+        end += f" Something is still unexplained{'; it varies with ' + _listed(states) if states else ''}."
+    names = _listed([f"**{effect['name']}**" for effect in effects])
+    return f"{start} The model lacks {names}. {' '.join(parts)} {end}{added}"
+
+
+def _effect_in_words(effect: Mapping[str, Any]) -> str:
+    numbers = ", ".join(
+        f"{name.replace('_', ' ')} {value['value']:.4g} {value['unit']}".removesuffix(" 1")
+        for name, value in effect["parameters"].items()
+    )
+    text = (
+        f"{effect['name'].capitalize()} in the form {effect['form']} ({numbers}; confidence "
+        f"{effect['confidence']:.2f}): {effect['physics']} Remedy on the rig: {effect['remedy']}"
+    )
+    if effect["tied_with"]:
+        tests = "; ".join(f"{k}: {v}" for k, v in effect.get("separating_tests", {}).items())
+        text += f" These tests cannot tell it from {_listed(effect['tied_with'])}{f' ({tests})' if tests else ''}."
+    if effect.get("corrected_in") == "prepare":
+        text += " It is a fault of sensors: corrections.yaml takes it out in prepare, it does not go into the damper."
+    return text
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 0.1 else f"{100.0 * share:.1f} %"

@@ -13,6 +13,7 @@ from mrpipe.campaigns import Campaign, Recording
 from mrpipe.errors import UserError
 from mrpipe.signals.cycles import SteadyCycles, choose_cycles, find_steady_cycles, is_sine
 from mrpipe.signals.differentiation import backward_difference, central_difference, savitzky_golay
+from mrpipe.signals.faults import KnownFaults, require_known
 from mrpipe.signals.filters import (
     Phase,
     advance,
@@ -63,6 +64,7 @@ class PreparationOptions:
     displacement_late_s: float = 0.0
     cycles: int = 10
     settle_cycles: int = 1
+    faults: KnownFaults = field(default_factory=KnownFaults)
 
     def gains(self, displacement: FloatArray, acceleration: FloatArray, rate: float) -> KalmanGains:
         """Return the gains of the kinematic Kalman filter; noise levels of 0 are estimated from the channels."""
@@ -145,9 +147,12 @@ def prepare_campaign(
         for index, (begin, end) in enumerate(recording.segments):
             name = recording.name if len(recording.segments) == 1 else f"{recording.name}-{index + 1}"
             work = _on_working_rate(recording, begin, end, name, rate)
-            work.channels["displacement"] = advance(work.channels["displacement"], options.displacement_late_s, rate)
+            channels = work.channels
+            channels["displacement"] = advance(channels["displacement"], options.displacement_late_s, rate)
+            channels["force"] = options.faults.force(name, channels["force"], channels["drive"], rate)
             _require_length(work, options, source)
             works.append(work)
+    require_known(options.faults, [work.name for work in works])
     findings = _check_acceleration(works)
     for work in works:
         _filter(work, options)

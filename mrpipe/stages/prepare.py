@@ -16,6 +16,7 @@ _SHOWN_TESTS = 3
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
+    from mrpipe.signals.faults import KnownFaults
     from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
     from mrpipe.signals.prepared import write_prepared
 
@@ -39,6 +40,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         displacement_late_s=settings.displacement_late_s,
         cycles=settings.cycles,
         settle_cycles=settings.settle_cycles,
+        faults=KnownFaults(**settings.corrections.model_dump()),
     )
     prepared = prepare_campaign(campaign, options, context.progress)
     preparations = prepared.tests

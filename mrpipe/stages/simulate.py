@@ -11,7 +11,9 @@ from mrpipe.pipeline.stage import Stage, StageContext
 if TYPE_CHECKING:
     from mrpipe.artifacts import FloatArray
     from mrpipe.control.controller import Controller, Gains
+    from mrpipe.control.inverse import InverseTable
     from mrpipe.dampers.model import DamperModel
+    from mrpipe.networks.network import Network
     from mrpipe.simulation.excitation import Excitation
     from mrpipe.simulation.loop import LoopOptions, Response
     from mrpipe.structures import Frame
@@ -59,7 +61,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     settings = context.settings.simulate
     rig = _rig(context)
     control = controller(context, law, rig.frame, rig.damper, perfect=rig.options.tracking == "ideal")
-    excitation, viscous = _excitation(context, rig)
+    excitation, viscous = excitation_of(context, rig)
     context.progress(0.4, f"loop under {law}")
     response = simulate_law(
         rig.frame,
@@ -94,7 +96,6 @@ def _rig(context: StageContext) -> Rig:
     from mrpipe.artifacts import load_parameter_set
     from mrpipe.dampers.model import damper_from_parameter_set, read_damper
     from mrpipe.errors import UserError
-    from mrpipe.simulation.loop import LoopOptions, SensorNoise
     from mrpipe.structures import frame_from_parameter_set, read_frame
 
     settings = context.settings.simulate
@@ -111,10 +112,18 @@ def _rig(context: StageContext) -> Rig:
         raise UserError(
             "simulate.frame", settings.frame, f"has {frame.floors} floors", f"calibrated for {len(position)}"
         )
+    return Rig(frame, damper, position, loop_options(context))
+
+
+def loop_options(context: StageContext) -> LoopOptions:
+    """Return how the loop is run, from the settings."""
+    from mrpipe.simulation.loop import LoopOptions, SensorNoise
+
+    settings = context.settings.simulate
     sensors = settings.sensors
     perfect = settings.tracking != "damper"
     noise = SensorNoise(sensors.displacement_noise_m, sensors.acceleration_noise_m_s2, sensors.acceleration_bias_m_s2)
-    options = LoopOptions(
+    return LoopOptions(
         plant_rate_hz=settings.plant_rate_hz,
         tracking=settings.tracking,
         delay_s=settings.controller.delay_s,
@@ -122,7 +131,6 @@ def _rig(context: StageContext) -> Rig:
         noise=SensorNoise() if perfect else noise,
         record_rate_hz=settings.record_rate_hz or (settings.plant_rate_hz if perfect else RECORD_RATE_HZ),
     )
-    return Rig(frame, damper, position, options)
 
 
 def controller(
@@ -133,6 +141,9 @@ def controller(
     gains: Gains | None = None,
     *,
     perfect: bool = False,
+    inverse: Network | InverseTable | None = None,
+    residual_force_n: float | None = None,
+    reference_factor: float = 1.0,
 ) -> Controller:
     """Return the controller of a law as the settings of simulate.controller say.
 
@@ -142,12 +153,15 @@ def controller(
         Of the stage.
     law, frame, damper
         What it controls.
-    gains
-        In place of the calibrated.
+    gains, inverse, residual_force_n
+        In place of the calibrated gains, of the inverse, and of the force below which the drive is 0 [N].
+    reference_factor
+        On the force of nnc.
     perfect
         For a perfect damper and perfect sensors: it reads the velocity, and at 500 Hz where the rate is not given.
     """
     import math
+    from dataclasses import replace
 
     from mrpipe.control.controller import PASSIVE, ControllerOptions, Gains, build_controller
     from mrpipe.control.inverse import inverse_table
@@ -170,7 +184,7 @@ def controller(
         displacement_noise_m=settings.kalman_displacement_noise_m,
         acceleration_noise_m_s2=settings.kalman_acceleration_noise_m_s2,
         bias_drift_m_s2=settings.kalman_bias_drift_m_s2,
-        residual_force_n=settings.residual_force_n,
+        residual_force_n=settings.residual_force_n if residual_force_n is None else residual_force_n,
         low_pass_hz=settings.low_pass_hz,
         drive_limit=settings.drive_limit or damper.drive_limit,
         dead_band_m_s=settings.dead_band_m_s,
@@ -179,26 +193,28 @@ def controller(
         extremum_share=settings.extremum_share,
         extremum_memory_s=settings.extremum_memory_periods * 2.0 * math.pi / calibrated.scalar("omega_0"),
     )
-    if settings.inverse == "network":
-        inverse: Any = read_network(context.artifact("train-inverse"), "network")
-    else:
+    if inverse is None and settings.inverse == "network":
+        inverse = read_network(context.artifact("train-inverse"), "network")
+    elif inverse is None:
         inverse = inverse_table(damper, drive_limit=settings.drive_limit)
     if gains is None:
         gains = Gains() if law in PASSIVE else read_gains(calibrated, law)
     observer = None
     if law == "lqg":
         observer = lqg_observer(frame, calibrated.array("position"), read_weights(calibrated), 1.0 / rate)
-    return build_controller(
-        law,
-        gains,
-        options,
-        inverse=inverse,
-        reference=read_reference(calibrated) if law == "nnc" else None,
-        observer=observer,
-    )
+    reference = None
+    if law == "nnc":
+        # its force is proportional to alpha, whatever the network looks like inside
+        known = read_reference(calibrated)
+        reference = replace(
+            known,
+            output_scale=reference_factor * known.output_scale,
+            output_shift=reference_factor * known.output_shift,
+        )
+    return build_controller(law, gains, options, inverse=inverse, reference=reference, observer=observer)
 
 
-def _excitation(context: StageContext, rig: Rig) -> tuple[Excitation, Response | None]:
+def excitation_of(context: StageContext, rig: Rig) -> tuple[Excitation, Response | None]:
     """Return the excitation and, where its amplitude was adjusted, the response of vd to it."""
     from mrpipe.simulation import excitation as kinds
 

@@ -33,6 +33,7 @@ class CustomTest(Section):
         "sine", description="Motion; `dwell` visits several positions, `hold` pauses in the middle."
     )
     amplitude_m: float = Field(0.010, gt=0.0, description="Amplitude or largest excursion [m].")
+    middle_m: float = Field(0.0, description="Position about which it moves [m].")
     frequency_hz: float = Field(1.0, gt=0.0, description="Frequency, or upper end of the band of random motion [Hz].")
     current: Literal["constant", "half-sine", "steps", "random"] = Field("constant", description="Kind of current.")
     current_a: float = Field(0.0, ge=0.0, description="Level, amplitude or largest value of the current [A].")

@@ -9,6 +9,21 @@ from pydantic import Field
 from mrpipe.config.section import Section
 
 
+class SensorCorrections(Section):
+    """Faults of sensors and time base, taken out before all else; `close-loop` writes them to corrections.yaml."""
+
+    force_late_s: float = Field(
+        0.0, ge=-0.1, le=0.1, description="Time by which the force is recorded later than displacement and drive."
+    )
+    force_offset_n: dict[str, float] = Field(
+        default_factory=dict, description="Offset of the load cell in a test (name: N), beside the one of all tests."
+    )
+    force_per_drive_n: float = Field(0.0, description="Offset of the load cell for each A or V of drive [N].")
+    force_per_drive_squared_n: float = Field(0.0, description="The same for the square of the drive.")
+    drive_lag_s: float = Field(0.0, ge=0.0, le=1.0, description="First-order lag of the drive in these two.")
+    force_drift_n_s: float = Field(0.0, description="Drift of the load cell from the beginning of each test [N/s].")
+
+
 class PrepareSettings(Section):
     """How measured tests are filtered, freed of offsets and differentiated."""
 
@@ -70,3 +85,4 @@ class PrepareSettings(Section):
     )
     cycles: int = Field(10, ge=0, description="Steady cycles kept of each periodic test; 0 keeps all.")
     settle_cycles: int = Field(1, ge=0, description="Steady cycles left out at the beginning, where there are enough.")
+    corrections: SensorCorrections = Field(SensorCorrections(), description="Faults of sensors that are known.")

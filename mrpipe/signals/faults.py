@@ -1,0 +1,47 @@
+"""Faults of sensors and time base that are known, taken out of the channels before anything else is done to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import UserError
+from mrpipe.signals.filters import advance
+
+
+@dataclass(frozen=True)
+class KnownFaults:
+    """Faults of sensors that are taken out before all else; the fields are those of `prepare.corrections`, see there.
+
+    They are subtracted from what was recorded, and so are no part of the offsets that a prepared test remembers.
+    """
+
+    force_late_s: float = 0.0
+    force_offset_n: Mapping[str, float] = field(default_factory=dict)
+    force_per_drive_n: float = 0.0
+    force_per_drive_squared_n: float = 0.0
+    drive_lag_s: float = 0.0
+    force_drift_n_s: float = 0.0
+
+    def force(self, name: str, force: FloatArray, drive: FloatArray, rate: float) -> FloatArray:
+        """Return the force [N] of a test without its faults, shape (n,)."""
+        force = advance(force, self.force_late_s, rate) - self.force_offset_n.get(name, 0.0)
+        if self.force_per_drive_n or self.force_per_drive_squared_n:
+            keep = float(np.exp(-1.0 / (rate * self.drive_lag_s))) if self.drive_lag_s > 0.0 else 0.0
+            late = signal.lfilter([1.0 - keep], [1.0, -keep], drive, zi=np.array([keep * drive[0]]))[0]
+            force = force - self.force_per_drive_n * late - self.force_per_drive_squared_n * late**2
+        if self.force_drift_n_s:
+            force = force - self.force_drift_n_s * np.arange(force.size) / rate
+        return np.asarray(force, dtype=np.float64)
+
+
+def require_known(faults: KnownFaults, names: Sequence[str]) -> None:
+    """Refuse an offset for a test that the campaign does not have."""
+    for name in faults.force_offset_n:
+        if name not in names:
+            where = f"prepare.corrections.force_offset_n.{name}"
+            raise UserError("configuration", where, "the campaign has no such test", f"one of {', '.join(names[:8])}")

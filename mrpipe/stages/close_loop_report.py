@@ -1,0 +1,172 @@
+"""What `close-loop` leaves for the report: words, maps, ranking, before and after, closed loop, next tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.pipeline.stage import StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.discrepancy.summary import Tracing
+
+
+def report(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
+    """Write the stage's part of the report."""
+    from mrpipe.reporting.discrepancy import in_plain_words
+
+    context.report.text(in_plain_words(summary))
+    for name, reason in summary["untestable"].items():
+        context.report.text(f"Effect {name} is {reason}.")
+    _where(context, traced, summary)
+    _candidates(context, summary)
+    _before_and_after(context, traced, summary)
+    _loop(context, summary["closed_loop"])
+    _next_steps(context, summary)
+
+
+def _where(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
+    import numpy as np
+
+    from mrpipe.reporting.discrepancy import residual_location, residual_maps
+
+    context.report.figure(
+        "where",
+        residual_location(summary["residual"]["location"]),
+        "Where the residual of the baseline lives (training tests).",
+    )
+    base = traced.selection.base
+    used = base.problem.root_weight > 0.0
+    residual = base.residual[used] / base.problem.root_weight[used]
+    states = {name: values[used] for name, values in traced.states.values.items()}
+    unit = traced.drive_unit
+    drive = f"effective drive [{unit}]"
+    maps = [
+        ("displacement [mm]", "velocity [mm/s]", 1e3 * states["displacement"], 1e3 * states["velocity"]),
+        ("velocity [mm/s]", drive, 1e3 * states["velocity"], states["drive"]),
+        (drive, f"largest drive so far [{unit}]", states["drive"], states["past of drive"] + np.abs(states["drive"])),
+        ("time in test [s]", "dissipated work [J]", states["time in test"], states["work"]),
+    ]
+    context.report.figure("maps", residual_maps(maps, residual), "Mean residual of the baseline over pairs of states.")
+
+
+def _candidates(context: StageContext, summary: Mapping[str, Any]) -> None:
+    import pandas as pd
+
+    from mrpipe.reporting.discrepancy import candidate_ranking
+
+    candidates = summary["candidates"]
+    if not candidates:
+        return
+    settings = context.settings.close_loop
+    context.report.figure(
+        "ranking",
+        candidate_ranking(candidates, settings.named_share, settings.least_share),
+        "What each family of effects recovers when it is added alone and everything is fitted anew; NRMSE on the "
+        "validation tests. A family at a bound of its strength is not named.",
+    )
+    rows = [
+        {
+            "effect": item["name"],
+            "form": item["form"],
+            "share": item["share"],
+            "NRMSE": item["nrmse"],
+            "evidence (log-likelihood)": item["evidence"],
+            "forms tried": ", ".join(f"{name} {share:.2f}" for name, share in item["forms"].items()),
+        }
+        for item in candidates
+    ]
+    context.report.table("candidates", pd.DataFrame(rows), "The same as a table, with every form that was tried.")
+
+
+def _before_and_after(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
+    import pandas as pd
+
+    from mrpipe.reporting.discrepancy import MOST_BARS, ShownTest, errors_per_test, loops_before_and_after
+
+    validation, rows = traced.validation, summary["tests"]
+    errors = {row["name"]: row for row in rows}
+    order = sorted(range(validation.tests), key=lambda k: -_gain(errors.get(validation.names[k], {})))[:3]
+    shown = []
+    for k in order:
+        piece = slice(int(validation.starts[k]), int(validation.starts[k + 1]))
+        error = errors.get(validation.names[k], {"nrmse_before": float("nan"), "nrmse_after": float("nan")})
+        shown.append(
+            ShownTest(
+                validation.names[k],
+                validation.time[piece],
+                validation.displacement[piece],
+                validation.velocity[piece],
+                traced.measured[piece],
+                traced.before[piece],
+                traced.after[piece],
+                error["nrmse_before"],
+                error["nrmse_after"],
+            )
+        )
+    context.report.figure(
+        "loops",
+        loops_before_and_after(shown),
+        "The validation tests that gain most: loops and history before and after, simulated without feedback of the "
+        "measured force.",
+    )
+    more = f"; the {MOST_BARS} with the largest errors of {len(rows)}" if len(rows) > MOST_BARS else ""
+    context.report.figure(
+        "errors",
+        errors_per_test(rows, summary["noise_floor_nrmse"]),
+        f"Error of the validation tests before and after{more}.",
+    )
+    table = pd.DataFrame(rows).rename(columns={"nrmse_before": "NRMSE before", "nrmse_after": "NRMSE after"})
+    context.report.table("tests", table, "Error of each validation test.")
+
+
+def _gain(row: Mapping[str, Any]) -> float:
+    return float(row["nrmse_before"] - row["nrmse_after"]) if row else float("-inf")
+
+
+def _loop(context: StageContext, found: Mapping[str, Any]) -> None:
+    import pandas as pd
+
+    from mrpipe.reporting.closed_loop import in_words, law_table, response_by_law
+
+    context.report.text(in_words(found))
+    if "laws" not in found:
+        return
+    context.report.figure(
+        "laws",
+        response_by_law(found),
+        "Response by control law: measured; predicted by the model without and with the effect, under the controller "
+        "that ran; and with the controller renewed for the effect.",
+    )
+    context.report.table("laws", pd.DataFrame(law_table(found)), "The same as a table.")
+    rows = []
+    for item in found["tests"]:
+        if item["recorded"]:
+            row = {"test": item["test"], "law": item["law"]}
+            row |= {f"NRMSE of x top {when}": item[when].get("nrmse_x_top") for when in ("before", "after")}
+            rows.append(row)
+    if rows:
+        context.report.table(
+            "recordings", pd.DataFrame(rows), "Error of the top floor's history in each closed-loop recording."
+        )
+
+
+def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
+    import pandas as pd
+
+    if summary["corrections"]["settings"]:
+        context.report.text(
+            "The faults of sensors named above are taken out by `mrpipe prepare --settings "
+            f"{summary['corrections']['file']}` (and by every later stage with the same option)."
+        )
+    wanted = summary["next_tests"]
+    if not wanted["tests"]:
+        return
+    for item in wanted["decides"]:
+        context.report.text(f"To decide {item['decides']}: {', '.join(item['tests'])}.")
+    context.report.table(
+        "next-tests",
+        pd.DataFrame(wanted["tests"]),
+        f"Tests that would decide what is open, as {wanted['file']} lists them: `mrpipe record --settings` adds them "
+        "to the virtual rig's campaign.",
+    )
