@@ -25,6 +25,15 @@ def print_summary(title: str, summary: Mapping[str, Any], warnings: Sequence[str
         print(f"  warning: {warning}")
 
 
+def print_brief(title: str, lines: Sequence[str], warnings: Sequence[str] = ()) -> None:
+    """Print what a stage says of itself in a few lines; --json has all of its numbers."""
+    print(title)
+    for line in lines:
+        print(f"  {line}")
+    for warning in warnings:
+        print(f"  warning: {warning}")
+
+
 def _lines(key: str, value: Any, depth: int) -> list[str]:
     margin = "  " * depth
     if isinstance(value, Mapping):

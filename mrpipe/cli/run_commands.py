@@ -40,6 +40,9 @@ def run(
             pipeline.force = frozenset(pipeline.stages)
         for name in names:
             if name != "report":
+                pipeline.check(name)
+        for name in names:
+            if name != "report":
                 pipeline.build(name)
         report = _write_report(pipeline) if "report" in names else []
     content = _run_summary(pipeline, report, time.monotonic() - started)
@@ -82,11 +85,13 @@ def _run_summary(pipeline: Pipeline, report: list[Path], seconds: float) -> dict
 
 
 def _print_run(pipeline: Pipeline, content: dict[str, Any]) -> None:
-    from mrpipe.reporting.headlines import headline
+    from mrpipe.reporting.headlines import headline, in_brief
 
     for name, stage in content["stages"].items():
         text = stage.get("skipped") or headline(name, stage["summary"])
         print(f"{name:20} {stage['outcome']:8} {text}")
+        for line in in_brief(name, stage["summary"]):
+            print(f"{'':20} {line}")
         for warning in stage["warnings"]:
             print(f"{'':20} warning: {warning}")
     print(f"done in {content['seconds']:.1f} s, in {pipeline.run_directory}")

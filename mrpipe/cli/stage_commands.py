@@ -33,8 +33,9 @@ def build_and_print(names: list[str], options: CommonOptions) -> None:
     UserError
         If a stage that was asked for has no data to work on.
     """
-    from mrpipe.cli.output import print_json, print_summary
+    from mrpipe.cli.output import print_brief, print_json, print_summary
     from mrpipe.cli.session import session
+    from mrpipe.reporting.headlines import in_brief
 
     with session(options) as pipeline:
         if options.force:
@@ -51,7 +52,11 @@ def build_and_print(names: list[str], options: CommonOptions) -> None:
         return
     for outcome in outcomes:
         note = " (up to date)" if outcome.what == "reused" else ""
-        print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
+        brief = in_brief(outcome.stage, outcome.manifest.summary)
+        if brief:
+            print_brief(f"{outcome.stage}{note}", brief, outcome.manifest.warnings)
+        else:
+            print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
     print(f"in {pipeline.run_directory}")
 
 

@@ -100,7 +100,7 @@ def kinds_in(advice: str) -> list[str]:
     return list(dict.fromkeys(kind for words, kind in _KINDS if words in advice))
 
 
-def tests_for(summary: Mapping[str, Any], needs: Mapping[str, Sequence[str]], recordings: Recordings) -> ExtraTests:
+def wanted_tests(summary: Mapping[str, Any], needs: Mapping[str, Sequence[str]], recordings: Recordings) -> ExtraTests:
     """Return the tests that a verdict leaves to be wished for.
 
     Parameters

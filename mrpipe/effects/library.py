@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 import mrpipe.effects as package
+from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.effects.contract import Effect
 from mrpipe.errors import UserError
 
@@ -50,7 +51,9 @@ def load_effect_file(path: Path) -> Effect:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise UserError(path, "close_loop.effect_files", f"cannot be run: {error}", "mend the file") from error
+        # compilers say much: the first line tells what it is
+        said = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
+        raise UserError(path, "close_loop.effect_files", f"cannot be run: {said}", "mend the file") from error
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):
         raise UserError(path, "EFFECT", "is missing", "define EFFECT = Effect(...) as mrpipe/effects/*.py do")
@@ -69,8 +72,6 @@ def effects_named(names: Sequence[str], files: Sequence[Path] = ()) -> dict[str,
     own = [load_effect_file(path) for path in files]
     for name in names:
         if name not in known:
-            raise UserError(
-                "configuration", "close_loop.candidates", f"no effect {name!r}", f"known: {', '.join(known)}"
-            )
+            raise UserError("configuration", "close_loop.candidates", f"no effect {name!r}", nearest(name, known))
     chosen = {name: known[name] for name in names} if names else dict(known)
     return {**chosen, **{item.name: item for item in own}}

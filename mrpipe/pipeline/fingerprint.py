@@ -111,15 +111,27 @@ def _is_artifact(path: Path) -> bool:
 
 
 def plain_settings(config: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return dotted name -> JSON-able value of the named settings of a pydantic configuration."""
-    content = config.model_dump(mode="json")
-    chosen = {}
+    """Return dotted name -> JSON-able value of the named settings of a pydantic configuration.
+
+    Files that they name count by their content: a user's own effect that was edited is another effect.
+    """
+    content, typed = config.model_dump(mode="json"), config.model_dump()
+    chosen: dict[str, Any] = {}
+    files: dict[str, str] = {}
     for name in names:
-        value = content
+        value, same = content, typed
         for part in name.split("."):
-            value = value[part]
+            value, same = value[part], same[part]
         chosen[name] = value
-    return chosen
+        files |= {str(path): hashlib.sha256(path.read_bytes()).hexdigest()[:16] for path in _files_in(same)}
+    return {**chosen, "content of files": files} if files else chosen
+
+
+def _files_in(value: Any) -> list[Path]:
+    if isinstance(value, Path):
+        return [value] if value.is_file() else []
+    inner = value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else ()
+    return [path for item in inner for path in _files_in(item)]
 
 
 def flatten(value: Any, prefix: str = "") -> dict[str, Any]:

@@ -116,6 +116,7 @@ class Pipeline:
         if name in self.outcomes:
             return self.outcomes[name]
         stage = self.stages[name]
+        self.check(name)
         missing = ""
         for item in stage.inputs:
             missing = missing or self._provide(item)
@@ -127,6 +128,18 @@ class Pipeline:
         self.outcomes[name] = outcome
         self._hashes.save()
         return outcome
+
+    def check(self, name: str) -> None:
+        """Let a stage look at its settings, so that a mistake is told before minutes of work and not after.
+
+        Raises
+        ------
+        UserError
+            If it cannot work with them.
+        """
+        stage = self.stages[name]
+        if stage.check is not None:
+            stage.check(SettingsView(self.loaded.config, stage.settings, name))
 
     def _can_be_had(self, name: str) -> bool:
         """Return whether the campaigns that an input hangs on are configured."""

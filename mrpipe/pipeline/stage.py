@@ -112,6 +112,8 @@ class Stage:
         Files (or directories) written, relative to the run directory; the first is the stage's artifact.
     modules
         Modules whose source, with all of mrpipe that they import, makes up the stage's code version.
+    check
+        Looks at the declared settings before anything is built for the stage; raises UserError where it cannot work.
     """
 
     name: str
@@ -122,3 +124,4 @@ class Stage:
     settings: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     modules: tuple[str, ...] = ()
+    check: Callable[[Any], None] | None = None

@@ -69,6 +69,52 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {floor})"
 
 
+def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
+    """Return the few lines that a person wants to read of a stage; empty where its numbers speak for themselves."""
+    if stage != "close-loop" or "before" not in summary:
+        return []
+    from mrpipe.reporting.closed_loop import in_words
+
+    before, after, floor = (
+        _number(value, digits=3)
+        for value in (summary["before"]["nrmse"], summary["after"]["nrmse"], summary["noise_floor_nrmse"])
+    )
+    lines = [f"campaign {summary['campaign']}, model {summary['model']}: {summary['verdict']}"]
+    for effect in summary["effects"]:
+        numbers = ", ".join(
+            f"{name.replace('_', ' ')} {_number(value['value'])} {value['unit']}".removesuffix(" 1")
+            for name, value in effect["parameters"].items()
+        )
+        rivals = f", not told apart from {' and '.join(effect['tied_with'])}" if effect["tied_with"] else ""
+        confidence = f", confidence {effect['confidence']:.2f}" if effect["name"] != "unattributed" else ""
+        shown = f": {numbers}" if numbers else ""
+        lines.append(f"effect {effect['name']} ({effect['form']}{shown}{confidence}{rivals})")
+    recovered = (
+        f", {100.0 * summary['ceiling']['recovered']:.0f} % of what is recoverable" if summary["effects"] else ""
+    )
+    lines.append(f"error on validation tests: NRMSE {before} before, {after} after (noise floor {floor}{recovered})")
+    unexplained = summary["unexplained"]
+    if unexplained["structured"]:
+        states = ", ".join(item["state"] for item in unexplained["depends_on"][:3])
+        lines.append(
+            f"still unexplained: {100.0 * unexplained['share_of_residual']:.0f} % of the residual"
+            f"{', varying with ' + states if states else ''}"
+        )
+    if summary.get("corrections", {}).get("settings"):
+        lines.append(f"fault of sensors: corrections in {summary['corrections']['file']} (mrpipe prepare --settings)")
+    lines += _sentences(in_words(summary["closed_loop"]))
+    wanted = summary.get("next_tests", {})
+    if wanted.get("tests"):
+        open_questions = "; ".join(item["decides"] for item in wanted["decides"])
+        lines.append(f"{len(wanted['tests'])} tests that would decide {open_questions}: {wanted['file']}")
+    return lines
+
+
+def _sentences(text: str) -> list[str]:
+    """Return a paragraph sentence by sentence."""
+    return [f"{part.rstrip('.')}." for part in text.split(". ") if part]
+
+
 def _plain(summary: Mapping[str, Any]) -> str:
     """Return the first few plain numbers and words."""
     shown = []

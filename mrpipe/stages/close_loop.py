@@ -86,10 +86,10 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
 
 def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Effect]) -> dict[str, Any]:
     """Write the tests that would decide what is open, as settings for `record`."""
-    from mrpipe.discrepancy.extra_tests import tests_for
+    from mrpipe.discrepancy.extra_tests import wanted_tests
 
     untestable = {name: library[name].needs for name in traced.summary["untestable"] if name in library}
-    extra = tests_for(traced.summary, untestable, traced.training)
+    extra = wanted_tests(traced.summary, untestable, traced.training)
     settings: dict[str, Any] = {}
     if extra.tests:
         listed = context.settings.laboratory.bench.tests
@@ -142,6 +142,14 @@ def _write(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
     atomic_write_text(context.run_directory / "close-loop.json", to_json(summary) + "\n")
 
 
+def _check(settings: Any) -> None:
+    """Look for effects that are not known and files of the user's own that do not work."""
+    from mrpipe.effects.library import effects_named
+
+    if settings.close_loop.candidates or settings.close_loop.effect_files:
+        effects_named(settings.close_loop.candidates, settings.close_loop.effect_files)
+
+
 STAGE = Stage(
     name="close-loop",
     summary="Trace the residual of a model to a missing effect, add it, and judge it before and after.",
@@ -157,4 +165,5 @@ STAGE = Stage(
         "laboratory.bench.tests",
     ),
     outputs=("close-loop.h5", "close-loop.json", CORRECTIONS, NEXT_TESTS),
+    check=_check,
 )

@@ -91,3 +91,24 @@ def test_campaign_path_is_relative_to_the_configuration(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", sorted(config_directory().glob("*.yaml")), ids=lambda path: path.stem)
 def test_shipped_configuration_is_valid(path: Path) -> None:
     assert load_config(path).config.name == path.stem
+
+
+def test_settings_are_laid_over_the_configuration(tmp_path: Path) -> None:
+    path, over = tmp_path / "config.yaml", tmp_path / "over.yaml"
+    path.write_text("name: x\nprepare: {order: 3, cycles: 4}\nstages: [prepare]\n", encoding="utf-8")
+    over.write_text("prepare: {cycles: 5, corrections: {force_offset_n: {a: 1.5}}}\n", encoding="utf-8")
+    config = load_config(path, ["prepare.cycles=6"], [over]).config
+    assert (config.prepare.order, config.prepare.cycles) == (3, 6)
+    assert config.prepare.corrections.force_offset_n == {"a": 1.5}
+    assert config.stages == ("prepare",)
+
+
+def test_fault_of_settings_laid_over_names_their_file(tmp_path: Path) -> None:
+    path, over = tmp_path / "config.yaml", tmp_path / "over.yaml"
+    path.write_text("name: x\n", encoding="utf-8")
+    over.write_text("laboratory:\n  bench:\n    tests:\n    - {name: a, motion: sinus}\n", encoding="utf-8")
+    with pytest.raises(UserError) as caught:
+        load_config(path, [], [over])
+    assert str(caught.value).startswith(f"{over}: line 4, laboratory.bench.tests.0.motion: is 'sinus'")
+    with pytest.raises(UserError, match=r"--settings: nowhere\.yaml: no such file"):
+        load_config(path, [], [Path("nowhere.yaml")])

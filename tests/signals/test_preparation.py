@@ -12,6 +12,7 @@ import pytest
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray, Provenance, config_directory
 from mrpipe.campaigns import Campaign, Recording, load_campaign
 from mrpipe.errors import UserError
+from mrpipe.signals.faults import KnownFaults
 from mrpipe.signals.preparation import Preparation, PreparationOptions, common_rate, prepare_campaign
 from mrpipe.signals.prepared import read_prepared, write_prepared
 
@@ -349,3 +350,46 @@ def test_the_public_random_test(public_data: Path) -> None:
         assert item.test.force_offset_n == pytest.approx(-110.0, abs=30.0)
         raw = np.gradient(item.test.displacement_raw_m, 1 / item.test.sampling_rate_hz)
         assert rms(item.test.velocity_m_s) == pytest.approx(rms(raw), rel=0.05)
+
+
+@pytest.mark.planted
+def test_faults_of_the_load_cell_that_are_known_are_taken_out() -> None:
+    test = recording("one")
+    lag, rate = 0.01, 1000.0
+    keep = np.exp(-1.0 / (rate * lag))
+    drive = test.channels["drive"]
+    late = np.empty_like(drive)
+    late[0] = drive[0]
+    for k in range(1, drive.size):
+        late[k] = keep * late[k - 1] + (1.0 - keep) * drive[k]
+    faults = {
+        "force_per_drive_n": 3.0,
+        "force_per_drive_squared_n": -0.5,
+        "drive_lag_s": lag,
+        "force_drift_n_s": 0.4,
+        "force_offset_n": {"one": 7.0},
+    }
+    wrong = test.channels["force"] + 3.0 * late - 0.5 * late**2 + 0.4 * test.time_s + 7.0
+    source = campaign(replace(test, channels={**test.channels, "force": wrong}))
+    (plain,) = prepare_campaign(campaign(test), PreparationOptions()).tests
+    (mended,) = prepare_campaign(source, PreparationOptions(faults=KnownFaults(**faults))).tests  # type: ignore[arg-type]
+    assert mended.test.force_n == pytest.approx(plain.test.force_n, abs=1e-9)
+    # what was taken out is no offset that the test remembers: tracing it again finds it gone
+    assert mended.test.force_offset_n == pytest.approx(plain.test.force_offset_n, abs=1e-9)
+
+
+@pytest.mark.planted
+def test_a_force_recorded_late_is_brought_in_time() -> None:
+    test = recording("one")
+    late = 0.0035
+    moved = truth(test.time_s - late)["force"]
+    source = campaign(replace(test, channels={**test.channels, "force": moved}))
+    (mended,) = prepare_campaign(source, PreparationOptions(faults=KnownFaults(force_late_s=late))).tests
+    (skewed,) = prepare_campaign(source, PreparationOptions()).tests
+    assert errors(mended)["force"] < 0.3 * errors(skewed)["force"]
+
+
+def test_an_offset_for_a_test_that_is_not_there_is_refused() -> None:
+    options = PreparationOptions(faults=KnownFaults(force_offset_n={"two": 1.0}))
+    with pytest.raises(UserError, match=r"force_offset_n\.two: the campaign has no such test; one of one"):
+        prepare_campaign(campaign(recording("one")), options)
