@@ -46,7 +46,7 @@ def _describe_test(campaign: Campaign, test: Recording) -> dict[str, Any]:
         row["segments"] = len(test.segments)
     row["channels"] = {
         name: {
-            "unit": _unit(campaign, name),
+            "unit": unit_of(campaign, name),
             "minimum": float(test.used(name).min()),
             "maximum": float(test.used(name).max()),
         }
@@ -57,6 +57,7 @@ def _describe_test(campaign: Campaign, test: Recording) -> dict[str, Any]:
     return row
 
 
-def _unit(campaign: Campaign, channel: str) -> str:
+def unit_of(campaign: Campaign, channel: str) -> str:
+    """Return the SI unit of a channel."""
     quantity = quantity_of(channel, campaign.rig) or ""
     return campaign.drive_unit if quantity == "drive" else SI_UNITS.get(quantity, "1")

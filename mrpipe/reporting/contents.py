@@ -8,12 +8,17 @@ from typing import Any
 
 import h5py
 import numpy as np
+from matplotlib.figure import Figure
 
 from mrpipe.artifacts import Artifact, atomic_path
 from mrpipe.campaigns import describe, load_campaign
+from mrpipe.campaigns.describe import unit_of
+from mrpipe.reporting.signals import campaign_overview
 from mrpipe.reporting.style import figure_with_axes, label
 
 _PANELS = 12
+_TESTS = 4
+_CHANNELS = 5
 
 
 def describe_file(path: Path) -> dict[str, Any]:
@@ -87,7 +92,28 @@ def _plain(value: Any) -> str:
 
 def plot_file(path: Path, picture: Path) -> None:
     """Draw the channels of a campaign's first tests, or the larger datasets of an artifact, into one picture."""
-    panels = _campaign_panels(path) if _is_campaign(path) else _artifact_panels(path)
+    figure = _campaign_figure(path) if _is_campaign(path) else _artifact_figure(path)
+    with atomic_path(picture) as temporary:
+        figure.savefig(temporary, format=picture.suffix.lower().lstrip("."), dpi=110)
+
+
+def _campaign_figure(path: Path) -> Figure:
+    """Draw a few tests spread over the campaign, each with its first channels."""
+    campaign = load_campaign(path)
+    step = max(1, len(campaign.recordings) // _TESTS)
+    chosen = campaign.recordings[::step][:_TESTS]
+    names = list(dict.fromkeys(name for item in chosen for name in item.channels))[:_CHANNELS]
+    return campaign_overview(
+        [
+            (item.name, item.time_s, {name: item.channels[name] for name in names if name in item.channels})
+            for item in chosen
+        ],
+        {name: unit_of(campaign, name) for name in names},
+    )
+
+
+def _artifact_figure(path: Path) -> Figure:
+    panels = _artifact_panels(path)
     rows = max(1, (len(panels) + 1) // 2)
     figure, axes = figure_with_axes(rows, 2 if len(panels) > 1 else 1, width=11.0, height=2.0)
     for axis, (title, x, y, x_label, y_label) in zip(axes.ravel(), panels, strict=False):
@@ -95,19 +121,7 @@ def plot_file(path: Path, picture: Path) -> None:
         label(axis, x_label, y_label, title)
     for axis in axes.ravel()[len(panels) :]:
         axis.set_visible(False)
-    with atomic_path(picture) as temporary:
-        figure.savefig(temporary, format=picture.suffix.lower().lstrip("."), dpi=110)
-
-
-def _campaign_panels(path: Path) -> list[tuple[str, Any, Any, str, str]]:
-    panels = []
-    campaign = load_campaign(path)
-    for recording in campaign.recordings:
-        for quantity, values in recording.channels.items():
-            panels.append((f"{recording.name}: {quantity}", recording.time_s, values, "time [s]", f"{quantity} (SI)"))
-            if len(panels) == _PANELS:
-                return panels
-    return panels
+    return figure
 
 
 def _artifact_panels(path: Path) -> list[tuple[str, Any, Any, str, str]]:

@@ -126,5 +126,9 @@ def campaign_overview(
                 axis.set_visible(False)
                 continue
             axis.plot(time, channels[name], color=MEASURED, linewidth=0.5)
-            label(axis, "time [s]", f"{name} [{units.get(name, '')}]", title if column == 0 else "")
+            last = row == len(recordings) - 1
+            name_shown = name.replace("_", " ")
+            label(
+                axis, "time [s]" if last else "", f"{name_shown} [{units.get(name, '')}]", title if column == 0 else ""
+            )
     return figure
