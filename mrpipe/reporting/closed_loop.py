@@ -92,7 +92,9 @@ def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
             "prediction, and little is to be gained in control."
         )
     listed = ", ".join(f"{law} {100.0 * change:+.0f} %" for law, change in told.items())
-    return f"It changes the RMS top displacement: {listed}; the other laws stay within 1 %."
+    return (
+        f"On the damper with the effect it changes the RMS top displacement: {listed}; the other laws stay within 1 %."
+    )
 
 
 def _percent(value: float | None) -> str:

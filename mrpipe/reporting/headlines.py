@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 
@@ -105,9 +105,23 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
     lines += _sentences(in_words(summary["closed_loop"]))
     wanted = summary.get("next_tests", {})
     if wanted.get("tests"):
-        open_questions = "; ".join(item["decides"] for item in wanted["decides"])
-        lines.append(f"{len(wanted['tests'])} tests that would decide {open_questions}: {wanted['file']}")
+        lines.append(
+            f"{len(wanted['tests'])} tests in {wanted['file']} would decide {_open_questions(wanted['decides'])}"
+        )
     return lines
+
+
+def _open_questions(decides: Sequence[Mapping[str, Any]]) -> str:
+    """Return what tests would decide, the rivals of one effect together."""
+    rivals: dict[str, list[str]] = {}
+    others = []
+    for item in decides:
+        effect, joined, rival = item["decides"].partition(" or ")
+        if joined:
+            rivals.setdefault(effect, []).append(rival)
+        else:
+            others.append(item["decides"])
+    return "; ".join([*(f"{effect} or {', '.join(names)}" for effect, names in rivals.items()), *others])
 
 
 def _sentences(text: str) -> list[str]:

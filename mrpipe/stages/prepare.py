@@ -21,6 +21,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.signals.prepared import write_prepared
 
     settings = context.settings.prepare
+    known = settings.corrections
     campaign = load_campaign(context.inputs["campaign:bench"])
     for finding in campaign.findings:
         context.warn(finding)
@@ -40,7 +41,14 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         displacement_late_s=settings.displacement_late_s,
         cycles=settings.cycles,
         settle_cycles=settings.settle_cycles,
-        faults=KnownFaults(**settings.corrections.model_dump()),
+        faults=KnownFaults(
+            force_late_s=known.force_late_s,
+            force_offset_n=known.force_offset_n,
+            force_per_drive_n=known.force_per_drive_n,
+            force_per_drive_squared_n=known.force_per_drive_squared_n,
+            drive_lag_s=known.drive_lag_s,
+            force_drift_n_s=known.force_drift_n_s,
+        ),
     )
     prepared = prepare_campaign(campaign, options, context.progress)
     preparations = prepared.tests
