@@ -134,10 +134,18 @@ def response_by_law(found: Mapping[str, Any]) -> Figure:
         for place, when in enumerate(shown):
             heights = [factor * item.get(when, {}).get(key, np.nan) for item in laws]
             at = np.arange(len(laws)) + (place - 0.5 * (len(shown) - 1)) * width
-            axis.bar(at, heights, 0.92 * width, color=COLUMNS[when][1], label=COLUMNS[when][0])
+            bars = axis.bar(at, heights, 0.92 * width, color=COLUMNS[when][1], label=COLUMNS[when][0])
+            axis.bar_label(
+                bars, fmt=lambda value: "" if np.isnan(value) else f"{value:.3g}", fontsize=6, rotation=90, padding=2
+            )
         axis.set_xticks(np.arange(len(laws)), [item["law"] for item in laws])
         axis.grid(axis="x", visible=False)
+        axis.margins(y=0.14)
         label(axis, "", name)
     handles, names = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper center", ncols=len(shown), fontsize=8, frameon=False)
     return figure
+
+
+def _plain_number(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.3g}"

@@ -47,7 +47,7 @@ def residual_location(location: Mapping[str, Mapping[str, float]]) -> Figure:
     figure, axes = figure_with_axes(1, 1, height=0.55 * len(groups) + 0.7)
     axis = axes[0, 0]
     for row, name in enumerate(groups):
-        left = 0.0
+        left, small = 0.0, []
         for index, (key, text) in enumerate(_PARTS[name][1].items()):
             share = float(location[name].get(key, 0.0))
             axis.barh(-row, share, 0.62, left=left, color=COLOURS[index], alpha=0.85)
@@ -56,7 +56,11 @@ def residual_location(location: Mapping[str, Mapping[str, float]]) -> Figure:
                     left + 0.5 * share, -row, f"{text} {100.0 * share:.0f} %", ha="center", va="center", fontsize=8,
                     color="white",
                 )  # fmt: skip
+            elif share >= 0.005:
+                small.append(f"{text} {100.0 * share:.0f} %")
             left += share
+        if small:
+            axis.text(1.01, -row, "\n".join(small), va="center", fontsize=8)
     axis.set_yticks([-row for row in range(len(groups))], [_PARTS[name][0] for name in groups])
     axis.set_xlim(0.0, 1.0)
     axis.grid(visible=False)
@@ -111,7 +115,7 @@ def candidate_ranking(candidates: Sequence[Mapping[str, Any]], named_share: floa
     axis.barh(place, shares, 0.7, color=[COLOURS[7] if stuck else AFTER for stuck in bound])
     for y, share, item, stuck in zip(place, shares, candidates, bound, strict=True):
         note = f" {100.0 * share:.0f} %, NRMSE {item['nrmse']:.3g}{', at a bound' if stuck else ''}"
-        inside = share > 0.6
+        inside = share > 0.75
         axis.text(share, y, note + " ", va="center", ha="right" if inside else "left", fontsize=8,
                   color="white" if inside else "black")  # fmt: skip
     axis.set_yticks(place, [f"{item['name']} ({item['form']})" for item in candidates])

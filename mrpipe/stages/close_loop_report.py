@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import StageContext
@@ -86,11 +86,10 @@ def _before_and_after(context: StageContext, traced: Tracing, summary: Mapping[s
 
     validation, rows = traced.validation, summary["tests"]
     errors = {row["name"]: row for row in rows}
-    order = sorted(range(validation.tests), key=lambda k: -_gain(errors.get(validation.names[k], {})))[:3]
     shown = []
-    for k in order:
+    for k in _chosen(validation.names, errors):
         piece = slice(int(validation.starts[k]), int(validation.starts[k + 1]))
-        error = errors.get(validation.names[k], {"nrmse_before": float("nan"), "nrmse_after": float("nan")})
+        error = errors[validation.names[k]]
         shown.append(
             ShownTest(
                 validation.names[k],
@@ -104,12 +103,13 @@ def _before_and_after(context: StageContext, traced: Tracing, summary: Mapping[s
                 error["nrmse_after"],
             )
         )
-    context.report.figure(
-        "loops",
-        loops_before_and_after(shown),
-        "The validation tests that gain most: loops and history before and after, simulated without feedback of the "
-        "measured force.",
-    )
+    if shown:
+        context.report.figure(
+            "loops",
+            loops_before_and_after(shown),
+            "Validation tests: the one that gains most, one of middling error, and the one of largest error left. The "
+            "models run freely, without the measured force.",
+        )
     more = f"; the {MOST_BARS} with the largest errors of {len(rows)}" if len(rows) > MOST_BARS else ""
     context.report.figure(
         "errors",
@@ -120,8 +120,12 @@ def _before_and_after(context: StageContext, traced: Tracing, summary: Mapping[s
     context.report.table("tests", table, "Error of each validation test.")
 
 
-def _gain(row: Mapping[str, Any]) -> float:
-    return float(row["nrmse_before"] - row["nrmse_after"]) if row else float("-inf")
+def _chosen(names: Sequence[str], errors: Mapping[str, Mapping[str, Any]]) -> list[int]:
+    """Return which tests to show: gains most, middling, largest error left."""
+    known = [k for k, name in enumerate(names) if name in errors]
+    gains = sorted(known, key=lambda k: errors[names[k]]["nrmse_after"] - errors[names[k]]["nrmse_before"])
+    left = sorted(known, key=lambda k: errors[names[k]]["nrmse_after"])
+    return list(dict.fromkeys([gains[0], left[len(left) // 2], left[-1]])) if known else []
 
 
 def _loop(context: StageContext, found: Mapping[str, Any]) -> None:
