@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import StageContext
@@ -40,7 +40,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     frame = read_frame(context.artifact("identify-frame"))
     position = context.artifact("calibrate").array("position")
     damper = damper_of(traced.selection.base, traced.drive_unit)
-    rig = Rig(frame, damper, position, loop_options(context))
+    rig = Rig(frame, damper, position, replace(loop_options(context), tracking="damper"))
     runs, status = _runs(context, rig)
     base, chosen = plant_chain(traced.selection.base), plant_chain(traced.selection.chosen)
     ways = {"before": Arrangement(base, lambda run: _as_it_ran(context, rig, run))}
