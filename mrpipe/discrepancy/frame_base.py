@@ -1,0 +1,113 @@
+"""From recordings to spectra with the right band and weights, and the ladder of linear frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.discrepancy.frame_fit import Base, Design, coefficients, design_of
+from mrpipe.discrepancy.frame_records import FrameRecord
+from mrpipe.discrepancy.frame_spectra import Band, Spectra, motion_of, noise_of, spectra_of, storey_sums
+
+HIGH_SHARE, LOW_SHARE = 1.3, 0.45
+"""Band over the highest and the lowest mode."""
+
+
+@dataclass(frozen=True)
+class FrameProblem:
+    """Spectra of training and validation records, and what is known of the structure.
+
+    Attributes
+    ----------
+    storey_stiffness
+        Of the shear frame fitted first, shape (n,) [N/m].
+    frequencies_hz
+        Its modes.
+    """
+
+    training: tuple[Spectra, ...]
+    validation: tuple[Spectra, ...]
+    masses_kg: FloatArray
+    band: Band
+    noise: FloatArray
+    storey_stiffness: FloatArray
+    frequencies_hz: FloatArray
+
+
+def frame_problem(
+    training: Sequence[FrameRecord], validation: Sequence[FrameRecord], masses: FloatArray
+) -> FrameProblem:
+    """Find band and weights by fitting a shear frame twice, and return the spectra of all records."""
+    n = len(masses)
+    band = _band_of_power(training)
+    storey = np.full(n, float(np.mean(masses)) * (2.0 * np.pi * np.sqrt(band.low_hz * band.high_hz)) ** 2)
+    frequencies = np.zeros(n)
+    # band and weights need few records only: the shortest that are forced
+    few = _few(training)
+    for _ in range(3):
+        spectra = _spectra(few, masses, band, storey)[0]
+        storey, frequencies = shear_stiffness_of(design_of("shear-frame", spectra), masses)
+        limits = [0.4 * item.rate_hz for item in training]
+        band = Band(LOW_SHARE * float(frequencies[0]), min(HIGH_SHARE * float(frequencies[-1]), *limits))
+    found, noise = _spectra(training, masses, band, storey)
+    held = tuple(spectra_of(item, masses, band, noise, _matrix(storey), motion_of(item, band)) for item in validation)
+    return FrameProblem(tuple(found), held, masses, band, noise, storey, frequencies)
+
+
+def _spectra(
+    records: Sequence[FrameRecord], masses: FloatArray, band: Band, storey: FloatArray
+) -> tuple[list[Spectra], FloatArray]:
+    noise = noise_of(records, band)
+    return [spectra_of(item, masses, band, noise, _matrix(storey), motion_of(item, band)) for item in records], noise
+
+
+def _few(records: Sequence[FrameRecord], most: int = 3) -> list[FrameRecord]:
+    forced = [item for item in records if item.kind in ("sweep", "random")]
+    return sorted(forced or records, key=lambda item: len(item.ground))[:most]
+
+
+def _matrix(storey: FloatArray) -> FloatArray:
+    """Return the shear of each storey per floor displacement, shape (n, n)."""
+    n = len(storey)
+    return np.asarray(storey[:, None] * (np.eye(n) - np.eye(n, k=-1)))
+
+
+def _band_of_power(records: Sequence[FrameRecord]) -> Band:
+    """Return where the floors' motion lies."""
+    lowest, highest = [], []
+    for item in records:
+        frequencies, density = signal.welch(
+            item.acceleration - np.mean(item.acceleration, axis=0),
+            item.rate_hz,
+            nperseg=min(len(item.ground), 4096),
+            axis=0,
+        )
+        power = density.sum(axis=1)
+        # noise of sensors is flat: only what stands out of it counts
+        power = np.maximum(power - 3.0 * np.median(power[len(power) // 2 :]), 0.0)
+        share = np.cumsum(power) / max(float(power.sum()), 1e-300)
+        lowest.append(float(frequencies[max(1, int(np.searchsorted(share, 0.002)))]))
+        highest.append(float(frequencies[min(len(share) - 1, int(np.searchsorted(share, 0.998)))]))
+    low, high = max(0.5 * min(lowest), 0.02), max(highest)
+    return Band(low, min(max(1.3 * high, 4.0 * low), 0.4 * min(item.rate_hz for item in records)))
+
+
+def shear_stiffness_of(design: Design, masses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return storey stiffnesses [N/m] of a fitted shear frame and its natural frequencies [Hz], shape (n,) each."""
+    linear = coefficients(design, None, np.zeros(0))
+    storey = np.array([-numbers[0] for numbers in linear])
+    positive = storey[storey > 0.0]
+    storey = np.where(storey > 0.0, storey, float(np.median(positive)) if positive.size else 1.0)
+    K = storey_sums(len(masses))
+    stiffness = np.linalg.inv(K) @ _matrix(storey)
+    squared = np.linalg.eigvals(stiffness / masses[:, None])
+    return storey, np.sort(np.sqrt(np.abs(np.real(squared)))) / (2.0 * np.pi)
+
+
+def ladder(spectra: Sequence[Spectra]) -> dict[Base, Design]:
+    """Return the linear models from simple to free."""
+    return {"shear-frame": design_of("shear-frame", spectra), "linear-frame": design_of("linear-frame", spectra)}

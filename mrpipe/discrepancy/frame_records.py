@@ -1,0 +1,206 @@
+"""Recordings of a structure for the tracing: all floors' motion on one clock, from accelerometers alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.model import Campaign, Recording
+from mrpipe.errors import UserError
+
+FASTEST_HZ = 250.0
+"""Records are thinned to at most about this rate: ten times the highest mode of a frame of the laboratory."""
+
+
+@dataclass(frozen=True)
+class FrameRecord:
+    """One test of a structure.
+
+    Attributes
+    ----------
+    name, role, kind
+        As in campaign.yaml.
+    rate_hz
+        Sampling rate.
+    ground
+        Ground acceleration, shape (m,) [m/s2]; zeros where a free decay recorded none.
+    acceleration
+        Absolute acceleration of every floor, shape (m, n) [m/s2].
+    measured_displacement
+        Floor (from 1) -> displacement relative to the ground, shape (m,) [m].
+    loads
+        Floor (from 1) -> known force on it, shape (m,) [N]: a shaker's, or the damper's with its sign turned.
+    damper
+        `force`, `drive`, `desired`, `displacement` of a closed-loop test as far as recorded, shape (m,).
+    from_displacement
+        Floors whose acceleration was differentiated.
+    details
+        What campaign.yaml says of the test.
+    """
+
+    name: str
+    role: str
+    kind: str
+    rate_hz: float
+    ground: FloatArray
+    acceleration: FloatArray
+    measured_displacement: dict[int, FloatArray]
+    loads: dict[int, FloatArray]
+    damper: dict[str, FloatArray]
+    from_displacement: tuple[int, ...] = ()
+    details: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
+        return 1.0 / self.rate_hz
+
+    @property
+    def floors(self) -> int:
+        """Number of floors."""
+        return int(self.acceleration.shape[1])
+
+    @property
+    def relative(self) -> FloatArray:
+        """Acceleration relative to the ground, shape (m, n) [m/s2]."""
+        return np.asarray(self.acceleration - self.ground[:, None])
+
+
+@dataclass(frozen=True)
+class FrameData:
+    """The tests whose floors are all recorded, and those of the closed loop, which may lack some."""
+
+    masses_kg: FloatArray
+    records: tuple[FrameRecord, ...]
+    loops: tuple[Recording, ...]
+    left_out: tuple[str, ...]
+
+    def with_role(self, *roles: str) -> list[FrameRecord]:
+        """Return the records of these roles."""
+        return [item for item in self.records if item.role in roles]
+
+
+def frame_data(campaign: Campaign) -> FrameData:
+    """Return the recordings of a campaign of a shear frame.
+
+    Raises
+    ------
+    UserError
+        If the masses are missing or do not fit the floors, no test records every floor, or there is no validation test.
+    """
+    source = campaign.directory / "campaign.yaml"
+    floors = max((floor for item in campaign.recordings for floor in _floors_of(item)), default=0)
+    loops = tuple(
+        item
+        for item in campaign.recordings
+        if {"damper_force", "drive"} <= set(item.channels) or "drive" in item.channels
+    )
+    masses = np.asarray(campaign.floor_masses_kg, dtype=np.float64)
+    whole, left_out = [], []
+    for item in campaign.recordings:
+        missing = set(range(1, floors + 1)) - set(_floors_of(item))
+        ground = "ground_acceleration" in item.channels or "input_force" in item.channels or item.kind == "free-decay"
+        if missing or not ground:
+            left_out.append(item.name)
+            continue
+        whole.append(item)
+    if not whole and not loops:
+        raise UserError(
+            source,
+            "channels",
+            "no test records every floor and the ground",
+            "give floor_acceleration_1, ... and ground",
+        )
+    if whole and masses.size != floors:
+        raise UserError(
+            source, "frame.floor_masses_kg", f"has {masses.size} entries, the channels are of {floors} floors",
+            "give the mass of every floor in kg",
+        )  # fmt: skip
+    if not any(item.role == "validation" for item in (*whole, *loops)):
+        raise UserError(source, "tests", "no validation test", "give one test the role validation")
+    records = tuple(_record(item) for item in whole)
+    return FrameData(masses, records, loops, tuple(left_out))
+
+
+def _floors_of(recording: Recording) -> list[int]:
+    found = {
+        int(name.rpartition("_")[2])
+        for name in recording.channels
+        if name.startswith(("floor_acceleration_", "floor_displacement_"))
+    }
+    return sorted(found)
+
+
+def part_of(recording: Recording) -> slice:
+    """Return the longest stretch that is to be used."""
+    if not recording.segments:
+        return slice(None)
+    begin, end = max(recording.segments, key=lambda item: item[1] - item[0])
+    return slice(begin, end)
+
+
+def thinning(rate_hz: float) -> int:
+    """Return by which factor records of a rate are thinned."""
+    return max(1, round(rate_hz / FASTEST_HZ))
+
+
+def on_even_clock(recording: Recording, values: FloatArray, part: slice) -> FloatArray:
+    """Return a channel on the nominal clock, thinned after a zero-phase low-pass."""
+    time = recording.time_s[part]
+    steps = np.diff(time)
+    chosen = values[part]
+    if float(np.ptp(steps)) > 0.02 * float(np.median(steps)):
+        even = np.arange(time[0], time[-1], 1.0 / recording.sampling_rate_hz)
+        chosen = np.interp(even, time, chosen)
+    factor = thinning(recording.sampling_rate_hz)
+    if factor == 1:
+        return np.asarray(chosen, dtype=np.float64)
+    ratio = Fraction(1, factor)
+    first = chosen[0]
+    return np.asarray(
+        first + signal.resample_poly(chosen - first, ratio.numerator, ratio.denominator), dtype=np.float64
+    )
+
+
+def _record(recording: Recording) -> FrameRecord:
+    part = part_of(recording)
+    channels = {
+        name: on_even_clock(recording, values, part) for name, values in recording.channels.items() if name != "time"
+    }
+    rate = recording.sampling_rate_hz / thinning(recording.sampling_rate_hz)
+    size = len(next(iter(channels.values())))
+    ground = channels.get("ground_acceleration", np.zeros(size))
+    floors = _floors_of(recording)
+    displacement = {
+        floor: channels[f"floor_displacement_{floor}"] for floor in floors if f"floor_displacement_{floor}" in channels
+    }
+    columns, derived = [], []
+    for floor in floors:
+        name = f"floor_acceleration_{floor}"
+        if name in channels:
+            columns.append(channels[name])
+            continue
+        derived.append(floor)
+        twice = np.gradient(np.gradient(displacement[floor], 1.0 / rate), 1.0 / rate)
+        columns.append(twice + ground)
+    loads: dict[int, FloatArray] = {}
+    if "input_force" in channels:
+        place = recording.details.get("floor", recording.details.get("input_force_floor", 1))
+        loads[int(place)] = channels["input_force"]
+    damper = {
+        key: channels[name]
+        for key, name in (
+            ("force", "damper_force"), ("drive", "drive"), ("desired", "desired_force"),
+            ("displacement", "damper_displacement"),
+        )
+        if name in channels
+    }  # fmt: skip
+    return FrameRecord(
+        recording.name, recording.role, recording.kind, rate, ground, np.column_stack(columns), displacement, loads,
+        damper, tuple(derived), dict(recording.details),
+    )  # fmt: skip

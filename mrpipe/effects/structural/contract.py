@@ -1,0 +1,91 @@
+"""What an effect of a structure is: the one narrow contract that every file of this package (and a user's own) keeps.
+
+A file defines `EFFECT = StructuralEffect(...)` and nothing else knows of it. Where it acts decides what its forms
+bring:
+
+- `storey`, `floor`: a *step*, a small compiled function that turns the history of a drift (or of a floor's displacement
+  relative to the ground) into unit forces; the forces are proportional to amplitudes, which are solved for exactly.
+- `base`: the turn of the base, as columns of motion of unit storey height.
+- `damper-rod`, `command`: declared here with its parameters, found in the closed loop by
+  :mod:`mrpipe.discrepancy.frame_brace` and :mod:`mrpipe.discrepancy.frame_delay`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from numba import float64, void
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.effects.contract import Parameter, Values
+
+STEP_SIGNATURE = void(float64, float64, float64[::1], float64[::1], float64, float64[::1])
+"""`step(position [m], rate [m/s], state, parameters, dt [s], out)`: writes one unit force for each amplitude."""
+
+Place = Literal["storey", "floor", "base", "damper-rod", "command"]
+
+
+@dataclass(frozen=True)
+class StructuralForm:
+    """One functional shape of an effect.
+
+    Attributes
+    ----------
+    name, summary
+        Key within the effect; the law in a line.
+    searched
+        Parameters that a fit searches, in the order in which the step reads them. Scales are those of the place:
+        stroke and speed of drift or floor, RMS of the storey's shear force.
+    amplitudes
+        What the unit forces are multiplied by: solved for, within their sign (a lower bound of 0 allows none below).
+    step
+        Compiled with :data:`STEP_SIGNATURE`; None for `base`, `damper-rod` and `command`.
+    state_size
+        Length of the step's memory, zeros at first.
+    columns
+        `base` only: (reference turn (m,), dt, values) -> columns (m, k) of the base's turn.
+    constants
+        Numbers that the step reads after the searched ones (which side, which kind).
+    """
+
+    name: str
+    summary: str
+    searched: tuple[Parameter, ...]
+    amplitudes: tuple[Parameter, ...]
+    step: Any = None
+    state_size: int = 0
+    columns: Callable[[FloatArray, float, Values], FloatArray] | None = None
+    constants: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class StructuralEffect:
+    """A physical effect of a structure that a linear frame lacks.
+
+    Attributes
+    ----------
+    name, summary
+        As shared by all callers; what it does, in a line.
+    physics, remedy, source
+        Sentences for the report: where it comes from, what to do on the rig, where the law is described.
+    acts_on
+        Where it acts.
+    places
+        `all`: every storey with its own amplitude; `one`: the place is searched for.
+    forms
+        One or several functional shapes.
+    separated_by
+        Other effect -> test that tells the two apart.
+    """
+
+    name: str
+    summary: str
+    physics: str
+    remedy: str
+    source: str
+    acts_on: Place
+    forms: tuple[StructuralForm, ...]
+    places: Literal["all", "one"] = "all"
+    separated_by: Mapping[str, str] = field(default_factory=dict)

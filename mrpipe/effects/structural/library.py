@@ -1,0 +1,43 @@
+"""All effects of a structure, found by walking the package; a user's own from files that the configuration names."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import mrpipe.effects.structural as package
+from mrpipe.effects.structural.contract import StructuralEffect
+
+
+@cache
+def all_structural_effects() -> dict[str, StructuralEffect]:
+    """Return name -> effect of every module of the package that defines EFFECT."""
+    found = []
+    for module in pkgutil.iter_modules(package.__path__):
+        effect = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), "EFFECT", None)
+        if isinstance(effect, StructuralEffect):
+            found.append(effect)
+    return {item.name: item for item in sorted(found, key=lambda item: item.name)}
+
+
+def load_structural_file(path: Path) -> StructuralEffect | None:
+    """Return the EFFECT of a user's own file where it is one of a structure, None where it is not."""
+    spec = importlib.util.spec_from_file_location(f"mrpipe_user_effect_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        return None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    effect = getattr(module, "EFFECT", None)
+    return effect if isinstance(effect, StructuralEffect) else None
+
+
+def structural_effects(names: Sequence[str] = (), files: Sequence[Path] = ()) -> dict[str, StructuralEffect]:
+    """Return the effects of these names (all where none of them is one of a structure), with those of the files."""
+    known = all_structural_effects()
+    chosen = {name: known[name] for name in names if name in known} or dict(known)
+    own = [item for item in map(load_structural_file, files) if item is not None]
+    return {**chosen, **{item.name: item for item in own}}

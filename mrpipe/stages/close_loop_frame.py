@@ -1,0 +1,113 @@
+"""`close-loop` on a structure: the residual of a linear frame, and of its closed loop, traced to an effect.
+
+Takes the place of the stage on a bench campaign where the user gives a campaign of a shear frame, or has no bench.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.config.sections.campaigns import LABORATORY
+from mrpipe.pipeline.stage import Stage, StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.config.sections.campaigns import CampaignsSettings
+    from mrpipe.discrepancy.frame_verdict import StructureTracing
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.campaigns import load_campaign
+    from mrpipe.discrepancy.frame_verdict import trace_structure
+    from mrpipe.discrepancy.verdict import Rules
+    from mrpipe.effects.library import damper_effects
+    from mrpipe.effects.structural.library import all_structural_effects, structural_effects
+
+    settings = context.settings.close_loop
+    campaigns = [load_campaign(path) for name, path in context.inputs.items() if name.startswith("campaign:")]
+    for campaign in campaigns:
+        for finding in campaign.findings:
+            context.warn(finding)
+    known = {**all_structural_effects(), **damper_effects()}
+    for name in campaigns[0].declared_effects:
+        if name not in known:
+            context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
+    traced = trace_structure(
+        campaigns,
+        structural_effects(settings.candidates, settings.effect_files),
+        Rules(settings.named_share, settings.least_share, settings.lead),
+        settings,
+        rng=context.rng,
+        jobs=context.jobs,
+        progress=context.progress,
+    )
+    for finding in traced.findings:
+        context.warn(finding)
+    _write(context, traced)
+    _report(context, traced)
+    return traced.summary
+
+
+def _write(context: StageContext, traced: StructureTracing) -> None:
+    from mrpipe.artifacts import atomic_write_text
+    from mrpipe.artifacts.plain import to_json
+
+    with context.write("close-loop.h5") as artifact:
+        artifact.put_json("summary", dict(traced.summary))
+        for name, history in traced.histories.items():
+            artifact.put(name, history.values, unit=history.unit, dims=history.dims)
+    atomic_write_text(context.run_directory / "close-loop.json", to_json(traced.summary) + "\n")
+
+
+def _report(context: StageContext, traced: StructureTracing) -> None:
+    import pandas as pd
+
+    from mrpipe.reporting import frame_tracing as figures
+    from mrpipe.reporting.discrepancy import candidate_ranking, errors_per_test
+
+    summary = traced.summary
+    context.report.text(figures.in_plain_words(summary))
+    if traced.maps:
+        context.report.figure("maps", figures.storey_maps(traced.maps), figures.MAPS_CAPTION)
+    if summary["candidates"]:
+        rows = [{k: v for k, v in item.items() if k not in ("forms", "at_bound")} for item in summary["candidates"]]
+        context.report.table("candidates", pd.DataFrame(rows), "Candidates with their evidence.")
+        context.report.figure(
+            "ranking", candidate_ranking(summary["candidates"]), "Share of what stands out of the noise, by family."
+        )
+    if traced.shown:
+        context.report.figure(
+            "histories", figures.histories(traced.shown), "Residual of validation tests before and after, per storey."
+        )
+    if summary["tests"]:
+        context.report.figure(
+            "errors", errors_per_test(summary["tests"], summary["noise_floor_nrmse"]), "Error of each validation test."
+        )
+        context.report.table("tests", pd.DataFrame(summary["tests"]), "Error of each validation test.")
+
+
+def _stage(*inputs: str) -> Stage:
+    return Stage(
+        name="close-loop",
+        summary="Trace the residual of a structure to a missing effect, add it, and judge it before and after.",
+        run=_run,
+        inputs=inputs,
+        settings=("close_loop",),
+        outputs=("close-loop.h5", "close-loop.json"),
+    )
+
+
+def structure_stage(campaigns: CampaignsSettings, given: str = "") -> Stage | None:
+    """Return the stage on a structure's campaign where there is one to trace, None where the bench is meant.
+
+    Parameters
+    ----------
+    given
+        Entry of `campaigns` that the user named on the command line, empty for none.
+    """
+    if given in ("frame", "closed_loop"):
+        return _stage(f"campaign:{given.replace('_', '-')}")
+    own = [name for name in ("frame", "closed_loop") if getattr(campaigns, name) not in (None, LABORATORY)]
+    if given or campaigns.bench is not None or not own:
+        return None
+    return _stage(*(f"campaign:{name.replace('_', '-')}" for name in own))
