@@ -65,7 +65,7 @@ def _report(context: StageContext, traced: StructureTracing) -> None:
     from mrpipe.reporting import frame_tracing as figures
     from mrpipe.reporting.discrepancy import candidate_ranking, errors_per_test
 
-    summary = traced.summary
+    summary, settings = traced.summary, context.settings.close_loop
     context.report.text(figures.in_plain_words(summary))
     if traced.maps:
         context.report.figure("maps", figures.storey_maps(traced.maps), figures.MAPS_CAPTION)
@@ -73,7 +73,9 @@ def _report(context: StageContext, traced: StructureTracing) -> None:
         rows = [{k: v for k, v in item.items() if k not in ("forms", "at_bound")} for item in summary["candidates"]]
         context.report.table("candidates", pd.DataFrame(rows), "Candidates with their evidence.")
         context.report.figure(
-            "ranking", candidate_ranking(summary["candidates"]), "Share of what stands out of the noise, by family."
+            "ranking",
+            candidate_ranking(summary["candidates"], settings.named_share, settings.least_share),
+            "Share of what stands out of the noise, by family.",
         )
     if traced.shown:
         context.report.figure(
