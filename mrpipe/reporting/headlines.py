@@ -100,7 +100,7 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
             f"still unexplained: {100.0 * unexplained['share_of_residual']:.0f} % of the residual"
             f"{', varying with ' + states if states else ''}"
         )
-    if summary.get("corrections", {}).get("settings"):
+    if summary.get("corrections", {}).get("found"):
         lines.append(f"fault of sensors: corrections in {summary['corrections']['file']} (mrpipe prepare --settings)")
     lines += _sentences(in_words(summary["closed_loop"]))
     wanted = summary.get("next_tests", {})

@@ -72,7 +72,8 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
         context.settings.prepare.displacement_late_s, **context.settings.prepare.corrections.model_dump()
     )
     found = corrections_of(traced, tests)
-    settings = {"prepare": found.settings(present)} if found.any else {}
+    # what was known before stays in the file, so that it can be given again and again
+    settings = {"prepare": found.settings(present)} if (present + found).any else {}
     path = context.run_directory / CORRECTIONS
     _write_settings(
         path,
@@ -81,34 +82,32 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
         if settings
         else "close-loop found no fault of sensors for prepare to take out.",
     )
-    return {"file": path.name, "settings": settings}
+    return {"file": path.name, "found": found.any, "settings": settings}
 
 
 def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Effect]) -> dict[str, Any]:
-    """Write the tests that would decide what is open, as settings for `record`."""
+    """Write the tests that would decide what is open, as settings for `record`; those of before stay in the list."""
     from mrpipe.discrepancy.extra_tests import wanted_tests
 
     untestable = {name: library[name].needs for name in traced.summary["untestable"] if name in library}
     extra = wanted_tests(traced.summary, untestable, traced.training)
-    settings: dict[str, Any] = {}
-    if extra.tests:
-        listed = context.settings.laboratory.bench.tests
-        there = [item.model_dump(exclude_defaults=True) for item in listed]
-        names = {item.name for item in listed}
-        more = [item for item in extra.tests if item["name"] not in names]
-        settings = {"laboratory": {"bench": {"tests": [*there, *more]}}}
-        if any("middle_m" in item for item in extra.tests):
-            # about another middle the mean of a test is no offset of its sensor
-            settings["prepare"] = {"offset": "campaign"}
+    listed = context.settings.laboratory.bench.tests
+    names = {item.name for item in listed}
+    new = [item for item in extra.tests if item["name"] not in names]
+    tests = [*(item.model_dump(exclude_defaults=True) for item in listed), *new]
+    settings: dict[str, Any] = {"laboratory": {"bench": {"tests": tests}}} if tests else {}
+    if any("middle_m" in item for item in tests):
+        # about another middle the mean of a test is no offset of its sensor
+        settings["prepare"] = {"offset": "campaign"}
     path = context.run_directory / NEXT_TESTS
     _write_settings(
         path,
         settings,
         "Tests that would decide what close-loop left open. On the virtual rig: mrpipe record --settings FILE"
-        if settings
+        if new
         else "close-loop left nothing open that another test would decide.",
     )
-    return {"file": path.name, "tests": list(extra.tests), "decides": list(extra.reasons)}
+    return {"file": path.name, "tests": new, "decides": list(extra.reasons)}
 
 
 def _write_settings(path: Path, settings: Mapping[str, Any], about: str) -> None:

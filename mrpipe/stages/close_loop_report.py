@@ -158,7 +158,7 @@ def _loop(context: StageContext, found: Mapping[str, Any]) -> None:
 def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
     import pandas as pd
 
-    if summary["corrections"]["settings"]:
+    if summary["corrections"]["found"]:
         context.report.text(
             "The faults of sensors named above are taken out by `mrpipe prepare --settings "
             f"{summary['corrections']['file']}` (and by every later stage with the same option)."
