@@ -21,6 +21,9 @@ from mrpipe.structures import Frame
 ALIKE = 0.01
 """Laws whose responses differ by less than this share have no order."""
 
+FAR_BEYOND = 30.0
+"""A damper moved by this many times the stroke it was tested at is no prediction any more: the response grows."""
+
 STATIONARY = 0.08
 """Where the energy of the base's motion grows this evenly, the first half of it is left out as settling."""
 
@@ -140,15 +143,36 @@ def judged_span(time: FloatArray, ground: FloatArray) -> tuple[float, float]:
     return (half, last) if steady else (float(time[np.searchsorted(share, 0.005)]), last)
 
 
-def predicted(
-    run: LoopRun, frame: Frame, way: Arrangement, position: FloatArray, options: LoopOptions, seed: int
-) -> dict[str, float]:
+@dataclass(frozen=True)
+class Bench:
+    """What the loop is simulated with.
+
+    Attributes
+    ----------
+    frame, position
+        Structure and connectivity vector w, shape (n,).
+    options
+        How the loop is run.
+    seed
+        Of the sensors' noise: every way and law meets the same.
+    tested_stroke_m
+        Largest displacement at which the damper was tested.
+    """
+
+    frame: Frame
+    position: FloatArray
+    options: LoopOptions
+    seed: int
+    tested_stroke_m: float
+
+
+def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
     """Return the indices of a run simulated with its ground acceleration, and its error of the top floor.
 
     Raises
     ------
     DivergedError
-        If the response grows without bound.
+        If the response grows without bound, or far beyond what the damper was tested at.
     """
     time, ground = run.time_s, run.ground_acceleration
 
@@ -157,16 +181,19 @@ def predicted(
 
     span = judged_span(time, ground)
     response = simulate_law(
-        frame,
+        bench.frame,
         way.chain,
         way.controller(run),
         Excitation(float(time[-1]), at, span),
-        options,
-        position=position,
-        # every way and law meets the same noise
-        rng=np.random.default_rng(seed),
+        bench.options,
+        position=bench.position,
+        rng=np.random.default_rng(bench.seed),
     )
+    beyond = float(np.max(np.abs(response.damper_displacement))) / bench.tested_stroke_m
+    if beyond > FAR_BEYOND:
+        raise DivergedError(f"law {run.law}: the damper would move {beyond:.0f} times the stroke it was tested at")
     found = run_indices(response.time_s, span, response.displacement, response.absolute_acceleration, response.force)
+    found["peak_over_tested_stroke"] = beyond
     if run.recorded:
         top = np.interp(time, response.time_s, response.displacement[:, -1])
         measured = run.displacement[:, -1] - np.mean(run.displacement[:, -1])
@@ -192,14 +219,30 @@ def run_indices(
     return found
 
 
-def compare_laws(
-    runs: Sequence[LoopRun],
-    frame: Frame,
-    ways: Mapping[str, Arrangement],
-    position: FloatArray,
-    options: LoopOptions,
-    seed: int,
-) -> dict[str, Any]:
+def best_ways(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench: Bench) -> dict[str, str]:
+    """Return for each law the way of least RMS top displacement in its first run; an earlier one unless it is worse.
+
+    Parameters
+    ----------
+    ways
+        Name -> way, the least changed first; a later one must be better by :data:`ALIKE`.
+    """
+    found = {}
+    for law in dict.fromkeys(run.law for run in runs):
+        run = next(item for item in runs if item.law == law)
+        best, least = next(iter(ways)), float("inf")
+        for name, way in ways.items():
+            try:
+                value = predicted(run, way, bench)["rms_x_top_m"]
+            except DivergedError:
+                continue
+            if value < (1.0 - ALIKE) * least:
+                best, least = name, value
+        found[law] = best
+    return found
+
+
+def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench: Bench) -> dict[str, Any]:
     """Return measured and predicted indices of every run and law, errors, and the ranking of the laws.
 
     Parameters
@@ -221,7 +264,7 @@ def compare_laws(
             )
         for when, way in ways.items():
             try:
-                row[when] = predicted(run, frame, way, position, options, seed)
+                row[when] = predicted(run, way, bench)
             except DivergedError as error:
                 row[when] = {"diverged": str(error)}
         rows.append(row)

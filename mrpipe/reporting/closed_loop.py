@@ -18,6 +18,9 @@ COLUMNS = {
 }
 """Column -> what it is called in figures, and its colour."""
 
+BEYOND = 1.25
+"""Damper motion over the stroke of the bench tests above which a prediction is called an extrapolation."""
+
 WORTH_SAYING = 0.01
 """Change of a law's response below which it is not spoken of."""
 
@@ -38,7 +41,24 @@ def in_words(found: Mapping[str, Any]) -> str:
     parts += [f"The effect {name} is not in the plant: {why}." for name, why in found["plant"]["left_out"].items()]
     if effects and "controller" in found:
         parts.append(controller_in_words(found))
+    parts += _doubts(found["laws"])
     return " ".join(parts)
+
+
+def _doubts(laws: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what to be careful about: responses that grow, and motion beyond what the damper was tested at."""
+    grows = [f"{row['law']} ({when})" for row in laws for when in COLUMNS if "diverged" in row.get(when, {})]
+    far = [
+        f"{row['law']} ({row['after']['peak_over_tested_stroke']:.1f} times)"
+        for row in laws
+        if row.get("after", {}).get("peak_over_tested_stroke", 0.0) > BEYOND
+    ]
+    said = []
+    if grows:
+        said.append(f"The predicted response grows without bound under {', '.join(grows)}.")
+    if far:
+        said.append(f"Beyond the stroke of the bench tests, and so extrapolated: {', '.join(far)}.")
+    return said
 
 
 def ranking_in_words(found: Mapping[str, Any]) -> str:
@@ -65,15 +85,20 @@ def ranking_in_words(found: Mapping[str, Any]) -> str:
 def controller_in_words(found: Mapping[str, Any]) -> str:
     """Return what was renewed in the controller and what it brings."""
     new = found["controller"]
-    factors = [value for value in new["gain_factors"].values() if abs(value - 1.0) > WORTH_SAYING]
     gains = ", ".join(
         f"{law} x {value:.2f}" for law, value in new["gain_factors"].items() if abs(value - 1.0) > WORTH_SAYING
     )
+    parts: dict[str, list[str]] = {}
+    for law, renewed in new["renewed"].items():
+        if renewed != "nothing":
+            parts.setdefault(renewed, []).append(law)
+    taken = "; ".join(f"{renewed} for {', '.join(laws)}" for renewed, laws in parts.items())
     text = (
-        f"A controller that knows the effect: inverse {new['inverse']}; residual force "
-        f"{new['residual_force_before_n']:.1f} N before and {new['residual_force_after_n']:.1f} N after, so it "
-        f"switches off below {new['switch_force_after_n']:.1f} N in place of {new['switch_force_before_n']:.1f} N; "
-        f"{'gains ' + gains if factors else 'gains stay within 1 %'}."
+        f"A controller that knows the effect has its inverse {new['inverse']}, a switch at "
+        f"{new['switch_force_after_n']:.1f} N in place of {new['switch_force_before_n']:.1f} N (the residual force is "
+        f"{new['residual_force_after_n']:.1f} N, without the effect {new['residual_force_before_n']:.1f} N) and "
+        f"{'gains ' + gains if gains else 'the gains it had'}. Of these each law takes what lowers its simulated "
+        f"response: {taken or 'none takes any'}."
     )
     return f"{text} {gain_in_words(found['laws'])}"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import StageContext
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from mrpipe.networks.network import Network
     from mrpipe.signals.prepared import PreparedTest
 
+PARTS = ("inverse", "switch", "gain")
+"""What is renewed in a controller, one after another."""
+
 _LACKING = {
     "identify-frame": "identified frame",
     "calibrate": "calibrated law",
@@ -27,7 +31,7 @@ _LACKING = {
 def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
     """Return the part `closed_loop` of the JSON: each law measured, before, after and recalibrated."""
     from mrpipe.discrepancy.augmented import damper_of, plant_chain
-    from mrpipe.discrepancy.closed_loop import Arrangement, compare_laws
+    from mrpipe.discrepancy.closed_loop import Arrangement, Bench, best_ways, compare_laws
     from mrpipe.structures import read_frame
 
     needed = ["identify-frame", "calibrate"]
@@ -41,18 +45,26 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     position = context.artifact("calibrate").array("position")
     damper = damper_of(traced.selection.base, traced.drive_unit)
     rig = Rig(frame, damper, position, replace(loop_options(context), tracking="damper"))
+    bench = Bench(frame, position, rig.options, context.seed, traced.selection.base.problem.scales.stroke)
     runs, status = _runs(context, rig)
     base, chosen = plant_chain(traced.selection.base), plant_chain(traced.selection.chosen)
-    ways = {"before": Arrangement(base, lambda run: _as_it_ran(context, rig, run))}
+    ways = {
+        "before": Arrangement(base, lambda run: _as_it_ran(context, rig, run)),
+        "after": Arrangement(chosen, lambda run: _as_it_ran(context, rig, run)),
+    }
     found: dict[str, Any] = {"status": status, "plant": _plant_words(traced)}
     if found["plant"]["effects"]:
-        ways["after"] = Arrangement(chosen, lambda run: _as_it_ran(context, rig, run))
         renewed = _renewed(context, traced, rig, tests)
-        found["controller"] = renewed.summary
-        ways["recalibrated"] = Arrangement(chosen, lambda run: _renewed_controller(context, rig, run, renewed))
-    else:
-        ways["after"] = Arrangement(chosen, lambda run: _as_it_ran(context, rig, run))
-    return {**found, **compare_laws(runs, frame, ways, position, rig.options, context.seed)}
+        offered = {
+            ", ".join(parts) or "nothing": Arrangement(
+                chosen, partial(_renewed_controller, context, rig, renewed, parts)
+            )
+            for parts in ((), ("inverse",), ("inverse", "switch"), ("inverse", "switch", "gain"))
+        }
+        taken = best_ways(runs, offered, bench)
+        found["controller"] = {**renewed.summary, "renewed": taken}
+        ways["recalibrated"] = Arrangement(chosen, lambda run: offered[taken[run.law]].controller(run))
+    return {**found, **compare_laws(runs, ways, bench)}
 
 
 def _runs(context: StageContext, rig: Rig) -> tuple[list[LoopRun], str]:
@@ -105,9 +117,6 @@ class Renewed:
 
     inverse: Network | InverseTable | None
     threshold_n: float
-    before: ForceInUse
-    after: ForceInUse
-    amplitude_m: float
     factors: dict[str, float]
     summary: dict[str, Any]
 
@@ -153,7 +162,7 @@ def _renewed(context: StageContext, traced: Tracing, rig: Rig, tests: list[Prepa
         inverse = _retrained(context, traced, tests, limit, summary)
     factors = _factors(context, before, after, omega, amplitude)
     summary["gain_factors"] = factors
-    return Renewed(inverse, threshold, before, after, amplitude, factors, summary)
+    return Renewed(inverse, threshold, factors, summary)
 
 
 def _working_drive(rig: Rig, force_n: float, limit: float) -> float:
@@ -202,12 +211,15 @@ def _factors(
     }
 
 
-def _renewed_controller(context: StageContext, rig: Rig, run: LoopRun, renewed: Renewed) -> Controller:
+def _renewed_controller(
+    context: StageContext, rig: Rig, renewed: Renewed, parts: tuple[str, ...], run: LoopRun
+) -> Controller:
+    """Return the controller of a run with some of its parts (`inverse`, `switch`, `gain`) renewed."""
     from mrpipe.control.controller import PASSIVE, Gains
     from mrpipe.control.storage import read_gains
     from mrpipe.discrepancy.recalibration import scaled
 
-    factor = renewed.factors.get(run.law, 1.0)
+    factor = renewed.factors.get(run.law, 1.0) if "gain" in parts else 1.0
     gains = _given_gains(run)
     if gains is None:
         gains = Gains() if run.law in PASSIVE else read_gains(context.artifact("calibrate"), run.law)
@@ -217,7 +229,7 @@ def _renewed_controller(context: StageContext, rig: Rig, run: LoopRun, renewed: 
         rig.frame,
         rig.damper,
         scaled(run.law, gains, factor),
-        inverse=renewed.inverse,
-        residual_force_n=renewed.threshold_n,
+        inverse=renewed.inverse if "inverse" in parts else None,
+        residual_force_n=renewed.threshold_n if "switch" in parts else None,
         reference_factor=factor,
     )

@@ -80,6 +80,7 @@ def test_words_table_and_figure_of_a_comparison() -> None:
             "switch_force_before_n": 18.0,
             "switch_force_after_n": 24.5,
             "gain_factors": {"vd": 0.9, "fdns": 1.0},
+            "renewed": {"vd": "inverse, switch", "vdps": "nothing", "fdns": "inverse, switch"},
         },
     }
     text = in_words(found)

@@ -1,0 +1,167 @@
+"""The stage as a whole on a small traced campaign: closed loop of every law, files for prepare and record, words."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrpipe.artifacts import ArtifactWriter, Provenance
+from mrpipe.config.loader import load_config
+from mrpipe.config.model import Config
+from mrpipe.control.calibration import CalibrationOptions, calibrate
+from mrpipe.control.lqg import Weights
+from mrpipe.control.neural import ReferenceOptions, train_reference
+from mrpipe.control.storage import write_calibration
+from mrpipe.discrepancy.summary import UNATTRIBUTED, Tracing, TracingOptions
+from mrpipe.discrepancy.tracing import trace_campaign
+from mrpipe.effects.library import damper_effects
+from mrpipe.pipeline.settings_view import SettingsView
+from mrpipe.pipeline.stage import StageContext
+from mrpipe.reporting.headlines import in_brief
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.stages import close_loop
+from mrpipe.stages.close_loop_laws import closed_loop
+from mrpipe.stages.close_loop_report import report
+from mrpipe.stages.simulate import LAWS
+from mrpipe.structures import floor_position, frame_from_parameter_set
+from mrpipe.structures.frame import write_frame
+from tests.discrepancy.rig import campaign
+
+SETTINGS: dict[str, Any] = {
+    "simulate": {
+        "controller": {"inverse": "model"},
+        "excitation": {"cycles": 10, "settling_cycles": 5, "decay_s": 1.0, "base_amplitude_m_s2": 0.788},
+    }
+}
+
+
+@dataclass
+class Sink:
+    """A report that only remembers."""
+
+    texts: list[str] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+
+    def text(self, paragraph: str) -> None:
+        self.texts.append(paragraph)
+
+    def table(self, name: str, frame: Any, caption: str) -> None:
+        self.names.append(name)
+
+    def figure(self, name: str, figure: Any, caption: str) -> None:
+        self.names.append(name)
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Write a frame and its calibration."""
+    folder = tmp_path_factory.mktemp("inputs")
+    frame = frame_from_parameter_set("thesis")
+    position = floor_position(frame.floors, 1)
+    calibration = calibrate(frame, position, CalibrationOptions())
+    quick = ReferenceOptions(3000.0, (0.005, 0.01, 0.015), (1.0, 1.3), hidden=(4,), starts=1, iterations=15, rows=1500)
+    reference = train_reference(quick, np.random.default_rng(0))
+    provenance = Provenance("test", "", {}, 0)
+    with ArtifactWriter.create(folder / "frame.h5", provenance) as artifact:
+        write_frame(artifact, frame)
+    with ArtifactWriter.create(folder / "control.h5", provenance) as artifact:
+        write_calibration(artifact, calibration, position, Weights(), reference, 0.005)
+    return {"identify-frame": folder / "frame.h5", "calibrate": folder / "control.h5"}
+
+
+@pytest.fixture(scope="module")
+def tests() -> list[PreparedTest]:
+    # a few of them do: what is tested is what becomes of a verdict
+    return [test for k, test in enumerate(campaign("accumulator")) if k in (0, 1, 3, 6, 8, 11, 12)]
+
+
+@pytest.fixture(scope="module")
+def traced(tests: list[PreparedTest]) -> Tracing:
+    library = {name: damper_effects()[name] for name in ("accumulator",)}
+    options = TracingOptions(refits=1, bootstrap_draws=50, most_effects=1, observation_filter=False)
+    return trace_campaign(tests, library, [], options, rng=np.random.default_rng(1))
+
+
+def context(tmp_path: Path, inputs: dict[str, Path], **changes: Any) -> StageContext:
+    config = Config.model_validate({**SETTINGS, **changes})
+    return StageContext(
+        "close-loop", SettingsView(config, close_loop.STAGE.settings, "close-loop"), inputs, tmp_path,
+        np.random.default_rng(0), 0, 1, lambda fraction, text="": None, Sink(), logging.getLogger("test"),
+        Provenance("close-loop", "", {}, 0),
+    )  # fmt: skip
+
+
+@pytest.mark.planted
+def test_every_law_runs_before_after_and_recalibrated(
+    tmp_path: Path, inputs: dict[str, Path], tests: list[PreparedTest], traced: Tracing
+) -> None:
+    own = context(tmp_path, inputs)
+    found = closed_loop(own, traced, tests)
+    assert found["status"] == "predicted alone under harmonic excitation: no closed-loop recordings"
+    assert [row["law"] for row in found["laws"]] == list(LAWS)
+    assert found["plant"] == {"effects": ["accumulator"], "left_out": {}}
+    assert found["controller"]["inverse"] == "rebuilt from the damper with its effects"
+    assert set(found["ranking"]) == {"before", "after", "recalibrated"}
+    for row in found["laws"]:
+        assert 0.001 < row["after"]["rms_x_top_m"] < 0.5
+        # what is renewed is taken where it helps
+        assert row["recalibrated"]["rms_x_top_m"] < 1.001 * row["after"]["rms_x_top_m"]
+    assert set(found["controller"]["renewed"]) == set(LAWS)
+    summary = {"campaign": "c", **traced.summary, "closed_loop": found}
+    summary["corrections"] = close_loop._corrections(own, traced, tests)
+    summary["next_tests"] = close_loop._next_tests(own, traced, {})
+    report(own, traced, summary)
+    sink = own.report
+    assert isinstance(sink, Sink)
+    for name in ("where", "maps", "ranking", "candidates", "loops", "errors", "tests", "laws"):
+        assert name in sink.names
+    lines = in_brief("close-loop", summary)
+    assert any("effect accumulator" in line for line in lines)
+    assert any("ranking of the laws" in line for line in lines)
+
+
+@pytest.mark.property
+def test_without_a_frame_the_closed_loop_is_skipped(tmp_path: Path, tests: list[PreparedTest], traced: Tracing) -> None:
+    found = closed_loop(context(tmp_path, {}), traced, tests)
+    assert found == {"status": "skipped: there is no identified frame and no calibrated law"}
+
+
+@pytest.mark.property
+def test_a_flexible_model_is_said_not_to_be_in_the_plant(
+    tmp_path: Path, inputs: dict[str, Path], tests: list[PreparedTest], traced: Tracing
+) -> None:
+    bare = replace(
+        traced,
+        summary={**traced.summary, "effects": [UNATTRIBUTED]},
+        selection=replace(traced.selection, chosen=traced.selection.base),
+        named=(),
+    )
+    found = closed_loop(context(tmp_path, inputs), bare, tests)
+    assert found["plant"]["effects"] == []
+    assert "cannot run in a loop" in found["plant"]["left_out"]["unattributed"]
+    assert not found["ranking_changes"]
+    assert "recalibrated" not in found["ranking"]
+
+
+@pytest.mark.property
+def test_files_are_settings_that_keep_what_was_there(
+    tmp_path: Path, tests: list[PreparedTest], traced: Tracing
+) -> None:
+    base = tmp_path / "config.yaml"
+    base.write_text("name: x\n", encoding="utf-8")
+    there = {"bench": {"tests": [{"name": "own", "motion": "triangle"}]}}
+    known = {"corrections": {"force_offset_n": {"00-sine": 2.0}}}
+    own = context(tmp_path, {}, laboratory=there, prepare=known)
+    tie = {**traced.summary["effects"][0], "tied_with": ["inertia"]}
+    tied = replace(traced, summary={**traced.summary, "effects": [tie]})
+    assert not close_loop._corrections(own, tied, tests)["found"]
+    wanted = close_loop._next_tests(own, tied, {})
+    assert wanted["decides"][0]["decides"] == "accumulator or inertia"
+    config = load_config(base, [], [tmp_path / "corrections.yaml", tmp_path / "next-tests.yaml"]).config
+    assert config.prepare.corrections.force_offset_n == {"00-sine": 2.0}
+    assert [item.name for item in config.laboratory.bench.tests] == ["own", *(item["name"] for item in wanted["tests"])]
