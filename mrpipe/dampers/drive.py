@@ -52,6 +52,19 @@ def lag_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: fl
 
 
 @njit(STEP_SIGNATURE, cache=True)
+def lag_apart_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: eta of a rising and of a falling effective drive [1/s]. State: effective drive, last command."""
+    if wire[FIRST] > 0.5:
+        state[0] = wire[DRIVE]
+    else:
+        # the rate goes by where the command stands over the interval
+        rate = parameters[0] if abs(wire[DRIVE]) + abs(state[1]) > 2.0 * abs(state[0]) else parameters[1]
+        state[0] = advance_lag(state[0], state[1], wire[DRIVE], rate * dt)
+    state[1] = wire[DRIVE]
+    wire[CURRENT] = state[0]
+
+
+@njit(STEP_SIGNATURE, cache=True)
 def polynomial_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: four coefficients of the yield force [N, N/A, ...], four of the viscosity [N s/m, ...]."""
     u = wire[CURRENT]
@@ -74,6 +87,11 @@ def command_place(chain: Chain) -> int:
         if function is lag_step:
             return int(at) + 1
     return -1
+
+
+def driver_lag_apart(rise: float, fall: float) -> Step:
+    """Return the driver's lag with rates [1/s] of their own where the effective drive rises and where it falls."""
+    return Step("driver-lag", Phase.CURRENT, lag_apart_step, np.array([float(rise), float(fall)]), state_size=2)
 
 
 def polynomial_coefficients(yield_force: Sequence[float] | FloatArray, viscosity: Sequence[float] | FloatArray) -> Step:

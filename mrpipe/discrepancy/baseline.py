@@ -11,6 +11,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.discrepancy.engine import Fit, fit, start_of
 from mrpipe.discrepancy.problem import BaseForm, Problem, Term
 from mrpipe.discrepancy.recordings import Recordings
+from mrpipe.discrepancy.screen import screen
 from mrpipe.discrepancy.weights import force_deviation, noise_of_repeats, repeated_pairs, sensor_deviation
 from mrpipe.effects.contract import Effect
 
@@ -32,12 +33,15 @@ class Baseline:
         Standard deviation of the force that noise explains [N], shape (n,).
     repeats
         Number of repeated pairs that told the noise.
+    model_error
+        Whether weights go by what a model cannot follow: the base form itself is in question, the noise is not.
     """
 
     fit: Fit
     noise: float
     deviation: FloatArray
     repeats: int
+    model_error: bool = False
 
 
 def base_form(recordings: Recordings, name: str, yield_order: int, viscosity_order: int) -> BaseForm:
@@ -136,6 +140,15 @@ def _with_declared(before: Fit, effect: Effect) -> Fit:
         start[: len(before.theta)] = before.theta
         fits.append(fit(problem, start, iterations=12))
     return min(fits, key=lambda item: item.cost * (1.0 + 0.01 * len(item.problem.terms[-1].form.parameters)))
+
+
+def with_form(before: Fit, effect: Effect, name: str, *, iterations: int = 12) -> Fit:
+    """Return the fit with one more effect in a form of this name, started at the screened point of its grid."""
+    term = Term(effect, effect.form(name))
+    problem = replace(before.problem, terms=(*before.problem.terms, term))
+    start = start_of(problem, before.base_values, [*before.term_values, screen(before, [term])[0].values])
+    start[: len(before.theta)] = before.theta
+    return fit(problem, start, iterations=iterations)
 
 
 def noise_level_of(found: Fit) -> tuple[float, int]:

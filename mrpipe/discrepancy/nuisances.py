@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.discrepancy.engine import Fit, fit
+from mrpipe.discrepancy.engine import Fit, fit, start_of
 from mrpipe.discrepancy.recordings import Recordings
 
 WINDOW_SHARES = (0.05, 0.1, 0.15)
 LEAST_GAIN = 0.05
-"""A filter is believed in only if it takes this share of the sum of squares."""
+"""A filter, or a lag of the drive that falls otherwise than it rises, is believed in only if it takes this share of the
+sum of squares."""
 
 
 def record_gains(recordings: Recordings, measured: FloatArray, simulated: FloatArray) -> dict[str, float]:
@@ -46,6 +47,17 @@ def observation_window(found: Fit, shares: Sequence[float] = WINDOW_SHARES) -> t
         best = min(trials, key=lambda share: trials[share].cost)
         width *= 0.5
     return best, trials[best]
+
+
+def with_lag_apart(found: Fit) -> Fit:
+    """Return the fit with rates of its own for the falling drive, or the same fit where that is not worth it."""
+    base = found.problem.base
+    if not base.lag_known or base.lag_apart:
+        return found
+    problem = replace(found.problem, base=replace(base, lag_apart=True))
+    values = {**found.base_values, "eta_fall": found.base_values["eta"]}
+    trial = fit(problem, start_of(problem, values, found.term_values), iterations=12)
+    return trial if trial.cost < (1.0 - LEAST_GAIN) * found.cost else found
 
 
 def _with(found: Fit, share: float) -> Fit:

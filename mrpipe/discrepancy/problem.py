@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.drive import driver_lag, polynomial_coefficients
+from mrpipe.dampers.drive import driver_lag, driver_lag_apart, polynomial_coefficients
 from mrpipe.dampers.hysteresis import hysteresis
 from mrpipe.dampers.plant import Step
 from mrpipe.discrepancy.recordings import Recordings
@@ -27,6 +27,7 @@ class BaseForm:
     yield_order: int = 3
     viscosity_order: int = 1
     lag_known: bool = True
+    lag_apart: bool = False
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return what is searched."""
@@ -37,6 +38,8 @@ class BaseForm:
             found.append(shape("exponent", "1", "n of (2.2)", "one", 1.0, 8.0, (1.9,)))
         if self.lag_known:
             found.append(shape("eta", "1/s", "rate of the drive's lag", "one", 2.0, 3000.0, (100.0,)))
+        if self.lag_known and self.lag_apart:
+            found.append(shape("eta_fall", "1/s", "rate where the drive falls", "one", 2.0, 3000.0, (100.0,)))
         return tuple(found)
 
     def steps(self, values: Mapping[str, float], yield_force: FloatArray, viscosity: FloatArray) -> list[Step]:
@@ -50,7 +53,8 @@ class BaseForm:
             ),
         ]
         if self.lag_known:
-            steps.append(driver_lag(values["eta"]))
+            apart = "eta_fall" in values
+            steps.append(driver_lag_apart(values["eta"], values["eta_fall"]) if apart else driver_lag(values["eta"]))
         return steps
 
 

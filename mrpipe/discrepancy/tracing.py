@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
-from mrpipe.discrepancy.baseline import Baseline, base_form, fit_baseline, noise_level_of
+from mrpipe.discrepancy.baseline import Baseline, base_form, fit_baseline, noise_level_of, with_form
 from mrpipe.discrepancy.ceiling import flexible_chi_square
 from mrpipe.discrepancy.crossvalidation import Gain, gain_of, intervals, left_out_residual
 from mrpipe.discrepancy.engine import Fit
-from mrpipe.discrepancy.nuisances import observation_window
+from mrpipe.discrepancy.nuisances import observation_window, with_lag_apart
 from mrpipe.discrepancy.offsets import offset_between_tests
 from mrpipe.discrepancy.problem import Term
 from mrpipe.discrepancy.recordings import Recordings, drive_jumps, enough_tests, record_tests, spread_tests
@@ -22,6 +22,7 @@ from mrpipe.discrepancy.summary import FLEXIBLE_SHARE, Summary, Tracing, Tracing
 from mrpipe.discrepancy.testability import untestable
 from mrpipe.discrepancy.verdict import Named, clear_lead, confidence_of, parameter_table, tied, unnamed_reason
 from mrpipe.effects.contract import Effect
+from mrpipe.effects.yielding_parts import with_yielding_parts
 from mrpipe.signals.prepared import PreparedTest
 
 MODEL_ERROR_CHI_SQUARE = 6.0
@@ -65,7 +66,9 @@ def trace_campaign(
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
     baseline, selection = _select(training, able, declared, options, jobs, progress)
-    window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
+    window = selection.base.problem.window_share
+    if not baseline.model_error:
+        window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
     reason = unnamed_reason(selection, options.rules)
     if reason:
@@ -99,15 +102,17 @@ def _select(
     own = list(declared)
     if options.model == "rate-dependent-yield":
         own.append(effects["rate-dependent-yield"])
-    terms = [Term(effect, form) for effect in effects.values() for form in effect.forms]
     floor = 0.0
     while True:
         baseline = fit_baseline(training, base, own, model_error_share=floor)
         progress(0.2, "candidates")
+        if floor > 0.0:
+            effects = with_yielding_parts(effects)
+            baseline = _without_nuisances(baseline, effects, options)
         selection = forward_selection(
             baseline.fit,
             baseline.noise,
-            terms,
+            [Term(effect, form) for effect in effects.values() for form in effect.forms],
             most=options.most_effects,
             refits=options.refits,
             thresholds=REAL_THRESHOLDS if floor > 0.0 else Thresholds(),
@@ -131,6 +136,22 @@ def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tup
     if not baseline.repeats or noise >= baseline.noise:
         return baseline, selection
     return replace(baseline, noise=noise), selection.with_floor(noise)
+
+
+def _without_nuisances(baseline: Baseline, effects: Mapping[str, Effect], options: TracingOptions) -> Baseline:
+    """Return the baseline with a drive lag that falls otherwise than it rises, and with the records' filter, if any.
+
+    Whether the records went through a filter is judged with the yield rounded: both round the corners of a loop.
+    """
+    found = with_lag_apart(baseline.fit)
+    rate = effects.get("rate-dependent-yield")
+    present = {term.effect.name for term in found.problem.terms}
+    if options.observation_filter and rate is not None and bool(np.all(found.problem.recordings.period_s > 0.0)):
+        rounded = found if rate.name in present else with_form(found, rate, "own-dashpot")
+        share = observation_window(rounded)[0]
+        if share > 0.0:
+            found = observation_window(found, (share,))[1]
+    return replace(baseline, fit=found, model_error=True)
 
 
 def _judged_by_trees(selection: Selection) -> Selection:

@@ -120,7 +120,7 @@ class Pipeline:
         missing = ""
         for item in stage.inputs:
             missing = missing or self._provide(item)
-        together = all(self._can_be_had(item) for item in stage.optional_inputs)
+        together = all(self._is_to_be_had(item) for item in stage.optional_inputs)
         for item in stage.optional_inputs:
             if self._wanted(item, together):
                 self._provide(item)
@@ -147,6 +147,14 @@ class Pipeline:
         if provider is None:
             return self.input_path(name) is not None
         return all(self._can_be_had(item) for item in self.stages[provider].inputs)
+
+    def _is_to_be_had(self, name: str) -> bool:
+        """Return whether an optional input can be had for this campaign: nothing is recorded beside a given one."""
+        if not self._can_be_had(name):
+            return False
+        provider = self.provider(name)
+        spared = provider is not None and self.campaign_given and self.needs_laboratory(name)
+        return not spared or (provider is not None and self._is_fresh(provider))
 
     def _wanted(self, name: str, together: bool) -> bool:
         """Return whether to bring an optional input up to date: they serve together, so one that lacks spares all.
