@@ -84,7 +84,7 @@ def command_place(chain: Chain) -> int:
     controller; the lag takes it as straight between the ends of a step otherwise.
     """
     for function, at in zip(chain.functions, chain.state_offsets, strict=False):
-        if function is lag_step:
+        if function is lag_step or function is lag_apart_step:
             return int(at) + 1
     return -1
 

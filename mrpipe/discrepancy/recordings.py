@@ -27,6 +27,9 @@ MOST_TESTS = 48
 MOST_SAMPLES = 50_000
 """Of long campaigns only so many samples are used, the same time of every test."""
 
+MOST_JUDGED = 200_000
+"""Errors on validation tests are judged on up to so many samples: they are simulated once, not fitted."""
+
 ACCELERATION_CUTOFF_HZ = 40.0
 """Least cut-off of a measured acceleration."""
 
@@ -138,7 +141,12 @@ class Recordings:
 
 
 def record_tests(
-    tests: Sequence[PreparedTest], *, rate_hz: float = 500.0, cutoff_hz: float = 0.0, longest_s: float = 60.0
+    tests: Sequence[PreparedTest],
+    *,
+    rate_hz: float = 500.0,
+    cutoff_hz: float = 0.0,
+    longest_s: float = 60.0,
+    most_samples: int = MOST_SAMPLES,
 ) -> Recordings:
     """Lay prepared tests end to end.
 
@@ -153,6 +161,8 @@ def record_tests(
         Cut-off of the displacement; 0 chooses it for each test by criterion.
     longest_s
         Of longer tests only so much is used.
+    most_samples
+        Of campaigns that hold more only so many are used, the same time of every test.
     """
     offsets = np.array([test.displacement_offset_m for test in tests])
     stroke = max(0.5 * float(np.ptp(test.displacement_m)) for test in tests)
@@ -160,7 +170,7 @@ def record_tests(
     trusted = offsets[periodic] if periodic.any() else offsets
     one = bool(np.std(trusted) < STEADY_OFFSET_SHARE * stroke)
     shared = float(np.median(trusted))
-    longest_s = min(longest_s, max(MOST_SAMPLES / (rate_hz * len(tests)), 4.0))
+    longest_s = min(longest_s, max(most_samples / (rate_hz * len(tests)), 4.0))
     rows = [
         _one_test(test, rate_hz, cutoff_hz, shared if one else test.displacement_offset_m, longest_s) for test in tests
     ]

@@ -13,7 +13,7 @@ from mrpipe.discrepancy.baseline import Baseline, ladder
 from mrpipe.discrepancy.ceiling import flexible_residual
 from mrpipe.discrepancy.engine import predict
 from mrpipe.discrepancy.errors import Score, campaign_offset, measured_force, score
-from mrpipe.discrepancy.nuisances import record_gains
+from mrpipe.discrepancy.nuisances import RecordGain, record_gains, session_gain
 from mrpipe.discrepancy.offsets import OffsetFinding
 from mrpipe.discrepancy.recordings import Recordings
 from mrpipe.discrepancy.select import Selection
@@ -107,8 +107,10 @@ class Summary:
         shared = campaign_offset(selection.chosen.test_offsets, training.force_rms)
         measured = measured_force(validation, after, shared)
         gains = record_gains(validation, measured, after)
+        session = session_gain(validation, measured, after, self._training_gains())
         if options.record_gain:
-            factor = np.array([gains.get(name, 1.0) for name in validation.names])[validation.test]
+            values = {name: item.value for name, item in gains.items()}
+            factor = np.array([values.get(name, 1.0) for name in validation.names])[validation.test]
             before, after = before * factor, after * factor
         shifted = before
         if self.offsets is not None:
@@ -154,7 +156,9 @@ class Summary:
             },
             "base_form": self._ladder(options, measured, effects.get("rate-dependent-yield")),
             "nuisances": {
-                "gain": {name: value for name, value in gains.items() if abs(value - 1.0) > 0.03},
+                "gain": {name: item.value for name, item in gains.items() if item.deviates},
+                "gain_interval": {name: list(item.interval) for name, item in gains.items() if item.deviates},
+                "session_gain": session.as_json() if session is not None else None,
                 "channel_skew_s": _value(named, "channel-skew", "skew"),
                 "observation_filter_s": window * float(np.median(training.period_s)),
                 "observation_filter_share_of_period": window,
@@ -210,6 +214,13 @@ class Summary:
         excess = self.baseline.noise / max(float(np.mean(expected[root > 0.0] ** 2)), 1e-12)
         deviation = sensor_deviation(fitted, self.validation)[used] * np.sqrt(excess)
         return float(np.sqrt(np.mean(deviation**2)) / max(np.sqrt(np.mean(measured[used] ** 2)), 1e-12))
+
+    def _training_gains(self) -> dict[str, RecordGain]:
+        fitted, recordings = self.selection.chosen, self.training
+        root = fitted.problem.root_weight
+        measured = recordings.force - fitted.test_offsets[recordings.test]
+        residual = np.divide(fitted.residual, root, out=np.zeros_like(root), where=root > 0.0)
+        return record_gains(recordings, measured, measured - residual)
 
     def _candidate_errors(self, measured: FloatArray) -> dict[str, float]:
         if not self.selection.rounds:

@@ -16,7 +16,14 @@ from mrpipe.discrepancy.engine import Fit
 from mrpipe.discrepancy.nuisances import observation_window, with_lag_apart
 from mrpipe.discrepancy.offsets import offset_between_tests
 from mrpipe.discrepancy.problem import Term
-from mrpipe.discrepancy.recordings import Recordings, drive_jumps, enough_tests, record_tests, spread_tests
+from mrpipe.discrepancy.recordings import (
+    MOST_JUDGED,
+    Recordings,
+    drive_jumps,
+    enough_tests,
+    record_tests,
+    spread_tests,
+)
 from mrpipe.discrepancy.select import Selection, Thresholds, forward_selection
 from mrpipe.discrepancy.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions
 from mrpipe.discrepancy.testability import untestable
@@ -62,7 +69,8 @@ def trace_campaign(
         rate = max(rate, JUMP_RATE_HZ)
     usable = spread_tests(enough_tests([t for t in tests if t.role != "validation"]))
     training = record_tests(usable, rate_hz=rate, cutoff_hz=cutoff)
-    validation = record_tests([t for t in tests if t.role == "validation"], rate_hz=rate, cutoff_hz=cutoff)
+    judged = [t for t in tests if t.role == "validation"]
+    validation = record_tests(judged, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
     baseline, selection = _select(training, able, declared, options, jobs, progress)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lsim
 
-from mrpipe.dampers.drive import advance_lag, driver_lag, lag_series, polynomial_coefficients
+from mrpipe.dampers.drive import advance_lag, driver_lag, driver_lag_apart, lag_series, polynomial_coefficients
 from mrpipe.dampers.plant import CURRENT, VISCOSITY, YIELD_FORCE, build_chain, run_chain
 
 numbers = st.floats(-5.0, 5.0)
@@ -34,6 +34,22 @@ def test_the_lag_agrees_with_scipys_first_order_hold():
     _, expected, _ = lsim(([[-100.0]], [[100.0]], [[1.0]], [[0.0]]), drive, times, X0=[drive[0]], interp=True)
     lagged = lag_series(drive, np.array([0, len(times)]), np.array([1e-3]), 100.0)
     np.testing.assert_allclose(lagged, expected, atol=1e-11)
+
+
+@pytest.mark.property
+def test_a_drive_rises_and_falls_with_rates_of_its_own():
+    drive = np.repeat([0.0, 2.0, 0.0], 200)
+    zero = np.zeros(600)
+    step = driver_lag_apart(100.0, 30.0)
+    u = run_chain(build_chain([polynomial_coefficients([1.0], [1.0]), step]), zero, zero, zero, drive, 1e-3)[:, CURRENT]
+    # within a millisecond the command runs straight from one level to the other: half a sample of the rise is left out
+    assert u[210:390] == pytest.approx(2.0 - 2.0 * np.exp(-100.0 * (np.arange(210, 390) - 199.5) * 1e-3), abs=1e-3)
+    assert u[410:590] == pytest.approx(u[400] * np.exp(-30.0 * (np.arange(410, 590) - 400) * 1e-3), rel=1e-3)
+    both = [
+        run_chain(build_chain([polynomial_coefficients([1.0], [1.0]), item]), zero, zero, zero, drive, 1e-3)[:, CURRENT]
+        for item in (driver_lag(50.0), driver_lag_apart(50.0, 50.0))
+    ]
+    np.testing.assert_allclose(both[0], both[1])
 
 
 @pytest.mark.property

@@ -116,6 +116,20 @@ def test_optional_inputs_serve_together_so_one_that_lacks_spares_all(make_pipeli
     assert CALLS == ["third"]
 
 
+def test_beside_a_given_campaign_nothing_is_built_for_optional_inputs_that_would_have_to_be_recorded(
+    make_pipeline: MakePipeline,
+) -> None:
+    recorder = replace(STAGES["first"], name="record-frame", outputs=("frame",))
+    third = replace(STAGES["third"], optional_inputs=("second", "campaign:frame"))
+    pipeline = make_pipeline(
+        {**STAGES, "record-frame": recorder, "third": third},
+        campaigns={"bench": None, "frame": "laboratory", "closed_loop": None},
+    )
+    pipeline.campaign_given = True
+    assert pipeline.build("third").what == "skipped"
+    assert CALLS == ["third"]
+
+
 def test_undeclared_setting_is_refused(make_pipeline: MakePipeline) -> None:
     def run(context: StageContext) -> Mapping[str, Any]:
         return {"order": context.settings.prepare.order}
