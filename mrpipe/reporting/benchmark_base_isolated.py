@@ -175,6 +175,7 @@ def _histories(sink: figures.Sink, result: IsolationResult) -> None:
         {"y": components[:, 1]},
         components[:, 0],
         quantity="ground acceleration [m/s^2]",
-        title=f"{result.motion.name}: x in grey",
+        title=result.motion.name,
+        reference_name="x",
     )
     sink.figure("motion", picture, "The two components of the ground motion (Figure 6.3).")

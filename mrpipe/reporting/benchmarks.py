@@ -40,6 +40,7 @@ def histories(
     quantity: str,
     title: str = "",
     until_s: float | None = None,
+    reference_name: str = "uncontrolled",
 ) -> Figure:
     """Return the history of one quantity under several laws, the uncontrolled one in grey.
 
@@ -57,11 +58,13 @@ def histories(
         Of the figure.
     until_s
         Time shown; all if left out.
+    reference_name
+        Legend of the grey curve.
     """
     figure, axes = figure_with_axes(1, 1, width=9.0, height=3.2)
     axis = axes[0, 0]
     shown = _thinned(len(time_s))
-    axis.plot(time_s[shown], reference[shown], color=MEASURED, linewidth=0.5, alpha=0.6, label="uncontrolled")
+    axis.plot(time_s[shown], reference[shown], color=MEASURED, linewidth=0.5, alpha=0.6, label=reference_name)
     for colour, (law, values) in zip(COLOURS, curves.items(), strict=False):
         axis.plot(time_s[shown], values[shown], color=colour, linewidth=0.8, label=law)
     if until_s is not None:
@@ -129,7 +132,8 @@ def index_bars(indices: Mapping[str, Mapping[str, float]], thesis: Mapping[str, 
     """
     laws = list(indices)
     names = [name for name in next(iter(indices.values())) if name.startswith("J")]
-    names = [name for name in names if max(abs(indices[law].get(name, 0.0)) for law in laws) < 10.0]
+    shown = [*indices.values(), *(thesis[law] for law in laws if law in thesis)]
+    names = [name for name in names if max(abs(values.get(name, 0.0)) for values in shown) < 10.0]
     figure, axes = figure_with_axes(1, 1, width=9.0, height=3.4)
     axis = axes[0, 0]
     width = 0.8 / max(len(laws), 1)
@@ -168,6 +172,8 @@ def sensitivity(
     for number, (name, values) in enumerate(indices.items()):
         style = "-" if number < len(COLOURS) else "--"
         axis.semilogx(capacities, values, style, color=COLOURS[number % 8], marker="o", markersize=3, label=name)
+    axis.set_xticks(list(capacities), [f"{value:g}" for value in capacities])
+    axis.set_xticks([], minor=True)
     axis.legend(fontsize=7, ncols=3)
     label(axis, unit, "index [1]", title)
     return figure
