@@ -32,10 +32,10 @@ THESIS = {law: dict(zip(_NAMES, values, strict=True)) for law, values in _PRINTE
 REASON = (
     "Two dampers of 1000 kN (1.4 MN at 10 V and 0.55 m/s) stand against some 15 to 25 MN of base shear, so J6 of MR "
     "dampers cannot exceed about 0.1 (lqg has ideal actuators without a limit) and J3 and J7 cannot change as printed; "
-    "J9 is a share of energy and cannot exceed 1, as the printed 1.89 does (errata row 20). Table 6.1 is in volts, 0 to "
-    "10, where the thesis has kN/A and kN/V (row 17). The thesis does not print its gains; here vd, vdns and fdns give "
-    "the isolation modes one damping ratio, by complex eigenvalues; the closed forms (4.13) to (4.25) take a device that "
-    "changes the mode little, which does not hold here."
+    "J9 is a share of energy and cannot exceed 1, as the printed 1.89 does (errata row 20). Table 6.1 is in volts, 0 "
+    "to 10, where the thesis has kN/A and kN/V (row 17). The thesis does not print its gains; here vd, vdns and fdns "
+    "give the isolation modes one damping ratio, by complex eigenvalues; the closed forms (4.13) to (4.25) take a "
+    "device that changes the mode little, which does not hold here."
 )
 """Why our figures differ from the printed ones."""
 

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mrpipe.control.benchmark_lqg import observer_gain
 from mrpipe.errors import UserError
 from mrpipe.simulation.benchmark_indices import WIND_FLOORS, WindResponse, wind_indices
 from mrpipe.simulation.benchmark_isolation_design import LqgWeights
 from mrpipe.simulation.benchmark_laws import LAWS
 from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, simulate
 from mrpipe.simulation.benchmark_wind import WindStudy, wind_response, wind_sensitivity, wind_study
+from mrpipe.simulation.benchmark_wind_design import CORRELATION_S, SENSOR_DENSITY, wind_outputs
 from mrpipe.structures.benchmark_wind import HEIGHT_M, WIDTH_M, Tower, place_device, surrogate_tower
 from mrpipe.structures.dynamics import discretise_first_order
 from mrpipe.structures.wind import WindLoad, synthetic_wind
@@ -160,6 +162,30 @@ def test_lqg_loop_in_the_kernel_is_the_joint_linear_system(outrigger: WindStudy)
         z = step @ z + now @ fine[k] + after @ fine[k + 1] - pulse @ force
     assert ours.forces[-1, 0] == pytest.approx(force[0], rel=1e-6)
     np.testing.assert_allclose(ours.positions[-1], z[: modal.modes], rtol=1e-6, atol=1e-9 * np.abs(z).max())
+
+
+@pytest.mark.oracle
+def test_lqg_of_the_tower_agrees_with_python_control(outrigger: WindStudy) -> None:
+    """Appendix E on the 46 states, outputs with feedthrough and noises that correlate, to 1e-9."""
+    import control
+
+    modal, load = outrigger.modal, outrigger.load
+    A, B, E = modal.state_matrix(), modal.input_matrix(modal.devices), modal.input_matrix(modal.load)
+    regulated, measured = wind_outputs(modal)
+    Q = np.diag([1000.0] * 9 + [0.0] * 9 + [10.0] * 9)
+    R = np.eye(1) / outrigger.lqg_force_n**2
+    state, cost = regulated.C.T @ Q @ regulated.C, regulated.D.T @ Q @ regulated.D + R
+    cross = regulated.C.T @ Q @ regulated.D
+    feedback, _, _ = control.lqr(A, B, 0.5 * (state + state.T), 0.5 * (cost + cost.T), cross)
+    np.testing.assert_allclose(outrigger.observer.feedback, feedback, rtol=1e-9, atol=1e-9 * np.abs(feedback).max())
+    # the noises of plant and sensors correlate through the wind: the same filter of the plant without that part
+    wind, noise = np.cov(load.forces_n.T) * CORRELATION_S, SENSOR_DENSITY * np.eye(18)
+    both = noise + measured.F @ wind @ measured.F.T
+    shift = E @ wind @ measured.F.T @ np.linalg.inv(both)
+    rest = E @ wind @ E.T - shift @ both @ shift.T
+    gain, _, _ = control.lqe(A - shift @ measured.C, np.eye(46), measured.C, 0.5 * (rest + rest.T), both)
+    ours = observer_gain(A, E, measured, wind, noise)
+    np.testing.assert_allclose(ours, gain + shift, rtol=1e-9, atol=1e-9 * np.abs(ours).max())
 
 
 @pytest.mark.planted
