@@ -81,14 +81,16 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
 
     settings = context.settings.benchmark.ten_storey
     bench.check_laws(settings.laws)
-    motion = _motion(context, settings.motion, 1)
     device = _bingham(settings.inverse)
     chain = damper_from_parameter_set(load_parameter_set("dampers", settings.damper)).chain()
+    # what is wrong with the files is told before a motion is synthesised
+    frames = {name: ten_storey(name) for name in settings.structures}
+    motion = _motion(context, settings.motion, 1)
     studies = {}
-    for index, name in enumerate(settings.structures):
-        context.progress(index / (len(settings.structures) + 1), name)
+    for index, (name, frame) in enumerate(frames.items()):
+        context.progress(index / (len(frames) + 1), name)
         study = bench.ten_storey_study(
-            ten_storey(name),
+            frame,
             motion,
             device=device,
             chain=chain,
@@ -119,7 +121,6 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
 
     settings = context.settings.benchmark.base_isolated
     bench.check_laws(settings.laws)
-    motion = _motion(context, settings.motion, 2)
     device = _bingham(settings.damper)
     building = building_of(
         settings.model,
@@ -127,6 +128,8 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
         bearing_stiffness=settings.bearing_stiffness_n_m,
         bearing_viscosity=settings.bearing_viscosity_n_s_m,
     )
+    motion = _motion(context, settings.motion, 2)
+    seven = [load_motion(name, context.rng) for name in SEVEN_MOTIONS] if settings.all_motions else []
     trained = None
     if settings.neural_inverse:
         context.progress(0.05, "neural inverse of the damper")
@@ -144,9 +147,8 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     context.progress(0.3, f"{len(settings.laws)} laws")
     free, cases = bench.run_cases(study, motion, settings.laws, context.jobs)
     motions = {}
-    if settings.all_motions:
+    if seven:
         context.progress(0.5, "seven motions")
-        seven = [load_motion(name, context.rng) for name in SEVEN_MOTIONS]
         motions = bench.run_motions(study, seven, settings.laws, context.jobs)
     law = settings.laws[0]
     context.progress(0.8, "sensitivity to damper capacity")
@@ -201,9 +203,9 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
 
     settings = context.settings.benchmark.wind
     bench.check_laws(settings.laws)
-    load = _wind_load(context, settings.load)
     device = _bingham(settings.damper)
     reference = tower_of(settings.model, settings.surrogate)
+    load = _wind_load(context, settings.load)
     tower = place_device(
         reference,
         settings.position,

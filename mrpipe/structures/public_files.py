@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mrpipe.artifacts import public_data_directory
+from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.errors import UserError
 
 
@@ -24,11 +25,18 @@ def named_file(option: str, value: str, public: Mapping[str, str]) -> Path:
     Raises
     ------
     UserError
-        If it is a public name and the public data are not there.
+        If it is a public name and the public data are not there, or a bare word that is neither name nor file.
     """
-    if value not in public or Path(value).is_file():
-        return Path(value)
+    path = Path(value)
+    if path.is_file():
+        return path
+    if value not in public:
+        if path.suffix or path.name != value:
+            return path
+        raise UserError(option, value, "is neither a file nor a name", nearest(value, list(public)))
     folder = public_data_directory()
     if folder is None:
-        raise UserError(option, value, "the public data are not there", "set MRPIPE_DATA to their folder, or a file")
+        raise UserError(
+            option, value, "the public data are not there", "set MRPIPE_DATA to their folder, or give a file"
+        )
     return folder / public[value]

@@ -240,6 +240,17 @@ def test_public_motions() -> None:
     assert load_motion("elcentro-ns", rng).peaks_m_s2[0] == pytest.approx(0.349 * GRAVITY, rel=2e-3)
 
 
+@pytest.mark.planted
+def test_a_name_that_is_nearly_a_motion_is_told_the_nearest(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"neither a file nor a name.*elcentro"):
+        load_motion("elcentroo", np.random.default_rng(0))
+    with pytest.raises(UserError, match="no such record"):
+        load_motion(str(tmp_path / "nothing.txt"), np.random.default_rng(0))
+    monkeypatch.setenv("MRPIPE_DATA", str(tmp_path / "nowhere"))
+    with pytest.raises(UserError, match="public data are not there"):
+        load_motion("kobe", np.random.default_rng(0))
+
+
 @pytest.mark.golden
 def test_two_files_make_two_components(tmp_path: Path) -> None:
     first = at2(tmp_path / "h1.at2")
