@@ -204,10 +204,11 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         return f"{start} Something is missing, but no known effect explains it.{depends}{added}"
     parts = [_effect_in_words(effect) for effect in effects]
     share = summary["ceiling"]["recovered"]
-    end = (
-        f"With {'it' if len(effects) == 1 else 'them'}{'' if flexible else f' the error is {_percent(after)}, and'} "
-        f"{100 * share:.0f} % of what a flexible model could recover is recovered."
-    )
+    recovers = f"recovers {100 * share:.0f} % of what a flexible model could"
+    added_up = "Added to the model, it" if len(effects) == 1 else "Added to the model, they"
+    if len(effects) > 1:
+        recovers = recovers.replace("recovers", "recover", 1)
+    end = f"{added_up} {recovers}." if flexible else f"{added_up} {recovers}; the error is then {_percent(after)}."
     if summary["unexplained"]["structured"]:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         end += f" Something is still unexplained{'; it varies with ' + _listed(states) if states else ''}."

@@ -16,6 +16,7 @@ def report(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
     from mrpipe.reporting.discrepancy import in_plain_words
 
     context.report.text(in_plain_words(summary))
+    _effects(context, summary)
     for name, reason in summary["untestable"].items():
         context.report.text(f"Effect {name} is {reason}.")
     _where(context, traced, summary)
@@ -23,6 +24,26 @@ def report(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
     _before_and_after(context, traced, summary)
     _loop(context, summary["closed_loop"])
     _next_steps(context, summary)
+
+
+def _effects(context: StageContext, summary: Mapping[str, Any]) -> None:
+    import pandas as pd
+
+    rows = [
+        {
+            "effect": effect["name"],
+            "form": effect["form"],
+            "parameter": name.replace("_", " "),
+            "value": entry["value"],
+            "from": entry["interval"][0],
+            "to": entry["interval"][1],
+            "unit": entry["unit"],
+        }
+        for effect in summary["effects"]
+        for name, entry in effect["parameters"].items()
+    ]
+    if rows:
+        context.report.table("effects", pd.DataFrame(rows), "Parameters of the effects with their 95 % intervals.")
 
 
 def _where(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
@@ -161,7 +182,8 @@ def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
     if summary["corrections"]["found"]:
         context.report.text(
             "The faults of sensors named above are taken out by `mrpipe prepare --settings "
-            f"{summary['corrections']['file']}` (and by every later stage with the same option)."
+            f"{summary['corrections']['file']}`, and for every later stage by the same option; the file stands in the "
+            "run directory."
         )
     wanted = summary["next_tests"]
     if not wanted["tests"]:
@@ -171,6 +193,6 @@ def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
     context.report.table(
         "next-tests",
         pd.DataFrame(wanted["tests"]),
-        f"Tests that would decide what is open, as {wanted['file']} lists them: `mrpipe record --settings` adds them "
-        "to the virtual rig's campaign.",
+        f"Tests that would decide what is open, as {wanted['file']} in the run directory lists them; on the virtual rig "
+        f"`mrpipe close-loop --settings {wanted['file']}` makes them and traces again.",
     )
