@@ -53,13 +53,14 @@ def check(
     from mrpipe.config.loader import default_config_path, load_config
     from mrpipe.config.model import options as all_options
     from mrpipe.config.sections.campaigns import LABORATORY
-    from mrpipe.pipeline.settings_view import setting_named
+    from mrpipe.pipeline.settings_view import SettingsView, setting_named
     from mrpipe.stages.registry import stage_named
 
     loaded = load_config(config or default_config_path(), options.overrides, options.settings)
     for name in loaded.config.stages:
-        if name != "report":
-            stage_named(name)
+        stage = None if name == "report" else stage_named(name)
+        if stage is not None and stage.check is not None:
+            stage.check(SettingsView(loaded.config, stage.settings, name))
     campaigns: dict[str, Any] = {}
     for rig, source in loaded.config.campaigns.model_dump().items():
         if source is None or source == LABORATORY:

@@ -32,6 +32,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     """Return the part `closed_loop` of the JSON: each law measured, before, after and recalibrated."""
     from mrpipe.discrepancy.augmented import damper_of, plant_chain
     from mrpipe.discrepancy.closed_loop import Arrangement, Bench, best_ways, compare_laws
+    from mrpipe.reporting.closed_loop import in_words
     from mrpipe.structures import read_frame
 
     needed = ["identify-frame", "calibrate"]
@@ -64,7 +65,8 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
         taken = best_ways(runs, offered, bench)
         found["controller"] = {**renewed.summary, "renewed": taken}
         ways["recalibrated"] = Arrangement(chosen, lambda run: offered[taken[run.law]].controller(run))
-    return {**found, **compare_laws(runs, ways, bench)}
+    found |= compare_laws(runs, ways, bench)
+    return {**found, "statement": in_words(found)}
 
 
 def _runs(context: StageContext, rig: Rig) -> tuple[list[LoopRun], str]:

@@ -193,6 +193,6 @@ def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
     context.report.table(
         "next-tests",
         pd.DataFrame(wanted["tests"]),
-        f"Tests that would decide what is open, as {wanted['file']} in the run directory lists them; on the virtual rig "
-        f"`mrpipe close-loop --settings {wanted['file']}` makes them and traces again.",
+        f"Tests that would decide what is open, as {wanted['file']} in the run directory lists them; on the virtual "
+        f"rig `mrpipe close-loop --settings {wanted['file']}` makes them and traces again.",
     )

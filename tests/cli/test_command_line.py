@@ -48,6 +48,8 @@ MISTAKES = {
     "unknown option": (["prepare", "--cofnig", "x"], "No such option"),
     "missing config": (["run", "nowhere.yaml"], "nowhere.yaml: no such configuration"),
     "unknown setting": (["prepare", "--set", "prepare.cutof_hz=3"], "did you mean cutoff_hz?"),
+    "unknown effect": (["check", "--set", "close_loop.candidates=[remanance]"], "did you mean remanence?"),
+    "settings file missing": (["prepare", "--settings", "no.yaml"], "--settings: no.yaml: no such file"),
     "unknown law": (["simulate", "--law", "vdn"], "did you mean vd"),
     "law missing": (["simulate"], "Missing option"),
     "until what is not there": (["run", "--until", "prepair"], "did you mean prepare?"),
