@@ -24,6 +24,9 @@ ALIKE = 0.01
 FAR_BEYOND = 30.0
 """A damper moved by this many times the stroke it was tested at is no prediction any more: the response grows."""
 
+TESTED = 1.25
+"""Damper motion over the stroke of the bench tests up to which a prediction is none beyond them."""
+
 STATIONARY = 0.08
 """Where the energy of the base's motion grows this evenly, the first half of it is left out as settling."""
 
@@ -277,7 +280,13 @@ def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench
         rankings["measured"] = ranking(recorded, "measured")
         found["ranking_agrees_with_measured"] = {when: not reversed_pairs(recorded, "measured", when) for when in ways}
         found["nrmse_x_top"] = {when: _error(recorded, when) for when in ways if when != "recalibrated"}
-        found["rms_x_top_error"] = {when: _index_error(recorded, when) for when in ways if when != "recalibrated"}
+        compared = [when for when in ways if when != "recalibrated"]
+        for key, name in (("rms_x_top_m", "rms_x_top_error"), ("rms_a1_m_s2", "rms_a1_error")):
+            found[name] = {when: _index_error(recorded, when, key) for when in compared}
+        within = [row for row in recorded if all(_peak(row[when]) <= TESTED for when in compared)]
+        found["rms_x_top_error_within_tested_stroke"] = {
+            when: _index_error(within, when, "rms_x_top_m") for when in compared
+        }
     return found
 
 
@@ -293,6 +302,7 @@ def law_rows(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> list[
                 entry[when] = {key: float(np.mean([item[key] for item in given])) for key in given[0]}
             elif any("diverged" in row.get(when, {}) for row in own):
                 entry[when] = {"diverged": own[0][when]["diverged"]}
+        entry["extrapolated"] = any(_peak(row["after"], 0.0) > TESTED for row in own if "after" in row)
         found.append(entry)
     return found
 
@@ -327,9 +337,13 @@ def _error(rows: Sequence[Mapping[str, Any]], when: str) -> float | None:
     return float(np.sqrt(np.mean(np.square(values)))) if values else None
 
 
-def _index_error(rows: Sequence[Mapping[str, Any]], when: str) -> float | None:
-    """Return the RMS over runs of the relative error of the top floor's RMS."""
+def _peak(values: Mapping[str, Any], default: float = float("inf")) -> float:
+    return float(values.get("peak_over_tested_stroke", default))
+
+
+def _index_error(rows: Sequence[Mapping[str, Any]], when: str, key: str) -> float | None:
+    """Return the RMS over runs of the relative error of an index."""
     values = [
-        row[when]["rms_x_top_m"] / row["measured"]["rms_x_top_m"] - 1.0 for row in rows if "rms_x_top_m" in row[when]
+        row[when][key] / row["measured"][key] - 1.0 for row in rows if key in row[when] and row["measured"].get(key)
     ]
     return float(np.sqrt(np.mean(np.square(values)))) if values else None

@@ -73,7 +73,7 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
     """Return the few lines that a person wants to read of a stage; empty where its numbers speak for themselves."""
     if stage != "close-loop" or "before" not in summary:
         return []
-    from mrpipe.reporting.closed_loop import in_words
+    from mrpipe.reporting.closed_loop_words import in_words
 
     before, after, floor = (
         _number(value, digits=3)

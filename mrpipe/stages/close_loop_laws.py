@@ -32,7 +32,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     """Return the part `closed_loop` of the JSON: each law measured, before, after and recalibrated."""
     from mrpipe.discrepancy.augmented import damper_of, plant_chain
     from mrpipe.discrepancy.closed_loop import Arrangement, Bench, best_ways, compare_laws
-    from mrpipe.reporting.closed_loop import in_words
+    from mrpipe.reporting.closed_loop_words import in_words
     from mrpipe.structures import read_frame
 
     needed = ["identify-frame", "calibrate"]

@@ -152,7 +152,8 @@ def _chosen(names: Sequence[str], errors: Mapping[str, Mapping[str, Any]]) -> li
 def _loop(context: StageContext, found: Mapping[str, Any]) -> None:
     import pandas as pd
 
-    from mrpipe.reporting.closed_loop import in_words, law_table, response_by_law
+    from mrpipe.reporting.closed_loop import law_table, response_by_law
+    from mrpipe.reporting.closed_loop_words import in_words
 
     context.report.text(in_words(found))
     if "laws" not in found:

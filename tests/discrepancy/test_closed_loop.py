@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from mrpipe.discrepancy.closed_loop import LoopRun, judged_span, law_rows, ranking, reversed_pairs, with_unrecorded
-from mrpipe.reporting.closed_loop import in_words, law_table, response_by_law
+from mrpipe.reporting.closed_loop import law_table, response_by_law
+from mrpipe.reporting.closed_loop_words import in_words
 
 
 def rows(**columns: dict[str, float]) -> list[dict[str, Any]]:

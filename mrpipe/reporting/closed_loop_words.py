@@ -1,0 +1,126 @@
+"""The closed loop before and after in plain words, from the summary alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+WHEN = ("before", "after", "recalibrated")
+"""How a law was simulated."""
+
+WORTH_SAYING = 0.01
+"""Change of a law's response below which it is not spoken of."""
+
+
+def in_words(found: Mapping[str, Any]) -> str:
+    """Return what the closed loop says, in plain words."""
+    if "laws" not in found:
+        return f"Closed loop {found['status']}."
+    effects = found["plant"]["effects"]
+    parts = [f"Closed loop, {found['status']}."]
+    if "rms_x_top_error" in found:
+        parts.append(errors_in_words(found))
+    parts.append(ranking_in_words(found))
+    parts += [f"The effect {name} is not in the plant: {why}." for name, why in found["plant"]["left_out"].items()]
+    if effects and "controller" in found:
+        parts.append(controller_in_words(found))
+    parts += _doubts(found["laws"])
+    return " ".join(parts)
+
+
+def errors_in_words(found: Mapping[str, Any]) -> str:
+    """Return how far the predictions are from what was measured, before and after."""
+
+    def pair(name: str) -> str:
+        error = found.get(name) or {}
+        return f"{_percent(error.get('before'))} before and {_percent(error.get('after'))} after"
+
+    text = (
+        f"The model misses the measured RMS displacement of the top floor by {pair('rms_x_top_error')} (RMS over the "
+        "recordings)"
+    )
+    within = found.get("rms_x_top_error_within_tested_stroke") or {}
+    if within.get("before") is not None and within != found["rms_x_top_error"]:
+        text += f", {pair('rms_x_top_error_within_tested_stroke')} where the damper stays within its tested stroke"
+    if (found.get("rms_a1_error") or {}).get("before") is not None:
+        text += f"; that of the first floor's acceleration by {pair('rms_a1_error')}"
+    return f"{text}."
+
+
+def _doubts(laws: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what to be careful about: responses that grow, and motion beyond what the damper was tested at."""
+    grows = [f"{row['law']} ({when})" for row in laws for when in WHEN if "diverged" in row.get(when, {})]
+    far = [
+        f"{row['law']} ({row['after']['peak_over_tested_stroke']:.1f} times)" for row in laws if row.get("extrapolated")
+    ]
+    said = []
+    if grows:
+        said.append(f"The predicted response grows without bound under {', '.join(grows)}.")
+    if far:
+        said.append(f"Beyond the stroke of the bench tests, and so extrapolated: {', '.join(far)}.")
+    return said
+
+
+def ranking_in_words(found: Mapping[str, Any]) -> str:
+    """Return whether the effect changes the order of the laws."""
+    order = found["ranking"]
+    listed = ", ".join(order["after"])
+    if not found["plant"]["effects"]:
+        return f"The damper stays as it is, and so does the ranking of the laws: {listed} (the best first)."
+    if found["ranking_changes"]:
+        swaps = ", ".join(f"{a} is now ahead of {b}" for a, b in found["reversed_pairs"])
+        said = f"The effect changes the ranking of the laws ({swaps}): {listed} (the best first)."
+    else:
+        said = f"The effect does not change the ranking of the laws: {listed} (the best first)."
+    if "measured" in order:
+        agrees = found["ranking_agrees_with_measured"]
+        words = {(True, True): "both before and after", (True, False): "before only", (False, True): "only after"}
+        said += (
+            f" The order measured is {', '.join(order['measured'])}; the model agrees with it "
+            f"{words.get((agrees['before'], agrees['after']), 'neither before nor after')}."
+        )
+    return said
+
+
+def controller_in_words(found: Mapping[str, Any]) -> str:
+    """Return what was renewed in the controller and what it brings."""
+    new = found["controller"]
+    gains = ", ".join(
+        f"{law} x {value:.2f}" for law, value in new["gain_factors"].items() if abs(value - 1.0) > WORTH_SAYING
+    )
+    parts: dict[str, list[str]] = {}
+    for law, renewed in new["renewed"].items():
+        if renewed != "nothing":
+            parts.setdefault(renewed, []).append(law)
+    taken = "; ".join(f"{renewed} for {', '.join(laws)}" for renewed, laws in parts.items())
+    text = (
+        f"A controller that knows the effect has its inverse {new['inverse']}, a switch at "
+        f"{new['switch_force_after_n']:.1f} N in place of {new['switch_force_before_n']:.1f} N (the residual force is "
+        f"{new['residual_force_after_n']:.1f} N, without the effect {new['residual_force_before_n']:.1f} N) and "
+        f"{'gains ' + gains if gains else 'the gains it had'}. Of these each law takes what lowers its simulated "
+        f"response: {taken or 'none takes any'}."
+    )
+    return f"{text} {gain_in_words(found['laws'])}"
+
+
+def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
+    """Return what the renewed controller changes on the damper with the effect."""
+    changes = {
+        row["law"]: row["recalibrated"]["rms_x_top_m"] / row["after"]["rms_x_top_m"] - 1.0
+        for row in laws
+        if "rms_x_top_m" in row.get("recalibrated", {}) and "rms_x_top_m" in row.get("after", {})
+    }
+    told = {law: change for law, change in changes.items() if abs(change) > WORTH_SAYING}
+    if not told:
+        return (
+            "It changes the RMS top displacement of no law by more than 1 %: knowing the effect corrects the "
+            "prediction, and little is to be gained in control."
+        )
+    listed = ", ".join(f"{law} {100.0 * change:+.0f} %" for law, change in told.items())
+    return (
+        f"On the damper with the effect it changes the RMS top displacement: {listed}; the other laws stay within 1 %."
+    )
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100.0 * value:.1f} %"
