@@ -53,6 +53,7 @@ class TracingOptions:
     rules: Rules = field(default_factory=Rules)
     record_gain: bool = False
     observation_filter: bool = True
+    model_error_share: float = 0.0
     unattributed: bool = False
     drive_unit: str = "A"
 

@@ -92,6 +92,9 @@ def trace_campaign(
     causes = [*named[: selection.proven], *([offsets.named()] if offsets is not None else [])]
     if offsets is not None and any(item.effect.name == "offset" for item in named[: selection.proven]):
         causes.pop()
+    if baseline.model_error:
+        # the base form is a verdict of its own, and every real damper asks for this one: what else there is comes first
+        causes.sort(key=lambda item: item.effect.name == "rate-dependent-yield")
     return report.build(
         options, tuple(causes), named[selection.proven :], reasons, window, [item.name for item in declared], effects
     )
@@ -110,7 +113,7 @@ def _select(
     own = list(declared)
     if options.model == "rate-dependent-yield":
         own.append(effects["rate-dependent-yield"])
-    floor = 0.0
+    floor = options.model_error_share
     while True:
         baseline = fit_baseline(training, base, own, model_error_share=floor)
         progress(0.2, "candidates")

@@ -48,6 +48,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         rules=Rules(settings.named_share, settings.least_share, settings.lead),
         record_gain=settings.record_gain,
         observation_filter=settings.observation_filter,
+        model_error_share=settings.model_error_share,
         unattributed=settings.unattributed,
         drive_unit=tests[0].drive_unit or "A",
     )

@@ -41,4 +41,11 @@ class CloseLoopSettings(Section):
     observation_filter: bool = Field(
         True, description="Look for a moving average that the records went through, in shares of a period."
     )
+    model_error_share: float = Field(
+        0.0,
+        ge=0.0,
+        lt=1.0,
+        description="Model error to weigh by, as a share of the force RMS, where it is known to outweigh the sensors' "
+        "noise, as on real dampers; 0 finds out by a first pass, for twice the time.",
+    )
     unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")
