@@ -54,6 +54,8 @@ class FormFit:
         What each start ended at, best first: the spread over starts.
     evaluations
         Trials of the model.
+    notes
+        What the user should know of how it was fitted.
     """
 
     form: Form
@@ -68,6 +70,7 @@ class FormFit:
     at_bound: tuple[str, ...] = ()
     start_nrmse: tuple[float, ...] = field(default_factory=tuple)
     evaluations: int = 0
+    notes: tuple[str, ...] = ()
 
     def standard_error(self, name: str) -> float:
         """Return the standard error of a parameter in its own unit; not a number where it was not searched."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -180,6 +180,15 @@ class Form:
             names += [f"{block}_{letter}" for letter in "abcd"[: order + 1]] if block != "k1" else ["k1"]
             blocks.append(bernstein_to_power(order, scales.drive_limit))
         return tuple(names), block_diagonal(blocks)
+
+
+def with_fixed(form: Form, values: Mapping[str, float]) -> Form:
+    """Return the form with some of its searched parameters held at these values."""
+    return replace(
+        form,
+        nonlinear=lambda scales: tuple(p for p in form.nonlinear(scales) if p.name not in values),
+        fixed=lambda scales: {**form.fixed(scales), **values},
+    )
 
 
 @dataclass(frozen=True)

@@ -73,10 +73,12 @@ def comparison_rows(judged: Sequence[JudgedFit]) -> list[dict[str, Any]]:
             "validation_fit_percent": number_or_none(item.validation.fit_percent),
             "validation_r2": number_or_none(item.validation.r2),
             "cross_validated_nrmse": item.cross_validated_nrmse,
+            "typical_left_out_nrmse": number_or_none(item.typical_left_out_nrmse),
             "parameter_count": len(item.fit.names),
             "spread_over_starts": float(np.ptp(item.fit.start_nrmse)),
             "evaluations": item.fit.evaluations,
             "at_bound": list(item.fit.at_bound),
+            "notes": list(item.fit.notes),
         }
         for item in judged
     ]
@@ -119,7 +121,10 @@ def findings(fit: FormFit) -> list[str]:
             "the drive is constant in every test, so its lag cannot be told: "
             f"eta = {scales.assumed_eta:g} 1/s is assumed"
         )
-    lines += [f"{fit.form.name}: {name} ended at its bound, the data do not determine it" for name in fit.at_bound]
+    lines += [f"{fit.form.name}: {note}" for note in fit.notes]
+    # what a note tells of is told once
+    silent = [name for name in fit.at_bound if not any(name in note for note in fit.notes)]
+    lines += [f"{fit.form.name}: {name} ended at its bound, the data do not determine it" for name in silent]
     if scales.yield_order < 3:
         lines.append(
             f"{scales.yield_order + 1} level(s) of drive: the yield force is of degree {scales.yield_order} in it"

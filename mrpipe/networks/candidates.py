@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise, product
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise, product
+from typing import Any
 
 from mrpipe.networks.network import FeatureSpec
 
@@ -99,6 +100,32 @@ class Grid:
                 *(Candidate(at.states, at.past_values, at.hidden, biases) for biases in self.biases),
             ]
         )
+
+    def crossings(self, scores: Mapping[Candidate, float]) -> list[Candidate]:
+        """Return what a star leaves out: the best of each axis put together, two axes at a time and more.
+
+        A star tells what helps by itself; the best network most often takes several of these steps at once.
+
+        Parameters
+        ----------
+        scores
+            Error of each candidate of the star.
+        """
+        at = self.centre
+        best: dict[str, Any] = {}
+        for axis in ("states", "past_values", "hidden", "biases"):
+            along = [item for item in scores if replace(item, **{axis: getattr(at, axis)}) == at]
+            best[axis] = getattr(min(along, key=lambda item: scores[item], default=at), axis)
+        moved = [axis for axis, value in best.items() if value != getattr(at, axis)]
+        groups = [group for count in range(2, len(moved) + 1) for group in combinations(moved, count)]
+        return [replace(at, **{axis: best[axis] for axis in group}) for group in groups]
+
+    @property
+    def most_crossings(self) -> int:
+        """How many crossings there can be."""
+        axes = (self.states, self.past_values, (*self.layers, *self.neurons), self.biases)
+        moving = sum(len(set(values)) > 1 for values in axes)
+        return 2**moving - 1 - moving
 
 
 def _once(candidates: Sequence[Candidate]) -> list[Candidate]:

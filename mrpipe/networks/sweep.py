@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -20,6 +20,12 @@ from mrpipe.networks.levenberg_marquardt import Method, StoppingRules, fit
 from mrpipe.networks.problem import Problem
 from mrpipe.networks.scaling import Normalisation, scaling_of
 from mrpipe.networks.training import hold_out, in_parallel, initial_parameters
+
+Crossings = Callable[[Mapping[Candidate, float]], list[Candidate]]
+"""Errors of the candidates screened so far -> further candidates."""
+
+_Fits = tuple[FloatArray, FloatArray]
+"""Errors (starts,) and parameters (starts, P) of one candidate."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,7 @@ def sweep(
     *,
     jobs: int = 1,
     cache: Path | None = None,
+    crossings: tuple[Crossings, int] | None = None,
     progress: Progress = no_progress,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SweepRun:
@@ -120,51 +127,72 @@ def sweep(
     cache
         Folder in which each fit is kept as soon as it is done, under a name made of everything it depends on; a sweep
         that was interrupted, or is widened, takes them from there.
+    crossings
+        Names further candidates once the first are screened (see :meth:`mrpipe.networks.candidates.Grid.crossings`),
+        and how many they can be.
     progress, tell
         Told how far it is; told the predicted cost before it starts.
     """
     began = time.perf_counter()
     data = _places(history, candidates, options, seed)
     digest = _digest_of(data, options, seed)
+    further = crossings[1] if crossings else 0
     with threadpool_limits(1):
-        costs = predicted_costs(data.fit, candidates, options)
-    screening = float(costs[0].sum())
-    # it is mostly the larger networks that go on
-    refining = float(np.sort(costs[1])[::-1][: options.refined].sum())
+        screening, refining = predicted_cost(data.fit, candidates, options, further)
     predicted = (screening + refining) / max(1, jobs)
-    tell(f"{len(candidates)} candidates x {options.starts} starts: about {predicted:.0f} s on {jobs} cores")
-
-    def screen(index: int) -> tuple[FloatArray, FloatArray]:
-        return _kept(
-            cache, f"screen-{digest}", candidates[index], lambda: _fit_all(data, candidates[index], options, seed)
-        )
-
+    more = f" and up to {further} combinations of the best" if further else ""
+    cores = "1 core" if jobs <= 1 else f"{jobs} cores"
+    tell(f"{len(candidates)} candidates{more} x {options.starts} starts: about {readable(predicted)} on {cores}")
     middle = screening / max(screening + refining, 1e-9)
-    screened = _pass(screen, len(candidates), jobs, _part(progress, 0.0, middle), "screened")
-    order = np.argsort([float(np.mean(np.log(errors))) for errors, _ in screened], kind="stable")
+
+    def screen_all(wanted: Sequence[Candidate], text: str, part: Progress) -> list[_Fits]:
+        def screen(index: int) -> _Fits:
+            return _kept(cache, f"screen-{digest}", wanted[index], lambda: _fit_all(data, wanted[index], options, seed))
+
+        return _pass(screen, len(wanted), jobs, part, text)
+
+    share = len(candidates) / (len(candidates) + further)
+    screened = screen_all(candidates, "screened", _part(progress, 0.0, share * middle))
+    every = list(candidates)
+    if crossings:
+        scores = {item: _mean(errors) for item, (errors, _) in zip(candidates, screened, strict=True)}
+        added = [item for item in crossings[0](scores) if item not in scores]
+        screened += screen_all(added, "screened combinations", _part(progress, share * middle, middle))
+        every += added
+    order = np.argsort([_mean(errors) for errors, _ in screened], kind="stable")
     chosen = sorted({0, *(int(index) for index in order[: options.refined])})
 
-    def refine(place: int) -> tuple[FloatArray, FloatArray]:
-        candidate, starts = candidates[chosen[place]], screened[chosen[place]][1]
+    def refine(place: int) -> _Fits:
+        candidate, starts = every[chosen[place]], screened[chosen[place]][1]
         return _kept(cache, f"refine-{digest}", candidate, lambda: _fit_all(data, candidate, options, seed, starts))
 
     refined = _pass(refine, len(chosen), jobs, _part(progress, middle, 1.0), "refined")
     after = {index: errors for index, (errors, _) in zip(chosen, refined, strict=True)}
     absent = np.full(options.starts, np.nan)
     outcomes = tuple(
-        Outcome(candidate, screened[index][0], after.get(index, absent)) for index, candidate in enumerate(candidates)
+        Outcome(candidate, screened[index][0], after.get(index, absent)) for index, candidate in enumerate(every)
     )
     return SweepRun(outcomes, data.held.names, predicted, time.perf_counter() - began)
 
 
-def _pass(
-    work: Callable[[int], tuple[FloatArray, FloatArray]], count: int, jobs: int, progress: Progress, text: str
-) -> list[tuple[FloatArray, FloatArray]]:
+def _mean(errors: FloatArray) -> float:
+    """Return the logarithm of the geometric mean."""
+    return float(np.mean(np.log(errors)))
+
+
+def readable(seconds: float) -> str:
+    """Return a time as people say it: 45 s, 12 min, 3.2 h."""
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _pass(work: Callable[[int], _Fits], count: int, jobs: int, progress: Progress, text: str) -> list[_Fits]:
     began = time.perf_counter()
 
     def timed(fraction: float, message: str = "") -> None:
         left = (time.perf_counter() - began) * (1.0 - fraction) / max(fraction, 1e-9)
-        progress(fraction, f"{message}, {left:.0f} s left")
+        progress(fraction, f"{message}, {readable(left)} left")
 
     return list(in_parallel(work, count, jobs, timed, text))  # type: ignore[arg-type]
 
@@ -216,6 +244,19 @@ def _fit_all(
     return np.array(errors), np.array(parameters)
 
 
+def predicted_cost(
+    history: History, candidates: Sequence[Candidate], options: SweepOptions, further: int = 0
+) -> tuple[float, float]:
+    """Return the seconds on one core that screening and refining will take, `further` candidates unknown as yet.
+
+    Combinations of the best, and what is refined, are mostly the larger ones of those that are known.
+    """
+    screen, refine = predicted_costs(history, candidates, options)
+    largest = float(np.sort(screen)[::-1][: max(1, len(screen) // 4)].mean())
+    kept = np.sort(refine)[::-1][: options.refined]
+    return float(screen.sum()) + further * largest, float(kept.sum())
+
+
 def predicted_costs(
     history: History, candidates: Sequence[Candidate], options: SweepOptions
 ) -> tuple[FloatArray, FloatArray]:
@@ -228,20 +269,32 @@ def predicted_costs(
     order = np.argsort(sizes, kind="stable")
     probes = sorted({int(order[place]) for place in (0, len(order) // 2, len(order) - 1)}, key=lambda item: sizes[item])
     rng = np.random.default_rng(0)
-    times = []
-    for probe in probes:
-        candidate = candidates[probe]
-        rows = min(options.screen_rows, history.samples)
-        inputs = rng.normal(size=(candidate.layers[0], rows))
-        problem = Problem(inputs, np.tanh(inputs[0]), candidate.layers, candidate.biases)
-        start = rng.uniform(-0.5, 0.5, problem.size)
-        began = time.perf_counter()
-        outcome = fit(problem, start, method=options.method, rules=StoppingRules(iterations=3))
-        times.append((time.perf_counter() - began) / max(1, outcome.iterations))
+    times = np.array([_iteration_seconds(candidates[probe], history.samples, options, rng) for probe in probes])
     # early stopping ends about a third of the runs halfway
-    each = np.interp(sizes, sizes[probes], times) * options.starts * 0.8
-    ratio = options.refine_rows / options.screen_rows
-    return each * options.screen_iterations, each * options.refine_iterations * ratio
+    effort = options.starts * 0.8
+    screen, refine = (np.interp(sizes, sizes[probes], column) * effort for column in times.T)
+    return screen * options.screen_iterations, refine * options.refine_iterations
+
+
+def _iteration_seconds(
+    candidate: Candidate, available: int, options: SweepOptions, rng: np.random.Generator
+) -> tuple[float, float]:
+    """Return the seconds of one iteration of screening and of refining, the look at the held-out rows included."""
+
+    def problem(rows: int) -> Problem:
+        inputs = rng.normal(size=(candidate.layers[0], min(rows, available)))
+        return Problem(inputs, np.tanh(inputs[0]), candidate.layers, candidate.biases)
+
+    held = problem(options.held_out_rows)
+    start = rng.uniform(-0.5, 0.5, held.size)
+    rules = StoppingRules(iterations=4, held_out_failures=5)
+    seconds = []
+    for rows in (options.screen_rows, options.refine_rows):
+        fitted = problem(rows)
+        began = time.perf_counter()
+        outcome = fit(fitted, start, method=options.method, rules=rules, held_out=held)
+        seconds.append((time.perf_counter() - began) / max(1, outcome.iterations))
+    return seconds[0], seconds[1]
 
 
 def _key(candidate: Candidate) -> str:

@@ -68,6 +68,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         context.seed,
         jobs=context.jobs,
         cache=context.run_directory / CACHE,
+        crossings=(grid.crossings, grid.most_crossings) if settings.design == "star" else None,
         progress=context.progress,
         tell=context.log.info,
     )
@@ -77,7 +78,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     _report(context, run, chosen, verdicts, grid)
     best = score(chosen.refined)
     return {
-        "candidates": len(candidates),
+        "candidates": len(run.outcomes),
         "starts": settings.starts,
         "refined": sum(outcome.is_refined for outcome in run.outcomes),
         "choice": chosen.candidate.label,

@@ -110,7 +110,38 @@ def test_larger_networks_are_predicted_to_cost_more() -> None:
     candidates = [replace(CENTRE, hidden=(2,)), CENTRE, replace(CENTRE, hidden=(24, 24))]
     screening, refining = predicted_costs(bench_history(), candidates, replace(TINY, screen_rows=2000))
     assert screening[0] < screening[2]
-    np.testing.assert_allclose(refining / screening, 5 / 8 * 500 / 2000)
+    assert refining[0] < refining[2]
+
+
+@pytest.mark.planted
+def test_a_star_is_completed_by_combinations_of_what_helps() -> None:
+    worst, better = 0.1, 0.05
+    scores = dict.fromkeys(GRID.candidates("star"), worst)
+    wide, seeing = replace(CENTRE, hidden=(6,)), replace(CENTRE, states=("velocity", "displacement"))
+    assert GRID.crossings({**scores, CENTRE: better}) == []
+    assert GRID.crossings({**scores, wide: better}) == []
+    both = replace(wide, states=seeing.states)
+    assert GRID.crossings({**scores, wide: better, seeing: better}) == [both]
+    biased, past = replace(CENTRE, biases=True), replace(CENTRE, past_values=2)
+    every = GRID.crossings({**scores, wide: better, seeing: better, biased: better, past: better})
+    assert len(every) == len(set(every)) == GRID.most_crossings == 11
+    assert not set(every) & set(scores)
+
+
+@pytest.mark.property
+def test_combinations_are_screened_refined_and_resumed(tmp_path: Path) -> None:
+    history, star = bench_history(), GRID.candidates("star")
+    crossings = (lambda scores: [replace(CENTRE, hidden=(3,), past_values=1), *list(scores)[:1]], 11)
+    told: list[str] = []
+    options = replace(TINY, screen_iterations=3, refine_iterations=2, refined=len(star) + 1)
+    run = sweep(history, star, options, 5, crossings=crossings, cache=tmp_path, tell=told.append)
+    assert "up to 11 combinations" in told[0]
+    assert len(run.outcomes) == len(star) + 1
+    assert run.outcomes[-1].candidate.hidden == (3,)
+    assert run.outcomes[-1].is_refined
+    again = sweep(history, star, options, 5, crossings=crossings, cache=tmp_path)
+    assert again.seconds < run.seconds
+    assert again.outcomes[-1].refined.tobytes() == run.outcomes[-1].refined.tobytes()
 
 
 def outcome(candidate: Candidate, *errors: float) -> Outcome:
