@@ -74,12 +74,19 @@ class History:
         )
 
     def largest_jump(self, channel: str) -> float:
-        """Return the largest step at a join over the largest step within a test (1 or less: no jump shows)."""
-        steps = np.abs(np.diff(self.channels[channel]))
+        """Return the largest step at a join over the largest step within a test.
+
+        2 or less for displacement: one sample before its zero crossing in one test, one after it in the next. 0 where
+        the channel moves within no test (a drive that is held): no step within is there to compare with.
+        """
+        values = self.channels[channel]
+        steps = np.abs(np.diff(values))
         joins = self.starts[1:-1] - 1
         within = np.delete(steps, joins)
         largest = float(within.max()) if len(within) else 0.0
-        return float(steps[joins].max()) / largest if len(joins) and largest > 0.0 else 0.0
+        # rounding of a constant channel is no step
+        moves = largest > 1e-9 * float(np.max(np.abs(values), initial=0.0))
+        return float(steps[joins].max()) / largest if len(joins) and moves else 0.0
 
 
 @dataclass(frozen=True)

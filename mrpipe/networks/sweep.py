@@ -159,8 +159,7 @@ def sweep(
         added = [item for item in crossings[0](scores) if item not in scores]
         screened += screen_all(added, "screened combinations", _part(progress, share * middle, middle))
         every += added
-    order = np.argsort([_mean(errors) for errors, _ in screened], kind="stable")
-    chosen = sorted({0, *(int(index) for index in order[: options.refined])})
+    chosen = _to_refine([_mean(errors) for errors, _ in screened], len(candidates), options.refined)
 
     def refine(place: int) -> _Fits:
         candidate, starts = every[chosen[place]], screened[chosen[place]][1]
@@ -173,6 +172,17 @@ def sweep(
         Outcome(candidate, screened[index][0], after.get(index, absent)) for index, candidate in enumerate(every)
     )
     return SweepRun(outcomes, data.held.names, predicted, time.perf_counter() - began)
+
+
+def _to_refine(means: Sequence[float], planned: int, count: int) -> list[int]:
+    """Return the places of what is refined: the first, the best `count` as planned, and of combinations the best third.
+
+    Combinations do not push out what the findings compare.
+    """
+    order = np.argsort(means, kind="stable")
+    best = [int(place) for place in order if place < planned][:count]
+    combined = [int(place) for place in order if place >= planned][: -(-count // 3)]
+    return sorted({0, *best, *combined})
 
 
 def _mean(errors: FloatArray) -> float:
@@ -249,12 +259,13 @@ def predicted_cost(
 ) -> tuple[float, float]:
     """Return the seconds on one core that screening and refining will take, `further` candidates unknown as yet.
 
-    Combinations of the best, and what is refined, are mostly the larger ones of those that are known.
+    Combinations of the best, and what is refined, are mostly of the larger half.
     """
     screen, refine = predicted_costs(history, candidates, options)
-    largest = float(np.sort(screen)[::-1][: max(1, len(screen) // 4)].mean())
-    kept = np.sort(refine)[::-1][: options.refined]
-    return float(screen.sum()) + further * largest, float(kept.sum())
+    upper = slice(len(screen) // 2, None)
+    typical, typical_refined = float(np.sort(screen)[upper].mean()), float(np.sort(refine)[upper].mean())
+    count = min(options.refined, len(candidates)) + min(-(-options.refined // 3), further)
+    return float(screen.sum()) + further * typical, count * typical_refined
 
 
 def predicted_costs(

@@ -140,6 +140,7 @@ def prepare_campaign(
     source = str(campaign.directory)
     if campaign.rig != "damper-bench":
         raise UserError(source, "rig", f"is {campaign.rig}", "prepare works on a damper-bench campaign")
+    _require_rate(options)
     rate = options.working_rate_hz or common_rate([test.sampling_rate_hz for test in campaign.recordings])
     works = []
     for count, recording in enumerate(campaign.recordings):
@@ -188,6 +189,18 @@ def _on_working_rate(recording: Recording, begin: int, end: int, name: str, rate
     )
     samples = channels["displacement"].size
     return _Work(name, recording.role, rate, time[0] + np.arange(samples) / rate, channels)
+
+
+def _require_rate(options: PreparationOptions) -> None:
+    """Refuse a rate asked for that could not carry the velocity's band (a campaign that is slow by itself may be)."""
+    least = 2.5 * options.velocity_cutoff_hz
+    if 0.0 < options.working_rate_hz < least:
+        raise UserError(
+            "prepare",
+            "working_rate_hz",
+            f"is {options.working_rate_hz:g}, too slow for a velocity cut-off of {options.velocity_cutoff_hz:g} Hz",
+            f"give {least:g} Hz at least, or 0 for the campaign's own",
+        )
 
 
 def _require_length(work: _Work, options: PreparationOptions, source: str) -> None:

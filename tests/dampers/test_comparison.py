@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,10 +13,13 @@ import pytest
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, no_progress
 from mrpipe.config.sections.identify_damper import IdentifyDamperSettings
-from mrpipe.dampers.comparison import FitOptions, best_by_folds, compare_forms
+from mrpipe.dampers.comparison import FitOptions, JudgedFit, best_by_folds, compare_forms
+from mrpipe.dampers.form import NonlinearParameter
 from mrpipe.dampers.forms import FORMS
 from mrpipe.dampers.model import read_damper
 from mrpipe.dampers.samples import scales_of, smooth_motion
+from mrpipe.dampers.scoring import PooledScore
+from mrpipe.dampers.summary import findings
 from mrpipe.errors import StageSkipped
 from mrpipe.pipeline.stage import StageContext
 from mrpipe.signals.prepared import write_prepared
@@ -104,6 +108,44 @@ def test_the_stage_returns_and_stores_what_it_found(tmp_path, campaign):
     assert {name for kind, name in report.parts if kind == "figure"} == {"loops", "comparison", "yield-force"}
     assert {name for kind, name in report.parts if kind == "table"} >= {"parameters", "comparison", "tests"}
     assert context.warnings == []
+
+
+def judged(names: tuple[str, ...], left_out: tuple[float, ...]) -> JudgedFit:
+    """A cross-validated form of which nothing counts but its parameters and its errors on tests left out."""
+    fit = SimpleNamespace(names=names, values=dict.fromkeys(names[:2]))
+    score = PooledScore(0.0, 0.0, 0.0)
+    return JudgedFit(fit, (), score, score, 0.0, left_out)  # type: ignore[arg-type]
+
+
+@pytest.mark.property
+def test_every_test_left_out_counts_alike():
+    plain = judged(("a", "b", "c"), (0.14, 0.13, 0.09, 0.10))
+    # better where the force is strong, worse by as much where it is weak: no reason for another form
+    strong = judged(("a", "b", "c", "d"), (0.18, 0.17, 0.07, 0.075))
+    assert best_by_folds([strong, plain]) is plain
+    clear = judged(("a", "b", "c", "d"), (0.10, 0.11, 0.07, 0.08))
+    assert best_by_folds([plain, strong, clear]) is clear
+    with pytest.raises(ValueError, match="cross-validated"):
+        best_by_folds([plain, judged(("a",), ())])
+
+
+@pytest.mark.planted
+def test_gamma_is_beta_where_the_loops_do_not_tell(campaign):
+    """Bounds that leave out the truth by a hair: the share ends there and gains nothing."""
+    tests = smooth_motion(campaign)
+    training = [test for test in tests if test.role == "training"]
+    scales, options = scales_of(training), FitOptions(starts=1, maximum_samples=2000)
+    narrow = replace(
+        FORMS["bouc-wen"],
+        nonlinear=lambda scales: (
+            *(p for p in FORMS["bouc-wen"].nonlinear(scales) if p.name != "gamma_share"),
+            NonlinearParameter("gamma_share", (0.53,), 0.505, 0.56, logarithmic=False),
+        ),
+    )
+    item = compare_forms([narrow], tests, scales, options)[0]
+    assert item.fit.model.parameters["gamma_share"] == 0.5
+    assert "gamma_share" not in item.fit.names
+    assert "gamma = beta is taken" in findings(item.fit)[-1]
 
 
 @pytest.mark.property

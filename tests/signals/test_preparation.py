@@ -393,3 +393,10 @@ def test_an_offset_for_a_test_that_is_not_there_is_refused() -> None:
     options = PreparationOptions(faults=KnownFaults(force_offset_n={"two": 1.0}))
     with pytest.raises(UserError, match=r"force_offset_n\.two: the campaign has no such test; one of one"):
         prepare_campaign(campaign(recording("one")), options)
+
+
+@pytest.mark.property
+def test_a_rate_that_cannot_carry_the_velocity_is_refused() -> None:
+    source = Campaign(name="c", directory=Path("c"), rig="damper-bench", drive_unit="A", recordings=())
+    with pytest.raises(UserError, match=r"working_rate_hz: is 3, too slow .* give 50 Hz at least"):
+        prepare_campaign(source, PreparationOptions(working_rate_hz=3.0))
