@@ -14,7 +14,7 @@ from mrpipe.dampers.samples import FitData, fit_data
 from mrpipe.dampers.scoring import PooledScore, TestScore, pool, score_tests
 from mrpipe.signals.prepared import PreparedTest
 
-WORTHWHILE = 0.03
+WORTHWHILE = 0.01
 """Share of the error that a parameter at its bound must gain to be kept there."""
 
 

@@ -137,11 +137,13 @@ def sweep(
     data = _places(history, candidates, options, seed)
     digest = _digest_of(data, options, seed)
     further = crossings[1] if crossings else 0
+    kept = [_kept_file(cache, f"screen-{digest}", item) is not None for item in candidates]
     with threadpool_limits(1):
-        screening, refining = predicted_cost(data.fit, candidates, options, further)
+        screening, refining = predicted_cost(data.fit, candidates, options, further, kept)
     predicted = (screening + refining) / max(1, jobs)
     more = f" and up to {further} combinations of the best" if further else ""
-    cores = "1 core" if jobs <= 1 else f"{jobs} cores"
+    cores = "1 free core" if jobs <= 1 else f"{jobs} free cores"
+    more += f" ({sum(kept)} screened by an earlier run)" if any(kept) else ""
     tell(f"{len(candidates)} candidates{more} x {options.starts} starts: about {readable(predicted)} on {cores}")
     middle = screening / max(screening + refining, 1e-9)
 
@@ -149,7 +151,8 @@ def sweep(
         def screen(index: int) -> _Fits:
             return _kept(cache, f"screen-{digest}", wanted[index], lambda: _fit_all(data, wanted[index], options, seed))
 
-        return _pass(screen, len(wanted), jobs, part, text)
+        known = sum(_kept_file(cache, f"screen-{digest}", item) is not None for item in wanted)
+        return _pass(screen, len(wanted), jobs, part, text, known)
 
     share = len(candidates) / (len(candidates) + further)
     screened = screen_all(candidates, "screened", _part(progress, 0.0, share * middle))
@@ -165,7 +168,8 @@ def sweep(
         candidate, starts = every[chosen[place]], screened[chosen[place]][1]
         return _kept(cache, f"refine-{digest}", candidate, lambda: _fit_all(data, candidate, options, seed, starts))
 
-    refined = _pass(refine, len(chosen), jobs, _part(progress, middle, 1.0), "refined")
+    known = sum(_kept_file(cache, f"refine-{digest}", every[index]) is not None for index in chosen)
+    refined = _pass(refine, len(chosen), jobs, _part(progress, middle, 1.0), "refined", known)
     after = {index: errors for index, (errors, _) in zip(chosen, refined, strict=True)}
     absent = np.full(options.starts, np.nan)
     outcomes = tuple(
@@ -197,12 +201,17 @@ def readable(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def _pass(work: Callable[[int], _Fits], count: int, jobs: int, progress: Progress, text: str) -> list[_Fits]:
+def _pass(
+    work: Callable[[int], _Fits], count: int, jobs: int, progress: Progress, text: str, known: int = 0
+) -> list[_Fits]:
+    """Do the work for 0 .. count - 1; what is `known` from an earlier run tells nothing of how long the rest takes."""
     began = time.perf_counter()
 
     def timed(fraction: float, message: str = "") -> None:
-        left = (time.perf_counter() - began) * (1.0 - fraction) / max(fraction, 1e-9)
-        progress(fraction, f"{message}, {readable(left)} left")
+        fresh = round(fraction * count) - known
+        if fresh > 0:
+            message += f", {readable((time.perf_counter() - began) * (count - known - fresh) / fresh)} left"
+        progress(fraction, message)
 
     return list(in_parallel(work, count, jobs, timed, text))  # type: ignore[arg-type]
 
@@ -255,9 +264,15 @@ def _fit_all(
 
 
 def predicted_cost(
-    history: History, candidates: Sequence[Candidate], options: SweepOptions, further: int = 0
+    history: History,
+    candidates: Sequence[Candidate],
+    options: SweepOptions,
+    further: int = 0,
+    kept: Sequence[bool] = (),
 ) -> tuple[float, float]:
     """Return the seconds on one core that screening and refining will take, `further` candidates unknown as yet.
+
+    Those `kept` are screened already.
 
     Combinations of the best, and what is refined, are mostly of the larger half.
     """
@@ -265,7 +280,8 @@ def predicted_cost(
     upper = slice(len(screen) // 2, None)
     typical, typical_refined = float(np.sort(screen)[upper].mean()), float(np.sort(refine)[upper].mean())
     count = min(options.refined, len(candidates)) + min(-(-options.refined // 3), further)
-    return float(screen.sum()) + further * typical, count * typical_refined
+    left = screen[~np.array(kept, dtype=bool)] if len(kept) else screen
+    return float(left.sum()) + further * typical, count * typical_refined
 
 
 def predicted_costs(
@@ -281,8 +297,8 @@ def predicted_costs(
     probes = sorted({int(order[place]) for place in (0, len(order) // 2, len(order) - 1)}, key=lambda item: sizes[item])
     rng = np.random.default_rng(0)
     times = np.array([_iteration_seconds(candidates[probe], history.samples, options, rng) for probe in probes])
-    # early stopping ends about a third of the runs halfway
-    effort = options.starts * 0.8
+    # early stopping leaves out 0 to 60 % of the iterations
+    effort = options.starts * 0.7
     screen, refine = (np.interp(sizes, sizes[probes], column) * effort for column in times.T)
     return screen * options.screen_iterations, refine * options.refine_iterations
 
@@ -302,9 +318,10 @@ def _iteration_seconds(
     seconds = []
     for rows in (options.screen_rows, options.refine_rows):
         fitted = problem(rows)
-        began = time.perf_counter()
+        # processor time: who else uses the machine for these few iterations says nothing of the hours to come
+        began = time.thread_time()
         outcome = fit(fitted, start, method=options.method, rules=rules, held_out=held)
-        seconds.append((time.perf_counter() - began) / max(1, outcome.iterations))
+        seconds.append((time.thread_time() - began) / max(1, outcome.iterations))
     return seconds[0], seconds[1]
 
 
@@ -332,13 +349,22 @@ def _kept(
     cache: Path | None, name: str, candidate: Candidate, work: Callable[[], tuple[FloatArray, FloatArray]]
 ) -> tuple[FloatArray, FloatArray]:
     """Return what an earlier run kept, else do the work and keep it."""
-    if cache is None:
-        return work()
-    path = cache / f"{name}-{_key(candidate)}.npz"
-    if path.is_file():
-        with np.load(path, allow_pickle=False) as kept:
-            return kept["errors"], kept["parameters"]
+    found = _kept_file(cache, name, candidate)
+    if found is not None:
+        with np.load(found, allow_pickle=False) as stored:
+            return stored["errors"], stored["parameters"]
     errors, parameters = work()
-    with atomic_path(path) as temporary, temporary.open("wb") as handle:
-        np.savez(handle, errors=errors, parameters=parameters)
+    if cache is not None:
+        with atomic_path(cache / _file_name(name, candidate)) as temporary, temporary.open("wb") as handle:
+            np.savez(handle, errors=errors, parameters=parameters)
     return errors, parameters
+
+
+def _file_name(name: str, candidate: Candidate) -> str:
+    return f"{name}-{_key(candidate)}.npz"
+
+
+def _kept_file(cache: Path | None, name: str, candidate: Candidate) -> Path | None:
+    """Return the file in which an earlier run kept the fits of a candidate; None where there is none."""
+    path = None if cache is None else cache / _file_name(name, candidate)
+    return path if path is not None and path.is_file() else None

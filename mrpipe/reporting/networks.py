@@ -143,6 +143,9 @@ def sweep_axes(outcomes: Sequence[Outcome], centre: Candidate) -> Figure:
         axis.tick_params(axis="y", which="both", labelsize=7)
         axis.set_xticks(range(len(names)), names, rotation=45, fontsize=7)
         label(axis, "", "held-out NRMSE", title)
+    for name, colour in (("screened", COLOURS[7]), ("refined", MODEL)):
+        axes[0, 0].plot([], [], ".", color=colour, label=name)
+    axes[0, 0].legend(fontsize=7)
     return figure
 
 

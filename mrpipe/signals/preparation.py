@@ -195,7 +195,9 @@ def _require_rate(options: PreparationOptions) -> None:
     """Refuse a rate asked for that could not carry the velocity's band (a campaign that is slow by itself may be)."""
     least = 2.5 * options.velocity_cutoff_hz
     if 0.0 < options.working_rate_hz < least:
-        problem = f"is {options.working_rate_hz:g}, too slow for a velocity cut-off of {options.velocity_cutoff_hz:g} Hz"
+        problem = (
+            f"is {options.working_rate_hz:g}, too slow for the velocity cut-off of {options.velocity_cutoff_hz:g} Hz"
+        )
         remedy = f"give {least:g} Hz at least, or 0 for the campaign's own"
         raise UserError("prepare", "working_rate_hz", problem, remedy)
 

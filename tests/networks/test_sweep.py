@@ -70,7 +70,9 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
         sweep(history, candidates, TINY, 5, cache=tmp_path, progress=interrupt)
     kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
     assert 3 <= len(kept) <= 4
-    resumed = sweep(history, candidates, TINY, 5, cache=tmp_path)
+    told: list[str] = []
+    resumed = sweep(history, candidates, TINY, 5, cache=tmp_path, tell=told.append)
+    assert f"({len(kept)} screened by an earlier run)" in told[0]
     for one, other in zip(undisturbed.outcomes, resumed.outcomes, strict=True):
         assert one.screened.tobytes() == other.screened.tobytes()
         assert one.refined.tobytes() == other.refined.tobytes()
