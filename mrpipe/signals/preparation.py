@@ -193,13 +193,10 @@ def _on_working_rate(recording: Recording, begin: int, end: int, name: str, rate
 
 def _require_rate(options: PreparationOptions) -> None:
     """Refuse a rate asked for that could not carry the velocity's band (a campaign that is slow by itself may be)."""
-    least = 2.5 * options.velocity_cutoff_hz
-    if 0.0 < options.working_rate_hz < least:
-        problem = (
-            f"is {options.working_rate_hz:g}, too slow for the velocity cut-off of {options.velocity_cutoff_hz:g} Hz"
-        )
-        remedy = f"give {least:g} Hz at least, or 0 for the campaign's own"
-        raise UserError("prepare", "working_rate_hz", problem, remedy)
+    asked, cutoff = options.working_rate_hz, options.velocity_cutoff_hz
+    if 0.0 < asked < 2.5 * cutoff:
+        problem = f"is {asked:g}, too slow for a velocity cut-off of {cutoff:g} Hz"
+        raise UserError("prepare", "working_rate_hz", problem, f"give {2.5 * cutoff:g} Hz at least")
 
 
 def _require_length(work: _Work, options: PreparationOptions, source: str) -> None:

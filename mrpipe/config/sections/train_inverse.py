@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from mrpipe.config.section import Section
@@ -29,12 +27,6 @@ class ViscousEmulationSettings(Section):
 class TrainInverseSettings(TrainingSettings):
     """How the inverse network (force to drive) is trained."""
 
-    architecture: Literal["thesis", "sweep"] | tuple[int, ...] = Field(
-        (12, 6),
-        description="Hidden layers: those of paper P5 ([12, 6], two fifths less error in drive than the 6-6 of the "
-        "thesis, for 174 weights), `thesis` (two of six), `sweep` (what the sweep chose for the forward network) or "
-        "the neurons of each layer.",
-    )
     compare_signed: bool = Field(
         True, description="Train a short second network on signed values, to compare the share of negative drive."
     )
