@@ -15,6 +15,7 @@ from mrpipe.discrepancy.crossvalidation import Gain, gain_of, intervals, left_ou
 from mrpipe.discrepancy.engine import Fit
 from mrpipe.discrepancy.nuisances import observation_window, with_lag_apart
 from mrpipe.discrepancy.offsets import offset_between_tests
+from mrpipe.discrepancy.pairs import with_play
 from mrpipe.discrepancy.problem import Term
 from mrpipe.discrepancy.recordings import (
     MOST_JUDGED,
@@ -131,7 +132,7 @@ def _select(
         )
         excess = selection.chosen.chi_square / max(baseline.noise, 1e-12)
         if floor > 0.0:
-            return baseline, _judged_by_trees(selection)
+            return baseline, _judged_by_trees(with_play(selection, effects))
         if excess < MODEL_ERROR_CHI_SQUARE:
             return _with_noise_of(selection.chosen, baseline, selection)
         # what is left on the force's own scale becomes the yardstick of the second pass
