@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import StageContext
 
 if TYPE_CHECKING:
+    from mrpipe.artifacts import FloatArray
     from mrpipe.discrepancy.summary import Tracing
 
 
@@ -47,8 +48,6 @@ def _effects(context: StageContext, summary: Mapping[str, Any]) -> None:
 
 
 def _where(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
-    import numpy as np
-
     from mrpipe.reporting.discrepancy import residual_location, residual_maps
 
     context.report.figure(
@@ -65,10 +64,20 @@ def _where(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
     maps = [
         ("displacement [mm]", "velocity [mm/s]", 1e3 * states["displacement"], 1e3 * states["velocity"]),
         ("velocity [mm/s]", drive, 1e3 * states["velocity"], states["drive"]),
-        (drive, f"largest drive so far [{unit}]", states["drive"], states["past of drive"] + np.abs(states["drive"])),
+        _drive_map(states, drive, unit),
         ("time in test [s]", "dissipated work [J]", states["time in test"], states["work"]),
     ]
     context.report.figure("maps", residual_maps(maps, residual), "Mean residual of the baseline over pairs of states.")
+
+
+def _drive_map(states: Mapping[str, FloatArray], drive: str, unit: str) -> tuple[str, str, FloatArray, FloatArray]:
+    """Return the drive and its past, or the displacement and the drive where no test's drive has a past."""
+    import numpy as np
+
+    past = states["past of drive"]
+    if float(np.max(past)) > 0.05 * float(np.max(np.abs(states["drive"]))):
+        return drive, f"largest drive so far [{unit}]", states["drive"], past + np.abs(states["drive"])
+    return "displacement [mm]", drive, 1e3 * states["displacement"], states["drive"]
 
 
 def _candidates(context: StageContext, summary: Mapping[str, Any]) -> None:
