@@ -144,6 +144,8 @@ def _test(name: str, motion: str, amplitude: float, frequency: float, duration: 
         "amplitude_m": float(f"{amplitude:.3g}"),
         "frequency_hz": float(f"{frequency:.3g}"),
         "duration_s": float(f"{max(duration, 2.5 / frequency):.3g}"),
+        # the rig stays what it is
+        "later": True,
     }
     return made | {key: float(f"{value:.3g}") if isinstance(value, float) else value for key, value in more.items()}
 

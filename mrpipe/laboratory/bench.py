@@ -190,7 +190,7 @@ def record_bench(
     """
     seed = int(rng.integers(2**62))
     motions = [fine_motion(test, rig, seed) for test in tests]
-    damper = calibrated(damper, motions)
+    damper = calibrated(damper, _at_first(tests, motions))
     sensors = rig.sensors
     draw = np.random.default_rng([seed, 1]).standard_normal(4)
     offsets = draw * np.array(
@@ -224,6 +224,12 @@ def record_bench(
         "seed": seed,
     }
     return BenchRecord(files, truth, damper)
+
+
+def _at_first(tests: Sequence[BenchTest], motions: Sequence[FineMotion]) -> list[FineMotion]:
+    """Return the motions that shares are told of: a test made later does not change the damper."""
+    first = [motion for test, motion in zip(tests, motions, strict=True) if not test.later]
+    return first or list(motions)
 
 
 class _Shares:
@@ -273,4 +279,5 @@ def calibrated_on(
     if all(effect.strength_share is None for effect in damper.effects):
         return damper
     seed = int(rng.integers(2**62))
-    return calibrated(damper, [fine_motion(test, rig, seed) for test in tests])
+    first = [test for test in tests if not test.later] or tests
+    return calibrated(damper, [fine_motion(test, rig, seed) for test in first])

@@ -52,6 +52,7 @@ class BenchTest:
     repeat_of: str = ""
     pause_s: float = 0.4
     middle_m: float = 0.0
+    later: bool = False
 
 
 @dataclass(frozen=True)

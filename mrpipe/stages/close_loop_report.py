@@ -202,7 +202,7 @@ def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
         context.report.text(f"To decide {item['decides']}: {', '.join(item['tests'])}.")
     context.report.table(
         "next-tests",
-        pd.DataFrame(wanted["tests"]),
+        pd.DataFrame(wanted["tests"]).drop(columns="later"),
         f"Tests that would decide what is open, as {wanted['file']} in the run directory lists them; on the virtual "
         f"rig `mrpipe close-loop --settings {wanted['file']}` makes them and traces again.",
     )

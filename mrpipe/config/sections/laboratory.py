@@ -39,6 +39,9 @@ class CustomTest(Section):
     current_a: float = Field(0.0, ge=0.0, description="Level, amplitude or largest value of the current [A].")
     duration_s: float = Field(10.0, gt=0.0, description="Duration [s].")
     repeat_of: str = Field("", description="Test whose command is repeated.")
+    later: bool = Field(
+        False, description="Made after the others: the strength of effects given as shares is that of the others."
+    )
     pause_s: float = Field(0.4, gt=0.0, description="Pause of `hold`, or time between steps of current [s].")
 
 
