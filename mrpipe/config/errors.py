@@ -33,6 +33,16 @@ def model_in(annotation: Any) -> type[BaseModel] | None:
     return None
 
 
+def _finding(error: ValidationError) -> tuple[Any, tuple[str | int, ...]]:
+    """Return the first finding and its keys; where a value may be of several kinds, that of the kind it comes nearest.
+
+    pydantic reports every kind and puts its name among the keys, such as `tuple[int,...]`: no key of the user's.
+    """
+    found = [(item, tuple(key for key in item["loc"] if "[" not in str(key))) for item in error.errors()]
+    first = found[0][1]
+    return max((entry for entry in found if entry[1][: len(first)] == first), key=lambda entry: len(entry[1]))
+
+
 def explain(
     error: ValidationError,
     model: type[BaseModel],
@@ -50,8 +60,7 @@ def explain(
     lines
         Path of keys -> line number in the file.
     """
-    first = error.errors()[0]
-    path = tuple(first["loc"])
+    first, path = _finding(error)
     known_path = path
     while known_path and known_path not in lines:
         known_path = known_path[:-1]

@@ -50,6 +50,12 @@ OVERRIDES = {
     "prepare.cutof_hz=80": "--set: prepare.cutof_hz: unknown key; did you mean cutoff_hz?",
     "prepare": "--set: prepare: is no assignment; write section.key=value",
     "seed=many": "--set: seed: is 'many'; input should be a valid integer",
+    "train_inverse.architecture=[12, six]": "train_inverse.architecture.1: is 'six'; input should be a valid int",
+    "train_inverse.architecture=[0]": "--set: train_inverse.architecture.0: is 0; input should be greater than 0",
+    "train_inverse.architecture=best": "train_inverse.architecture: is 'best'; input should be 'thesis' or 'sweep'",
+    "identify_damper.form=bouc-wenn": "identify_damper.form: is 'bouc-wenn'; input should be 'bouc-wen', ",
+    "sweep.neurons=[0]": "--set: sweep.neurons.0: is 0; input should be greater than 0",
+    "sweep.layers=[]": "--set: sweep.layers: is []; tuple should have at least 1 item",
     "seed=[1": "--set: seed=[1: value is not valid YAML; quote it",
 }
 

@@ -23,7 +23,7 @@ FormName = Literal[
 class IdentifyDamperSettings(Section):
     """Which parametric damper is fitted to the bench tests, and how."""
 
-    form: FormName | Literal["best"] = Field(
+    form: Literal[FormName, "best"] = Field(
         "bouc-wen",
         description="Form of the damper that later stages use: one by name (bouc-wen is the thesis' simplified "
         "Bouc-Wen, 2.1 to 2.4), or best: the one with the fewest parameters within one standard error of the smallest "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, NonNegativeInt, PositiveInt
 
 from mrpipe.config.section import Section
 
@@ -16,7 +16,8 @@ class SweepSettings(Section):
 
     design: Literal["star", "full"] = Field(
         "star",
-        description="`star` varies one thing at a time about the thesis' network; `full` takes every combination.",
+        description="`star` varies one thing at a time about the thesis' network and then combines what helped; `full` takes every "
+        "combination.",
     )
     states: tuple[tuple[State, ...], ...] = Field(
         (
@@ -28,11 +29,18 @@ class SweepSettings(Section):
             ("displacement", "acceleration"),
             ("displacement", "velocity", "acceleration"),
         ),
+        min_length=1,
         description="Motion channels tried as inputs; the drive is always one.",
     )
-    past_values: tuple[int, ...] = Field((0, 1, 2, 3, 4, 5), description="Past values of each input tried.")
-    layers: tuple[int, ...] = Field((1, 2, 3), description="Numbers of hidden layers tried.")
-    neurons: tuple[int, ...] = Field((3, 6, 9, 12), description="Neurons of each hidden layer tried.")
+    past_values: tuple[NonNegativeInt, ...] = Field(
+        (0, 1, 2, 3, 4, 5), min_length=1, description="Past values of each input tried."
+    )
+    layers: tuple[NonNegativeInt, ...] = Field(
+        (1, 2, 3), min_length=1, description="Numbers of hidden layers tried (0: a linear model)."
+    )
+    neurons: tuple[PositiveInt, ...] = Field(
+        (3, 6, 9, 12), min_length=1, description="Neurons of each hidden layer tried."
+    )
     biases: tuple[bool, ...] = Field(
         (False, True), min_length=1, description="Without or with biases; the first is the thesis'."
     )

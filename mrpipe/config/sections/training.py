@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, PositiveInt
 
 from mrpipe.config.section import Section
 
@@ -12,7 +12,7 @@ from mrpipe.config.section import Section
 class TrainingSettings(Section):
     """How a network is trained."""
 
-    architecture: Literal["thesis", "sweep"] | tuple[int, ...] = Field(
+    architecture: Literal["thesis", "sweep"] | tuple[PositiveInt, ...] = Field(
         "thesis",
         description="Hidden layers: `thesis` (two of six neurons), `sweep` (what the sweep chose, its past values and "
         "input states and biases included) or the neurons of each layer, such as [12, 6].",
