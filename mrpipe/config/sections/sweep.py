@@ -16,8 +16,8 @@ class SweepSettings(Section):
 
     design: Literal["star", "full"] = Field(
         "star",
-        description="`star` varies one thing at a time about the thesis' network and then combines what helped; `full` takes every "
-        "combination.",
+        description="`star` varies one thing at a time about the thesis' network and then combines what helped; "
+        "`full` takes every combination.",
     )
     states: tuple[tuple[State, ...], ...] = Field(
         (
