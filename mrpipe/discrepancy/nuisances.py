@@ -135,7 +135,7 @@ def session_gain(
         deviation = float(np.std(values, ddof=1))
         if deviation > 0.5 * abs(value - 1.0):
             continue
-        half = float(stats.t.ppf(0.975, len(values) - 1)) * deviation / np.sqrt(len(values))
+        half = float(stats.t.ppf(0.975, len(values) - 1) * deviation / np.sqrt(len(values)))
         rest = recordings.used & ~first
         weaker = np.isin(recordings.test, [k for k, name in enumerate(recordings.names) if name in chosen])
         power = float(np.sqrt(np.mean(measured[rest] ** 2)))
