@@ -181,7 +181,7 @@ def _decrement(time: FloatArray, peak: FloatArray) -> tuple[Estimate, Estimate, 
     return Estimate.of(zeta, float(error)), Estimate.of(mean, mean_error), series
 
 
-def _sinusoids(time: FloatArray, poles: list[complex]) -> FloatArray:
+def _waves(time: FloatArray, poles: list[complex]) -> FloatArray:
     columns = [np.ones_like(time)]
     for pole in poles:
         wave = np.exp(pole * time)
@@ -189,7 +189,14 @@ def _sinusoids(time: FloatArray, poles: list[complex]) -> FloatArray:
     return np.column_stack(columns)
 
 
-def _exponential_fit(
+def damped_sinusoids(time: FloatArray, angular_frequencies: FloatArray, damping_ratios: FloatArray) -> FloatArray:
+    """Return a constant and, a mode, the real and imaginary part of its decaying wave: shape (m, 1 + 2r)."""
+    zetas, omegas = damping_ratios, angular_frequencies
+    poles = -zetas * omegas + 1j * omegas * np.sqrt(1.0 - zetas**2)
+    return _waves(time, [complex(pole) for pole in poles])
+
+
+def exponential_fit(
     time: FloatArray, coordinate: FloatArray, mode: int, omegas: FloatArray, zetas: FloatArray
 ) -> tuple[float, Estimate, FloatArray]:
     """Fit damped sinusoids of all modes, this mode's pole free: frequency [rad/s], damping, fitted curve."""
@@ -199,7 +206,7 @@ def _exponential_fit(
     def solve(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         omega, zeta = np.exp(theta)
         own = complex(-zeta * omega, omega * np.sqrt(max(1 - zeta**2, 1e-12)))
-        basis = _sinusoids(time, [own, *others])
+        basis = _waves(time, [own, *others])
         fitted = basis @ np.linalg.lstsq(basis, coordinate, rcond=None)[0]
         return coordinate - fitted, fitted
 
@@ -264,7 +271,7 @@ def analyse_decay(
         else own[begin:end]
     )
     clock = np.arange(piece.size) * step / rate
-    fitted_omega, exponential, fitted = _exponential_fit(clock, piece, mode, angular_frequencies, damping_ratios)
+    fitted_omega, exponential, fitted = exponential_fit(clock, piece, mode, angular_frequencies, damping_ratios)
     return DecayResult(
         test=test.name,
         mode=mode + 1,

@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
@@ -13,7 +14,7 @@ from mrpipe.modal.checks import LARGEST_COUPLING, check_mode_matrix, modal_coupl
 from mrpipe.modal.decay import DecayResult, Estimate, analyse_decay
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.records import FrameTest, FrameTests
-from mrpipe.modal.search import find_modes
+from mrpipe.modal.search import check_channels, find_modes
 from mrpipe.modal.tridiagonal import TridiagonalFit, fit_tridiagonal
 from mrpipe.modal.verification import (
     FrequencyVerification,
@@ -79,7 +80,7 @@ class FrameIdentification:
     damping
         Damping ratios that went into C, with intervals.
     damping_source
-        `decay` or `sweep`, a mode.
+        `decay`, `sweep`, or `decay and sweep` where the decay is uncertain, a mode.
     sweep_damping
         Damping ratios of the multi-mode fit of the forced tests: the second method.
     mode_shapes
@@ -138,7 +139,7 @@ def _find(
 ) -> tuple[MultiModeFit, tuple[float, float], list[str]]:
     """Find the modes in the tests that are not for validation; in all of them where a mode is too weak in those."""
     first = tuple(test for test in forced if test.role != "validation") or forced
-    arguments = (tests.floor_masses, options.band_low_hz, options.band_high_hz, tests.source)
+    arguments = (tests.floor_masses, options.band_low_hz, options.band_high_hz, tests.source, tests.decays)
     sets = [first]
     # sweeps put more into each mode than random motion, and fewer tests are fitted sooner
     for more in (tuple(test for test in forced if test.kind == "sweep"), forced):
@@ -168,11 +169,7 @@ def _check_coherence(fit: MultiModeFit, tests: FrameTests) -> list[str]:
     """Raise where a peak is mostly noise; return warnings for single floors."""
     findings = []
     frequency = fit.angular_frequencies / (2.0 * np.pi)
-    dead = np.flatnonzero(np.all(fit.coherence < _LEAST_COHERENCE, axis=1))
-    if dead.size:
-        place = f"channel of floor {dead[0] + 1}"
-        problem = f"coherence is below {_LEAST_COHERENCE:g} at every peak (largest {fit.coherence[dead[0]].max():.2f})"
-        raise UserError(tests.source, place, problem, "check the sensor, its cable and its column")
+    check_channels(fit.coherence, tests.source)
     pooled = fit.mode_coherence()
     weak = np.flatnonzero(pooled < _LEAST_COHERENCE)
     if weak.size:
@@ -202,6 +199,12 @@ def _decays(tests: FrameTests, fit: MultiModeFit) -> tuple[dict[int, DecayResult
     return results, findings
 
 
+def _pooled(first: Estimate, second: Estimate) -> Estimate:
+    weights = np.array([1.0 / max(item.half_width, 1e-12) ** 2 for item in (first, second)])
+    value = float(weights @ [first.value, second.value] / weights.sum())
+    return Estimate.of(value, float(1.0 / np.sqrt(weights.sum())) / _NORMAL_95)
+
+
 def _choose_damping(
     sweep: tuple[Estimate, ...], decays: dict[int, DecayResult], damping_from: str
 ) -> tuple[tuple[Estimate, ...], tuple[str, ...], list[str]]:
@@ -211,15 +214,16 @@ def _choose_damping(
     for mode, second in enumerate(sweep, start=1):
         decay = decays.get(mode)
         first = decay.exponential_fit if decay else None
-        certain = first is not None and (
-            first.half_width <= max(_WIDEST_DECAY_INTERVAL * first.value, 0.0) or first.half_width < second.half_width
-        )
-        if first is not None and certain and damping_from == "decay":
+        if first is None or damping_from != "decay":
+            chosen.append(second)
+            sources.append("sweep")
+        elif first.half_width <= _WIDEST_DECAY_INTERVAL * first.value:
             chosen.append(first)
             sources.append("decay")
         else:
-            chosen.append(second)
-            sources.append("sweep")
+            # neither is sure: the mean of two independent methods, each by its certainty
+            chosen.append(_pooled(first, second))
+            sources.append("decay and sweep")
         if first is None and damping_from == "decay":
             findings.append(f"mode {mode}: no free decay, damping from the sweep")
         if first is not None:
@@ -261,7 +265,12 @@ def identify_frame(
         If a mode has no peak, the coherence at a peak is below 0.5, or a given mode matrix is singular or not
         orthogonal to the mass.
     """
-    chosen = options or IdentificationOptions()
+    # tall matrices of a few columns gain nothing from threads, and lose a hundredfold where other work shares the cores
+    with threadpool_limits(1):
+        return _identify(tests, options or IdentificationOptions(), progress)
+
+
+def _identify(tests: FrameTests, chosen: IdentificationOptions, progress: Progress) -> FrameIdentification:
     forced, findings = _one_place(tests)
     mass = mass_matrix(tests.floor_masses, source=tests.source)
     if chosen.mode_matrix is not None:

@@ -14,11 +14,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.projection import DIRECT_POWERS, Problem, State, evaluate, stack
 from mrpipe.modal.spectra import ComplexArray, RecordSpectrum
-
-_TRANSIENT_POWERS = 5
-_DIRECT_POWERS = 4
-_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -86,99 +83,6 @@ class MultiModeFit:
         return np.vstack([m - s for m, s in zip(self.measured, self.steady, strict=True)])
 
 
-def _stack(matrix: ComplexArray) -> FloatArray:
-    return np.concatenate([matrix.real, matrix.imag], axis=0)
-
-
-class _Problem:
-    """Linear basis of the fit for given poles, for outputs of one kind (accelerations or displacements)."""
-
-    def __init__(self, spectra: Sequence[RecordSpectrum], modes: int, displacement: bool) -> None:
-        self.spectra = spectra
-        self.modes = modes
-        self.displacement = displacement
-        self.rows = [item.omega.size for item in spectra]
-        self.total = sum(self.rows)
-        self.high = max(float(item.omega[-1]) for item in spectra)
-        # one scale for all tests: what stands for the modes above the band is a property of the frame, not of a test
-        power = sum(float(np.linalg.norm(item.excitation)) ** 2 for item in spectra)
-        self.scale = float(np.sqrt(power / self.total))
-        self.tests = len(spectra)
-
-    def mode_columns(self, omega_r: float, zeta: float) -> ComplexArray:
-        """Columns of one mode, shape (rows, 2 + 2 tests): two of H U, and a complex transient a test."""
-        columns = np.zeros((self.total, 2 + 2 * self.tests), dtype=np.complex128)
-        start = 0
-        pole = complex(-zeta * omega_r, omega_r * np.sqrt(max(1.0 - zeta**2, 1e-12)))
-        for index, item in enumerate(self.spectra):
-            part = slice(start, start + item.omega.size)
-            jw = 1j * item.omega
-            resonance = 1.0 / (omega_r**2 - item.omega**2 + 2.0 * zeta * omega_r * jw)
-            sign = -1.0 if item.shaker_floor else 1.0
-            amplitude = sign * (-1.0 if self.displacement else 1.0) * (1.0 if self.displacement else item.omega**2)
-            columns[part, 0] = amplitude * resonance * item.excitation
-            columns[part, 1] = columns[part, 0] * jw / omega_r
-            first = 1.0 / (1.0 - np.exp((pole - jw) * item.dt))
-            second = 1.0 / (1.0 - np.exp((pole.conjugate() - jw) * item.dt))
-            columns[part, 2 + 2 * index] = first + second
-            columns[part, 3 + 2 * index] = 1j * (first - second)
-            start += item.omega.size
-        return columns
-
-    def smooth_columns(self) -> ComplexArray:
-        """What modes above the band, sensor offsets and drift leave inside it: powers of i omega."""
-        columns = np.zeros((self.total, _DIRECT_POWERS + self.tests * (_TRANSIENT_POWERS + 1)), dtype=np.complex128)
-        start = 0
-        for index, item in enumerate(self.spectra):
-            part = slice(start, start + item.omega.size)
-            ratio = 1j * item.omega / self.high
-            direct = ratio[:, None] ** np.arange(_DIRECT_POWERS)
-            columns[part, :_DIRECT_POWERS] = direct * item.excitation[:, None] / self.scale
-            first = _DIRECT_POWERS + index * (_TRANSIENT_POWERS + 1)
-            columns[part, first : first + _TRANSIENT_POWERS + 1] = ratio[:, None] ** np.arange(-1, _TRANSIENT_POWERS)
-            start += item.omega.size
-        return columns
-
-
-@dataclass
-class _State:
-    """One evaluation of the projection."""
-
-    residual: FloatArray
-    jacobian: FloatArray
-    coefficients: FloatArray
-    basis: ComplexArray
-
-
-def _evaluate(
-    problem: _Problem, smooth: ComplexArray, theta: FloatArray, target: FloatArray, weight: FloatArray
-) -> _State:
-    """Project the weighted target on the basis at theta = (ln omega, ln zeta), with Kaufman's Jacobian."""
-    modes = problem.modes
-    omega, zeta = np.exp(theta[:modes]), np.exp(theta[modes:])
-    blocks = [problem.mode_columns(w, z) for w, z in zip(omega, zeta, strict=True)]
-    basis = np.hstack([*blocks, smooth])
-    weighted = _stack(basis) * weight[:, None]
-    norms = np.linalg.norm(weighted, axis=0)
-    q, r = np.linalg.qr(weighted / norms)
-    coefficients = np.linalg.lstsq(r, q.T @ target, rcond=1e-13)[0]
-    residual = target - weighted / norms @ coefficients
-    coefficients = coefficients / norms[:, None]
-    width = blocks[0].shape[1]
-    changes = []
-    for index in range(modes):
-        own = coefficients[index * width : (index + 1) * width]
-        for which in (0, 1):
-            w, z = omega[index], zeta[index]
-            moved = problem.mode_columns(w * (1 + _STEP), z) if which == 0 else problem.mode_columns(w, z * (1 + _STEP))
-            changes.append(_stack((moved - blocks[index]) / _STEP) * weight[:, None] @ own)
-    change = np.hstack(changes)
-    change -= q @ (q.T @ change)
-    # blocks follow (mode 1 omega, mode 1 zeta, mode 2 omega, ...): put them in the order of theta
-    jacobian = -change.reshape(target.shape[0], modes, 2, target.shape[1]).transpose(0, 3, 2, 1).reshape(-1, 2 * modes)
-    return _State(residual.ravel(), jacobian, coefficients, basis)
-
-
 def _group_target(spectra: Sequence[RecordSpectrum], outputs: Sequence[int]) -> ComplexArray:
     return np.vstack([item.responses[:, outputs] for item in spectra])
 
@@ -189,7 +93,7 @@ class _Fit:
     def __init__(self, spectra: Sequence[RecordSpectrum], modes: int) -> None:
         kinds = spectra[0].is_displacement
         self.groups = [
-            (_Problem(spectra, modes, flag), [i for i, d in enumerate(kinds) if d is flag])
+            (Problem(spectra, modes, flag), [i for i, d in enumerate(kinds) if d is flag])
             for flag in (False, True)
             if flag in kinds
         ]
@@ -198,9 +102,9 @@ class _Fit:
         self.sigma = [np.std(target, axis=0) for target in self.targets]
         self.weight = [np.ones(problem.total) for problem, _ in self.groups]
         self.input_noise = [0.0 for _ in self.groups]
-        self._cache: tuple[bytes, list[_State]] | None = None
+        self._cache: tuple[bytes, list[State]] | None = None
 
-    def states(self, theta: FloatArray) -> list[_State]:
+    def states(self, theta: FloatArray) -> list[State]:
         key = theta.tobytes()
         if self._cache is None or self._cache[0] != key:
             states = []
@@ -208,7 +112,7 @@ class _Fit:
                 self.groups, self.smooth, self.targets, self.sigma, self.weight, strict=True
             ):
                 both = np.concatenate([weight, weight])
-                states.append(_evaluate(problem, smooth, theta, _stack(target / sigma) * both[:, None], both))
+                states.append(evaluate(problem, smooth, theta, stack(target / sigma) * both[:, None], both))
             self._cache = (key, states)
         return self._cache[1]
 
@@ -253,24 +157,24 @@ class _Fit:
             self.input_noise[index] = float(np.sqrt(np.median(noise)))
         self._cache = None
 
-    def complex_residual(self, index: int, state: _State) -> ComplexArray:
+    def complex_residual(self, index: int, state: State) -> ComplexArray:
         """Residual of a group in the unit of its spectra."""
         return self.targets[index] - state.basis @ (state.coefficients * self.sigma[index])
 
-    def coefficient_errors(self, index: int, state: _State) -> FloatArray:
+    def coefficient_errors(self, index: int, state: State) -> FloatArray:
         """Standard errors of a group's coefficients for responses of unit noise, shape (columns,)."""
         weight = np.concatenate([self.weight[index], self.weight[index]])
-        weighted = _stack(state.basis) * weight[:, None]
+        weighted = stack(state.basis) * weight[:, None]
         norms = np.linalg.norm(weighted, axis=0)
         inverse = np.linalg.pinv(np.linalg.qr(weighted / norms, mode="r"))
         return np.asarray(np.linalg.norm(inverse, axis=1) / norms)
 
-    def steady(self, index: int, state: _State) -> ComplexArray:
+    def steady(self, index: int, state: State) -> ComplexArray:
         """H U of a group."""
         problem = self.groups[index][0]
         width = 2 + 2 * problem.tests
         columns = [m * width + k for m in range(problem.modes) for k in (0, 1)]
-        columns += list(range(problem.modes * width, problem.modes * width + _DIRECT_POWERS))
+        columns += list(range(problem.modes * width, problem.modes * width + DIRECT_POWERS))
         return state.basis[:, columns] @ (state.coefficients[columns] * self.sigma[index])
 
 

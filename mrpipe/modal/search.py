@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.errors import UserError
 from mrpipe.modal.checks import modal_coupling, possible_sign_changes
+from mrpipe.modal.free_response import same_place, strongest_frequency, with_decays
 from mrpipe.modal.lscf import PoleCandidate, stable_poles
 from mrpipe.modal.multimode import MultiModeFit, fit_modes
 from mrpipe.modal.records import FrameTest
@@ -20,6 +21,9 @@ _USUAL_HIGH_HZ = 30.0
 _SURPLUS = 4
 _LEAST_COHERENCE = 0.5
 _DIVERGED_DAMPING = 0.25
+_LARGEST_DAMPING = 0.1
+_LEAST_DAMPING = 2e-6
+_UNKNOWN_SHAPE = 0.5
 _LARGEST_COUPLING = 0.15
 _SAME_SHAPE = 0.6
 _LAST_BAND = 1.25
@@ -71,8 +75,20 @@ def _strength(fit: MultiModeFit) -> FloatArray:
 def _couplings(fit: MultiModeFit, masses: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the scaled U'MU of all poles, and how large an element may be by the errors of the shapes."""
     coupling = modal_coupling(fit.residues.real, np.diag(masses))
-    error = np.linalg.norm(fit.residue_errors, axis=0) / np.linalg.norm(fit.residues, axis=0)
-    return coupling, _LARGEST_COUPLING + 2.0 * np.add.outer(error, error)
+    error = _shape_errors(fit)
+    return coupling, np.minimum(_LARGEST_COUPLING + 2.0 * np.add.outer(error, error), _SAME_SHAPE)
+
+
+def _shape_errors(fit: MultiModeFit) -> FloatArray:
+    """Return the error of each shape over its norm, shape (r,)."""
+    norm = np.maximum(np.linalg.norm(fit.residues, axis=0), 1e-300)
+    return np.asarray(np.linalg.norm(fit.residue_errors, axis=0) / norm)
+
+
+def _usable(fit: MultiModeFit) -> BoolArray:
+    """Return which poles may be modes: neither run off nor at the bound, coherent, and of a shape that is known."""
+    inside = (fit.damping_ratios < _LARGEST_DAMPING) & (fit.damping_ratios > _LEAST_DAMPING)
+    return np.asarray(inside & (fit.mode_coherence() >= _LEAST_COHERENCE) & (_shape_errors(fit) < _UNKNOWN_SHAPE))
 
 
 def _structural(fit: MultiModeFit, masses: FloatArray) -> tuple[int, ...]:
@@ -82,7 +98,7 @@ def _structural(fit: MultiModeFit, masses: FloatArray) -> tuple[int, ...]:
     empty where there is none.
     """
     floors = masses.size
-    usable = (fit.damping_ratios < _DIVERGED_DAMPING) & (fit.mode_coherence() >= _LEAST_COHERENCE)
+    usable = _usable(fit)
     ranges = _sign_ranges(fit)
     coupling, allowed = _couplings(fit, masses)
 
@@ -111,7 +127,7 @@ def _sign_ranges(fit: MultiModeFit) -> list[tuple[int, int]]:
 def _strongest_by_signs(fit: MultiModeFit, floors: int) -> tuple[int, ...]:
     """Return the strongest rising choice with the sign changes of a shear frame (masses may be wrong), or nothing."""
     score = np.log(np.maximum(_strength(fit), 1e-300))
-    score[(fit.damping_ratios > _DIVERGED_DAMPING) | (fit.mode_coherence() < _LEAST_COHERENCE)] = -np.inf
+    score[~_usable(fit)] = -np.inf
     ranges = _sign_ranges(fit)
     poles = score.size
     best = np.full((floors + 1, poles + 1), -np.inf)
@@ -160,12 +176,17 @@ def _sound(fit: MultiModeFit) -> list[int]:
     for index in np.argsort(-strength):
         omega = fit.angular_frequencies[index]
         apart = [abs(omega - fit.angular_frequencies[other]) > 1e-3 * omega for other in sound]
-        if fit.damping_ratios[index] < _DIVERGED_DAMPING and all(apart):
+        if _LEAST_DAMPING < fit.damping_ratios[index] < _DIVERGED_DAMPING and all(apart):
             sound.append(int(index))
     return sorted(sound)
 
 
-def _look(spectra: tuple[RecordSpectrum, ...], masses: FloatArray, band_hz: tuple[float, float]) -> _Found | None:
+def _look(
+    spectra: tuple[RecordSpectrum, ...],
+    masses: FloatArray,
+    band_hz: tuple[float, float],
+    decays: Sequence[FrameTest] = (),
+) -> _Found | None:
     """Fit stable poles; then, while the frame's modes are not complete, doubtful ones and peaks of the residual."""
     floors = masses.size
     band = (2.0 * np.pi * band_hz[0] * 1.05, 2.0 * np.pi * band_hz[1] * 0.99)
@@ -175,13 +196,15 @@ def _look(spectra: tuple[RecordSpectrum, ...], masses: FloatArray, band_hz: tupl
     # the end of the band draws poles that are none: fewer occurrences, more damping
     candidates.sort(key=lambda item: (-item.occurrences, item.damping_ratio))
     firm = [item for item in candidates if item.occurrences >= len(orders) // 2][: floors + _SURPLUS]
+    firm += _of_decays(decays, firm, band_hz)
     if not firm:
         return None
     doubtful = [item for item in candidates if item not in firm and item.occurrences >= 2 and item.damping_ratio < 0.05]
-    fit = _fit_candidates(spectra, firm)
+    fit = with_decays(_fit_candidates(spectra, firm), decays)
     found = _Found(fit, _structural(fit, masses), spectra, band_hz)
     if not found.keep and doubtful:
-        fit = _fit_candidates(spectra, [*firm, *doubtful[: max(_SURPLUS, floors + _SURPLUS - len(firm))]])
+        more = doubtful[: max(_SURPLUS, floors + _SURPLUS - len(firm))]
+        fit = with_decays(_fit_candidates(spectra, [*firm, *more]), decays)
         found = _Found(fit, _structural(fit, masses), spectra, band_hz)
     if not found.keep:
         sound = _sound(fit)
@@ -189,9 +212,22 @@ def _look(spectra: tuple[RecordSpectrum, ...], masses: FloatArray, band_hz: tupl
         extra = _next_peaks(fit, max(2, floors + 2 - len(sound)))
         omega = np.concatenate([fit.angular_frequencies, extra])
         zeta = np.concatenate([fit.damping_ratios, np.full(len(extra), 0.004)])
-        fit = fit_modes(spectra, omega, zeta, evaluations=15)
+        fit = with_decays(fit_modes(spectra, omega, zeta, evaluations=15), decays)
         found = _Found(fit, _structural(fit, masses), spectra, band_hz)
     return found
+
+
+def _of_decays(
+    decays: Sequence[FrameTest], known: Sequence[PoleCandidate], band_hz: tuple[float, float]
+) -> list[PoleCandidate]:
+    """Return the poles that decay tests ring at and that the forced tests do not show as stable."""
+    new: list[PoleCandidate] = []
+    for test in decays:
+        omega = strongest_frequency(test, band_hz)
+        others = [item.angular_frequency for item in [*known, *new]]
+        if omega is not None and not any(same_place(test, omega, other) for other in others):
+            new.append(PoleCandidate(omega, 0.004, 0))
+    return new
 
 
 def _fit_candidates(spectra: Sequence[RecordSpectrum], candidates: Sequence[PoleCandidate]) -> MultiModeFit:
@@ -201,9 +237,16 @@ def _fit_candidates(spectra: Sequence[RecordSpectrum], candidates: Sequence[Pole
 
 
 def find_modes(
-    tests: Sequence[FrameTest], floor_masses: FloatArray, low_hz: float, high_hz: float, source: Path
+    tests: Sequence[FrameTest],
+    floor_masses: FloatArray,
+    low_hz: float,
+    high_hz: float,
+    source: Path,
+    decays: Sequence[FrameTest] = (),
 ) -> tuple[MultiModeFit, tuple[float, float]]:
     """Return the fit of as many modes as there are floors, and the band [Hz] used.
+
+    Modes that the forced tests hardly show are taken from `decays` where these show them better.
 
     Raises
     ------
@@ -214,16 +257,16 @@ def find_modes(
     span = f"between {low_hz:g} and {max(high for _, high in bands):.3g} Hz"
     best: _Found | None = None
     for band in bands:
-        found = _look(tuple(record_spectrum(test, band) for test in tests), floor_masses, band)
+        found = _look(tuple(record_spectrum(test, band) for test in tests), floor_masses, band, decays)
         best = found or best
         if found is not None and found.keep:
-            return _only(found, found.keep), band
+            return _only(found, found.keep, decays), band
     if best is None:
         raise UserError(source, "forced tests", f"no peak {span}", "check channels, or set identify_frame.band_high_hz")
-    return _only(best, _strongest(best, floor_masses, source, span)), best.band_hz
+    return _only(best, _strongest(best, floor_masses, source, span), decays), best.band_hz
 
 
-def _only(found: _Found, keep: Sequence[int]) -> MultiModeFit:
+def _only(found: _Found, keep: Sequence[int], decays: Sequence[FrameTest]) -> MultiModeFit:
     """Fit once more with the frame's poles and those beyond them that are real peaks, up to a little above the frame.
 
     Without a support's peak its response would be blamed on the frame. A peak just beyond the band of the search is no
@@ -239,7 +282,7 @@ def _only(found: _Found, keep: Sequence[int]) -> MultiModeFit:
         [item.below(top) for item in found.spectra], fit.angular_frequencies[both], fit.damping_ratios[both]
     )
     place = [int(np.argmin(np.abs(refined.angular_frequencies - fit.angular_frequencies[i]))) for i in keep]
-    return refined.only(place)
+    return with_decays(refined, decays).only(place)
 
 
 def _strongest(found: _Found, masses: FloatArray, source: Path, span: str) -> tuple[int, ...]:
@@ -247,20 +290,32 @@ def _strongest(found: _Found, masses: FloatArray, source: Path, span: str) -> tu
     fit, floors = found.fit, masses.size
     strength = _strength(fit)
     coupling = modal_coupling(fit.residues.real, np.diag(masses))
-    coherent = [i for i in _sound(fit) if fit.mode_coherence()[i] >= _LEAST_COHERENCE]
+    usable = _usable(fit)
+    coherent = [i for i in _sound(fit) if usable[i]]
     chosen: list[int] = []
-    for index in sorted((i for i in coherent if fit.damping_ratios[i] < 0.1), key=lambda i: -strength[i]):
+    for index in sorted((i for i in coherent if fit.damping_ratios[i] < _LARGEST_DAMPING), key=lambda i: -strength[i]):
         # two poles of one shape are one mode, or a mode and noise
         if len(chosen) < floors and all(abs(coupling[index, other]) < _SAME_SHAPE for other in chosen):
             chosen.append(index)
     chosen.sort()
     if len(chosen) < floors:
+        if chosen:
+            check_channels(fit.coherence[:, chosen], source)
         present = fit.angular_frequencies[chosen] / (2.0 * np.pi)
         peaks = ", ".join(f"{value:.3g}" for value in present) or "none"
         problem = f"mode {_missing_mode(fit, chosen)} of {floors} has no peak {span} (peaks at {peaks} Hz)"
         remedy = "excite it, or set identify_frame.band_low_hz and band_high_hz"
         raise UserError(source, "forced tests", problem, remedy)
     return tuple(chosen)
+
+
+def check_channels(coherence: FloatArray, source: Path) -> None:
+    """Raise where a floor, a row of `coherence` (n, r), answers to the excitation at none of the peaks."""
+    dead = np.flatnonzero(np.all(coherence < _LEAST_COHERENCE, axis=1))
+    if dead.size:
+        place = f"channel of floor {dead[0] + 1}"
+        problem = f"coherence is below {_LEAST_COHERENCE:g} at every peak (largest {coherence[dead[0]].max():.2f})"
+        raise UserError(source, place, problem, "check the sensor, its cable and its column")
 
 
 def _missing_mode(fit: MultiModeFit, chosen: Sequence[int]) -> int:

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from mrpipe.modal.lscf import stable_poles
-from mrpipe.modal.multimode import _Problem, fit_modes
+from mrpipe.modal.multimode import fit_modes
+from mrpipe.modal.projection import Problem
 from mrpipe.modal.spectra import averaged_responses, excited_band, record_spectrum
 from mrpipe.modal.verification import verify_in_frequency, verify_in_time
 from mrpipe.structures import complex_modes, frame_from_parameter_set, modal_assurance, natural_modes
@@ -107,6 +108,6 @@ def test_what_lies_above_the_band_is_scaled_alike_in_all_tests(thesis):
     rng = np.random.default_rng(3)
     tests = [sweep_test(frame, rng, Rig(rate=100.0, sweep_s=20.0, amplitude=size)) for size in (0.3, 3.0)]
     spectra = [record_spectrum(test, (0.2, 14.0)) for test in tests]
-    columns = _Problem(spectra, 5, displacement=False).smooth_columns()[:, 0]
+    columns = Problem(spectra, 5, displacement=False).smooth_columns()[:, 0]
     excitation = np.concatenate([item.excitation for item in spectra])
     assert np.ptp(np.abs(columns / excitation)) < 1e-12

@@ -1,0 +1,138 @@
+"""Linear part of the multi-mode fit: what responses to given poles look like, and the projection on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_solve
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.spectra import ComplexArray, RecordSpectrum
+
+_TRANSIENT_POWERS = 5
+DIRECT_POWERS = 4
+_STEP = 1e-6
+_LEAST_INDEPENDENCE = 1e-5
+"""Part of a unit column that the columns before it do not explain, below which normal equations are too coarse."""
+
+
+def stack(matrix: ComplexArray) -> FloatArray:
+    """Return real and imaginary parts after one another, shape (2 m, n)."""
+    return np.concatenate([matrix.real, matrix.imag], axis=0)
+
+
+class Problem:
+    """Linear basis of the fit for given poles, for outputs of one kind (accelerations or displacements)."""
+
+    def __init__(self, spectra: Sequence[RecordSpectrum], modes: int, displacement: bool) -> None:
+        self.spectra = spectra
+        self.modes = modes
+        self.displacement = displacement
+        self.rows = [item.omega.size for item in spectra]
+        self.total = sum(self.rows)
+        self.high = max(float(item.omega[-1]) for item in spectra)
+        # one scale for all tests: what stands for the modes above the band is a property of the frame, not of a test
+        power = sum(float(np.linalg.norm(item.excitation)) ** 2 for item in spectra)
+        self.scale = float(np.sqrt(power / self.total))
+        self.tests = len(spectra)
+        self.turns = [np.exp(-1j * item.omega * item.dt) for item in spectra]
+
+    def mode_columns(self, omega_r: float, zeta: float) -> ComplexArray:
+        """Columns of one mode, shape (rows, 2 + 2 tests): two of H U, and a complex transient a test."""
+        columns = np.zeros((self.total, 2 + 2 * self.tests), dtype=np.complex128)
+        start = 0
+        pole = complex(-zeta * omega_r, omega_r * np.sqrt(max(1.0 - zeta**2, 1e-12)))
+        for index, item in enumerate(self.spectra):
+            part = slice(start, start + item.omega.size)
+            jw = 1j * item.omega
+            resonance = 1.0 / (omega_r**2 - item.omega**2 + 2.0 * zeta * omega_r * jw)
+            sign = -1.0 if item.shaker_floor else 1.0
+            amplitude = sign * (-1.0 if self.displacement else 1.0) * (1.0 if self.displacement else item.omega**2)
+            columns[part, 0] = amplitude * resonance * item.excitation
+            columns[part, 1] = columns[part, 0] * jw / omega_r
+            first = 1.0 / (1.0 - np.exp(pole * item.dt) * self.turns[index])
+            second = 1.0 / (1.0 - np.exp(pole.conjugate() * item.dt) * self.turns[index])
+            columns[part, 2 + 2 * index] = first + second
+            columns[part, 3 + 2 * index] = 1j * (first - second)
+            start += item.omega.size
+        return columns
+
+    def smooth_columns(self) -> ComplexArray:
+        """What modes above the band, sensor offsets and drift leave inside it: powers of i omega."""
+        columns = np.zeros((self.total, DIRECT_POWERS + self.tests * (_TRANSIENT_POWERS + 1)), dtype=np.complex128)
+        start = 0
+        for index, item in enumerate(self.spectra):
+            part = slice(start, start + item.omega.size)
+            ratio = 1j * item.omega / self.high
+            direct = ratio[:, None] ** np.arange(DIRECT_POWERS)
+            columns[part, :DIRECT_POWERS] = direct * item.excitation[:, None] / self.scale
+            first = DIRECT_POWERS + index * (_TRANSIENT_POWERS + 1)
+            columns[part, first : first + _TRANSIENT_POWERS + 1] = ratio[:, None] ** np.arange(-1, _TRANSIENT_POWERS)
+            start += item.omega.size
+        return columns
+
+
+@dataclass
+class State:
+    """One evaluation of the projection."""
+
+    residual: FloatArray
+    jacobian: FloatArray
+    coefficients: FloatArray
+    basis: ComplexArray
+
+
+def _projection(basis: FloatArray, target: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+    """Return the least-squares coefficients of the target, and what takes the basis out of other columns.
+
+    Normal equations with one refinement cost a fifth of an orthogonal basis; where columns are too much alike for them,
+    the orthogonal basis it is.
+    """
+    gram = basis.T @ basis
+    try:
+        root = np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        root = np.zeros_like(gram)
+    if np.diag(root).min() < _LEAST_INDEPENDENCE:
+        q, r = np.linalg.qr(basis)
+        return np.linalg.lstsq(r, q.T @ target, rcond=1e-13)[0], lambda columns: columns - q @ (q.T @ columns)
+
+    def solve(columns: FloatArray) -> FloatArray:
+        return np.asarray(cho_solve((root, True), basis.T @ columns, check_finite=False))
+
+    def project(columns: FloatArray) -> FloatArray:
+        rest = columns - basis @ solve(columns)
+        return np.asarray(rest - basis @ solve(rest))
+
+    coefficients = solve(target)
+    return coefficients + solve(target - basis @ coefficients), project
+
+
+def evaluate(
+    problem: Problem, smooth: ComplexArray, theta: FloatArray, target: FloatArray, weight: FloatArray
+) -> State:
+    """Project the weighted target on the basis at theta = (ln omega, ln zeta), with Kaufman's Jacobian."""
+    modes = problem.modes
+    omega, zeta = np.exp(theta[:modes]), np.exp(theta[modes:])
+    blocks = [problem.mode_columns(w, z) for w, z in zip(omega, zeta, strict=True)]
+    basis = np.hstack([*blocks, smooth])
+    weighted = stack(basis) * weight[:, None]
+    norms = np.linalg.norm(weighted, axis=0)
+    weighted /= norms
+    coefficients, project = _projection(weighted, target)
+    residual = target - weighted @ coefficients
+    coefficients = coefficients / norms[:, None]
+    width = blocks[0].shape[1]
+    changes = []
+    for index in range(modes):
+        own = coefficients[index * width : (index + 1) * width]
+        for which in (0, 1):
+            w, z = omega[index], zeta[index]
+            moved = problem.mode_columns(w * (1 + _STEP), z) if which == 0 else problem.mode_columns(w, z * (1 + _STEP))
+            changes.append(stack((moved - blocks[index]) / _STEP) * weight[:, None] @ own)
+    change = project(np.hstack(changes))
+    # blocks follow (mode 1 omega, mode 1 zeta, mode 2 omega, ...): put them in the order of theta
+    jacobian = -change.reshape(target.shape[0], modes, 2, target.shape[1]).transpose(0, 3, 2, 1).reshape(-1, 2 * modes)
+    return State(residual.ravel(), jacobian, coefficients, basis)
