@@ -109,7 +109,11 @@ class SessionGain:
 
 
 def session_gain(
-    recordings: Recordings, measured: FloatArray, simulated: FloatArray, training: Mapping[str, RecordGain]
+    recordings: Recordings,
+    measured: FloatArray,
+    simulated: FloatArray,
+    training: Mapping[str, RecordGain],
+    levels: FloatArray | None = None,
 ) -> SessionGain | None:
     """Return the gain that validation records of one session share, or None where none is confirmed.
 
@@ -122,9 +126,15 @@ def session_gain(
         Validation tests as in :func:`record_gains`.
     training
         Gains of the training tests, by the same model.
+    levels
+        Mean drive of each training test: a record whose drive is none of these tells of the model between the levels,
+        not of its session. Not looked at where left out.
     """
     first = recordings.time < DECLARED_SHARE * (np.diff(recordings.starts) * recordings.dt)[recordings.test]
     gains = record_gains(recordings, measured, simulated, first)
+    if levels is not None:
+        strange = _strange_to(recordings, levels)
+        gains = {name: item for name, item in gains.items() if name not in strange}
     spread = float(np.std([item.value for item in training.values()])) if training else 0.0
     for side in (-1.0, 1.0):
         chosen = {name: g.value for name, g in gains.items() if g.deviates and side * (g.value - 1.0) > 2.0 * spread}
@@ -145,6 +155,18 @@ def session_gain(
         )
         return SessionGain(value, (value - half, value + half), tuple(chosen), spread, without, with_it)
     return None
+
+
+def mean_drives(recordings: Recordings) -> FloatArray:
+    """Return the mean drive of each test, shape (tests,)."""
+    counts = np.maximum(np.bincount(recordings.test, minlength=recordings.tests), 1)
+    return np.asarray(np.bincount(recordings.test, weights=recordings.drive, minlength=recordings.tests) / counts)
+
+
+def _strange_to(recordings: Recordings, levels: FloatArray) -> set[str]:
+    means = mean_drives(recordings)
+    margin = 0.1 * max(float(np.max(np.abs(levels))), 1e-12)
+    return {name for name, mean in zip(recordings.names, means, strict=True) if np.min(np.abs(levels - mean)) > margin}
 
 
 def observation_window(found: Fit, shares: Sequence[float] = WINDOW_SHARES) -> tuple[float, Fit]:

@@ -13,7 +13,7 @@ from mrpipe.discrepancy.baseline import Baseline, ladder
 from mrpipe.discrepancy.ceiling import flexible_residual
 from mrpipe.discrepancy.engine import predict
 from mrpipe.discrepancy.errors import Score, campaign_offset, measured_force, score
-from mrpipe.discrepancy.nuisances import RecordGain, record_gains, session_gain
+from mrpipe.discrepancy.nuisances import RecordGain, mean_drives, record_gains, session_gain
 from mrpipe.discrepancy.offsets import OffsetFinding
 from mrpipe.discrepancy.recordings import Recordings
 from mrpipe.discrepancy.select import Selection
@@ -108,7 +108,7 @@ class Summary:
         shared = campaign_offset(selection.chosen.test_offsets, training.force_rms)
         measured = measured_force(validation, after, shared)
         gains = record_gains(validation, measured, after)
-        session = session_gain(validation, measured, after, self._training_gains())
+        session = session_gain(validation, measured, after, self._training_gains(), mean_drives(training))
         if options.record_gain:
             values = {name: item.value for name, item in gains.items()}
             factor = np.array([values.get(name, 1.0) for name in validation.names])[validation.test]

@@ -51,6 +51,8 @@ def test_the_gain_of_a_session_is_named_and_judged_on_what_its_estimate_has_not_
     assert found.tests == ("t1", "t2", "t3", "t4")
     assert found.interval[0] < 0.9 < found.interval[1]
     assert found.with_it < 0.4 * found.without
+    # at a drive that no training test had, it is the model between the levels that errs
+    assert session_gain(given, weak * given.force, simulated, trained, np.array([1.0, 2.0])) is None
 
 
 @pytest.mark.planted
