@@ -169,5 +169,5 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "empty.py").write_text("x = 1\n", encoding="utf-8")
     with pytest.raises(UserError, match="EFFECT"):
         load_effect_file(tmp_path / "empty.py")
-    with pytest.raises(UserError, match="known"):
+    with pytest.raises(UserError, match=r"did you mean inertia\?"):
         effects_named(["inertja"])
