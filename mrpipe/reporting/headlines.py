@@ -108,6 +108,9 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"{len(wanted['tests'])} tests in {wanted['file']} would decide {_open_questions(wanted['decides'])}"
         )
+    elif wanted.get("made_already"):
+        questions = _open_questions(wanted["decides"])
+        lines.append(f"open though the tests for it have been made: {questions}; longer ones or repeats may do")
     return lines
 
 

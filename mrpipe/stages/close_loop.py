@@ -101,14 +101,15 @@ def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Ef
         # about another middle the mean of a test is no offset of its sensor
         settings["prepare"] = {"offset": "campaign"}
     path = context.run_directory / NEXT_TESTS
-    _write_settings(
-        path,
-        settings,
-        "Tests that would decide what close-loop left open. On the virtual rig: mrpipe record --settings FILE"
-        if new
-        else "close-loop left nothing open that another test would decide.",
-    )
-    return {"file": path.name, "tests": new, "decides": list(extra.reasons)}
+    made = bool(extra.tests) and not new
+    if new:
+        about = "Tests that would decide what close-loop left open. On the virtual rig: mrpipe record --settings FILE"
+    elif made:
+        about = "All tests that would decide what close-loop left open have been made: longer ones, or repeats, remain."
+    else:
+        about = "close-loop left nothing open that another test would decide."
+    _write_settings(path, settings, about)
+    return {"file": path.name, "tests": new, "decides": list(extra.reasons), "made_already": made}
 
 
 def _write_settings(path: Path, settings: Mapping[str, Any], about: str) -> None:

@@ -196,6 +196,11 @@ def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
             "run directory."
         )
     wanted = summary["next_tests"]
+    if wanted["made_already"]:
+        listed = "; ".join(item["decides"] for item in wanted["decides"])
+        context.report.text(
+            f"Still open, though the tests for it have been made: {listed}. Longer tests or repeats remain."
+        )
     if not wanted["tests"]:
         return
     for item in wanted["decides"]:
