@@ -23,6 +23,9 @@ QUICK = 0.55
 """Where the extrema after the stop show less than this share of the first half period's damping, the decay was over
 within a period: what follows swings about the place where the damper stuck, and the first half period counts."""
 
+LEAST_ENERGY = 0.02
+"""What is left of the energy below this share is no decay any more."""
+
 SMALLEST_FITTED_PEAK = 0.15
 """Peaks below this share of the first are no decay under control any more: residual force or a locked damper."""
 
@@ -101,6 +104,46 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     return Decay(mean, ratios, t[peaks], x[peaks], flows)
 
 
+def energy_damping(response: Response, start_s: float, omega: float) -> float:
+    """Return the damping ratio by which the stored energy fades in the first period after `start_s` [s].
+
+    ln(E0/E1)/(2 omega T) over a whole period, since energy is taken out twice a period and not evenly; over half of it
+    where less than a fiftieth is left by then. For decays that are over before there is a second extremum.
+
+    Parameters
+    ----------
+    response
+        Of a run with a decay.
+    start_s
+        When the base stops.
+    omega
+        Of the mode [rad/s].
+    """
+    half = math.pi / omega
+    at = np.interp(start_s + half * np.arange(3), response.time_s, response.energy)
+    for periods in (2, 1):
+        if at[0] > 0.0 and (at[periods] > LEAST_ENERGY * at[0] or periods == 1):
+            left = max(float(at[periods] / at[0]), 1e-12)
+            return float(-math.log(left) / (2.0 * math.pi * periods))
+    return math.nan
+
+
+def _damping(response: Response, excitation: Excitation, drive_threshold: float) -> dict[str, Any]:
+    """Return the damping of the decay and within which bounds its readings lie; by energy where there is no other."""
+    decay = decay_damping(response, excitation.decay_from_s, drive_threshold)
+    omega = excitation.frequency_rad_s
+    energy = energy_damping(response, excitation.decay_from_s, omega) if math.isfinite(omega) else math.nan
+    first = float(decay.point_to_point[0]) if len(decay.point_to_point) else math.nan
+    readings = [value for value in (decay.mean, first, energy) if math.isfinite(value)]
+    ratio = decay.mean if math.isfinite(decay.mean) else energy
+    return {
+        "damping_ratio": ratio if math.isfinite(ratio) else None,
+        "damping_ratio_by_energy": energy if math.isfinite(energy) else None,
+        "damping_ratio_interval": [min(readings), max(readings)] if readings else None,
+        "damping_ratio_point_to_point": [float(value) for value in decay.point_to_point[:12]],
+    }
+
+
 def _ratio(decrement: FloatArray) -> FloatArray:
     """Return damping ratios from logarithmic decrements over half a period."""
     return np.asarray(decrement / np.sqrt(np.pi**2 + decrement**2))
@@ -145,9 +188,7 @@ def indices(
         "rms_force_n": _rms(response.force[steady]),
     }
     if math.isfinite(excitation.decay_from_s):
-        decay = decay_damping(response, excitation.decay_from_s, FLOWING * drive_limit)
-        result["damping_ratio"] = None if math.isnan(decay.mean) else decay.mean
-        result["damping_ratio_point_to_point"] = [float(value) for value in decay.point_to_point[:12]]
+        result |= _damping(response, excitation, FLOWING * drive_limit)
     else:
         result["damping_ratio"] = None
     result |= _tracking(response, steady, residual_force_n, drive_limit)

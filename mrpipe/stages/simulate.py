@@ -359,7 +359,10 @@ def _report(
 
 def _words(law: str, excitation: Excitation, values: Mapping[str, Any]) -> str:
     damping = values["damping_ratio"]
-    decay = "" if damping is None else f" Free decay: mean damping ratio {damping:.3f} while current flows."
+    decay = ""
+    if damping is not None:
+        low, high = values["damping_ratio_interval"]
+        decay = f" Free decay: damping ratio {damping:.3f} while current flows; readings from {low:.3f} to {high:.3f}."
     return (
         f"Law {law}, {excitation.details['kind']} excitation: rms top displacement "
         f"{1e3 * values['rms_x_top_m']:.1f} mm, first floor {1e3 * values['rms_x1_m']:.1f} mm; "
