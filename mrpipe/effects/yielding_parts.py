@@ -71,6 +71,13 @@ OWN_DASHPOT = EffectForm(
     {"force": 1, "force_rate": 2, "force_square": 3},
 )
 
+STIFF_DASHPOT = replace(
+    OWN_DASHPOT,
+    name="own-dashpot-stiff",
+    parameters=(replace(_SPRING, starts=(450.0, 900.0)), _SPEED, *_PARTS),
+)
+"""The same law from starts of its own: a soft and a stiff spring are two optima with a ridge between them."""
+
 CONTAINED = ("rounded", "algebraic", "saturating-dashpot")
 """Forms of the library that this one contains: a stiff spring rounds the force with speed alone."""
 
@@ -81,5 +88,5 @@ def with_yielding_parts(effects: Mapping[str, Effect]) -> dict[str, Effect]:
     effect = found.get("rate-dependent-yield")
     if effect is not None:
         others = tuple(form for form in effect.forms if form.name not in CONTAINED)
-        found["rate-dependent-yield"] = replace(effect, forms=(OWN_DASHPOT, *others))
+        found["rate-dependent-yield"] = replace(effect, forms=(OWN_DASHPOT, STIFF_DASHPOT, *others))
     return found

@@ -40,7 +40,8 @@ def test_only_the_family_of_the_yield_gets_it_and_only_beside_forms_that_it_does
     library = damper_effects()
     richer = with_yielding_parts(library)
     names = [form.name for form in richer["rate-dependent-yield"].forms]
-    assert names[0] == "own-dashpot"
+    # one law from a soft and from a stiff spring: on utfsm the soft start alone ends in a poorer optimum
+    assert names[:2] == ["own-dashpot", "own-dashpot-stiff"]
     assert not set(names) & set(CONTAINED)
     assert {name: item for name, item in richer.items() if name != "rate-dependent-yield"} == {
         name: item for name, item in library.items() if name != "rate-dependent-yield"
