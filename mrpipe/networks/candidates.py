@@ -123,8 +123,15 @@ class Grid:
     @property
     def most_crossings(self) -> int:
         """How many crossings there can be."""
-        axes = (self.states, self.past_values, (*self.layers, *self.neurons), self.biases)
-        moving = sum(len(set(values)) > 1 for values in axes)
+        at = self.centre
+        shapes = [(neurons,) * layers for layers, neurons in product(self.layers, self.neurons)]
+        axes = (
+            (at.states, self.states),
+            (at.past_values, self.past_values),
+            (at.hidden, shapes),
+            (at.biases, self.biases),
+        )
+        moving = sum(any(value != own for value in values) for own, values in axes)
         return 2**moving - 1 - moving
 
 

@@ -127,6 +127,8 @@ def test_a_star_is_completed_by_combinations_of_what_helps() -> None:
     biased, past = replace(CENTRE, biases=True), replace(CENTRE, past_values=2)
     every = GRID.crossings({**scores, wide: better, seeing: better, biased: better, past: better})
     assert len(every) == len(set(every)) == GRID.most_crossings == 11
+    # one value an axis, none of them the centre's
+    assert Grid((("displacement",),), (3,), (1,), (9,), (False,), CENTRE).most_crossings == 1
     assert not set(every) & set(scores)
 
 
