@@ -152,13 +152,14 @@ def _test(name: str, motion: str, amplitude: float, frequency: float, duration: 
 
 def _speeds(span: Range) -> list[dict[str, Any]]:
     amplitude = 0.8 * span.stroke_m
-    speeds = span.speed_m_s * np.geomspace(0.03, 0.9, 4)
+    # beyond the largest speed so far too: a bend that looks like another within it does not outside
+    speeds = span.speed_m_s * np.geomspace(0.03, 1.5, 5)
     return [
         _test(
-            f"speed-{1e3 * speed:.3g}mm_s-{drive:.3g}", "triangle", amplitude, speed / (4.0 * amplitude),
-            span.duration_s, current_a=drive,
+            f"speed-{number}-{drive:.3g}", "triangle", amplitude, speed / (4.0 * amplitude), span.duration_s,
+            current_a=drive,
         )
-        for speed in speeds
+        for number, speed in enumerate(speeds, start=1)
         for drive in (0.0, 0.5 * span.drive)
     ]  # fmt: skip
 
@@ -194,10 +195,8 @@ def _frequencies(span: Range) -> list[dict[str, Any]]:
     amplitude = 0.5 * span.stroke_m
     highest = span.speed_m_s / (2.0 * np.pi * amplitude)
     return [
-        _test(
-            f"frequency-{frequency:.3g}Hz-{drive:.3g}", "sine", amplitude, frequency, span.duration_s, current_a=drive
-        )
-        for frequency in highest * np.geomspace(0.15, 1.5, 4)
+        _test(f"frequency-{number}-{drive:.3g}", "sine", amplitude, frequency, span.duration_s, current_a=drive)
+        for number, frequency in enumerate(highest * np.geomspace(0.15, 1.5, 4), start=1)
         for drive in (0.0, 0.5 * span.drive)
     ]
 
