@@ -181,5 +181,6 @@ def ladder(found: Fit, rate_forms: Effect | None, rate_fit: Fit | None = None) -
         dahl = replace(problem, base=other)
         fits["dahl"] = fit(dahl, start_of(dahl, found.base_values, found.term_values), iterations=8)
     if rate_forms is not None and all(term.effect.name != rate_forms.name for term in problem.terms):
-        fits[rate_forms.name] = rate_fit or _with_declared(found, rate_forms)
+        # forms that screening found no promise in are not all worth a fit
+        fits[rate_forms.name] = rate_fit or _with_declared(found, replace(rate_forms, forms=rate_forms.forms[:2]))
     return fits

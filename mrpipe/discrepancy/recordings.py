@@ -30,6 +30,9 @@ MOST_SAMPLES = 50_000
 MOST_JUDGED = 200_000
 """Errors on validation tests are judged on up to so many samples: they are simulated once, not fitted."""
 
+JUMP_RATE_HZ = 500.0
+"""Least rate of a test whose drive jumps: between samples it is taken to run straight, a jump must not be smeared."""
+
 ACCELERATION_CUTOFF_HZ = 40.0
 """Least cut-off of a measured acceleration."""
 
@@ -156,7 +159,7 @@ def record_tests(
         Prepared tests; their raw displacement and force are used.
     rate_hz
         Tests are thinned to at most about this rate after the displacement has been filtered. Forces are picked, never
-        filtered.
+        filtered. A test whose drive jumps keeps a higher rate.
     cutoff_hz
         Cut-off of the displacement; 0 chooses it for each test by criterion.
     longest_s
@@ -171,8 +174,16 @@ def record_tests(
     one = bool(np.std(trusted) < STEADY_OFFSET_SHARE * stroke)
     shared = float(np.median(trusted))
     longest_s = min(longest_s, max(most_samples / (rate_hz * len(tests)), 4.0))
+    largest = max(float(np.max(np.abs(test.drive))) for test in tests)
     rows = [
-        _one_test(test, rate_hz, cutoff_hz, shared if one else test.displacement_offset_m, longest_s) for test in tests
+        _one_test(
+            test,
+            max(rate_hz, JUMP_RATE_HZ) if drive_jumps(test, largest) else rate_hz,
+            cutoff_hz,
+            shared if one else test.displacement_offset_m,
+            longest_s,
+        )
+        for test in tests
     ]
     lengths = [len(row["force"]) for row in rows]
 
@@ -202,10 +213,9 @@ def record_tests(
     )
 
 
-def drive_jumps(tests: Sequence[PreparedTest]) -> bool:
-    """Return whether the drive of any test changes by a tenth of its range from one sample to the next."""
-    largest = max(float(np.max(np.abs(test.drive))) for test in tests)
-    return any(float(np.max(np.abs(np.diff(test.drive)))) > 0.1 * largest > 0.0 for test in tests)
+def drive_jumps(test: PreparedTest, largest: float) -> bool:
+    """Return whether the drive of a test changes by a tenth of the campaign's largest from one sample to the next."""
+    return float(np.max(np.abs(np.diff(test.drive)))) > 0.1 * largest > 0.0
 
 
 def spread_tests(tests: Sequence[PreparedTest], most: int = MOST_TESTS) -> list[PreparedTest]:
@@ -271,7 +281,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: floa
         "dt": stride / rate,
         "displacement_noise": noise * np.sqrt(band),
         "velocity_noise": noise * np.sqrt(band) * 2.0 * np.pi * cutoff / np.sqrt(3.0),
-        "force_noise": noise_level(test.force_raw_n, rate),
+        "force_noise": force_noise(test.force_raw_n, rate),
         "force_offset": test.force_offset_n,
         "period_s": float(np.median(periods)) / rate if len(periods) else 0.0,
         "cutoff_hz": cutoff,
@@ -282,6 +292,17 @@ def _acceleration_was_measured(test: PreparedTest) -> bool:
     derived = np.gradient(test.velocity_m_s, test.dt)
     difference = test.acceleration_m_s2 - derived
     return float(np.std(difference)) > 0.02 * float(np.std(derived))
+
+
+def force_noise(force: FloatArray, rate_hz: float) -> float:
+    """Return the standard deviation of the noise of a force [N].
+
+    Corners of the force, as play and late rises leave at every reversal, reach up to the highest frequencies and look
+    like noise in a spectrum. They are few: the median of third differences does not see them.
+    """
+    spectral = noise_level(force, rate_hz)
+    typical = float(np.median(np.abs(np.diff(force, 3)))) / (0.6745 * np.sqrt(20.0))
+    return min(spectral, max(typical, 0.2 * spectral))
 
 
 def displacement_cutoff(test: PreparedTest) -> float:

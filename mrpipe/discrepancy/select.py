@@ -135,7 +135,7 @@ def refit(before: Fit, screened: Screened, *, iterations: int = 7) -> Fit:
     problem = replace(before.problem, terms=(*before.problem.terms, screened.term))
     start = start_of(problem, before.base_values, [*before.term_values, screened.values])
     start[: len(before.theta)] = before.theta
-    return fit(problem, start, iterations=iterations)
+    return fit(problem, start, iterations=iterations, tolerance=2e-3)
 
 
 def on_all(before: Fit, drafted: Fit, *, iterations: int) -> Fit:

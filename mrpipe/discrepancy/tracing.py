@@ -20,7 +20,6 @@ from mrpipe.discrepancy.problem import Term
 from mrpipe.discrepancy.recordings import (
     MOST_JUDGED,
     Recordings,
-    drive_jumps,
     enough_tests,
     record_tests,
     spread_tests,
@@ -35,9 +34,6 @@ from mrpipe.signals.prepared import PreparedTest
 
 MODEL_ERROR_CHI_SQUARE = 6.0
 """Where the best composite leaves this many times the noise, sensors' noise is no measure: weights by force RMS."""
-
-JUMP_RATE_HZ = 500.0
-"""Least rate of the fits where the drive jumps from one sample to the next."""
 
 REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25)
 """What a further effect must recover where weights go by force RMS: noise is far below any model's error."""
@@ -65,9 +61,6 @@ def trace_campaign(
         Effects that the campaign declares: part of the baseline.
     """
     rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
-    if drive_jumps(tests):
-        # between two samples a drive is taken to run straight: a jump must not be smeared by thinning
-        rate = max(rate, JUMP_RATE_HZ)
     usable = spread_tests(enough_tests([t for t in tests if t.role != "validation"]))
     training = record_tests(usable, rate_hz=rate, cutoff_hz=cutoff)
     judged = [t for t in tests if t.role == "validation"]

@@ -9,7 +9,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, FIRST, STEP_SIGNATURE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, strength
+from mrpipe.effects.contract import Effect, EffectForm, Values, shape, strength
 
 BUFFER = 512
 """Samples of effective drive that the dead time can look back."""
@@ -53,6 +53,34 @@ def second_lag_step(wire: FloatArray, state: FloatArray, parameters: FloatArray,
     wire[CURRENT] = state[0]
 
 
+@njit(STEP_SIGNATURE, cache=True)
+def second_order_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: delay 2 zeta/omega [s], damping ratio. State: output, its rate, last input. Trapezoidal steps."""
+    u = wire[CURRENT]
+    if wire[FIRST] > 0.5:
+        state[0] = u
+        state[1] = 0.0
+        state[2] = u
+    if parameters[0] > 1e-7:
+        omega = 2.0 * parameters[1] / parameters[0]
+        count = min(int(omega * dt / 0.3) + 1, 50)
+        h = dt / count
+        damping = 2.0 * parameters[1] * omega
+        for index in range(count):
+            middle = state[2] + (u - state[2]) * (index + 0.5) / count
+            force = omega * omega * (middle - state[0]) - damping * state[1]
+            change = h * force / (1.0 + 0.5 * h * damping + 0.25 * h * h * omega * omega)
+            # the mean rate over the step acts on the displacement within it
+            change -= 0.5 * h * h * omega * omega * state[1] / (1.0 + 0.5 * h * damping + 0.25 * h * h * omega * omega)
+            state[0] += h * (state[1] + 0.5 * change)
+            state[1] += change
+    else:
+        state[0] = u
+        state[1] = 0.0
+    state[2] = u
+    wire[CURRENT] = state[0]
+
+
 def _dead_time(values: Values) -> list[Step]:
     return [Step("dead-time", Phase.CURRENT_EFFECT, dead_time_step, np.array([values["delay"]]), BUFFER + 1)]
 
@@ -63,6 +91,16 @@ def _lag(rising: float, falling: float) -> list[Step]:
 
 def _second(values: Values) -> list[Step]:
     return _lag(values["time_constant"], values["time_constant"])
+
+
+def _second_order(values: Values) -> list[Step]:
+    numbers = np.array([values["delay"], values["damping_ratio"]])
+    return [Step("second-order", Phase.CURRENT_EFFECT, second_order_step, numbers, 3)]
+
+
+def _dead_time_and_lag(values: Values) -> list[Step]:
+    lag = values["lag_share"] * values["delay"]
+    return [*_dead_time({"delay": values["delay"] - lag}), *_lag(lag, lag)]
 
 
 def _rise(values: Values) -> list[Step]:
@@ -89,6 +127,24 @@ EFFECT = Effect(
             "tau w' = u - w",
             (strength("time_constant", "s", "time constant", "one", 0.0, 0.5, 0.002),),
             _second,
+        ),
+        EffectForm(
+            "second-order",
+            "w'' + 2 zeta omega w' + omega^2 (w - u) = 0, T = 2 zeta/omega",
+            (
+                strength("delay", "s", "delay of slow changes", "one", 0.0, 0.5, 0.002),
+                shape("damping_ratio", "1", "below 1 it overshoots", "one", 0.25, 3.0, (0.8,)),
+            ),
+            _second_order,
+        ),
+        EffectForm(
+            "dead-time-and-lag",
+            "tau w' = u(t - T + tau) - w, tau = s T",
+            (
+                strength("delay", "s", "dead time and time constant", "one", 0.0, 0.15, 0.002),
+                shape("lag_share", "1", "share of the time constant", "one", 0.05, 0.95, (0.4,)),
+            ),
+            _dead_time_and_lag,
         ),
         EffectForm(
             "slow-rise",

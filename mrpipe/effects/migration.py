@@ -26,7 +26,7 @@ from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
 
 @njit(STEP_SIGNATURE, cache=True)
 def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: amplitude, length [m] or time [s], kind of rise (0..3), of amplitude (0 of yield, 1, 2 with drive).
+    """Parameters: amplitude, length [m] or time [s], kind of rise (0..5), of amplitude (0 yield, 1, 2 with drive), p.
 
     State: a variable that follows the direction of motion with slip, its direction memory.
     """
@@ -37,6 +37,10 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
         rise = 1.0 - math.exp(-wire[SINCE_REVERSAL] / parameters[1])
     elif kind == 2.0:
         rise = wire[SLIP] / (wire[SLIP] + parameters[1])
+    elif kind >= 4.0:
+        # stretched: many lengths or times at once
+        way = wire[SLIP] if kind == 4.0 else wire[SINCE_REVERSAL]
+        rise = 1.0 - math.exp(-((way / parameters[1]) ** parameters[4]))
     else:
         # a second, slow hysteretic variable: it follows the direction of motion along the path
         if wire[FIRST] > 0.5:
@@ -55,8 +59,8 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     wire[FORCE] += parameters[0] * force * rise * shape_of
 
 
-def _step(value: float, length: float, kind: float, of: float) -> Step:
-    return Step("migration", Phase.FORCE_EFFECT, migration_step, np.array([value, length, kind, of]), 1)
+def _step(value: float, length: float, kind: float, of: float, power: float = 1.0) -> Step:
+    return Step("migration", Phase.FORCE_EFFECT, migration_step, np.array([value, length, kind, of, power]), 1)
 
 
 def _slip(values: Values) -> list[Step]:
@@ -75,12 +79,22 @@ def _slow(values: Values) -> list[Step]:
     return [_step(values["share"], values["slip_length"], 3.0, 0.0)]
 
 
+def _stretched(values: Values) -> list[Step]:
+    return [_step(values["share"], values["slip_length"], 4.0, 0.0, values["exponent"])]
+
+
+def _stretched_time(values: Values) -> list[Step]:
+    return [_step(values["share"], values["rise_time"], 5.0, 0.0, values["exponent"])]
+
+
 def _own(values: Values) -> list[Step]:
     length = values["slip_length"]
     return [_step(values["friction"], length, 0.0, 1.0), _step(values["friction_rate"], length, 0.0, 2.0)]
 
 
-_LENGTH = shape("slip_length", "m", "path over which the force comes back", "stroke", 0.1, 0.9, (0.15, 0.4))
+_LENGTH = shape("slip_length", "m", "path over which the force comes back", "stroke", 0.02, 0.9, (0.06, 0.15, 0.4))
+_TIME = shape("rise_time", "s", "time over which the force comes back", "stroke/speed", 0.05, 20.0, (0.2, 0.5, 2.0))
+_POWER = shape("exponent", "1", "below 1 a steep rise and a long tail", "one", 0.3, 2.0, (0.6,))
 _SHARE = amplitude("share", "1", "share of the yield force that comes late", "one", 0.0, 3.0)
 
 EFFECT = Effect(
@@ -95,16 +109,27 @@ EFFECT = Effect(
         EffectForm(
             "time",
             "alpha (1 + s (1 - exp(-t_rev/tau)))",
-            (
-                shape("rise_time", "s", "time over which the force comes back", "stroke/speed", 0.15, 20.0, (0.5, 2.0)),
-                _SHARE,
-            ),
+            (_TIME, _SHARE),
             _time,
             {"share": 0},
         ),
         EffectForm("rational", "alpha (1 + s slip/(slip + L))", (_LENGTH, _SHARE), _rational, {"share": 0}),
         EffectForm(
             "slow-hysteresis", "F + s alpha w, dw = (sign v - w) |dx|/L", (_LENGTH, _SHARE), _slow, {"share": 0}
+        ),
+        EffectForm(
+            "stretched-slip",
+            "alpha (1 + s (1 - exp(-(slip/L)^p)))",
+            (_LENGTH, _POWER, _SHARE),
+            _stretched,
+            {"share": 0},
+        ),
+        EffectForm(
+            "stretched-time",
+            "alpha (1 + s (1 - exp(-(t_rev/tau)^p)))",
+            (_TIME, _POWER, _SHARE),
+            _stretched_time,
+            {"share": 0},
         ),
         EffectForm(
             "own-friction",
