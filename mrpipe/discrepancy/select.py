@@ -41,7 +41,7 @@ CONTENDER_SHARE = 0.3
 """Forms that leave more than the best draft by this share of what the best takes are not fitted on all tests."""
 
 FURTHER = 0.15
-"""Where less than this share is left, a further effect is looked for only if the screening promises its share."""
+"""Where less than this share is left, and less than the noise, a further effect must promise its share in screening."""
 
 
 _Item = TypeVar("_Item")
@@ -253,7 +253,8 @@ def forward_selection(
     if excess <= NOTHING_MISSING * noise or most == 0:
         return Selection(base, noise, (), base)
     while len(rounds) < most:
-        if rounds and chosen.chi_square - noise < FURTHER * excess and _nothing_more(chosen, terms, excess, jobs):
+        little = chosen.chi_square - noise < min(FURTHER * excess, noise)
+        if rounds and little and _nothing_more(chosen, terms, excess, jobs):
             break
         found = candidates_after(chosen, base, noise, terms, refits=refits, jobs=jobs, progress=progress)
         able = [item for item in found if admissible(item.fit)]
