@@ -65,8 +65,9 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     State: m, peak, path.
 
     The memory m fades with time and slip together, fast at first and ever slower: it falls by m^2 (kind 0), as
-    peak/(1 + path) (1) or exponentially (2). What it holds up is what the drive itself does not do: the larger of the
-    two, with a rounded corner (0); the same, the remanence limited (1); beside the drive, less the larger that is (2).
+    peak/(1 + path) (1) or exponentially (2); or it follows the drive both ways (3). What it holds up is what the drive
+    itself does not do: the larger of the two, with a rounded corner (0); the same, the remanence limited (1); beside the
+    drive, less the larger that is (2); what the memory is above the drive, less the larger the drive is (3).
     """
     u = wire[CURRENT]
     gain, size, kind = parameters[0], parameters[3], parameters[5]
@@ -80,9 +81,11 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     elif kind == 1.0:
         state[2] += path
         state[0] = state[1] / (1.0 + state[2])
-    else:
+    elif kind == 2.0:
         state[0] = state[0] * math.exp(-path)
-    if u >= state[0]:
+    else:
+        state[0] = u + (state[0] - u) * math.exp(-path)
+    if u >= state[0] and kind != 3.0:
         state[0] = u
         state[1] = u
         state[2] = 0.0
@@ -94,8 +97,10 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
         wire[CURRENT] = larger * (1.0 + ratio**size) ** (1.0 / size) if u > 0.0 else held
     elif kind == 1.0:
         wire[CURRENT] = max(u, size * math.tanh(held / size))
-    else:
+    elif kind == 2.0:
         wire[CURRENT] = u + held * math.exp(-u / size)
+    elif state[0] > u:
+        wire[CURRENT] = u + gain * (state[0] - u) / (1.0 + (u / size) ** 2)
 
 
 def _step(gain: float, size: float, kind: float) -> list[Step]:
@@ -195,6 +200,12 @@ EFFECT = Effect(
             "u + g m exp(-u/w), m decays to 0 over L and tau",
             (_GAIN, _LENGTH, _TIME, shape("width", "drive", "drive that outdoes it", "drive", 0.01, 2.0, (0.08,))),
             _field(2.0, "width"),
+        ),
+        EffectForm(
+            "lagging",
+            "u + g (m - u)/(1 + (u/w)^2) where m > u, m follows u over L and tau",
+            (_HELD, _LENGTH, _TIME, shape("width", "drive", "drive that outdoes it", "drive", 0.01, 20.0, (0.1, 0.5))),
+            _field(3.0, "width"),
         ),
         EffectForm("fading-root", "sqrt(u^2 + (g m)^2), m decays to 0", (_GAIN, _LENGTH, _TIME), _together(9.0)),
         EffectForm("past-maximum", "u + g (max u - u)", (_GAIN,), _past),
