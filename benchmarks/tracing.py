@@ -138,6 +138,7 @@ def judged(summary: dict[str, Any], truth: dict[str, Any]) -> dict[str, Any]:
         "found": found,
         "verdict": "+".join(found) or ("unknown" if structured else "none"),
         "right": right,
+        "further": [item["name"] for item in summary["further_terms"]],
         "spurious": [name for name in found if name not in planted],
         "effects": [
             {

@@ -40,20 +40,23 @@ def force_of(x: np.ndarray, v: np.ndarray, a: np.ndarray, i: np.ndarray, t: np.n
     for k in range(1, len(i)):
         slope = (i[k] - i[k - 1]) / (100.0 * dt)
         u[k] = i[k] - slope + (u[k - 1] - i[k - 1] + slope) * np.exp(-100.0 * dt)
-    if effect == "remanence":
+    planted = effect.split("+")
+    if "remanence" in planted:
         memory = np.maximum.accumulate(u)
         u = u + 0.12 * np.sqrt(np.maximum(memory - u, 0.0) * 3.0)
-    rod = play(x, 1.2e-4) if effect == "backlash" else x
-    moved = np.gradient(rod, dt) if effect == "backlash" else v
+    rod = play(x, 1.2e-4) if "backlash" in planted else x
+    moved = np.gradient(rod, dt) if "backlash" in planted else v
     z = hysteresis(rod, 3.7e-4)
     yield_force = 20.0 + 8.0 * u + 14.0 * u**2
-    if effect == "pinching":
+    if "pinching" in planted:
         yield_force = yield_force * (1.0 - 0.25 / np.cosh(x / 2.2e-3))
     force = yield_force * z + (50.0 + 75.0 * u) * moved
-    if effect == "accumulator":
+    if "accumulator" in planted:
         force = force + 1400.0 * x * (1.0 + 4.0 * x)
-    if effect == "unknown":
+    if effect == "unknown-in-time":
         force = force + 8.0 * np.sin(2 * np.pi * 7.3 * t)
+    if effect == "unknown-in-place":
+        force = force + 9.0 * np.sin(2 * np.pi * x / 2.3e-3)
     return force
 
 

@@ -15,7 +15,7 @@ from tests.discrepancy.rig import campaign
 
 @functools.cache
 def traced(effect: str) -> Tracing:
-    options = TracingOptions(refits=2, bootstrap_draws=100, most_effects=1)
+    options = TracingOptions(refits=2, bootstrap_draws=100, most_effects=1 + effect.count("+"))
     names = ("accumulator", "backlash", "channel-skew", "heating", "inertia", "remanence", "stribeck")
     library = {name: damper_effects()[name] for name in names}
     return trace_campaign(campaign(effect), library, [], options, rng=np.random.default_rng(1))
@@ -28,6 +28,8 @@ def test_a_planted_effect_is_named_first(effect: str) -> None:
     assert summary["residual"]["structured"]
     assert summary["effects"][0]["name"] == effect
     assert summary["candidates"][0]["name"] == effect
+    assert [item["name"] for item in summary["effects"]] == [effect]
+    assert summary["effects"][0]["tied_with"] == []
     assert summary["after"]["nrmse"] < 0.6 * summary["before"]["nrmse"]
 
 
@@ -48,8 +50,17 @@ def test_a_clean_rig_lacks_nothing() -> None:
 
 
 @pytest.mark.planted
-def test_a_shape_of_no_family_stays_unknown() -> None:
-    summary = traced("unknown").summary
+def test_both_of_a_pair_are_named() -> None:
+    summary = traced("accumulator+remanence").summary
+    assert {item["name"] for item in summary["effects"]} == {"accumulator", "remanence"}
+    assert summary["further_terms"] == []
+    assert summary["after"]["nrmse"] < 0.4 * summary["before"]["nrmse"]
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("shape", ["unknown-in-time", "unknown-in-place"])
+def test_a_shape_of_no_family_stays_unknown(shape: str) -> None:
+    summary = traced(shape).summary
     assert summary["effects"] == []
     assert summary["residual"]["structured"]
     assert summary["unexplained"]["structured"]
