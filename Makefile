@@ -42,7 +42,7 @@ bench: $(RUN_STAMP)  ## timings: optimiser, closed loop
 	$(BIN)/python -m benchmarks.closed_loop
 
 bench-tracing: $(RUN_STAMP)  ## how often planted effects are found, by effect, strength and noise
-	$(BIN)/python -m benchmarks.tracing
+	$(BIN)/python -m benchmarks.tracing --preset core conditions
 
 reproduce: $(RUN_STAMP)  ## every printed figure of the thesis beside ours
 	$(BIN)/mrpipe reproduce --config $(CONFIG)

@@ -224,11 +224,16 @@ def admissible(found: Fit) -> bool:
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What a further effect must recover: of what the base lacked, and of what is left; the latter to be named."""
+    """What a further effect must recover: of what the base lacked, and of what is left.
+
+    To be named it must recover `named_share` of what is left, and every other family must leave `lead` times what it
+    leaves.
+    """
 
     gain: float = SECOND_GAIN
     term_share: float = TERM_SHARE
     named_share: float = SECOND_SHARE
+    lead: float = PROVEN_LEAD
 
 
 def forward_selection(
@@ -267,7 +272,7 @@ def forward_selection(
         if len(rounds) > 1:
             if gain < thresholds.gain * excess or gain < thresholds.term_share * left:
                 break
-            sure = sure and gain >= thresholds.named_share * left and _leads(rounds[-1], noise)
+            sure = sure and gain >= thresholds.named_share * left and _leads(rounds[-1], noise, thresholds.lead)
         proven += int(sure)
         chosen = best.fit
         if chosen.chi_square - noise < max(NOTHING_MISSING * noise, SECOND_GAIN * excess):
@@ -275,8 +280,8 @@ def forward_selection(
     return Selection(base, noise, tuple(rounds), chosen, proven)
 
 
-def _leads(candidates: Sequence[Candidate], noise: float) -> bool:
+def _leads(candidates: Sequence[Candidate], noise: float, lead: float) -> bool:
     if len(candidates) < 2:
         return True
     best, second = (max(item.fit.chi_square - noise, 0.0) + 0.05 * noise for item in candidates[:2])
-    return second >= PROVEN_LEAD * best
+    return second >= lead * best

@@ -35,8 +35,10 @@ from mrpipe.signals.prepared import PreparedTest
 MODEL_ERROR_CHI_SQUARE = 6.0
 """Where the best composite leaves this many times the noise, sensors' noise is no measure: weights by force RMS."""
 
-REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25)
-"""What a further effect must recover where weights go by force RMS: noise is far below any model's error."""
+REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25, lead=1.0)
+"""What a further effect must recover where weights go by force RMS: noise is far below any model's error.
+
+Rivals that come near are told by `tied_with`."""
 
 
 def trace_campaign(
