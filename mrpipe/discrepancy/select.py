@@ -263,6 +263,9 @@ def forward_selection(
             break
         found = candidates_after(chosen, base, noise, terms, refits=refits, jobs=jobs, progress=progress)
         able = [item for item in found if admissible(item.fit)]
+        if rounds and thresholds.lead > 1.0:
+            # beside other effects a parameter that runs to its bound mends a form, and badly where motions are other
+            able = [item for item in able if set(item.fit.at_bound) <= set(chosen.at_bound)]
         rounds.append(tuple(able + [item for item in found if item not in able]))
         if not able:
             break
