@@ -7,6 +7,7 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
+from mrpipe.discrepancy.crossvalidation import folds_of
 from mrpipe.discrepancy.engine import Fit
 from mrpipe.discrepancy.recordings import Recordings
 from mrpipe.discrepancy.structure import states_of
@@ -78,8 +79,8 @@ def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations
     used = problem.root_weight > 0.0
     features, target = lagged_states(found, problem.recordings), found.residual
     total = 0.0
-    for fold in range(folds):
-        out = problem.recordings.test % folds == fold
+    for part in folds_of(problem.recordings, folds):
+        out = np.isin(problem.recordings.test, part)
         rows = _rows(used & ~out)
         judged = np.flatnonzero(used & out)
         if not len(rows) or not len(judged):

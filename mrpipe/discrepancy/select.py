@@ -11,7 +11,7 @@ import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.discrepancy.crossvalidation import folds_of
-from mrpipe.discrepancy.engine import Fit, fit, start_of
+from mrpipe.discrepancy.engine import Fit, fit, solve, start_of, weighting
 from mrpipe.discrepancy.problem import Term
 from mrpipe.discrepancy.screen import Screened, screen
 
@@ -139,9 +139,16 @@ def refit(before: Fit, screened: Screened, *, iterations: int = 7) -> Fit:
 
 
 def on_all(before: Fit, drafted: Fit, *, iterations: int) -> Fit:
-    """Fit the terms of a draft on all tests of `before`, from where the draft ended."""
-    terms = (*before.problem.terms, drafted.problem.terms[-1])
-    return fit(replace(before.problem, terms=terms), drafted.theta, iterations=iterations)
+    """Fit the terms of a draft on all tests of `before`, from where the draft ended.
+
+    What both share starts from the draft or from `before`, whichever is nearer: on a share of the tests it may have
+    gone where the others do not follow.
+    """
+    problem = replace(before.problem, terms=(*before.problem.terms, drafted.problem.terms[-1]))
+    both = [drafted.theta, np.concatenate([before.theta, drafted.theta[len(before.theta) :]])]
+    w = weighting(problem)
+    start = min(both, key=lambda theta: float(np.sum(solve(problem, theta, w)[0] ** 2)))
+    return fit(problem, start, iterations=iterations)
 
 
 def candidates_after(
@@ -176,7 +183,7 @@ def candidates_after(
     contenders = [item for items in own.values() for item in items[:3] if item.chi_square <= within]
     others = [items[0] for items in own.values() if items[0].chi_square > within]
     fits = _each(lambda item: on_all(before, item, iterations=10), contenders, jobs)
-    fits += _each(lambda item: on_all(before, item, iterations=0), others, jobs)
+    fits += _each(lambda item: on_all(before, item, iterations=1), others, jobs)
     already = share_of(base, before, noise)
     found = []
     for name in chosen:
