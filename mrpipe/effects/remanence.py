@@ -151,6 +151,9 @@ _GAIN = strength("gain", "1", "share of the surplus of the past drive that stays
 _HELD = strength("gain", "1", "share of the past drive that stays", "one", 0.0, 1.0, 0.3)
 """A remanence that acts only where it is the larger shows nothing at a small gain: the search starts at a fair one."""
 
+_PLAY_GAIN = strength("gain", "1", "height of the loop over its width", "one", 0.0, 1.5, 0.03)
+"""1 is the flux that follows the drive with a coercive width: no bound may lie there."""
+
 _LENGTH = shape("slip_length", "m", "path that breaks it", "stroke", 0.05, 100.0, (2.0, 8.0))
 _TIME = shape("relaxation_time", "s", "time that breaks it", "time", 0.008, 12.0, (0.06, 0.3))
 
@@ -212,7 +215,7 @@ EFFECT = Effect(
         EffectForm(
             "play",
             "u + g (play_w(u) - u)",
-            (_GAIN, shape("width", "drive", "width of the loop", "drive", 0.01, 0.9, (0.1, 0.4))),
+            (_PLAY_GAIN, shape("width", "drive", "width of the loop", "drive", 0.01, 0.9, (0.1, 0.4))),
             _play,
         ),
         EffectForm(
