@@ -33,7 +33,6 @@ class FrameProblem:
     validation: tuple[Spectra, ...]
     masses_kg: FloatArray
     band: Band
-    noise: FloatArray
     storey_stiffness: FloatArray
     frequencies_hz: FloatArray
 
@@ -49,20 +48,20 @@ def frame_problem(
     # band and weights need few records only: the shortest that are forced
     few = _few(training)
     for _ in range(3):
-        spectra = _spectra(few, masses, band, storey)[0]
+        spectra = _spectra(few, masses, band, storey)
         storey, frequencies = shear_stiffness_of(design_of("shear-frame", spectra), masses)
         limits = [0.4 * item.rate_hz for item in training]
         band = Band(LOW_SHARE * float(frequencies[0]), min(HIGH_SHARE * float(frequencies[-1]), *limits))
-    found, noise = _spectra(training, masses, band, storey)
-    held = tuple(spectra_of(item, masses, band, noise, _matrix(storey), motion_of(item, band)) for item in validation)
-    return FrameProblem(tuple(found), held, masses, band, noise, storey, frequencies)
+    found, held = (tuple(_spectra(items, masses, band, storey)) for items in (training, validation))
+    return FrameProblem(found, held, masses, band, storey, frequencies)
 
 
-def _spectra(
-    records: Sequence[FrameRecord], masses: FloatArray, band: Band, storey: FloatArray
-) -> tuple[list[Spectra], FloatArray]:
-    noise = noise_of(records, band)
-    return [spectra_of(item, masses, band, noise, _matrix(storey), motion_of(item, band)) for item in records], noise
+def _spectra(records: Sequence[FrameRecord], masses: FloatArray, band: Band, storey: FloatArray) -> list[Spectra]:
+    found = []
+    for item in records:
+        noise = noise_of(item, band)
+        found.append(spectra_of(item, masses, band, noise, _matrix(storey), motion_of(item, band, noise)))
+    return found
 
 
 def _few(records: Sequence[FrameRecord], most: int = 3) -> list[FrameRecord]:

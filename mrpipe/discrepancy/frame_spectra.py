@@ -35,6 +35,22 @@ class Band:
 
 
 @dataclass(frozen=True)
+class Noise:
+    """Power densities of a record's sensors.
+
+    Attributes
+    ----------
+    acceleration
+        Of ground and floors, shape (1 + n,) [(m/s2)^2/Hz].
+    displacement
+        Floor -> of its laser [m2/Hz].
+    """
+
+    acceleration: FloatArray
+    displacement: dict[int, float]
+
+
+@dataclass(frozen=True)
 class Motion:
     """Motion of a record in time, relative to the ground; shape (m, n), SI.
 
@@ -108,29 +124,70 @@ def taper_of(samples: int, dt: float, low_hz: float) -> FloatArray:
     return np.asarray(signal.windows.tukey(samples, share))
 
 
-def motion_of(record: FrameRecord, band: Band) -> Motion:
-    """Integrate the relative accelerations of a record; what lies below the band is taken away smoothly."""
+def motion_of(record: FrameRecord, band: Band, noise: Noise) -> Motion:
+    """Return the motion of a record: accelerations integrated, mixed with lasers by what either's noise makes of it.
+
+    What lies below the band is taken away smoothly from what the equation of motion is written in.
+    """
     dt, corner = record.dt, INTEGRATION_SHARE * band.low_hz
     size, n = record.acceleration.shape
     pad = _padding(size, int(6.0 / (corner * dt)))
-    stack = np.column_stack([record.relative, record.acceleration, record.ground])
-    lines, frequencies = _padded_lines(stack, pad, dt)
-    keep = _high_pass(frequencies, corner)
-    omega = 2.0 * np.pi * np.maximum(frequencies, 1e-9)
-    total = len(stack) + 2 * pad
+    lines, frequencies = _padded_lines(np.column_stack([record.relative, record.acceleration, record.ground]), pad, dt)
+    keep = _high_pass(frequencies, corner)[:, None]
+    omega = 2.0 * np.pi * np.maximum(frequencies, 1e-9)[:, None]
+    total = size + 2 * pad
 
     def back(values: ComplexArray) -> FloatArray:
         return np.asarray(fft.irfft(values, total, axis=0)[pad : pad + size])
 
-    relative = lines[:, :n]
-    displacement = back(relative * (-keep / omega**2)[:, None])
-    velocity = back(relative * (keep / (1j * omega))[:, None])
-    filtered = back(lines[:, n:] * keep[:, None])
-    slow, slow_rate = _slow_part(record, keep, omega, pad)
-    state, rate = displacement + slow, velocity + slow_rate
+    integrated = -lines[:, :n] / omega**2
+    moved = integrated * keep
+    slow = np.zeros_like(moved)
+    if record.measured_displacement:
+        floors = sorted(record.measured_displacement)
+        seen = _laser_lines(record, floors, pad)
+        for k, floor in enumerate(floors):
+            share = laser_share(omega[:, 0], noise, floor)[:, None]
+            own = seen[:, k : k + 1] * _gain_of(seen[:, k], integrated[:, floor - 1], frequencies, band)
+            moved[:, floor - 1 : floor] = keep * (share * own + (1.0 - share) * integrated[:, floor - 1 : floor])
+        slow = (seen * (1.0 - keep)) @ _over_floors(n, floors)
+    displacement, velocity = back(moved), back(moved * 1j * omega)
+    filtered = back(lines[:, n:] * keep)
+    state, rate = displacement + back(slow), velocity + back(slow * 1j * omega)
     drift = np.ascontiguousarray(np.diff(state, axis=1, prepend=0.0).T)
     drift_rate = np.ascontiguousarray(np.diff(rate, axis=1, prepend=0.0).T)
     return Motion(displacement, velocity, filtered[:, :n], filtered[:, n], state, rate, drift, drift_rate)
+
+
+def laser_share(omega: FloatArray, noise: Noise, floor: int) -> FloatArray:
+    """Return the weight of a floor's laser beside its integrated acceleration, shape (f,)."""
+    if floor not in noise.displacement:
+        return np.zeros_like(omega)
+    accelerometer = noise.acceleration[floor] + noise.acceleration[0]
+    return np.asarray(accelerometer / (accelerometer + noise.displacement[floor] * omega**4))
+
+
+def _laser_lines(record: FrameRecord, floors: Sequence[int], pad: int) -> ComplexArray:
+    seen = np.column_stack([record.measured_displacement[floor] for floor in floors])
+    return _padded_lines(seen - np.mean(seen[_at_rest(record)], axis=0), pad, record.dt)[0]
+
+
+def _gain_of(laser: ComplexArray, integrated: ComplexArray, frequencies: FloatArray, band: Band) -> float:
+    """Return what a laser is to be multiplied by to agree with the accelerometer; 1 where they disagree altogether."""
+    inside = (frequencies > band.low_hz) & (frequencies < band.high_hz)
+    power = float(np.sum(np.abs(laser[inside]) ** 2))
+    gain = float(np.sum((np.conj(laser[inside]) * integrated[inside]).real)) / max(power, 1e-300)
+    return gain if 0.8 < gain < 1.25 else 1.0
+
+
+def _over_floors(n: int, floors: Sequence[int]) -> FloatArray:
+    """Return how the slow motion of lasers is carried to all floors, shape (lasers, n).
+
+    It has about the shape of the first mode of a uniform frame: between lasers its factor is interpolated.
+    """
+    shape = np.sin(np.pi * np.arange(1, n + 1) / (2 * n + 1))
+    own = shape[np.array(floors) - 1]
+    return np.stack([shape * np.interp(np.arange(1, n + 1), floors, unit / own) for unit in np.eye(len(floors))])
 
 
 def _padding(size: int, wanted: int) -> int:
@@ -151,53 +208,33 @@ def _high_pass(frequencies: FloatArray, corner: float) -> FloatArray:
     return np.asarray(ratio**8 / (1.0 + ratio**8))
 
 
-def _slow_part(record: FrameRecord, keep: FloatArray, omega: FloatArray, pad: int) -> tuple[FloatArray, FloatArray]:
-    """Return what lasers see below the band, between them interpolated over the floors, and its rate; shape (m, n)."""
-    size, n = record.acceleration.shape
-    if not record.measured_displacement:
-        return np.zeros((size, n)), np.zeros((size, n))
-    floors = sorted(record.measured_displacement)
-    rest = _at_rest(record)
-    seen = np.column_stack([record.measured_displacement[floor] for floor in floors])
-    seen = seen - np.mean(seen[rest], axis=0)
-    lines, _ = _padded_lines(seen, pad, record.dt)
-    below = lines * (1.0 - keep)[:, None]
-    total = size + 2 * pad
-    slow = fft.irfft(below, total, axis=0)[pad : pad + size]
-    rate = fft.irfft(below * (1j * omega)[:, None], total, axis=0)[pad : pad + size]
-    # slow motion has about the shape of the first mode of a uniform frame: between lasers its factor is interpolated
-    shape = np.sin(np.pi * np.arange(1, n + 1) / (2 * n + 1))
-    own = shape[np.array(floors) - 1]
-    share = np.stack([shape * np.interp(np.arange(1, n + 1), floors, unit / own) for unit in np.eye(len(floors))])
-    return np.asarray(slow @ share), np.asarray(rate @ share)
-
-
 def _at_rest(record: FrameRecord) -> slice:
     """Return the quietest second of a record where it is quiet; all of it otherwise."""
     size = max(8, round(record.rate_hz))
     strength = np.sum(record.relative - np.mean(record.relative, axis=0), axis=1) ** 2
     blocks = strength[: len(strength) // size * size].reshape(-1, size).mean(axis=1)
-    if len(blocks) < 2 or blocks.min() > 1e-3 * blocks.mean():
+    if len(blocks) < 2 or blocks.min() > 1e-2 * blocks.mean():
         return slice(None)
     quiet = int(np.argmin(blocks))
     return slice(quiet * size, (quiet + 1) * size)
 
 
 def noise_density(values: FloatArray, rate_hz: float, above_hz: float) -> float:
-    """Return the power density of the noise on an accelerometer, told by what lies above the band [(m/s2)^2/Hz]."""
+    """Return the power density of the noise on a channel, told by what lies above the band [unit^2/Hz]."""
     frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=min(len(values), 2048))
     high = (frequencies > min(above_hz, 0.3 * rate_hz)) & (frequencies < 0.45 * rate_hz)
     # the lower quartile passes by resonances of what the model does not hold
     return float(np.quantile(density[high], 0.25)) / 0.85
 
 
-def noise_of(records: Sequence[FrameRecord], band: Band) -> FloatArray:
-    """Return the noise density of ground and floors, shape (1 + n,), the smallest of all records of a channel."""
-    rows = [
-        [noise_density(channel, item.rate_hz, 1.25 * band.high_hz) for channel in (item.ground, *item.acceleration.T)]
-        for item in records
-    ]
-    return np.asarray(np.median(rows, axis=0))
+def noise_of(record: FrameRecord, band: Band) -> Noise:
+    """Return the noise of a record's sensors, told by what lies above the band."""
+    above, rate = 1.25 * band.high_hz, record.rate_hz
+    channels = (record.ground, *record.acceleration.T)
+    return Noise(
+        np.array([noise_density(channel, rate, above) for channel in channels]),
+        {floor: noise_density(x, rate, above) for floor, x in record.measured_displacement.items()},
+    )
 
 
 def storey_sums(floors: int) -> FloatArray:
@@ -206,7 +243,7 @@ def storey_sums(floors: int) -> FloatArray:
 
 
 def spectra_of(
-    record: FrameRecord, masses: FloatArray, band: Band, noise: FloatArray, stiffness: FloatArray, motion: Motion
+    record: FrameRecord, masses: FloatArray, band: Band, noise: Noise, stiffness: FloatArray, motion: Motion
 ) -> Spectra:
     """Return the lines of a record.
 
@@ -214,8 +251,6 @@ def spectra_of(
     ----------
     masses
         Shape (n,) [kg].
-    noise
-        Of ground and floors, shape (1 + n,) [(m/s2)^2/Hz].
     stiffness
         Row a storey, column a floor's displacement, shape (n, n) [N/m]: for the weights alone.
     """
@@ -239,11 +274,13 @@ def spectra_of(
         if floor in loads:
             parts.append(spectrum_of(loads[floor], taper, dt, frequencies)[None])
     target = spectrum_of(shear, taper, dt, frequencies)
-    inverse = 1.0 / omega**2
+    lasers = np.stack([laser_share(omega, noise, floor) for floor in range(1, n + 1)])
+    inverse = (1.0 - lasers) / omega**2
     by_floor = sums[:, :, None] * masses[None, :, None] - stiffness[:, :, None] * inverse
-    variance = (
-        np.einsum("slb,l->sb", by_floor**2, noise[1:]) + noise[0] * (stiffness.sum(axis=1)[:, None] * inverse) ** 2
-    )
+    of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
+    variance = np.einsum("slb,l->sb", by_floor**2, noise.acceleration[1:])
+    variance += noise.acceleration[0] * np.einsum("sl,lb->sb", stiffness, inverse) ** 2
+    variance += np.einsum("sl,lb->sb", stiffness**2, of_lasers)
     own = np.mean(np.abs(target) ** 2, axis=1, keepdims=True)
     variance = variance + MODEL_FLOOR**2 * own
     return Spectra(record, motion, frequencies, taper, target, np.concatenate(parts), np.sqrt(2.0 / variance), variance)

@@ -88,7 +88,8 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
         rivals = f", not told apart from {' and '.join(effect['tied_with'])}" if effect["tied_with"] else ""
         confidence = f", confidence {effect['confidence']:.2f}" if effect["name"] != "unattributed" else ""
         shown = f": {numbers}" if numbers else ""
-        lines.append(f"effect {effect['name']} ({effect['form']}{shown}{confidence}{rivals})")
+        place = f" at {effect['place']}" if effect.get("place") else ""
+        lines.append(f"effect {effect['name']}{place} ({effect['form']}{shown}{confidence}{rivals})")
     recovered = (
         f", {100.0 * summary['ceiling']['recovered']:.0f} % of what is recoverable" if summary["effects"] else ""
     )
@@ -102,7 +103,8 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
         )
     if summary.get("corrections", {}).get("found"):
         lines.append(f"fault of sensors: corrections in {summary['corrections']['file']} (mrpipe prepare --settings)")
-    lines += _sentences(in_words(summary["closed_loop"]))
+    if "closed_loop" in summary:
+        lines += _sentences(in_words(summary["closed_loop"]))
     wanted = summary.get("next_tests", {})
     if wanted.get("tests"):
         lines.append(

@@ -92,7 +92,8 @@ def frame_campaign(effect: str, seed: int = 0) -> Campaign:
         channels = {"ground_acceleration": ground[::FINE][:size] + 0.004 * rng.standard_normal(size)}
         for k in range(FLOORS):
             channels[f"floor_acceleration_{k + 1}"] = a[:size, k] + 0.004 * rng.standard_normal(size) + 0.02
-        channels["floor_displacement_1"] = x[:size, 0] + 1e-5 * rng.standard_normal(size) + 3e-4
+            if k != 2:
+                channels[f"floor_displacement_{k + 1}"] = x[:size, k] + 1e-5 * rng.standard_normal(size) + 3e-4
         clock = np.arange(size) / RATE
         recordings.append(Recording(name, role, RATE, clock, channels, ((0, size),), kind, {}))
     return Campaign(f"own-{effect}", "shear-frame", Path("nowhere"), tuple(recordings), floor_masses_kg=tuple(MASSES))
