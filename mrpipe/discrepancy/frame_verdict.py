@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.campaigns.model import Campaign
+from mrpipe.discrepancy.frame_parts import Part, command_part, damper_part, merged
 from mrpipe.discrepancy.frame_records import FrameData, frame_data
 from mrpipe.discrepancy.frame_scores import residual_in_time
 from mrpipe.discrepancy.frame_tracing import FrameTracing, trace_frame
-from mrpipe.discrepancy.verdict import Rules
+from mrpipe.discrepancy.summary import TracingOptions
+from mrpipe.effects.contract import Effect
 from mrpipe.effects.structural.contract import StructuralEffect
-
-
-class LoopSettings(Protocol):
-    """What of the stage's settings is read here."""
-
-    most_effects: int
-    bootstrap_draws: int
+from mrpipe.errors import UserError
 
 
 @dataclass(frozen=True)
@@ -59,31 +55,50 @@ class StructureTracing:
 def trace_structure(
     campaigns: Sequence[Campaign],
     effects: Mapping[str, StructuralEffect],
-    rules: Rules,
-    settings: LoopSettings,
+    damper_effects: Mapping[str, Effect],
+    options: TracingOptions,
     *,
     rng: np.random.Generator,
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> StructureTracing:
-    """Trace what a structure's recordings lack.
+    """Trace what a structure's recordings lack: in the frame, in the command, in the damper seen through it.
 
     Parameters
     ----------
     campaigns
         Of one and the same rig.
-    effects
-        The library of structural effects.
+    effects, damper_effects
+        The libraries.
     """
-    data = joined_data(campaigns)
+    data, campaign = joined_data(campaigns), campaigns[0]
     findings = [f"test {name} does not record every floor: it is not judged for the frame" for name in data.left_out]
-    declared = [effects[name] for name in campaigns[0].declared_effects if name in effects]
-    library = [item for item in effects.values() if item not in declared]
-    frame = trace_frame(
-        data, library, declared, rules, most=settings.most_effects, draws=settings.bootstrap_draws, rng=rng, jobs=jobs,
-        progress=progress,
-    )  # fmt: skip
-    summary = {"campaign": campaigns[0].name, **frame.summary}
+    names = campaign.declared_effects
+    declared = [effects[name] for name in names if name in effects]
+    parts, frame = [], None
+    if any(item.role != "validation" for item in data.records):
+        library = [item for item in effects.values() if item not in declared]
+        frame = trace_frame(
+            data, library, declared, options.rules, most=options.most_effects, draws=options.bootstrap_draws, rng=rng,
+            jobs=jobs, progress=progress,
+        )  # fmt: skip
+        parts.append(Part("frame", frame.summary))
+    found = [
+        command_part(data.loops, effects, names),
+        damper_part(
+            data.loops, campaign, damper_effects, effects.get("brace-flexibility"), options, rng=rng, jobs=jobs,
+            progress=progress,
+        ),
+    ]  # fmt: skip
+    parts += [item for item in found if item is not None]
+    if not parts:
+        raise UserError(
+            campaign.directory / "campaign.yaml", "tests", "no test can be judged: floors or drive are missing",
+            "record every floor's acceleration, or damper_force, drive and floor 1",
+        )  # fmt: skip
+    summary = {"campaign": campaign.name, **merged(parts), "declared_effects": list(names)}
+    if frame is None:
+        return StructureTracing(summary, findings=findings)
     return StructureTracing(summary, _histories(frame), _maps(frame), _shown(frame), findings)
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
     from mrpipe.discrepancy.frame_verdict import trace_structure
+    from mrpipe.discrepancy.summary import TracingOptions
     from mrpipe.discrepancy.verdict import Rules
     from mrpipe.effects.library import damper_effects
     from mrpipe.effects.structural.library import all_structural_effects, structural_effects
@@ -32,11 +33,25 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for name in campaigns[0].declared_effects:
         if name not in known:
             context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
+    options = TracingOptions(
+        model=settings.model,
+        yield_order=settings.yield_order,
+        viscosity_order=settings.viscosity_order,
+        most_effects=settings.most_effects,
+        fit_rate_hz=settings.fit_rate_hz,
+        displacement_cutoff_hz=settings.displacement_cutoff_hz,
+        refits=min(settings.refits, 4),
+        folds=settings.folds,
+        bootstrap_draws=settings.bootstrap_draws,
+        rules=Rules(settings.named_share, settings.least_share, settings.lead),
+        observation_filter=False,
+        drive_unit=campaigns[0].drive_unit or "A",
+    )
     traced = trace_structure(
         campaigns,
         structural_effects(settings.candidates, settings.effect_files),
-        Rules(settings.named_share, settings.least_share, settings.lead),
-        settings,
+        damper_effects(),
+        options,
         rng=context.rng,
         jobs=context.jobs,
         progress=context.progress,
