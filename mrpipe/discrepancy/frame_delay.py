@@ -29,7 +29,8 @@ BINS = (16, 10)
 class LoopSignals:
     """A closed-loop test on its own clock; SI, shape (m,) each.
 
-    `displacement`, `velocity` are those of the damper, relative to the ground.
+    `displacement`, `velocity` are those of the damper, relative to the ground; `gains` are the law's on velocity
+    [N s/m] and displacement [N/m], None where they were not told.
     """
 
     name: str
@@ -40,6 +41,7 @@ class LoopSignals:
     drive: FloatArray
     desired: FloatArray
     controller_rate_hz: float = 0.0
+    gains: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,9 @@ def law_lag(tests: Sequence[LoopSignals], laws: Mapping[str, str], *, longest_s:
         for item in validation:
             acting = np.abs(item.desired) > 0.02 * np.max(np.abs(item.desired))
             rows = np.column_stack([_shifted(v, shift, item.rate_hz) for v in (item.velocity, item.displacement)])
+            if item.gains is not None:
+                # in harmonic motion gains left free would turn a delay into stiffness
+                rows = (rows @ np.array(item.gains))[:, None]
             numbers = np.linalg.lstsq(rows[acting], item.desired[acting], rcond=None)[0]
             found.append(_relative(rows[acting] @ numbers, item.desired[acting]))
         return np.array(found)

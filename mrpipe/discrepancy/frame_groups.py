@@ -76,8 +76,7 @@ def groups_of(design: Design) -> Groups:
     storey = np.repeat(np.arange(n), offset)
     record = np.tile(np.concatenate(records), n)
     sums = np.bincount(index.ravel(), weights=(design.residual**2).ravel()) / count
-    scale = np.array([min(1.0, float(np.median(sums[storey == s])) * 1.02) for s in range(n)])
-    scale = np.maximum(scale, 1e-12)
+    scale = np.ones(n)
     limit = stats.chi2.isf(FLAG_P / len(count), count) / count
     # weights reckon with white noise: a tenth more is forgiven
     flagged = sums / scale[storey] > 1.1 * limit

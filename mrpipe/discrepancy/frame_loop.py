@@ -88,6 +88,14 @@ def loop_signals(loops: Sequence[Recording]) -> list[LoopSignals]:
             LoopSignals(
                 item.name, item.role, rate, smooth, np.gradient(smooth, 1.0 / rate), item.channels["drive"][part],
                 item.channels["desired_force"][part], float(item.details.get("controller_rate_hz", 0.0)),
+                _gains_of(item),
             )
         )  # fmt: skip
     return found
+
+
+def _gains_of(recording: Recording) -> tuple[float, float] | None:
+    gains = recording.details.get("gains") or {}
+    if "c_n_s_m" not in gains:
+        return None
+    return float(gains["c_n_s_m"]), float(gains.get("k_n_m", 0.0))

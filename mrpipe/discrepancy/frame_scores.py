@@ -14,7 +14,7 @@ from mrpipe.discrepancy.frame_model import FrameModel, in_time
 from mrpipe.discrepancy.frame_spectra import Spectra
 
 LAGS_S = (0.02, 0.06, 0.2, 0.5)
-MOST_ROWS = 12_000
+MOST_ROWS = 8000
 BINS = 16
 
 
@@ -80,21 +80,27 @@ def _features(record: Spectra, storey: int) -> FloatArray:
     return np.column_stack(columns)
 
 
-def flexible_score(model: FrameModel, training: Sequence[Spectra], validation: Sequence[Spectra]) -> float:
-    """Return the NRMSE on validation records of the model with boosted trees on its residual."""
-    n = training[0].record.floors
+def flexible_score(
+    model: FrameModel, training: Sequence[Spectra], validation: Sequence[Spectra], storeys: Sequence[int]
+) -> float:
+    """Return the NRMSE on validation records of the model with boosted trees on the residual of some storeys."""
     extra = [np.zeros_like(item.motion.acceleration) for item in validation]
-    for storey in range(n):
+    for storey in storeys:
         x = np.concatenate([_features(item, storey) for item in training])
         y = np.concatenate([residual_in_time(model, item)[:, storey] for item in training])
         step = max(1, len(y) // MOST_ROWS)
         trees = HistGradientBoostingRegressor(
-            max_iter=60, learning_rate=0.1, max_leaf_nodes=24, min_samples_leaf=60, random_state=0, early_stopping=False
+            max_iter=40,
+            learning_rate=0.15,
+            max_leaf_nodes=24,
+            min_samples_leaf=60,
+            random_state=0,
+            early_stopping=False,
         )
         with threadpool_limits(1):
             trees.fit(x[::step], y[::step])
-        for item, force in zip(validation, extra, strict=True):
-            force[:, storey] = trees.predict(_features(item, storey))
+            for item, force in zip(validation, extra, strict=True):
+                force[:, storey] = trees.predict(_features(item, storey))
     errors = wholes = 0.0
     for item, force in zip(validation, extra, strict=True):
         # trees learn a tapered, band-limited residual: their own sum is brought to the same lines

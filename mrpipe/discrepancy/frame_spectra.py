@@ -26,6 +26,10 @@ INTEGRATION_SHARE = 0.6
 """Corner of the integration over the lower edge of the band."""
 
 
+SAME_GAIN = 0.02
+"""Gains of laser and accelerometer that differ by less are taken as one."""
+
+
 @dataclass(frozen=True)
 class Band:
     """Frequencies that are compared [Hz]."""
@@ -119,9 +123,14 @@ def lines_in_band(samples: int, dt: float, band: Band) -> FloatArray:
 
 
 def taper_of(samples: int, dt: float, low_hz: float) -> FloatArray:
-    """Return a window that is flat but for a few periods of the lower edge at either end."""
-    share = min(1.0, 2.0 * 2.0 / (low_hz * samples * dt))
-    return np.asarray(signal.windows.tukey(samples, share))
+    """Return a window that is flat but for a few periods of the lower edge at either end.
+
+    The first and last of these are left out altogether: what integration makes of a record's ends dies away there.
+    """
+    margin = int(min(1.5 / (low_hz * dt), 0.06 * samples))
+    inner = samples - 2 * margin
+    share = min(1.0, 2.0 * 3.0 / (low_hz * inner * dt))
+    return np.pad(signal.windows.tukey(inner, share), margin)
 
 
 def motion_of(record: FrameRecord, band: Band, noise: Noise) -> Motion:
@@ -174,10 +183,12 @@ def _laser_lines(record: FrameRecord, floors: Sequence[int], pad: int) -> Comple
 
 def _gain_of(laser: ComplexArray, integrated: ComplexArray, frequencies: FloatArray, band: Band) -> float:
     """Return what a laser is to be multiplied by to agree with the accelerometer; 1 where they disagree altogether."""
-    inside = (frequencies > band.low_hz) & (frequencies < band.high_hz)
-    power = float(np.sum(np.abs(laser[inside]) ** 2))
-    gain = float(np.sum((np.conj(laser[inside]) * integrated[inside]).real)) / max(power, 1e-300)
-    return gain if 0.8 < gain < 1.25 else 1.0
+    inside = (frequencies > 1.5 * band.low_hz) & (frequencies < band.high_hz)
+    power = np.where(inside, np.abs(laser) ** 2, 0.0)
+    # the strongest lines alone: elsewhere the noise of one or the other would pass for a gain
+    strong = power > 0.1 * float(power.max())
+    gain = float(np.sum((np.conj(laser[strong]) * integrated[strong]).real)) / max(float(power[strong].sum()), 1e-300)
+    return gain if 0.8 < gain < 1.25 and abs(gain - 1.0) > SAME_GAIN else 1.0
 
 
 def _over_floors(n: int, floors: Sequence[int]) -> FloatArray:

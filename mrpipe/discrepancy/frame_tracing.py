@@ -25,6 +25,9 @@ QUANTITY = (
     "pooled over storeys; lines of the spectrum weighted by the accelerometers' noise"
 )
 
+LEAST_STOREY = 0.05
+"""Storeys with a smaller share of what stands out are not worth a flexible model."""
+
 
 @dataclass(frozen=True)
 class FrameTracing:
@@ -96,7 +99,8 @@ def _summary(
     scores = frame_score(before, problem.validation), frame_score(after, problem.validation)
     named = [] if reason else _named(selection, after, rules)
     structured = selection.structured
-    ceiling = flexible_score(before, problem.training, problem.validation) if structured else scores[0].nrmse
+    lacking = [k for k, value in enumerate(_by_storey(selection)) if value > LEAST_STOREY]
+    ceiling = flexible_score(before, problem.training, problem.validation, lacking) if lacking else scores[0].nrmse
     best = min(ceiling, scores[1].nrmse)
     gain = scores[0].nrmse ** 2 - best**2
     recovered = (scores[0].nrmse ** 2 - scores[1].nrmse ** 2) / gain if gain > 1e-12 else 0.0

@@ -76,9 +76,9 @@ def frame_campaign(effect: str, seed: int = 0) -> Campaign:
     dt = 1.0 / (RATE * FINE)
     recordings = []
     for name, role, kind, seconds, level in (
-        ("random-1", "training", "random", 60.0, 0.5),
-        ("sweep-1", "training", "sweep", 60.0, 0.25),
-        ("random-2", "validation", "random", 40.0, 0.4),
+        ("random-1", "training", "random", 40.0, 0.5),
+        ("sweep-1", "training", "sweep", 40.0, 0.25),
+        ("random-2", "validation", "random", 25.0, 0.4),
     ):
         time = np.arange(int(seconds / dt)) * dt
         if kind == "sweep":
