@@ -226,6 +226,11 @@ def admissible(found: Fit) -> bool:
     for item in term.form.parameters:
         if item.role in ("strength", "amplitude") and len(term.form.amplitudes) <= 1 and item.name in found.at_bound:
             return False
+    amplitudes = term.form.amplitudes
+    corrected = len(amplitudes) > 1 and amplitudes[0].lower == 0.0 and all(item.lower < 0.0 for item in amplitudes[1:])
+    if corrected and values[amplitudes[0].name] <= 0.0:
+        # without the part of definite sign only its corrections are left: a spring of no stiffness is no spring
+        return False
     return any(values[item.name] != 0.0 for item in term.form.parameters if item.role != "shape")
 
 
