@@ -209,11 +209,25 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     if len(effects) > 1:
         recovers = recovers.replace("recovers", "recover", 1)
     end = f"{added_up} {recovers}." if flexible else f"{added_up} {recovers}; the error is then {_percent(after)}."
+    end += _unproven_in_words(summary.get("further_terms", []))
     if summary["unexplained"]["structured"]:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         end += f" Something is still unexplained{'; it varies with ' + _listed(states) if states else ''}."
     names = _listed([f"**{effect['name']}**" for effect in effects])
     return f"{start} The model lacks {names}. {' '.join(parts)} {end}{added}"
+
+
+def _unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
+    if not terms:
+        return ""
+    names = _listed([f"{item['name']} ({item['form']})" for item in terms])
+    rest = (
+        "lowers the error and is part of it, but is not proven"
+        if len(terms) == 1
+        else ("lower the error and are part of it, but are not proven")
+    )
+    rivals = sorted({name for item in terms for name in item["tied_with"]})
+    return f" Beside that {names} {rest}{f' against {_listed(rivals)}' if rivals else ''}."
 
 
 def _effect_in_words(effect: Mapping[str, Any]) -> str:
