@@ -69,6 +69,10 @@ class ControllerOptions:
         RMS noise the Kalman filter reckons with.
     bias_drift_m_s2
         Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.
+    inverse_request
+        What the past values of an inverse network are: `steady`, the present ones, that is the drive that would hold
+        this force at this speed; or `history`, what was asked for before. A network has learned from measured forces,
+        which build up over the yield displacement after a reversal. A desired force jumps there.
     residual_force_n
         Switch P2 (24): below it the drive is 0; 0 leaves the switch out.
     low_pass_hz
@@ -91,6 +95,7 @@ class ControllerOptions:
     displacement_noise_m: float = 20e-6
     acceleration_noise_m_s2: float = 0.1
     bias_drift_m_s2: float = 0.0
+    inverse_request: Literal["steady", "history"] = "steady"
     residual_force_n: float = 18.0
     low_pass_hz: float | None = 60.0
     drive_limit: float | None = None
@@ -195,7 +200,10 @@ def build_controller(
         pack.table(inverse)
         limit = inverse.largest_drive if limit is None else limit
     elif inverse is not None:
-        history = max(history, pack.network(inverse, kernel.NETWORK_INVERSE, kernel.INVERSE_SPACING))
+        # its own past output is refused by the pack, in words
+        plain = options.inverse_request == "history" or inverse.features.past_target
+        asked = inverse if plain else inverse.steady()
+        history = max(history, pack.network(asked, kernel.NETWORK_INVERSE, kernel.INVERSE_SPACING))
         pack.layout[kernel.INVERSE] = kernel.INVERSE_NETWORK
     if reference is not None and law == "nnc":
         history = max(history, pack.network(reference, kernel.NETWORK_LAW, kernel.LAW_SPACING))

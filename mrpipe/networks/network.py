@@ -19,7 +19,7 @@ of samples `1 / sampling_rate_hz` apart, each made absolute where `FeatureSpec.a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -181,6 +181,31 @@ class Network:
         slack = margin * (self.feature_maximum - self.feature_minimum)
         outside = (features < self.feature_minimum - slack) | (features > self.feature_maximum + slack)
         return float(np.mean(np.any(outside, axis=1)))
+
+    def steady(self) -> Network:
+        """Return this network for inputs that do not change: a network without past values, to 1e-12 the same.
+
+        Every past value equals the present one, so that the weights of a channel add up. An inverse asked so gives the
+        drive at which the damper would hold this force at this speed, whatever force was asked for before.
+        """
+        spec = self.features
+        if spec.past_target:
+            raise ValueError("a network with its own past output has no steady form")
+        if spec.past_values == 0:
+            return self
+        by_channel = (len(spec.channels), spec.past_values + 1)
+        first = self.weights[0] / self.input_scale
+        known = len(self.feature_minimum) > 0
+        return replace(
+            self,
+            weights=(first.reshape(len(first), *by_channel).sum(axis=2), *self.weights[1:]),
+            biases=(self.biases[0] - first @ self.input_shift, *self.biases[1:]),
+            input_scale=np.ones(len(spec.channels)),
+            input_shift=np.zeros(len(spec.channels)),
+            features=replace(spec, past_values=0),
+            feature_minimum=self.feature_minimum.reshape(by_channel).max(axis=1) if known else self.feature_minimum,
+            feature_maximum=self.feature_maximum.reshape(by_channel).min(axis=1) if known else self.feature_maximum,
+        )
 
 
 def write_network(artifact: ArtifactWriter, group: str, network: Network) -> None:

@@ -184,6 +184,7 @@ def controller(
         displacement_noise_m=settings.kalman_displacement_noise_m,
         acceleration_noise_m_s2=settings.kalman_acceleration_noise_m_s2,
         bias_drift_m_s2=settings.kalman_bias_drift_m_s2,
+        inverse_request=settings.inverse_request,
         residual_force_n=settings.residual_force_n if residual_force_n is None else residual_force_n,
         low_pass_hz=settings.low_pass_hz,
         drive_limit=settings.drive_limit or damper.drive_limit,

@@ -162,12 +162,23 @@ def test_inverse_network_sees_its_own_lags_whatever_the_rate(rate):
     """At 500 Hz the past values of a network of 200 Hz lie between samples."""
     network = random_network(("velocity", "force"), "drive", 3, True)
     _, x, a, v = motion(rate, 4.0)
-    options = ControllerOptions(rate_hz=rate, velocity="measured", residual_force_n=0.0)
+    options = ControllerOptions(rate_hz=rate, velocity="measured", inverse_request="history", residual_force_n=0.0)
     asked = run(build_controller("vd", Gains(650.0), options, inverse=network), x, a, v)[:, COMMAND_INVERSE]
     t = np.arange(0.0, 4.0, 1.0 / 200.0)
     wanted = network.predict(lagged([0.072 * np.cos(8.0 * t), 650.0 * 0.072 * np.cos(8.0 * t)], 3, absolute=True))
     both = np.interp(t[3:], np.arange(len(asked)) / rate, asked)
     assert np.max(np.abs(both - wanted)[20:]) < (1e-9 if rate == 200.0 else 0.02)
+
+
+@pytest.mark.property
+def test_steady_request_asks_for_what_would_hold_the_force():
+    """A desired force that jumps at a reversal has no history that a damper's measured force could have."""
+    network = random_network(("velocity", "force"), "drive", 3, True)
+    _, x, a, v = motion(200.0, 4.0)
+    options = ControllerOptions(velocity="measured", residual_force_n=0.0)
+    commands = run(build_controller("vdns", Gains(250.0, -4500.0), options, inverse=network), x, a, v)
+    present = np.abs(commands[:, [COMMAND_VELOCITY, COMMAND_FORCE]])
+    np.testing.assert_allclose(commands[:, COMMAND_INVERSE], network.predict(np.repeat(present, 4, axis=1)), atol=1e-10)
 
 
 @pytest.mark.literature

@@ -78,7 +78,13 @@ def test_c_equals_python(law, kind, tmp_path, thesis_frame, floor_one, set_c):
     controller = build_controller(
         law,
         gains,
-        ControllerOptions(rate_hz=rate, drive_limit=4.0, bias_drift_m_s2=0.01, dead_band_m_s=1e-3),
+        ControllerOptions(
+            rate_hz=rate,
+            drive_limit=4.0,
+            bias_drift_m_s2=0.01,
+            dead_band_m_s=1e-3,
+            inverse_request="history",
+        ),
         inverse=random_network(("velocity", "force"), "drive", 3, True) if kind == "network" else inverse_table(set_c),
         reference=random_network(("displacement", "velocity"), "force", 5, False) if law == "nnc" else None,
         observer=lqg_observer(thesis_frame, floor_one, Weights(), 1.0 / rate) if law == "lqg" else None,

@@ -52,6 +52,17 @@ def test_predict_is_the_formula_of_the_thesis_written_out() -> None:
 
 
 @pytest.mark.property
+def test_steady_network_is_the_network_whose_past_equals_the_present() -> None:
+    network = random_network((8, 6, 6, 1))
+    present = np.random.default_rng(3).normal(size=(20, 2))
+    steady = network.steady()
+    assert steady.architecture == "2-6-6-1" and steady.features.past_values == 0
+    np.testing.assert_allclose(steady.predict(present), network.predict(np.repeat(present, 4, axis=1)), rtol=1e-10)
+    assert steady.outside_training_range(np.array([[0.0, 0.9], [0.0, 1.5]])) == 0.5
+    assert steady.steady() is steady
+
+
+@pytest.mark.property
 @given(st.integers(0, 5), st.integers(1, 3), st.integers(6, 40), st.booleans())
 @settings(deadline=None, max_examples=40)
 def test_lagged_rows_hold_present_then_past_values(past: int, count: int, length: int, absolute: bool) -> None:

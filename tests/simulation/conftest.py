@@ -31,7 +31,9 @@ class Rig:
     ideal_amplitude: float
     adjusted_amplitude: float
 
-    def controller(self, law: str, gains: Gains | None = None, **options: Any) -> Controller:
+    def controller(
+        self, law: str, gains: Gains | None = None, inverse: Network | None = None, **options: Any
+    ) -> Controller:
         chosen = ControllerOptions(**options)
         observer = None
         if law == "lqg":
@@ -39,7 +41,8 @@ class Rig:
         if gains is None:
             gains = THESIS_GAINS.get(law, Gains())
         reference = self.reference if law == "nnc" else None
-        return build_controller(law, gains, chosen, inverse=self.inverse, reference=reference, observer=observer)
+        used = inverse or self.inverse
+        return build_controller(law, gains, chosen, inverse=used, reference=reference, observer=observer)
 
     def excitation(self, amplitude: float, cycles: int = 40, decay_s: float = 6.0) -> Excitation:
         return harmonic(amplitude, 8.0, cycles=cycles, settling_cycles=cycles // 2, decay_s=decay_s)

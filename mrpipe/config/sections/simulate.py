@@ -63,6 +63,11 @@ class ControllerSettings(Section):
     inverse: Literal["network", "model"] = Field(
         "network", description="Inverse of the damper: the trained network, or the identified model's post-yield force."
     )
+    inverse_request: Literal["steady", "history"] = Field(
+        "steady",
+        description="Past values for an inverse network: `steady`, the present ones; `history`, as (2.9) has it, what "
+        "was desired before: at a reversal a history that no measured force has, and the network answers with spikes.",
+    )
     residual_force_n: float = Field(
         18.0, ge=0.0, description="Switch: below this desired force the drive is 0 (P2 24)."
     )
