@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -134,11 +134,17 @@ def damper_part(
         return None
     tests = prepared_loops(bench)
     declared = [effects[name] for name in campaign.declared_effects if name in effects]
+    measured = any("damper_displacement" in item.channels for item in loops)
+    found = None
+    if brace is not None and not measured and brace.name not in campaign.declared_effects:
+        found = find_brace(tests, options, declared)
+    if found is not None and found.strong:
+        # sensors' noise is no yardstick for a rigid brace: rivals are weighed by what the brace leaves, one at a time
+        options = replace(options, model_error_share=max(options.model_error_share, found.nrmse_after), most_effects=1)
     summary = dict(trace_damper(tests, effects, declared, options, rng=rng, jobs=jobs, progress=progress).summary)
     summary["quantity"] = DAMPER_QUANTITY
-    measured = any("damper_displacement" in item.channels for item in loops)
-    if brace is not None and not measured and brace.name not in campaign.declared_effects:
-        _with_brace(summary, find_brace(tests, options, declared), brace, options)
+    if brace is not None and found is not None:
+        _with_brace(summary, found, brace, options)
     return Part("damper", summary)
 
 

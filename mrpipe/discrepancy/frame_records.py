@@ -66,6 +66,11 @@ class FrameRecord:
         return int(self.acceleration.shape[1])
 
     @property
+    def known_loads(self) -> dict[int, FloatArray]:
+        """Return floor (from 1) -> force on it that was measured, the damper's included, shape (m,) [N]."""
+        return {**self.loads, **({1: self.damper["force"]} if "force" in self.damper else {})}
+
+    @property
     def relative(self) -> FloatArray:
         """Acceleration relative to the ground, shape (m, n) [m/s2]."""
         return np.asarray(self.acceleration - self.ground[:, None])

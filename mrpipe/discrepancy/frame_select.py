@@ -251,6 +251,10 @@ def _rocking(
         return None
     # what a general linear frame, of many more numbers, makes of the same groups
     reachable = simple.share(free.design.residual)
+    # a base that rocks shows at the first of its starts already: without, its shape is not worth a search
+    screened = [search(item, simple.design, None, about, screen_only=True) for item in base_forms]
+    if max(simple.share(item.solved.residual) for item in screened) < 0.5 * rules.least_share:
+        return None
     found = _round(simple, base_forms, about, jobs)
     if not found or found[0].share < rules.least_share:
         return None

@@ -9,10 +9,10 @@ line of the spectrum weighted by what the accelerometers' noise makes of it (int
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import fft, signal
+from scipy import fft, signal, stats
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.discrepancy.frame_records import FrameRecord
@@ -25,6 +25,9 @@ interest."""
 INTEGRATION_SHARE = 0.6
 """Corner of the integration over the lower edge of the band."""
 
+
+NOISE_BLOCKS = 14
+"""Least number of blocks that the spectrum of a sensor's noise is averaged over."""
 
 SAME_GAIN = 0.02
 """Gains of laser and accelerometer that differ by less are taken as one."""
@@ -48,10 +51,13 @@ class Noise:
         Of ground and floors, shape (1 + n,) [(m/s2)^2/Hz].
     displacement
         Floor -> of its laser [m2/Hz].
+    loads
+        Floor -> of the load cell there [N2/Hz].
     """
 
     acceleration: FloatArray
     displacement: dict[int, float]
+    loads: dict[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -232,10 +238,13 @@ def _at_rest(record: FrameRecord) -> slice:
 
 def noise_density(values: FloatArray, rate_hz: float, above_hz: float) -> float:
     """Return the power density of the noise on a channel, told by what lies above the band [unit^2/Hz]."""
-    frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=min(len(values), 2048))
+    length = min(2048, max(64, len(values) // NOISE_BLOCKS))
+    frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=min(len(values), length))
     high = (frequencies > min(above_hz, 0.3 * rate_hz)) & (frequencies < 0.45 * rate_hz)
-    # the lower quartile passes by resonances of what the model does not hold
-    return float(np.quantile(density[high], 0.25)) / 0.85
+    # the lower quartile passes by resonances of what the model does not hold; its place below the mean goes by how many
+    # blocks were averaged (half overlapping Hann windows: 1.06 of the variance of separate ones)
+    freedom = 2.0 * max(1.0, 2.0 * len(values) / length - 1.0) / 1.06
+    return float(np.quantile(density[high], 0.25)) / float(stats.chi2.ppf(0.25, freedom) / freedom)
 
 
 def noise_of(record: FrameRecord, band: Band) -> Noise:
@@ -245,6 +254,7 @@ def noise_of(record: FrameRecord, band: Band) -> Noise:
     return Noise(
         np.array([noise_density(channel, rate, above) for channel in channels]),
         {floor: noise_density(x, rate, above) for floor, x in record.measured_displacement.items()},
+        {floor: noise_density(x, rate, above) for floor, x in record.known_loads.items()},
     )
 
 
@@ -278,9 +288,7 @@ def spectra_of(
         ground[None],
         (-ground * omega**2 / omega[-1] ** 2)[None],
     ]
-    loads = dict(record.loads)
-    if "force" in record.damper:
-        loads[1] = record.damper["force"]
+    loads = record.known_loads
     for floor in range(1, n + 1):
         if floor in loads:
             parts.append(spectrum_of(loads[floor], taper, dt, frequencies)[None])
@@ -292,6 +300,9 @@ def spectra_of(
     variance = np.einsum("slb,l->sb", by_floor**2, noise.acceleration[1:])
     variance += noise.acceleration[0] * np.einsum("sl,lb->sb", stiffness, inverse) ** 2
     variance += np.einsum("sl,lb->sb", stiffness**2, of_lasers)
+    # a measured load brings the noise of its cell to every storey below it
+    for floor, density in noise.loads.items():
+        variance[:floor] += density
     own = np.mean(np.abs(target) ** 2, axis=1, keepdims=True)
     variance = variance + MODEL_FLOOR**2 * own
     return Spectra(record, motion, frequencies, taper, target, np.concatenate(parts), np.sqrt(2.0 / variance), variance)
