@@ -33,13 +33,13 @@ def damper_effects() -> dict[str, Effect]:
     return {name: item for name, item in all_effects().items() if item.rig == "damper"}
 
 
-def load_effect_file(path: Path) -> Effect:
-    """Load the EFFECT of a user's own file.
+def effect_of_file(path: Path) -> object:
+    """Run a user's own file and return its EFFECT, of whatever kind; None where it defines none.
 
     Raises
     ------
     UserError
-        If the file is missing, cannot be run, or defines no EFFECT.
+        If the file is missing or cannot be run.
     """
     if not Path(path).is_file():
         raise UserError(path, "close_loop.effect_files", "no such file", "name a Python file that defines EFFECT")
@@ -54,7 +54,18 @@ def load_effect_file(path: Path) -> Effect:
         # compilers say much: the first line tells what it is
         said = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
         raise UserError(path, "close_loop.effect_files", f"cannot be run: {said}", "mend the file") from error
-    effect = getattr(module, "EFFECT", None)
+    return getattr(module, "EFFECT", None)
+
+
+def load_effect_file(path: Path) -> Effect:
+    """Load the EFFECT of a user's own file.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, cannot be run, or defines no EFFECT.
+    """
+    effect = effect_of_file(path)
     if not isinstance(effect, Effect):
         raise UserError(path, "EFFECT", "is missing", "define EFFECT = Effect(...) as mrpipe/effects/*.py do")
     return effect

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import pkgutil
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 import mrpipe.effects.structural as package
+from mrpipe.effects.contract import Effect
+from mrpipe.effects.library import effect_of_file
 from mrpipe.effects.structural.contract import StructuralEffect
+from mrpipe.errors import UserError
 
 
 @cache
@@ -25,14 +27,20 @@ def all_structural_effects() -> dict[str, StructuralEffect]:
 
 
 def load_structural_file(path: Path) -> StructuralEffect | None:
-    """Return the EFFECT of a user's own file where it is one of a structure, None where it is not."""
-    spec = importlib.util.spec_from_file_location(f"mrpipe_user_effect_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        return None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    effect = getattr(module, "EFFECT", None)
-    return effect if isinstance(effect, StructuralEffect) else None
+    """Return the EFFECT of a user's own file where it is one of a structure, None where it is one of a damper.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, cannot be run, or defines no EFFECT.
+    """
+    effect = effect_of_file(path)
+    if isinstance(effect, StructuralEffect):
+        return effect
+    if not isinstance(effect, Effect):
+        remedy = "define EFFECT = StructuralEffect(...) as mrpipe/effects/structural/*.py do"
+        raise UserError(path, "EFFECT", "is missing", remedy)
+    return None
 
 
 def structural_effects(names: Sequence[str] = (), files: Sequence[Path] = ()) -> dict[str, StructuralEffect]:

@@ -1,0 +1,40 @@
+"""A user's own effect of a structure, and files that are none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mrpipe.effects.structural.library import all_structural_effects, structural_effects
+from mrpipe.errors import UserError
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    "text", ["def x(:\n", "raise RuntimeError('first\\nsecond')\n", "EFFECT = 3\n", "", "import nowhere_at_all\n"]
+)
+def test_a_broken_file_is_a_users_mistake_in_one_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "own.py"
+    path.write_text(text)
+    with pytest.raises(UserError) as caught:
+        structural_effects((), [path])
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.property
+def test_a_missing_file_is_a_users_mistake(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such file"):
+        structural_effects((), [tmp_path / "none.py"])
+
+
+@pytest.mark.property
+def test_an_effect_of_a_structure_and_one_of_a_damper_are_told_apart(tmp_path: Path) -> None:
+    own, damper = tmp_path / "own.py", tmp_path / "damper.py"
+    own.write_text(
+        "from dataclasses import replace\nfrom mrpipe.effects.structural.impact import EFFECT as I\n"
+        "EFFECT = replace(I, name='own-impact')\n"
+    )
+    damper.write_text("from mrpipe.effects.remanence import EFFECT\n")
+    assert set(structural_effects((), [own, damper])) == {*all_structural_effects(), "own-impact"}
