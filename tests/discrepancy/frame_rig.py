@@ -15,7 +15,7 @@ STOREYS = np.array([9000.0, 8000.0, 7000.0])
 DAMPERS = np.array([6.0, 5.0, 4.0])
 
 
-@njit
+@njit(cache=True)
 def _slope(z: np.ndarray, ground: float, code: int, out: np.ndarray) -> None:
     """State: x (3), v (3), hysteresis of each storey (3), turn of the base times storey height and its rate (2)."""
     x, v = z[:3], z[3:6]
@@ -48,7 +48,7 @@ def _slope(z: np.ndarray, ground: float, code: int, out: np.ndarray) -> None:
         out[9], out[10] = turn_rate, (moment - 9.0e4 * turn - 60.0 * turn_rate) / 8.0
 
 
-@njit
+@njit(cache=True)
 def shake(ground: np.ndarray, dt: float, code: int, every: int) -> tuple[np.ndarray, np.ndarray]:
     z, k = np.zeros(11), np.zeros((4, 11))
     size = (len(ground) - 1) // every + 1
@@ -76,9 +76,9 @@ def frame_campaign(effect: str, seed: int = 0) -> Campaign:
     dt = 1.0 / (RATE * FINE)
     recordings = []
     for name, role, kind, seconds, level in (
-        ("random-1", "training", "random", 40.0, 0.5),
-        ("sweep-1", "training", "sweep", 40.0, 0.25),
-        ("random-2", "validation", "random", 25.0, 0.4),
+        ("random-1", "training", "random", 30.0, 0.5),
+        ("sweep-1", "training", "sweep", 30.0, 0.25),
+        ("random-2", "validation", "random", 20.0, 0.4),
     ):
         time = np.arange(int(seconds / dt)) * dt
         if kind == "sweep":
