@@ -46,7 +46,9 @@ class ReferenceController:
         self._follow(started)
         force = self._force()
         past = self.inverse.features.past_values
-        if not started:
+        if not started or self.options.inverse_request == "steady":
+            self.speeds.clear()
+            self.forces.clear()
             self.speeds.extend([self.v] * past)
             self.forces.extend([force] * past)
         self.speeds.appendleft(self.v)

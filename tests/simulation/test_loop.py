@@ -93,9 +93,10 @@ def test_passive_damper_equals_an_integrator_of_scipy(rig):
 
 
 @pytest.mark.oracle
+@pytest.mark.parametrize("request_form", ["steady", "history"])
 @pytest.mark.parametrize("law", ["vd", "vdns", "fdns"])
-def test_compiled_loop_equals_the_plain_one(rig, law):
-    options = ControllerOptions(drive_limit=4.0)
+def test_compiled_loop_equals_the_plain_one(rig, law, request_form):
+    options = ControllerOptions(drive_limit=4.0, inverse_request=request_form)
     network = random_network(("velocity", "force"), "drive", 3, True)
     gains = THESIS_GAINS[law]
     excitation = harmonic(0.7, 8.0, cycles=3, settling_cycles=1)
