@@ -11,7 +11,8 @@ from mrpipe.stages.close_loop_laws import closed_loop
 from mrpipe.stages.close_loop_report import report
 
 if TYPE_CHECKING:
-    from mrpipe.discrepancy.summary import Tracing
+    from mrpipe.config.sections.close_loop import CloseLoopSettings
+    from mrpipe.discrepancy.summary import Tracing, TracingOptions
     from mrpipe.effects.contract import Effect
     from mrpipe.signals.prepared import PreparedTest
 
@@ -19,23 +20,12 @@ CORRECTIONS = "corrections.yaml"
 NEXT_TESTS = "next-tests.yaml"
 
 
-def _run(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.campaigns import load_campaign
+def tracing_options(settings: CloseLoopSettings, drive_unit: str) -> TracingOptions:
+    """Return what the settings ask of a tracing, on a bench or behind a structure."""
     from mrpipe.discrepancy.summary import TracingOptions
-    from mrpipe.discrepancy.tracing import trace_campaign
     from mrpipe.discrepancy.verdict import Rules
-    from mrpipe.effects.library import damper_effects, effects_named
-    from mrpipe.signals.prepared import read_prepared
 
-    settings = context.settings.close_loop
-    campaign = load_campaign(context.inputs["campaign:bench"])
-    tests = read_prepared(context.artifact("prepare"))
-    known = damper_effects()
-    declared = [known[name] for name in campaign.declared_effects if name in known]
-    for name in campaign.declared_effects:
-        if name not in known:
-            context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
-    options = TracingOptions(
+    return TracingOptions(
         model=settings.model,
         yield_order=settings.yield_order,
         viscosity_order=settings.viscosity_order,
@@ -50,8 +40,25 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         observation_filter=settings.observation_filter,
         model_error_share=settings.model_error_share,
         unattributed=settings.unattributed,
-        drive_unit=tests[0].drive_unit or "A",
+        drive_unit=drive_unit or "A",
     )
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.campaigns import load_campaign
+    from mrpipe.discrepancy.tracing import trace_campaign
+    from mrpipe.effects.library import damper_effects, effects_named
+    from mrpipe.signals.prepared import read_prepared
+
+    settings = context.settings.close_loop
+    campaign = load_campaign(context.inputs["campaign:bench"])
+    tests = read_prepared(context.artifact("prepare"))
+    known = damper_effects()
+    declared = [known[name] for name in campaign.declared_effects if name in known]
+    for name in campaign.declared_effects:
+        if name not in known:
+            context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
+    options = tracing_options(settings, tests[0].drive_unit)
     library = effects_named(settings.candidates, settings.effect_files)
     traced = trace_campaign(
         tests, library, declared, options, rng=context.rng, jobs=context.jobs, progress=context.progress

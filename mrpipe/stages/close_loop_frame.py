@@ -6,10 +6,12 @@ Takes the place of the stage on a bench campaign where the user gives a campaign
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.config.sections.campaigns import LABORATORY
 from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.stages.close_loop import tracing_options
 
 if TYPE_CHECKING:
     from mrpipe.config.sections.campaigns import CampaignsSettings
@@ -19,8 +21,6 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
     from mrpipe.discrepancy.frame_verdict import trace_structure
-    from mrpipe.discrepancy.summary import TracingOptions
-    from mrpipe.discrepancy.verdict import Rules
     from mrpipe.effects.library import damper_effects
     from mrpipe.effects.structural.library import all_structural_effects, structural_effects
 
@@ -33,20 +33,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for name in campaigns[0].declared_effects:
         if name not in known:
             context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
-    options = TracingOptions(
-        model=settings.model,
-        yield_order=settings.yield_order,
-        viscosity_order=settings.viscosity_order,
-        most_effects=settings.most_effects,
-        fit_rate_hz=settings.fit_rate_hz,
-        displacement_cutoff_hz=settings.displacement_cutoff_hz,
-        refits=min(settings.refits, 4),
-        folds=settings.folds,
-        bootstrap_draws=settings.bootstrap_draws,
-        rules=Rules(settings.named_share, settings.least_share, settings.lead),
-        observation_filter=False,
-        drive_unit=campaigns[0].drive_unit or "A",
-    )
+    asked = tracing_options(settings, campaigns[0].drive_unit)
+    # few long tests: fewer forms are refitted, and nothing filtered their force
+    options = replace(asked, refits=min(settings.refits, 4), observation_filter=False, unattributed=False)
     traced = trace_structure(
         campaigns,
         structural_effects(settings.candidates, settings.effect_files),
