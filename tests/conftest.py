@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from mrpipe.artifacts import public_data_directory
+
+# The suite asks the same questions on every machine, however slow: a change is judged by what it changed. New examples
+# are looked for with `pytest --hypothesis-profile explore`.
+hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)
+hypothesis.settings.register_profile("explore", max_examples=1000, deadline=None)
+hypothesis.settings.load_profile("suite")
 
 
 @pytest.fixture(scope="session")

@@ -54,7 +54,8 @@ def test_a_passive_device_never_drives_the_rod(velocity: float, free: float, pus
     assert abs(force) <= 4.0
     assert abs(end) <= max(abs(velocity), abs(free)) + 1e-12
     if velocity * free >= 0.0:
-        assert force * free >= 0.0
+        # a rod that sticks is held at rest to rounding: the force may then have either sign
+        assert force * free >= -1e-15
 
 
 @pytest.mark.property
