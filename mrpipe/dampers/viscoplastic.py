@@ -117,15 +117,21 @@ def advance_dashpot(
     return _solve_stage(weight, z0 + (1.0 - _SDIRK) * rate + _SDIRK * gain * present, first)
 
 
-@njit(STEP_SIGNATURE, cache=True)
-def dashpot_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: q [1/m], velocity scale v0 [m/s]. State: atanh z, last velocity."""
+@njit(float64(float64[::1], float64[::1], float64, float64, float64), cache=True)
+def follow_dashpot(wire: FloatArray, state: FloatArray, stiffness: float, velocity_scale: float, dt: float) -> float:
+    """Return z of :func:`advance_dashpot` at the velocity on the wire. State: atanh z, last velocity."""
     if wire[FIRST] > 0.5:
         state[0] = 0.0
     else:
-        state[0] = advance_dashpot(state[0], state[1], wire[VELOCITY], dt, parameters[0], parameters[1])
+        state[0] = advance_dashpot(state[0], state[1], wire[VELOCITY], dt, stiffness, velocity_scale)
     state[1] = wire[VELOCITY]
-    wire[HYSTERESIS] = math.tanh(state[0])
+    return math.tanh(state[0])
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def dashpot_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: q [1/m], velocity scale v0 [m/s]. State: atanh z, last velocity."""
+    wire[HYSTERESIS] = follow_dashpot(wire, state, parameters[0], parameters[1], dt)
 
 
 def saturating_dashpot(stiffness: float, velocity_scale: float) -> Step:

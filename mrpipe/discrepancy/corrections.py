@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,36 +11,21 @@ import numpy as np
 from mrpipe.discrepancy.engine import predict
 from mrpipe.discrepancy.recordings import record_tests
 from mrpipe.discrepancy.summary import Tracing
+from mrpipe.signals.faults import KnownFaults
 from mrpipe.signals.prepared import PreparedTest
 
 
 @dataclass(frozen=True)
-class Corrections:
-    """What to take out of the channels, in the names of `prepare.corrections`.
+class Corrections(KnownFaults):
+    """What to take out of the channels: the faults that `prepare` knows, and the displacement's time.
 
     Attributes
     ----------
     displacement_late_s
         By how much the displacement is recorded later than force and drive (`prepare.displacement_late_s`).
-    force_late_s
-        By how much the force is recorded later than displacement and drive.
-    force_offset_n
-        Test -> offset of its load cell beside that of the campaign.
-    force_per_drive_n, force_per_drive_squared_n
-        Offset for each unit of drive, and of drive squared.
-    drive_lag_s
-        Lag of the drive in these.
-    force_drift_n_s
-        Drift of the load cell in each test.
     """
 
     displacement_late_s: float = 0.0
-    force_late_s: float = 0.0
-    force_offset_n: Mapping[str, float] = field(default_factory=dict)
-    force_per_drive_n: float = 0.0
-    force_per_drive_squared_n: float = 0.0
-    drive_lag_s: float = 0.0
-    force_drift_n_s: float = 0.0
 
     @property
     def any(self) -> bool:

@@ -11,7 +11,6 @@ from numba import njit
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
     CURRENT,
-    FIRST,
     FORCE,
     HYSTERESIS,
     RATE_YIELD,
@@ -21,7 +20,7 @@ from mrpipe.dampers.plant import (
     Phase,
     Step,
 )
-from mrpipe.dampers.viscoplastic import advance_dashpot
+from mrpipe.dampers.viscoplastic import follow_dashpot
 from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape, strength
 
 
@@ -54,12 +53,9 @@ def power_law_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
 @njit(STEP_SIGNATURE, cache=True)
 def dashpot_blend_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: share, spring rate [1/m], velocity scale [m/s]. State: atanh z, last velocity."""
-    if wire[FIRST] > 0.5:
-        state[0] = 0.0
-    else:
-        state[0] = advance_dashpot(state[0], state[1], wire[VELOCITY], dt, parameters[1], parameters[2])
-    state[1] = wire[VELOCITY]
-    wire[HYSTERESIS] += parameters[0] * (math.tanh(state[0]) - wire[HYSTERESIS])
+    wire[HYSTERESIS] += parameters[0] * (
+        follow_dashpot(wire, state, parameters[1], parameters[2], dt) - wire[HYSTERESIS]
+    )
 
 
 def _rounded(value: float, scale: float, power: float, kind: float = 0.0) -> Step:

@@ -9,7 +9,6 @@ judged where the base form itself is in question.
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -17,8 +16,8 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import CURRENT, FIRST, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.dampers.viscoplastic import advance_dashpot
+from mrpipe.dampers.plant import CURRENT, FORCE, STEP_SIGNATURE, Phase, Step
+from mrpipe.dampers.viscoplastic import follow_dashpot
 from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
 
 DASHPOT = 20
@@ -28,12 +27,7 @@ DASHPOT = 20
 @njit(STEP_SIGNATURE, cache=True)
 def dashpot_part_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: spring rate [1/m], velocity scale [m/s]. State: atanh z, last velocity."""
-    if wire[FIRST] > 0.5:
-        state[0] = 0.0
-    else:
-        state[0] = advance_dashpot(state[0], state[1], wire[VELOCITY], dt, parameters[0], parameters[1])
-    state[1] = wire[VELOCITY]
-    wire[DASHPOT] = math.tanh(state[0])
+    wire[DASHPOT] = follow_dashpot(wire, state, parameters[0], parameters[1], dt)
 
 
 @njit(STEP_SIGNATURE, cache=True)

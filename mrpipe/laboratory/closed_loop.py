@@ -15,7 +15,7 @@ from mrpipe.errors import DivergedError, UserError
 from mrpipe.laboratory import structure_kernel as kernel
 from mrpipe.laboratory.coefficient_effects import INERTIA_GROWTH, INERTIA_PLAIN
 from mrpipe.laboratory.damper import TrueDamper, packed_for
-from mrpipe.laboratory.frame_rig import ACCELEROMETER_M_S2_PER_V, LASER_M_PER_V, LOAD_CELL_N_PER_V
+from mrpipe.laboratory.frame_rig import ACCELEROMETER_M_S2_PER_V, LASER_M_PER_V, LOAD_CELL_N_PER_V, TableRecord
 from mrpipe.laboratory.motion import smooth_start
 from mrpipe.laboratory.structure import TrueStructure, assemble
 
@@ -69,16 +69,6 @@ class LoopHistories:
     force: FloatArray
     drive: FloatArray
     desired: FloatArray
-
-
-@dataclass(frozen=True)
-class LoopRecord:
-    """A campaign ready to be written, and its truth."""
-
-    tests: list[TestFile]
-    channels: dict[str, tuple[str, str]]
-    scales: dict[str, float]
-    truth: dict[str, Any]
 
 
 def base_motion(rig: LoopRig, factor: float = 1.0) -> FloatArray:
@@ -176,7 +166,7 @@ def record_closed_loop(
     rig: LoopRig,
     rng: np.random.Generator,
     progress: Progress = no_progress,
-) -> LoopRecord:
+) -> TableRecord:
     """Record each law twice: a training test, and a validation test at another amplitude.
 
     Parameters
@@ -220,7 +210,7 @@ def record_closed_loop(
         "indices": reached,
         "offsets": dict(zip(scales, offsets.tolist(), strict=True)),
     }
-    return LoopRecord(tests, channels, scales, truth)
+    return TableRecord(tests, channels, scales, truth)
 
 
 _UNITS = {"acceleration": "m/s^2", "displacement": "m", "force": "N", "drive": "A"}

@@ -87,8 +87,8 @@ class FrameTestOrder:
 
 
 @dataclass(frozen=True)
-class FrameRecord:
-    """A campaign ready to be written, and its truth."""
+class TableRecord:
+    """A campaign of the shaking table ready to be written, and its truth."""
 
     tests: list[TestFile]
     channels: dict[str, tuple[str, str]]
@@ -184,7 +184,7 @@ def _support_mode(ground: FloatArray, rig: FrameRig, omega: float) -> FloatArray
 
 def record_frame(
     structure: TrueStructure, rig: FrameRig, rng: np.random.Generator, progress: Progress = no_progress
-) -> FrameRecord:
+) -> TableRecord:
     """Record a frame campaign (chapter 3): absolute accelerometers of ground and floors, lasers on some floors.
 
     Parameters
@@ -246,7 +246,7 @@ def record_frame(
         "offsets": dict(zip(quantities, offsets.tolist(), strict=True)),
         "sensitivity": dict(zip(quantities, errors.tolist(), strict=True)),
     }
-    return FrameRecord(tests, channels, dict(zip(quantities, units, strict=True)), truth)
+    return TableRecord(tests, channels, dict(zip(quantities, units, strict=True)), truth)
 
 
 def calibrated_structure(structure: TrueStructure, rig: FrameRig) -> TrueStructure:

@@ -15,9 +15,22 @@ from mrpipe.signals.filters import advance
 
 @dataclass(frozen=True)
 class KnownFaults:
-    """Faults of sensors that are taken out before all else; the fields are those of `prepare.corrections`, see there.
+    """Faults of sensors that are taken out before all else; the fields are those of `prepare.corrections`.
 
     They are subtracted from what was recorded, and so are no part of the offsets that a prepared test remembers.
+
+    Attributes
+    ----------
+    force_late_s
+        By how much the force is recorded later than displacement and drive.
+    force_offset_n
+        Test -> offset of its load cell beside that of the campaign.
+    force_per_drive_n, force_per_drive_squared_n
+        Offset for each unit of drive, and of drive squared.
+    drive_lag_s
+        Lag of the drive in these.
+    force_drift_n_s
+        Drift of the load cell in each test.
     """
 
     force_late_s: float = 0.0

@@ -76,9 +76,8 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
     """Write what `prepare` should take out of the channels, as settings to be laid over the configuration."""
     from mrpipe.discrepancy.corrections import Corrections, corrections_of
 
-    present = Corrections(
-        context.settings.prepare.displacement_late_s, **context.settings.prepare.corrections.model_dump()
-    )
+    prepare = context.settings.prepare
+    present = Corrections(**prepare.corrections.model_dump(), displacement_late_s=prepare.displacement_late_s)
     found = corrections_of(traced, tests)
     # what was known before stays in the file, so that it can be given again and again
     settings = {"prepare": found.settings(present)} if (present + found).any else {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
     from mrpipe.laboratory.bench import BenchRig
     from mrpipe.laboratory.damper import TrueDamper
-    from mrpipe.laboratory.frame_rig import FrameRig
+    from mrpipe.laboratory.effects import Planted
+    from mrpipe.laboratory.frame_rig import FrameRig, TableRecord
     from mrpipe.laboratory.motion import BenchTest
     from mrpipe.laboratory.structure import TrueStructure
 
@@ -112,37 +113,18 @@ def _frame_rig(settings: Any) -> FrameRig:
 
 
 def _record_frame(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.campaigns import write_campaign
-    from mrpipe.laboratory.frame_rig import floor_masses, record_frame
-    from mrpipe.laboratory.sealing import campaign_directory, write_scales, write_sealed
+    from mrpipe.laboratory.frame_rig import record_frame
 
     rig = _frame_rig(context.settings.laboratory.frame)
     structure = _true_structure(context)
     record = record_frame(structure, rig, context.rng, context.progress)
-    declared = [item.name for item in structure.effects if item.declared]
-    final = context.run_directory / "campaigns" / "frame"
-    with campaign_directory(final) as folder:
-        write_campaign(
-            folder,
-            campaign="virtual-frame",
-            rig="shear-frame",
-            sampling_rate_hz=rig.sampling_rate_hz,
-            channels=record.channels,
-            tests=record.tests,
-            extra={"declared_effects": declared, "frame": {"floor_masses_kg": floor_masses(structure)}},
-        )
-        write_scales(folder, record.scales)
-        write_sealed(final, record.truth)
-    return _summary(context, "campaigns/frame", record.tests, declared, rig.sampling_rate_hz)
+    return _write_table(context, "frame", record, structure, structure.effects, rig.sampling_rate_hz)
 
 
 def _record_closed_loop(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.campaigns import write_campaign
     from mrpipe.dampers.model import read_damper
     from mrpipe.laboratory.bench import calibrated_on
     from mrpipe.laboratory.closed_loop import LoopRig, record_closed_loop
-    from mrpipe.laboratory.frame_rig import floor_masses
-    from mrpipe.laboratory.sealing import campaign_directory, write_scales, write_sealed
     from mrpipe.stages.simulate import controller
     from mrpipe.structures import read_frame
 
@@ -152,22 +134,39 @@ def _record_closed_loop(context: StageContext) -> Mapping[str, Any]:
     frame, model = read_frame(context.artifact("identify-frame")), read_damper(context.artifact("identify-damper"))
     controllers = {law: controller(context, law, frame, model) for law in settings.laws}
     record = record_closed_loop(damper, structure, controllers, rig, context.rng, context.progress)
-    declared = [item.name for item in (*damper.effects, *structure.effects) if item.declared]
-    final = context.run_directory / "campaigns" / "closed-loop"
+    effects = (*damper.effects, *structure.effects)
+    summary = _write_table(context, "closed-loop", record, structure, effects, rig.sampling_rate_hz)
+    return {**summary, "laws": list(settings.laws)}
+
+
+def _write_table(
+    context: StageContext,
+    name: str,
+    record: TableRecord,
+    structure: TrueStructure,
+    effects: Sequence[Planted],
+    rate_hz: float,
+) -> dict[str, Any]:
+    """Write what was recorded on the shaking table as a campaign, its truth beside it; return what is said of it."""
+    from mrpipe.campaigns import write_campaign
+    from mrpipe.laboratory.frame_rig import floor_masses
+    from mrpipe.laboratory.sealing import campaign_directory, write_scales, write_sealed
+
+    declared = [item.name for item in effects if item.declared]
+    final = context.run_directory / "campaigns" / name
     with campaign_directory(final) as folder:
         write_campaign(
             folder,
-            campaign="virtual-closed-loop",
+            campaign=f"virtual-{name}",
             rig="shear-frame",
-            sampling_rate_hz=rig.sampling_rate_hz,
+            sampling_rate_hz=rate_hz,
             channels=record.channels,
             tests=record.tests,
             extra={"declared_effects": declared, "frame": {"floor_masses_kg": floor_masses(structure)}},
         )
         write_scales(folder, record.scales)
         write_sealed(final, record.truth)
-    summary = _summary(context, "campaigns/closed-loop", record.tests, declared, rig.sampling_rate_hz)
-    return {**summary, "laws": list(settings.laws)}
+    return _summary(context, f"campaigns/{name}", record.tests, declared, rate_hz)
 
 
 def _summary(
