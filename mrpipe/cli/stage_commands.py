@@ -47,8 +47,11 @@ def build_and_print(names: list[str], options: CommonOptions) -> None:
                 outcome.stage, "", f"nothing to work on: {outcome.manifest.skipped}", "name the data it needs"
             )
     if options.json:
-        summaries = {outcome.stage: outcome.manifest.summary for outcome in outcomes}
-        print_json(summaries if len(names) > 1 else outcomes[0].manifest.summary)
+        # a caller that reads standard output alone sees them too
+        summaries = {
+            outcome.stage: {"warnings": outcome.manifest.warnings, **outcome.manifest.summary} for outcome in outcomes
+        }
+        print_json(summaries if len(names) > 1 else summaries[outcomes[0].stage])
         return
     for outcome in outcomes:
         note = " (up to date)" if outcome.what == "reused" else ""

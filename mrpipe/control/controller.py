@@ -120,6 +120,8 @@ class Controller:
         What it was built from.
     floors
         Floors whose accelerometers it reads (lqg), else 0.
+    networks
+        `inverse` and `law`, where there are such, in the form in which they are asked.
     details
         More about how it was built, for tables and JSON.
     """
@@ -130,6 +132,7 @@ class Controller:
     gains: Gains
     options: ControllerOptions
     floors: int = 0
+    networks: Mapping[str, Network] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -196,6 +199,7 @@ def build_controller(
     pack.numbers[0][kernel.GAIN_C : kernel.GAIN_ALPHA + 1] = [gains.c_n_s_m, gains.k_n_m, gains.alpha_n_m]
     limit = options.drive_limit
     history = 2
+    networks: dict[str, Network] = {}
     if isinstance(inverse, InverseTable):
         pack.table(inverse)
         limit = inverse.largest_drive if limit is None else limit
@@ -205,7 +209,10 @@ def build_controller(
         asked = inverse if plain else inverse.steady()
         history = max(history, pack.network(asked, kernel.NETWORK_INVERSE, kernel.INVERSE_SPACING))
         pack.layout[kernel.INVERSE] = kernel.INVERSE_NETWORK
+        if law not in PASSIVE:
+            networks["inverse"] = asked
     if reference is not None and law == "nnc":
+        networks["law"] = reference
         history = max(history, pack.network(reference, kernel.NETWORK_LAW, kernel.LAW_SPACING))
     floors = 0
     if observer is not None and law == "lqg":
@@ -216,7 +223,7 @@ def build_controller(
         if limit is None:
             raise UserError("control law", law, "has no drive limit", "give the largest drive of the damper")
         head[kernel.CONSTANT_DRIVE] = limit
-    return pack.finish(law, gains, history, floors)
+    return pack.finish(law, gains, history, floors, networks)
 
 
 class _Pack:
@@ -296,7 +303,7 @@ class _Pack:
             self.numbers.append(np.ravel(part))
         return observer.floors
 
-    def finish(self, law: str, gains: Gains, history: int, floors: int) -> Controller:
+    def finish(self, law: str, gains: Gains, history: int, floors: int, networks: Mapping[str, Network]) -> Controller:
         """Return the controller."""
         layout = self.layout
         layout[kernel.STATE_HISTORY] = kernel.S_HEAD
@@ -310,6 +317,7 @@ class _Pack:
             gains=gains,
             options=self.options,
             floors=floors,
+            networks=networks,
         )
 
 

@@ -49,6 +49,8 @@ KNOWN_FORMS = (
 HYSTERETIC_FORMS = ("bouc-wen", "modified-bouc-wen", "dahl", "rounded-yield", "power-yield")
 """Forms that hold the Bouc-Wen hysteresis."""
 
+_TESTED = {"displacement": "m", "velocity": "m/s"}
+
 
 @dataclass(frozen=True)
 class DamperModel:
@@ -280,3 +282,14 @@ def read_damper(artifact: Artifact, group: str = "damper") -> DamperModel:
         drive_unit=str(notes["drive_unit"]),
         drive_limit=float(notes["drive_limit"]),
     )
+
+
+def write_tested(artifact: ArtifactWriter, largest: Mapping[str, float]) -> None:
+    """Write the largest |displacement| [m] and |velocity| [m/s] of the tests that a model was identified from."""
+    for name, unit in _TESTED.items():
+        artifact.put(f"tested/{name}", float(largest[name]), unit=unit)
+
+
+def read_tested(artifact: Artifact) -> dict[str, float]:
+    """Return what :func:`write_tested` wrote; empty where nothing is known of the tests."""
+    return {name: artifact.scalar(f"tested/{name}") for name in artifact.members("tested")}

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
+    import numpy as np
+
     from mrpipe.dampers.comparison import FitOptions, compare_forms
     from mrpipe.dampers.forms import FORMS
     from mrpipe.dampers.samples import scales_of, smooth_motion
@@ -56,7 +58,11 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for line in findings(chosen.fit):
         context.warn(line)
     summary = _summary(judged, chosen, settings.reference_A)
-    _write(context, judged, chosen, summary)
+    largest = {
+        "displacement": max(float(np.abs(test.displacement_m).max()) for test in training),
+        "velocity": max(float(np.abs(test.velocity_m_s).max()) for test in training),
+    }
+    _write(context, judged, chosen, summary, largest)
     _report(context, tests, judged, chosen, summary)
     return summary
 
@@ -95,12 +101,19 @@ def _summary(judged: Sequence[JudgedFit], chosen: JudgedFit, reference: float) -
     }
 
 
-def _write(context: StageContext, judged: Sequence[JudgedFit], chosen: JudgedFit, summary: Mapping[str, Any]) -> None:
-    from mrpipe.dampers.model import write_damper
+def _write(
+    context: StageContext,
+    judged: Sequence[JudgedFit],
+    chosen: JudgedFit,
+    summary: Mapping[str, Any],
+    largest: Mapping[str, float],
+) -> None:
+    from mrpipe.dampers.model import write_damper, write_tested
 
     fit = chosen.fit
     with context.write("damper.h5") as artifact:
         write_damper(artifact, fit.model)
+        write_tested(artifact, largest)
         for item in judged:
             write_damper(artifact, item.fit.model, f"forms/{item.fit.form.name}")
         dims = ("parameter", "parameter_of_column")

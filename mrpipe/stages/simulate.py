@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.stages.simulate_ranges import check_ranges, ranges_as_json, report_ranges
 
 if TYPE_CHECKING:
     from mrpipe.artifacts import FloatArray
@@ -49,7 +50,7 @@ def simulate_stage(law: str) -> Stage:
         inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
         settings=("simulate",),
         outputs=(f"response-{law}.h5",),
-        modules=("mrpipe.stages.simulate",),
+        modules=("mrpipe.stages.simulate", "mrpipe.stages.simulate_ranges"),
     )
 
 
@@ -83,13 +84,17 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     if viscous is not None:
         against = indices(viscous, excitation, residual_force_n=residual, drive_limit=limit, absolute=absolute)
         values["rms_x_top_over_vd"] = values["rms_x_top_m"] / against["rms_x_top_m"]
+    ranges = check_ranges(context, rig, control, response)
     with context.write(f"response-{law}.h5") as artifact:
         write_response(artifact, response, rig.damper.drive_unit)
         artifact.put_json("indices", values)
+        artifact.put_json("training_range", ranges_as_json(ranges))
         artifact.put_json("excitation", excitation.details)
         artifact.attributes("/", law=law)
     _report(context, law, rig, response, excitation, values, against)
-    return {"law": law, **values, "excitation": excitation.details, "drive_unit": rig.damper.drive_unit}
+    report_ranges(context, ranges)
+    details = {"excitation": excitation.details, "drive_unit": rig.damper.drive_unit}
+    return {"law": law, **values, **details, "training_range": ranges_as_json(ranges)}
 
 
 def _rig(context: StageContext) -> Rig:

@@ -100,6 +100,11 @@ def _tracking(
         f"Viscous damping of {viscous.damping_n_s_m:.0f} N s/m at {viscous.frequency_hz:g} Hz is emulated with NRMSE "
         f"{viscous.figures.nrmse:.3f}, and {viscous.fast.nrmse:.3f} at more than half the peak velocity."
     )
+    if viscous.outside_training_range > 0.01:
+        context.warn(
+            f"the viscous damping to be emulated lies {100 * viscous.outside_training_range:.1f} % of the time "
+            "outside the training range: lower train_inverse.viscous.amplitude_m, frequency_hz or damping_n_s_m"
+        )
     context.report.figure(
         "viscous",
         figures.viscous_emulation(viscous, training.drive_unit),

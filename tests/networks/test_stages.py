@@ -161,6 +161,21 @@ def test_inverse_says_how_it_tracks(built: tuple[Rig, dict[str, Mapping[str, Any
 
 
 @pytest.mark.property
+def test_viscous_damping_beyond_the_campaign_is_warned_of(
+    built: tuple[Rig, dict[str, Mapping[str, Any]]], tmp_path: Path
+) -> None:
+    built_rig, _ = built
+    quick = {"starts": 1, "subsample_iterations": 5, "iterations": 0, "compare_signed": False}
+    rig = rig_in(tmp_path, train_inverse=TrainInverseSettings(**quick, viscous={"amplitude_m": 0.05}))
+    for name in ("training.h5", "sweep.h5", "forward.h5"):
+        (tmp_path / name).write_bytes((built_rig.directory / name).read_bytes())
+    summary = rig.run(train_inverse.STAGE)
+    assert summary["viscous_outside_training_range_share"] > 0.3
+    assert any("viscous damping to be emulated lies" in warning for warning in rig.warnings)
+    assert not any("viscous damping to be emulated lies" in warning for warning in built_rig.warnings)
+
+
+@pytest.mark.property
 def test_sweep_gives_a_choice_and_verdicts(built: tuple[Rig, dict[str, Mapping[str, Any]]]) -> None:
     rig, summaries = built
     artifact = Artifact(rig.directory / "sweep.h5")

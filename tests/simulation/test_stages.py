@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, load_parameter_set, no_progress
 from mrpipe.config.model import Config
-from mrpipe.dampers.model import damper_from_parameter_set, write_damper
+from mrpipe.dampers.model import damper_from_parameter_set, write_damper, write_tested
 from mrpipe.errors import UserError
 from mrpipe.networks.network import write_network
 from mrpipe.pipeline.runner import plain
@@ -64,8 +65,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         write_frame(artifact, frame_from_parameter_set("thesis"))
     with ArtifactWriter.create(directory / "damper.h5", Provenance("test")) as artifact:
         write_damper(artifact, damper_from_parameter_set(load_parameter_set("dampers", "set-c")))
+        write_tested(artifact, {"displacement": 5e-3, "velocity": 10.0})
     with ArtifactWriter.create(directory / "inverse.h5", Provenance("test")) as artifact:
-        write_network(artifact, "network", random_network(("velocity", "force"), "drive", 3, True))
+        limits = {"feature_minimum": np.zeros(8), "feature_maximum": np.repeat([10.0, 60.0], 4)}
+        network = replace(random_network(("velocity", "force"), "drive", 3, True), **limits)
+        write_network(artifact, "network", network)
 
     def go(stage: Stage, settings: dict[str, Any] | None = None) -> dict:
         context = StageContext(
@@ -84,7 +88,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         summary = plain(stage.run(context))
         json.dumps(summary, allow_nan=False)
         assert context.report.parts  # type: ignore[attr-defined]
-        return {**summary, "warnings": context.warnings, "directory": directory}
+        told = {"warnings": context.warnings, "directory": directory, "parts": context.report.parts}  # type: ignore[attr-defined]
+        return {**summary, **told}
 
     go(calibrate.STAGE, {"calibrate": SMALL})
     return go
@@ -129,6 +134,25 @@ def test_simulate_tells_what_the_contract_says(run, law):
     artifact = Artifact(summary["directory"] / f"response-{law}.h5")
     assert artifact.unit("displacement") == "m" and artifact.unit("drive") == "A"
     assert artifact.array("displacement").shape[1] == 5
+
+
+@pytest.mark.planted
+def test_a_loop_that_leaves_what_was_learned_and_tested_says_so(run):
+    """A network that knows 60 N and a damper that was tested at 5 mm, under a law that asks for more of both."""
+    excitation = {"base_amplitude_m_s2": 0.78, "cycles": 12, "settling_cycles": 6, "decay_s": 1.0}
+    summary = run(SIMULATE["simulate-vd"], {"simulate": {"excitation": excitation}})
+    network, damper = (summary["training_range"][name] for name in ("inverse_network", "damper_model"))
+    assert network["inputs"]["force"]["outside_share"] == network["outside_share"] > 0.01
+    assert network["inputs"]["force"]["largest_n"] > 60.0 == network["inputs"]["force"]["known_largest_n"]
+    assert network["inputs"]["velocity"]["outside_share"] == 0.0
+    assert damper["inputs"]["displacement"]["outside_share"] > 0.1
+    told = [line for line in summary["warnings"] if "outside the range it knows" in line]
+    assert ["inverse network" in told[0], "damper model" in told[1]] == [True, True] and len(told) == 2
+    assert "force up to" in told[0] and "(known to 60)" in told[0] and "velocity" not in told[0]
+    assert "table training-range 4" in summary["parts"]
+    # with a perfect damper neither is asked anything
+    perfect = run(SIMULATE["simulate-vd"], {"simulate": {"tracking": "ideal", "excitation": excitation}})
+    assert perfect["training_range"] == {} and not any("outside the range" in line for line in perfect["warnings"])
 
 
 @pytest.mark.golden

@@ -1,0 +1,206 @@
+"""Whether networks and damper model of a closed loop were asked only for what training and bench tests have shown them.
+
+A network answers to anything, and outside the range of its training rows with no meaning. What the controller asked is
+found from what it noted at each of its samples, in the form in which its kernel asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import BoolArray, FloatArray
+from mrpipe.control.controller import Controller
+from mrpipe.control.kernel import COMMAND_DISPLACEMENT, COMMAND_FORCE, COMMAND_SWITCHED, COMMAND_VELOCITY
+from mrpipe.networks.network import Network
+from mrpipe.simulation.loop import Response
+
+MARGIN = 0.02
+"""How far beyond the range counts as within, as a share of the range: noise at the edge is no extrapolation."""
+
+WORTH_A_WARNING = 1e-3
+"""Share of time outside above which it is warned of: six hundredths of a second in a minute, one strong peak."""
+
+_SUFFIX = {"displacement": "m", "velocity": "m_s", "acceleration": "m_s2", "force": "n"}
+_SHOWN = {
+    "displacement": (1e3, "mm"),
+    "velocity": (1.0, "m/s"),
+    "acceleration": (1.0, "m/s^2"),
+    "force": (1.0, "N"),
+}
+
+
+@dataclass(frozen=True)
+class InputRange:
+    """One input of a network or model: what it was asked and what it knows.
+
+    Attributes
+    ----------
+    outside_share
+        Share of time outside, past values included [1].
+    asked, known
+        Smallest and largest value, SI.
+    """
+
+    outside_share: float
+    asked: tuple[float, float]
+    known: tuple[float, float]
+
+    def words(self, name: str) -> str:
+        """Return such as `velocity up to 0.21 m/s, trained up to 0.14, 3.2 % of the time`."""
+        factor, unit = _SHOWN[name]
+        low, high = (factor * value for value in self.asked)
+        known_low, known_high = (factor * value for value in self.known)
+        if high - known_high >= known_low - low:
+            asked, known = f"up to {high:.3g} {unit}", f"{known_high:.3g}"
+        else:
+            asked, known = f"down to {low:.3g} {unit}", f"{known_low:.3g}"
+        return f"{name} {asked} (known to {known}) {100.0 * self.outside_share:.2g} % of the time"
+
+
+@dataclass(frozen=True)
+class RangeCheck:
+    """How one network or model was asked.
+
+    Attributes
+    ----------
+    what
+        `inverse network`, `network of law nnc` or `damper model`.
+    outside_share
+        Share of time with any input outside [1].
+    inputs
+        By channel.
+    """
+
+    what: str
+    outside_share: float
+    inputs: Mapping[str, InputRange]
+
+    @property
+    def warning(self) -> str:
+        """What to warn of; empty where it stayed within."""
+        if self.outside_share < WORTH_A_WARNING:
+            return ""
+        left = [item.words(name) for name, item in self.inputs.items() if item.outside_share >= WORTH_A_WARNING / 10.0]
+        return (
+            f"the {self.what} is asked outside the range it knows {100.0 * self.outside_share:.2g} % of the time: "
+            + "; ".join(left)
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as plain values, SI, keys with units."""
+        inputs = {
+            name: {
+                "outside_share": item.outside_share,
+                f"smallest_{_SUFFIX[name]}": item.asked[0],
+                f"largest_{_SUFFIX[name]}": item.asked[1],
+                f"known_smallest_{_SUFFIX[name]}": item.known[0],
+                f"known_largest_{_SUFFIX[name]}": item.known[1],
+            }
+            for name, item in self.inputs.items()
+        }
+        return {"outside_share": self.outside_share, "inputs": inputs}
+
+
+@dataclass(frozen=True)
+class Requests:
+    """What the controller knew at each of its samples: channel -> shape (samples,), SI."""
+
+    channels: Mapping[str, FloatArray]
+
+    def rows(self, network: Network, rate_hz: float) -> FloatArray:
+        """Return the feature rows with which the kernel asks a network, shape (samples, R).
+
+        Past values between samples are interpolated; before the first sample the memory is filled with it.
+        """
+        spec = network.features
+        spacing = rate_hz / spec.sampling_rate_hz
+        columns = []
+        for name in spec.channels:
+            signal = self.channels[name]
+            places = np.arange(len(signal), dtype=np.float64)
+            columns += [np.interp(places - lag * spacing, places, signal) for lag in range(spec.past_values + 1)]
+        rows = np.stack(columns, axis=1)
+        return np.abs(rows) if spec.absolute else rows
+
+
+def requests(response: Response, acceleration: FloatArray) -> Requests:
+    """Return what the controller knew, from what it noted; `acceleration` of the damper at its samples [m/s^2]."""
+    commands = response.commands
+    return Requests(
+        {
+            "displacement": commands[:, COMMAND_DISPLACEMENT],
+            "velocity": commands[:, COMMAND_VELOCITY],
+            "acceleration": acceleration,
+            "force": commands[:, COMMAND_FORCE],
+        }
+    )
+
+
+def check_networks(
+    controller: Controller, response: Response, acceleration: FloatArray, *, drive_counts: bool = True
+) -> list[RangeCheck]:
+    """Compare what the controller asked its networks with what they were trained on.
+
+    Parameters
+    ----------
+    controller, response
+        Of the run.
+    acceleration
+        Of the damper at the samples of the controller [m/s^2], shape (samples,), for networks that read it.
+    drive_counts
+        False for a perfect damper, which no inverse is needed for.
+    """
+    asked = requests(response, acceleration)
+    checks = []
+    for role, network in controller.networks.items():
+        if not len(network.feature_minimum) or (role == "inverse" and not drive_counts):
+            continue
+        counts = np.ones(len(response.commands), dtype=bool)
+        if role == "inverse":
+            # below the switch its answer is thrown away
+            counts = response.commands[:, COMMAND_SWITCHED] < 0.5
+        what = "inverse network" if role == "inverse" else f"network of law {controller.law}"
+        checks.append(_check(what, network, asked.rows(network, controller.options.rate_hz), counts))
+    return checks
+
+
+def check_damper(response: Response, tested: Mapping[str, float]) -> RangeCheck:
+    """Compare the motion of the damper with the largest of the bench tests.
+
+    Parameters
+    ----------
+    response
+        Of the run.
+    tested
+        Largest |displacement| [m] and |velocity| [m/s] of the tests from which the model was identified.
+    """
+    signals = {"displacement": response.damper_displacement, "velocity": response.damper_velocity}
+    outside = np.zeros(len(response.time_s), dtype=bool)
+    inputs = {}
+    for name, largest in tested.items():
+        size = np.abs(signals[name])
+        beyond = size > (1.0 + MARGIN) * largest
+        outside |= beyond
+        inputs[name] = InputRange(float(np.mean(beyond)), (float(size.min()), float(size.max())), (0.0, largest))
+    return RangeCheck("damper model", float(np.mean(outside)), inputs)
+
+
+def _check(what: str, network: Network, rows: FloatArray, counts: BoolArray) -> RangeCheck:
+    low, high = network.feature_minimum, network.feature_maximum
+    slack = MARGIN * (high - low)
+    outside = ((rows < low - slack) | (rows > high + slack)) & counts[:, None]
+    window = network.features.past_values + 1
+    inputs = {}
+    for index, name in enumerate(network.features.channels):
+        block = slice(index * window, (index + 1) * window)
+        asked = rows[counts, block]
+        inputs[name] = InputRange(
+            outside_share=float(np.mean(np.any(outside[:, block], axis=1))),
+            asked=(float(asked.min()), float(asked.max())) if asked.size else (0.0, 0.0),
+            known=(float(low[block].min()), float(high[block].max())),
+        )
+    return RangeCheck(what, float(np.mean(np.any(outside, axis=1))), inputs)
