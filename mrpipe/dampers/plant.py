@@ -16,8 +16,8 @@ The same chain serves the bench (:func:`run_chain` over recorded motion) and the
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -25,6 +25,7 @@ import numpy as np
 from numba import NumbaExperimentalFeatureWarning, float64, int64, njit, types, void
 
 from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.timing import look_ahead
 
 # numba calls function pointers experimental; the signature below is fixed, which is the case that is stable
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
@@ -89,6 +90,9 @@ class Step:
         Its numbers, shape (p,), SI.
     state_size
         Length of its memory.
+    ahead_s
+        Time by which it wants the motion from after the present instant [s]: a recorded displacement that is late. Only
+        recordings can give that; a closed loop runs without such steps.
     """
 
     name: str
@@ -96,6 +100,7 @@ class Step:
     function: Any
     parameters: FloatArray
     state_size: int = 0
+    ahead_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ class Chain:
     parameter_offsets: IntArray
     state_offsets: IntArray
     names: tuple[str, ...]
-    metadata: Mapping[str, Any] = field(default_factory=dict)
+    ahead_s: float = 0.0
 
     @property
     def state_size(self) -> int:
@@ -152,6 +157,7 @@ def build_chain(steps: Sequence[Step]) -> Chain:
         parameter_offsets=np.cumsum([0, *(len(values) for values in parameters)], dtype=np.int64),
         state_offsets=np.cumsum([0, *(step.state_size for step in ordered)], dtype=np.int64),
         names=tuple(step.name for step in ordered),
+        ahead_s=sum(step.ahead_s for step in ordered),
     )
 
 
@@ -275,6 +281,10 @@ def run_chain(
     Shape (n, WIRE_SIZE): the wire after each step; column FORCE is the damper force [N].
     """
     wires = np.empty((len(displacement), WIRE_SIZE))
-    signals = [np.ascontiguousarray(item, dtype=np.float64) for item in (displacement, velocity, acceleration, drive)]
-    _run(*chain.arguments, *signals, float(dt), wires)
+    x, v, a, u = (
+        np.ascontiguousarray(item, dtype=np.float64) for item in (displacement, velocity, acceleration, drive)
+    )
+    if chain.ahead_s:
+        x, v, a = look_ahead(x, v, a, np.array([0, len(x)]), np.array([dt]), chain.ahead_s)
+    _run(*chain.arguments, x, v, a, u, float(dt), wires)
     return wires

@@ -32,6 +32,7 @@ from mrpipe.dampers.plant import (
     YIELD_FORCE,
     Chain,
 )
+from mrpipe.dampers.timing import look_ahead
 from mrpipe.discrepancy.recordings import Recordings
 
 COLUMNS = 8
@@ -157,11 +158,12 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
     Shape (COLUMNS + len(tapped), n).
     """
     result = np.empty((COLUMNS + len(tapped), len(recordings.force)))
+    motion = recordings.displacement, recordings.velocity, recordings.acceleration
+    if chain.ahead_s:
+        motion = look_ahead(*motion, recordings.starts, recordings.dt, chain.ahead_s)
     _run(
         *chain.arguments,
-        recordings.displacement,
-        recordings.velocity,
-        recordings.acceleration,
+        *motion,
         recordings.drive,
         recordings.starts,
         recordings.dt,

@@ -1,10 +1,9 @@
 """Channel skew: displacement and force are not sampled at the same instant."""
 
-# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
@@ -17,49 +16,53 @@ from mrpipe.dampers.plant import (
     VELOCITY,
     Phase,
     Step,
+    idle_step,
 )
+from mrpipe.dampers.timing import between
 from mrpipe.effects.contract import Effect, EffectForm, Values, strength
 
+_KEPT = 4  # displacement, velocity, acceleration and drive of an instant
 
-@njit(STEP_SIGNATURE, cache=True)
-def shift_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: time [s] by which the displacement lies behind the force."""
-    skew = parameters[0]
-    wire[DISPLACEMENT] += skew * wire[VELOCITY] + 0.5 * skew * skew * wire[ACCELERATION]
-    wire[VELOCITY] += skew * wire[ACCELERATION]
+
+@njit(void(float64[::1], float64[::1], int64), cache=True)
+def _keep(wire: FloatArray, state: FloatArray, place: int) -> None:
+    state[_KEPT * place] = wire[DISPLACEMENT]
+    state[_KEPT * place + 1] = wire[VELOCITY]
+    state[_KEPT * place + 2] = wire[ACCELERATION]
+    state[_KEPT * place + 3] = wire[DRIVE]
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def late_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: time [s] by which the force lies behind displacement and drive. State: ring of drives, its place.
+    """Parameters: time [s] by which the force lies behind displacement and drive. State: ring of instants, its place.
 
     The force is late by as much as motion and drive are taken from before.
     """
-    skew = max(parameters[0], 0.0)
-    wire[DISPLACEMENT] += -skew * wire[VELOCITY] + 0.5 * skew * skew * wire[ACCELERATION]
-    wire[VELOCITY] -= skew * wire[ACCELERATION]
-    size = state.shape[0] - 1
+    size = (state.shape[0] - 1) // _KEPT
     if wire[FIRST] > 0.5:
         for index in range(size):
-            state[index] = wire[DRIVE]
-        state[size] = 0.0
-    at = int(state[size])
-    state[at] = wire[DRIVE]
-    back = min(skew / dt, size - 2.0)
+            _keep(wire, state, index)
+        state[-1] = 0.0
+    at = int(state[-1])
+    _keep(wire, state, at)
+    back = min(max(parameters[0], 0.0) / dt, size - 2.0)
     whole = int(back)
     part = back - whole
-    late = (1.0 - part) * state[(at - whole + size) % size] + part * state[(at - whole - 1 + size) % size]
-    state[size] = (at + 1) % size
-    wire[DRIVE] = late
-    wire[CURRENT] = late
+    new, old = _KEPT * ((at - whole + size) % size), _KEPT * ((at - whole - 1 + size) % size)
+    wire[DISPLACEMENT] = between(state[new], state[old], -dt * state[new + 1], -dt * state[old + 1], part)
+    wire[VELOCITY] = (1.0 - part) * state[new + 1] + part * state[old + 1]
+    wire[ACCELERATION] = (1.0 - part) * state[new + 2] + part * state[old + 2]
+    wire[DRIVE] = (1.0 - part) * state[new + 3] + part * state[old + 3]
+    wire[CURRENT] = wire[DRIVE]
+    state[-1] = (at + 1) % size
 
 
 def _late(values: Values) -> list[Step]:
-    return [Step("late-force", Phase.MOTION, late_force_step, np.array([values["skew"]]), 129)]
+    return [Step("late-force", Phase.MOTION, late_force_step, np.array([values["skew"]]), _KEPT * 128 + 1)]
 
 
 def _shift(values: Values) -> list[Step]:
-    return [Step("channel-skew", Phase.MOTION, shift_step, np.array([values["skew"]]))]
+    return [Step("channel-skew", Phase.MOTION, idle_step, np.zeros(0), ahead_s=values["skew"])]
 
 
 EFFECT = Effect(

@@ -101,6 +101,26 @@ def test_zero_strength_changes_nothing(name: str, form: EffectForm, frequency: f
 
 
 @pytest.mark.property
+@pytest.mark.parametrize("form", all_effects()["channel-skew"].forms, ids=lambda form: form.name)
+def test_a_skew_is_taken_back_over_a_quick_motion(form: EffectForm) -> None:
+    # 10 ms at 2.5 Hz: a series of the displacement in its derivatives misses by more than its noise
+    x, v, a, u, dt = motion(frequency=2.5)
+    late = round(0.01 / dt)
+    plain = run_chain(build_chain(base_steps()), x, v, a, u, dt)[:, FORCE]
+    skewed = form.steps({"skew": late * dt})
+    if form.name == "shift":
+        found = run_chain(build_chain([*base_steps(), *skewed]), x[:-late], v[:-late], a[:-late], u[late:], dt)[
+            :, FORCE
+        ]
+        expected = plain[late:]
+    else:
+        found = run_chain(build_chain([*base_steps(), *skewed]), x, v, a, u, dt)[:, FORCE][late:]
+        expected = plain[:-late]
+    settled = slice(len(expected) // 3, -2 * late)
+    np.testing.assert_allclose(found[settled], expected[settled], atol=1e-6 * np.ptp(expected))
+
+
+@pytest.mark.property
 @pytest.mark.parametrize(("name", "form"), FORMS, ids=IDS)
 def test_strength_changes_something(name: str, form: EffectForm) -> None:
     values = {
