@@ -15,6 +15,9 @@ from mrpipe.discrepancy.screen import screen
 from mrpipe.discrepancy.weights import force_deviation, noise_of_repeats, repeated_pairs, sensor_deviation
 from mrpipe.effects.contract import Effect
 
+FREE_EXPONENT = "bouc-wen-free-exponent"
+"""Name of the base form whose hysteresis has an exponent of its own."""
+
 DRIVE_VARIES_SHARE = 0.05
 LEAST_PAIR_SAMPLES = 400
 
@@ -163,6 +166,24 @@ def noise_level_of(found: Fit) -> tuple[float, int]:
     return sensors, 0
 
 
+def with_free_exponent(found: Fit) -> Fit:
+    """Return the fit with the exponent of the hysteresis free, from about 2 or from Dahl's law, whichever is nearer.
+
+    The same fit where the exponent is free already.
+    """
+    base = found.problem.base
+    if base.exponent_free:
+        return found
+    problem = replace(found.problem, base=replace(base, exponent_free=True, gamma_free=True))
+    # Dahl's law is the exponent 1 without the part that goes with the sign of the velocity alone
+    starts = ({"exponent": 1.9}, {"exponent": 1.1, "gamma_share": 1.0})
+    fits = [
+        fit(problem, start_of(problem, {**found.base_values, **start}, found.term_values), iterations=8)
+        for start in starts
+    ]
+    return min(fits, key=lambda item: item.cost)
+
+
 def ladder(found: Fit, rate_forms: Effect | None, rate_fit: Fit | None = None) -> dict[str, Fit]:
     """Return fits of the ladder of base forms: declared, exponent free, Dahl, rate-dependent yield.
 
@@ -172,10 +193,7 @@ def ladder(found: Fit, rate_forms: Effect | None, rate_fit: Fit | None = None) -
     base = problem.base
     fits = {base.name: found}
     if base.name == "bouc-wen":
-        free = replace(problem, base=replace(base, exponent_free=True))
-        fits["bouc-wen-free-exponent"] = fit(
-            free, start_of(free, {**found.base_values, "exponent": 1.9}, found.term_values), iterations=5
-        )
+        fits[FREE_EXPONENT] = with_free_exponent(found)
     other = replace(base, name="dahl", exponent=1.0, gamma_free=False, gamma_share=1.0)
     if base.name != "dahl":
         dahl = replace(problem, base=other)

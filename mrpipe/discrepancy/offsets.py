@@ -33,7 +33,7 @@ class OffsetFinding:
         return Named(self.effect, "per-test", table, 0.97)
 
 
-def offset_between_tests(found: Fit, effect: Effect | None) -> OffsetFinding | None:
+def offset_between_tests(found: Fit, effect: Effect | None, *, least_ratio: float = 0.0) -> OffsetFinding | None:
     """Compare one offset for all tests with one for each; None where the zero is steady.
 
     Parameters
@@ -42,6 +42,8 @@ def offset_between_tests(found: Fit, effect: Effect | None) -> OffsetFinding | N
         The final fit, with an offset for each test.
     effect
         The effect `offset` of the library; None where it is not considered.
+    least_ratio
+        Least spread of the offsets, in RMS of what the fit leaves of the force.
     """
     if effect is None or found.problem.recordings.tests < 4:
         return None
@@ -50,6 +52,10 @@ def offset_between_tests(found: Fit, effect: Effect | None) -> OffsetFinding | N
     spread = float(np.std(found.test_offsets, ddof=1))
     excess = (common.chi_square - found.chi_square) / max(found.chi_square, 1e-12)
     if spread < LEAST_SPREAD_SHARE * rms or excess < LEAST_EXCESS:
+        return None
+    root = found.problem.root_weight
+    used = root > 0.0
+    if spread < least_ratio * float(np.sqrt(np.mean((found.residual[used] / root[used]) ** 2))):
         return None
     half = 1.96 * spread / np.sqrt(2.0 * found.problem.recordings.tests)
     return OffsetFinding(effect, spread, (spread - half, spread + half), 0.5 * (common.cost - found.cost), spread / rms)

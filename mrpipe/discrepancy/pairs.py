@@ -47,7 +47,9 @@ def with_play(selection: Selection, effects: Mapping[str, Effect]) -> Selection:
     ]
     best = min(trials, key=lambda item: item.cost)
     pair = fit(replace(selection.base.problem, terms=best.problem.terms), best.theta, iterations=10)
-    if pair.chi_square > (1.0 - LEAST_GAIN) * selection.chosen.chi_square or "gap" in pair.at_bound:
+    alone = fit(replace(pair.problem, terms=pair.problem.terms[:-1]), pair.theta[:-1], iterations=8)
+    least = min(selection.chosen.chi_square, alone.chi_square)
+    if pair.chi_square > (1.0 - LEAST_GAIN) * least or "gap" in pair.at_bound:
         return selection
     share = share_of(selection.base, pair, selection.noise)
     form = pair.problem.terms[-1].form.name

@@ -44,6 +44,10 @@ FURTHER = 0.15
 """Where less than this share is left, and less than the noise, a further effect must promise its share in screening."""
 
 
+BETTER_OPTIMUM = 0.03
+"""A fit that leaves less than another of the same terms by this share shows that the other had not arrived."""
+
+
 _Item = TypeVar("_Item")
 
 
@@ -81,6 +85,8 @@ class Selection:
         The fit kept (the base where none was).
     proven
         How many of the rounds name a cause; terms of later rounds improve the model, their cause is not proven.
+    ground
+        Fit without effects that the rounds build on: the base, or the base in the form that the tests ask for.
     """
 
     base: Fit
@@ -88,6 +94,12 @@ class Selection:
     rounds: tuple[tuple[Candidate, ...], ...]
     chosen: Fit
     proven: int = 3
+    ground: Fit | None = None
+
+    @property
+    def without_effects(self) -> Fit:
+        """Return the fit that the rounds build on."""
+        return self.base if self.ground is None else self.ground
 
     @property
     def recoverable(self) -> float:
@@ -234,6 +246,17 @@ def admissible(found: Fit) -> bool:
     return any(values[item.name] != 0.0 for item in term.form.parameters if item.role != "shape")
 
 
+def stuck(found: Fit) -> set[str]:
+    """Return what sits at a bound; but one of several amplitudes of a form at zero is a part that is not there."""
+    absent = {
+        item.name
+        for term, values in zip(found.problem.terms, found.term_values, strict=True)
+        for item in term.form.amplitudes
+        if item.lower == 0.0 and values[item.name] == 0.0 and len(term.form.amplitudes) > 1
+    }
+    return set(found.at_bound) - absent
+
+
 @dataclass(frozen=True)
 class Thresholds:
     """What a further effect must recover: of what the base lacked, and of what is left.
@@ -265,7 +288,7 @@ def forward_selection(
     else it may as well mend the form of the effect before it, and so may all that follow.
     """
     rounds: list[tuple[Candidate, ...]] = []
-    chosen, proven, sure = base, 0, True
+    chosen, proven, sure, again = base, 0, True, False
     excess = max(base.chi_square - noise, 0.0)
     if excess <= NOTHING_MISSING * noise or most == 0:
         return Selection(base, noise, (), base)
@@ -277,22 +300,38 @@ def forward_selection(
         able = [item for item in found if admissible(item.fit)]
         if rounds and thresholds.lead > 1.0:
             # beside other effects a parameter that runs to its bound mends a form, and badly where motions are other
-            able = [item for item in able if set(item.fit.at_bound) <= set(chosen.at_bound)]
-        rounds.append(tuple(able + [item for item in found if item not in able]))
-        if not able:
-            break
-        best = able[0]
-        gain = chosen.chi_square - best.fit.chi_square
+            able = [item for item in able if stuck(item.fit) <= stuck(chosen)]
+        ordered = tuple(able + [item for item in found if item not in able])
+        gain = chosen.chi_square - able[0].fit.chi_square if able else 0.0
         left = chosen.chi_square - noise
+        if not able or (rounds and (gain < thresholds.gain * excess or gain < thresholds.term_share * left)):
+            rounds.append(ordered)
+            break
+        nearer = chosen if not rounds or again else _nearer(chosen, able[0].fit)
+        again = nearer is not chosen
+        if again:
+            # the term had only shown the way to a better optimum of the others: look again from there
+            rounds[-1] = tuple(_with_fit(item, chosen, nearer, base, noise) for item in rounds[-1])
+            chosen = nearer
+            continue
+        rounds.append(ordered)
         if len(rounds) > 1:
-            if gain < thresholds.gain * excess or gain < thresholds.term_share * left:
-                break
-            sure = sure and gain >= thresholds.named_share * left and _leads(rounds[-1], noise, thresholds.lead)
+            sure = sure and gain >= thresholds.named_share * left and _leads(ordered, noise, thresholds.lead)
         proven += int(sure)
-        chosen = best.fit
+        chosen = able[0].fit
         if chosen.chi_square - noise < max(NOTHING_MISSING * noise, SECOND_GAIN * excess):
             break
     return Selection(base, noise, tuple(rounds), chosen, proven)
+
+
+def _nearer(chosen: Fit, best: Fit) -> Fit:
+    """Return the fit without the last term of `best`, begun where that ended, if it is clearly better than before."""
+    trial = fit(chosen.problem, best.theta[: len(chosen.theta)], iterations=6)
+    return trial if trial.chi_square < (1.0 - BETTER_OPTIMUM) * chosen.chi_square else chosen
+
+
+def _with_fit(item: Candidate, old: Fit, new: Fit, base: Fit, noise: float) -> Candidate:
+    return replace(item, fit=new, share=share_of(base, new, noise)) if item.fit is old else item
 
 
 def _leads(candidates: Sequence[Candidate], noise: float, lead: float) -> bool:

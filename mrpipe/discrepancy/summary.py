@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.discrepancy.baseline import Baseline, ladder
+from mrpipe.discrepancy.baseline import FREE_EXPONENT, Baseline, ladder
 from mrpipe.discrepancy.ceiling import flexible_residual
 from mrpipe.discrepancy.engine import predict
 from mrpipe.discrepancy.errors import Score, campaign_offset, measured_force, score
@@ -132,8 +132,9 @@ class Summary:
         excess = max(selection.base.chi_square - selection.noise, 1e-12)
         final_states = states_of(selection.chosen, training)
         effects_found = [item.as_json() for item in named]
-        still = structured and left > max(0.2 * selection.noise, 0.1 * excess if named else 0.0)
-        best = min(ceiling, after_ceiling, score_after.nrmse if named else ceiling)
+        better = selection.chosen is not selection.base
+        still = structured and left > max(0.2 * selection.noise, 0.1 * excess if better else 0.0)
+        best = min(ceiling, after_ceiling, score_after.nrmse if better else ceiling)
         gain = score_before.nrmse**2 - best**2
         # what the named effects recover: the flexible model, where it is asked for, comes after
         recovered = (score_before.nrmse**2 - score_after.nrmse**2) / gain if gain > 1e-12 else 0.0
@@ -241,7 +242,8 @@ class Summary:
             errors[options.model] = errors[next(iter(fits))]
         # decided on the training tests, reported on the validation tests; a form must earn its parameters
         best = min(fits, key=lambda name: fits[name].chi_square * (1.0 if name == base.problem.base.name else 1.05))
-        return {"name": options.model, "best": best, "nrmse": errors}
+        taken = options.model if self.selection.ground is None else FREE_EXPONENT
+        return {"name": options.model, "best": best, "taken": taken, "nrmse": errors}
 
 
 def _score_json(value: Score) -> dict[str, float]:
@@ -258,6 +260,6 @@ def _value(named: Sequence[Named], effect: str, parameter: str) -> float:
 def _verdict(named: Sequence[Named], selection: Selection, rules: Rules) -> str:
     share = selection.share(selection.chosen)
     names = " and ".join(item.effect.name for item in named)
-    if share >= rules.named_share or selection.chosen is selection.base:
+    if share >= rules.named_share or not selection.structured:
         return f"{names}: explains what is missing"
     return f"{names}: explains part of what is missing, its form is not proven"

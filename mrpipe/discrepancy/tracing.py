@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
-from mrpipe.discrepancy.baseline import Baseline, base_form, fit_baseline, noise_level_of, with_form
+from mrpipe.discrepancy.baseline import (
+    Baseline,
+    base_form,
+    fit_baseline,
+    noise_level_of,
+    with_form,
+    with_free_exponent,
+)
 from mrpipe.discrepancy.ceiling import flexible_chi_square
 from mrpipe.discrepancy.crossvalidation import Gain, gain_of, intervals, left_out_residual
 from mrpipe.discrepancy.engine import Fit
@@ -24,10 +32,18 @@ from mrpipe.discrepancy.recordings import (
     record_tests,
     spread_tests,
 )
-from mrpipe.discrepancy.select import Selection, Thresholds, forward_selection
+from mrpipe.discrepancy.select import Selection, Thresholds, forward_selection, share_of
 from mrpipe.discrepancy.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions
 from mrpipe.discrepancy.testability import untestable
-from mrpipe.discrepancy.verdict import Named, clear_lead, confidence_of, parameter_table, tied, unnamed_reason
+from mrpipe.discrepancy.verdict import (
+    Named,
+    clear_lead,
+    confidence_of,
+    left_of,
+    parameter_table,
+    tied,
+    unnamed_reason,
+)
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.yielding_parts import with_yielding_parts
 from mrpipe.signals.prepared import PreparedTest
@@ -39,6 +55,9 @@ REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25, lead=
 """What a further effect must recover where weights go by force RMS: noise is far below any model's error.
 
 Rivals that come near are told by `tied_with`."""
+
+CLEAR_OFFSETS = 3.0
+"""Offsets of the tests that spread by so many times what an unknown residual leaves are no part of that residual."""
 
 
 def trace_campaign(
@@ -76,12 +95,10 @@ def trace_campaign(
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
     reason = unnamed_reason(selection, options.rules)
     if reason:
-        selection = replace(selection, chosen=selection.base)
+        selection = replace(selection, chosen=selection.without_effects)
     progress(0.85, "ceiling")
-    offsets = (
-        offset_between_tests(selection.chosen, effects.get("offset"))
-        if not reason or not selection.structured
-        else None
+    offsets = offset_between_tests(
+        selection.chosen, effects.get("offset"), least_ratio=CLEAR_OFFSETS if reason and selection.structured else 0.0
     )
     report = Summary(selection, baseline, training, validation, offsets, reason)
     named = _named(selection, gains, len(declared), options, rng)
@@ -116,15 +133,18 @@ def _select(
         if floor > 0.0:
             effects = with_yielding_parts(effects)
             baseline = _without_nuisances(baseline, effects, options)
-        selection = forward_selection(
-            baseline.fit,
-            baseline.noise,
-            [Term(effect, form) for effect in effects.values() for form in effect.forms],
+        select = partial(
+            forward_selection,
+            noise=baseline.noise,
+            terms=[Term(effect, form) for effect in effects.values() for form in effect.forms],
             most=options.most_effects,
             refits=options.refits,
             thresholds=REAL_THRESHOLDS if floor > 0.0 else Thresholds(),
             jobs=jobs,
         )
+        selection = select(baseline.fit)
+        if floor == 0.0:
+            selection = _in_better_form(selection, select, options)
         excess = selection.chosen.chi_square / max(baseline.noise, 1e-12)
         if floor > 0.0:
             return baseline, _judged_by_trees(with_play(selection, effects))
@@ -135,6 +155,27 @@ def _select(
         used = chosen.problem.root_weight > 0.0
         left = chosen.residual[used] / chosen.problem.root_weight[used]
         floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
+
+
+def _in_better_form(selection: Selection, select: Callable[[Fit], Selection], options: TracingOptions) -> Selection:
+    """Return the selection upon a base with an exponent of its own, where that leaves less than any one effect does.
+
+    A hysteresis rounded otherwise than the declared one is no missing effect; named as one it would be late rise or
+    friction that is not there.
+    """
+    if not selection.structured or not selection.rounds:
+        return selection
+    ground = with_free_exponent(selection.base)
+    best = min(item.fit.chi_square for item in selection.rounds[0])
+    if selection.share(ground) < options.rules.least_share or ground.chi_square > best:
+        return selection
+    again = select(ground)
+    if share_of(ground, again.chosen, again.noise) < options.rules.least_share:
+        again = replace(again, chosen=ground)
+    if left_of(again.chosen, again.noise) > (1.0 + options.rules.lead) * left_of(selection.chosen, selection.noise):
+        return selection
+    rounds = again.rounds if again.chosen is not ground else selection.rounds[:1]
+    return replace(again, base=selection.base, ground=ground, rounds=rounds).with_floor(again.noise)
 
 
 def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tuple[Baseline, Selection]:
@@ -187,10 +228,10 @@ def _with_window(
     share, filtered = observation_window(selection.chosen)
     if share == 0.0:
         return 0.0, selection
-    base = observation_window(selection.base, (share,))[1]
+    base, ground = (observation_window(item, (share,))[1] for item in (selection.base, selection.without_effects))
     terms = [Term(effect, form) for effect in effects.values() for form in effect.forms]
     again = forward_selection(
-        base,
+        ground,
         noise,
         terms,
         most=options.most_effects,
@@ -198,6 +239,8 @@ def _with_window(
         thresholds=REAL_THRESHOLDS,
         jobs=jobs,
     )
+    if selection.ground is not None:
+        again = replace(again, base=base, ground=ground).with_floor(noise)
     if noise < selection.noise:
         again = _judged_by_trees(again)
     if again.chosen.chi_square > filtered.chi_square:
@@ -212,13 +255,13 @@ def _cross_validated(
     chosen = selection.chosen
     if len(chosen.problem.terms) == declared:
         return [], selection
-    path = [selection.base]
+    path = [selection.without_effects]
     for candidates in selection.rounds:
         nearest = [c.fit for c in candidates if c.fit.problem.terms == chosen.problem.terms[: len(path) + declared]]
         if nearest:
             path.append(nearest[0])
     if path[-1] is not chosen:
-        path = [selection.base, chosen]
+        path = [selection.without_effects, chosen]
     errors = [left_out_residual(item, options.folds, jobs=jobs) for item in path]
     gains: list[Gain] = []
     for before, after in itertools.pairwise(errors):

@@ -101,6 +101,8 @@ def unnamed_reason(selection: Selection, rules: Rules) -> str:
     """Return why nothing may be named, or nothing where something may."""
     if not selection.structured:
         return "the residual is noise: nothing is missing"
+    if selection.ground is not None and selection.chosen is selection.ground:
+        return "the base form: a hysteresis with an exponent of its own explains what is missing, and no effect is"
     if not selection.rounds or selection.chosen is selection.base:
         return "no effect of the library changes the error"
     if selection.share(selection.chosen) < rules.least_share:

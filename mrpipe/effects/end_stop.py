@@ -52,6 +52,11 @@ def _sides(values: Values) -> list[Step]:
     return [_step(values["stiffness_out"], free, 0.0, 1.0), _step(values["stiffness_in"], free, 0.0, -1.0)]
 
 
+def _progressive_sides(values: Values) -> list[Step]:
+    free = values["free_travel"]
+    return [_step(values["stiffness_out"], free, 1.0, 1.0), _step(values["stiffness_in"], free, 1.0, -1.0)]
+
+
 _FREE = shape("free_travel", "m", "travel before the contact", "stroke", 0.3, 0.995, (0.6, 0.8, 0.92))
 _STIFFNESS = amplitude("stiffness", "N/m", "stiffness of the contact", "force/stroke", 0.0, 1e4)
 
@@ -83,6 +88,17 @@ EFFECT = Effect(
                 amplitude("stiffness_in", "N/m", "stiffness at negative displacement", "force/stroke", 0.0, 1e4),
             ),
             _sides,
+            {"stiffness_out": 0, "stiffness_in": 1},
+        ),
+        EffectForm(
+            "two-sided-progressive",
+            "own curvature at either end",
+            (
+                _FREE,
+                amplitude("stiffness_out", "N/m^2", "curvature at positive displacement", "force/stroke^2", 0.0, 1e5),
+                amplitude("stiffness_in", "N/m^2", "curvature at negative displacement", "force/stroke^2", 0.0, 1e5),
+            ),
+            _progressive_sides,
             {"stiffness_out": 0, "stiffness_in": 1},
         ),
     ),

@@ -24,6 +24,19 @@ def hysteresis(x: np.ndarray, yield_displacement: float) -> np.ndarray:
 
 
 @njit
+def dahl(x: np.ndarray, yield_displacement: float) -> np.ndarray:
+    """Integrate dz/dx = (1 - z sign) / x_y in fine Euler steps."""
+    z = np.zeros(len(x))
+    for index in range(1, len(x)):
+        step = (x[index] - x[index - 1]) / 20.0
+        value = z[index - 1]
+        for _ in range(20):
+            value += (step - abs(step) * value) / yield_displacement
+        z[index] = value
+    return z
+
+
+@njit
 def play(x: np.ndarray, gap: float) -> np.ndarray:
     y = np.empty_like(x)
     y[0] = x[0]
@@ -46,13 +59,15 @@ def force_of(x: np.ndarray, v: np.ndarray, a: np.ndarray, i: np.ndarray, t: np.n
         u = u + 0.12 * np.sqrt(np.maximum(memory - u, 0.0) * 3.0)
     rod = play(x, 1.2e-4) if "backlash" in planted else x
     moved = np.gradient(rod, dt) if "backlash" in planted else v
-    z = hysteresis(rod, 3.7e-4)
+    z = dahl(rod, 3.7e-4) if "dahl" in planted else hysteresis(rod, 3.7e-4)
     yield_force = 20.0 + 8.0 * u + 14.0 * u**2
     if "pinching" in planted:
         yield_force = yield_force * (1.0 - 0.25 / np.cosh(x / 2.2e-3))
     force = yield_force * z + (50.0 + 75.0 * u) * moved
     if "accumulator" in planted:
         force = force + 1400.0 * x * (1.0 + 4.0 * x)
+    if "end-stop" in planted:
+        force = force + 3e7 * np.maximum(x - 8.2e-3, 0.0) ** 2
     if effect == "unknown-in-time":
         force = force + 8.0 * np.sin(2 * np.pi * 7.3 * t)
     if effect == "unknown-in-place":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from mrpipe.discrepancy.summary import Tracing, TracingOptions
 from mrpipe.discrepancy.tracing import trace_campaign
 from mrpipe.effects.library import damper_effects
+from mrpipe.signals.prepared import PreparedTest
 from tests.discrepancy.rig import campaign
 
 
@@ -63,6 +65,42 @@ def test_a_shape_of_no_family_stays_unknown(shape: str) -> None:
     summary = traced(shape).summary
     assert summary["effects"] == []
     assert summary["residual"]["structured"]
+    assert summary["unexplained"]["structured"]
+
+
+def traced_with(effect: str, names: tuple[str, ...], tests: list[PreparedTest] | None = None) -> Tracing:
+    options = TracingOptions(refits=2, bootstrap_draws=100, most_effects=2)
+    library = {name: damper_effects()[name] for name in names}
+    return trace_campaign(tests or campaign(effect), library, [], options, rng=np.random.default_rng(1))
+
+
+@pytest.mark.planted
+def test_a_hysteresis_of_another_shape_is_a_base_form_and_no_effect() -> None:
+    # Dahl's law under a declared exponent of 2 looks like a late rise
+    summary = traced_with("dahl", ("migration", "accumulator")).summary
+    assert summary["effects"] == []
+    assert summary["base_form"]["taken"] == "bouc-wen-free-exponent"
+    assert summary["after"]["nrmse"] < 0.4 * summary["before"]["nrmse"]
+    assert not summary["unexplained"]["structured"]
+    assert "base form" in summary["verdict"]
+
+
+@pytest.mark.planted
+def test_a_stop_on_one_side_is_named_beside_another_effect() -> None:
+    summary = traced_with("accumulator+end-stop", ("accumulator", "end-stop", "inertia")).summary
+    found = {item["name"]: item for item in summary["effects"]}
+    assert set(found) == {"accumulator", "end-stop"}
+    assert found["end-stop"]["parameters"]["free_travel"]["value"] == pytest.approx(8.2e-3, rel=0.06)
+
+
+@pytest.mark.planted
+def test_offsets_of_tests_are_told_beside_an_unknown_rest() -> None:
+    shifts = np.random.default_rng(3).normal(0.0, 40.0, 20)
+    tests = [
+        replace(test, force_offset_n=shift) for test, shift in zip(campaign("unknown-in-time"), shifts, strict=False)
+    ]
+    summary = traced_with("", ("accumulator", "offset"), tests).summary
+    assert [item["name"] for item in summary["effects"]] == ["offset"]
     assert summary["unexplained"]["structured"]
 
 
