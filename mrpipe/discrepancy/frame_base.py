@@ -9,12 +9,16 @@ import numpy as np
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.discrepancy.frame_fit import Base, Design, coefficients, design_of
+from mrpipe.discrepancy.frame_fit import Base, Design, base_rows, coefficients, design_of
 from mrpipe.discrepancy.frame_records import FrameRecord
 from mrpipe.discrepancy.frame_spectra import Band, Spectra, motion_of, noise_of, spectra_of, storey_sums
+from mrpipe.structures.dynamics import ComplexArray
 
 HIGH_SHARE, LOW_SHARE = 1.3, 0.45
 """Band over the highest and the lowest mode."""
+
+COUPLING_SHARE = 0.05
+"""Couplings of a storey to floors that are not its own are sought within about this share of its stiffness."""
 
 
 @dataclass(frozen=True)
@@ -48,19 +52,20 @@ def frame_problem(
     # band and weights need few records only: the shortest that are forced
     few = _few(training)
     for _ in range(3):
-        spectra = _spectra(few, masses, band, storey)
+        spectra = _spectra(few, masses, band, _matrix(storey))
         storey, frequencies = shear_stiffness_of(design_of("shear-frame", spectra), masses)
         limits = [0.4 * item.rate_hz for item in training]
         band = Band(LOW_SHARE * float(frequencies[0]), min(HIGH_SHARE * float(frequencies[-1]), *limits))
-    found, held = (tuple(_spectra(items, masses, band, storey)) for items in (training, validation))
+    stiffness = coupled_stiffness(_spectra(few, masses, band, _matrix(storey)), _matrix(storey))
+    found, held = (tuple(_spectra(items, masses, band, stiffness)) for items in (training, validation))
     return FrameProblem(found, held, masses, band, storey, frequencies)
 
 
-def _spectra(records: Sequence[FrameRecord], masses: FloatArray, band: Band, storey: FloatArray) -> list[Spectra]:
+def _spectra(records: Sequence[FrameRecord], masses: FloatArray, band: Band, stiffness: FloatArray) -> list[Spectra]:
     found = []
     for item in records:
         noise = noise_of(item, band)
-        found.append(spectra_of(item, masses, band, noise, _matrix(storey), motion_of(item, band, noise)))
+        found.append(spectra_of(item, masses, band, noise, stiffness, motion_of(item, band, noise)))
     return found
 
 
@@ -73,6 +78,40 @@ def _matrix(storey: FloatArray) -> FloatArray:
     """Return the shear of each storey per floor displacement, shape (n, n)."""
     n = len(storey)
     return np.asarray(storey[:, None] * (np.eye(n) - np.eye(n, k=-1)))
+
+
+def coupled_stiffness(spectra: Sequence[Spectra], sheared: FloatArray) -> FloatArray:
+    """Return the shear of each storey per floor displacement of any linear frame, shape (n, n) [N/m].
+
+    Floors without a laser are known far worse at low frequencies than those with one: where a storey feels them, be it
+    little, their noise rules its equation. Couplings that the records hardly tell are held near those of a shear frame.
+
+    Parameters
+    ----------
+    sheared
+        Of the shear frame, shape (n, n) [N/m].
+    """
+    n = len(sheared)
+    found = sheared.copy()
+    for storey in range(n):
+        rows = [_weighted(base_rows("linear-frame", item, storey), item, storey) for item in spectra]
+        width = max(len(item) for item in rows)
+        stacked = np.concatenate([np.pad(item, ((0, width - len(item)), (0, 0))) for item in rows], axis=1)
+        target = np.concatenate([_weighted(item.target[storey][None], item, storey)[0] for item in spectra])
+        left = target + sheared[storey] @ stacked[:n]
+        prior = np.zeros((width, width))
+        prior[:n, :n] = np.eye(n) / (COUPLING_SHARE * sheared[storey, storey])
+        scale = np.linalg.norm(stacked, axis=1)
+        prior[np.arange(n, width), np.arange(n, width)] = 1e-6 * scale[n:]
+        equations = np.concatenate([stacked, prior], axis=1).T
+        numbers = np.linalg.lstsq(equations, np.concatenate([left, np.zeros(width)]), rcond=None)[0]
+        found[storey] -= numbers[:n]
+    return found
+
+
+def _weighted(lines: ComplexArray, spectra: Spectra, storey: int) -> FloatArray:
+    weighted = lines * spectra.weight[storey]
+    return np.asarray(np.concatenate([weighted.real, weighted.imag], axis=-1))
 
 
 def _band_of_power(records: Sequence[FrameRecord]) -> Band:

@@ -11,6 +11,11 @@ from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.discrepancy.frame_fit import Design
 
 LINES_OF_A_GROUP = 24
+
+OF_RESPONSE, OF_FLOOR, LEAST_OF_RESPONSE = 0.01, 0.2, 0.002
+"""What stands out matters where it is, in some record, this share of a storey's force; or raises what noise leaves
+there by the second share, and is at least the third of the force: below it lie errors of clocks and gains."""
+
 FLAG_P = 1e-5
 """A group stands out where noise alone would make it so once in this many trials, all groups together."""
 
@@ -31,6 +36,10 @@ class Groups:
         Storey of each group, shape (g,).
     flagged
         Groups that stand out of the noise, shape (g,).
+    record
+        Record of each group, shape (g,).
+    response
+        Sum of squares of the weighted force of each group, shape (g,).
     """
 
     index: IntArray
@@ -39,6 +48,7 @@ class Groups:
     storey: IntArray
     flagged: BoolArray
     record: IntArray
+    response: FloatArray
 
     def mean_square(self, residual: FloatArray) -> FloatArray:
         """Return the mean square of each group over that of the noise, shape (g,)."""
@@ -52,10 +62,19 @@ class Groups:
         over = (self.mean_square(residual) - 1.0) * self.count
         return float(np.sum(over[self.flagged]))
 
-    @property
-    def total(self) -> float:
-        """Number of all residuals."""
-        return float(self.count.sum())
+    def over(self, residual: FloatArray) -> FloatArray:
+        """Return what each flagged group holds above the noise, none below nought, shape (g,)."""
+        return np.where(self.flagged, np.maximum((self.mean_square(residual) - 1.0) * self.count, 0.0), 0.0)
+
+    def material(self, residual: FloatArray) -> bool:
+        """Return whether what stands out matters beside the force of some storey in some record."""
+        place = self.record * (int(self.storey.max()) + 1) + self.storey
+        over, response, count = (
+            np.bincount(place, weights=w) for w in (self.over(residual), self.response, self.count)
+        )
+        share = np.sqrt(over / np.maximum(response, 1e-300))
+        raised = np.sqrt(1.0 + over / np.maximum(count, 1.0)) - 1.0
+        return bool(np.any((share > OF_RESPONSE) | ((raised > OF_FLOOR) & (share > LEAST_OF_RESPONSE))))
 
 
 def groups_of(design: Design) -> Groups:
@@ -80,4 +99,9 @@ def groups_of(design: Design) -> Groups:
     limit = stats.chi2.isf(FLAG_P / len(count), count) / count
     # weights reckon with white noise: a tenth more is forgiven
     flagged = sums / scale[storey] > 1.1 * limit
-    return Groups(index, count, scale, storey, flagged, record)
+    target = np.concatenate(
+        [np.concatenate([part.real, part.imag], axis=1) for part in (s.target * s.weight for s in design.spectra)],
+        axis=1,
+    )
+    response = np.asarray(np.bincount(index.ravel(), weights=(target**2).ravel()), dtype=np.float64)
+    return Groups(index, count, scale, storey, flagged, record, response)

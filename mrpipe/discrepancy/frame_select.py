@@ -76,8 +76,8 @@ class FrameSelection:
 
     @property
     def structured(self) -> bool:
-        """Whether anything stands out of the noise."""
-        return self.groups.excess(self.design.residual) > 0.0
+        """Whether anything that matters stands out of the noise."""
+        return self.groups.material(self.design.residual)
 
     def share(self, residual: FloatArray) -> float:
         """Return the share of what stands out that a fit explains."""

@@ -29,6 +29,10 @@ INTEGRATION_SHARE = 0.6
 NOISE_BLOCKS = 14
 """Least number of blocks that the spectrum of a sensor's noise is averaged over."""
 
+NOISE_PARTS, LEAST_PART, QUIETEST = 8, 250, 0.1
+"""Parts of a record whose noise is told apart, least samples of one, and the least share of the whole's noise that the
+quieter ones may show."""
+
 SAME_GAIN = 0.02
 """Gains of laser and accelerometer that differ by less are taken as one."""
 
@@ -237,9 +241,27 @@ def _at_rest(record: FrameRecord) -> slice:
 
 
 def noise_density(values: FloatArray, rate_hz: float, above_hz: float) -> float:
-    """Return the power density of the noise on a channel, told by what lies above the band [unit^2/Hz]."""
-    length = min(2048, max(64, len(values) // NOISE_BLOCKS))
-    frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=min(len(values), length))
+    """Return the power density of the noise on a channel, told by what lies above the band [unit^2/Hz].
+
+    Slip and impact reach far above the band, but not while a frame rests or moves little: the quieter parts of a record
+    tell the noise, never less than a share of what all of it would tell.
+    """
+    whole = _density_above(values, rate_hz, above_hz)
+    parts = min(NOISE_PARTS, len(values) // LEAST_PART)
+    if parts < 3:
+        return whole
+    pieces = np.array_split(values, parts)
+    levels = sorted(_density_above(piece, rate_hz, above_hz) for piece in pieces)
+    # by how many deviations the second least lies below the mean (Blom); that of a level goes by its number of lines
+    below = -float(stats.norm.ppf((2.0 - 0.375) / (parts + 0.25)))
+    inside = len(pieces[0]) * max(0.9 - 2.0 * min(above_hz / rate_hz, 0.3), 0.1)
+    quiet = levels[1] / (1.0 - below * min(0.7, np.sqrt(3.5 / inside)))
+    return float(min(max(quiet, QUIETEST * whole), whole))
+
+
+def _density_above(values: FloatArray, rate_hz: float, above_hz: float) -> float:
+    length = min(2048, max(64, len(values) // NOISE_BLOCKS), len(values))
+    frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=length)
     high = (frequencies > min(above_hz, 0.3 * rate_hz)) & (frequencies < 0.45 * rate_hz)
     # the lower quartile passes by resonances of what the model does not hold; its place below the mean goes by how many
     # blocks were averaged (half overlapping Hann windows: 1.06 of the variance of separate ones)

@@ -12,7 +12,6 @@ from scipy import stats
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.discrepancy.frame_base import FrameProblem, frame_problem
 from mrpipe.discrepancy.frame_candidates import Fitted
-from mrpipe.discrepancy.frame_groups import Groups
 from mrpipe.discrepancy.frame_model import FrameModel, model_of
 from mrpipe.discrepancy.frame_records import FrameData
 from mrpipe.discrepancy.frame_scores import FrameScore, dependence, flexible_score, frame_score, noise_floor
@@ -105,7 +104,11 @@ def _summary(
     gain = scores[0].nrmse ** 2 - best**2
     recovered = (scores[0].nrmse ** 2 - scores[1].nrmse ** 2) / gain if gain > 1e-12 else 0.0
     share = selection.share(selection.residual) if named else 0.0
-    still = structured and share < rules.named_share
+    still = (
+        structured
+        and share < rules.named_share
+        and selection.groups.material(selection.residual if named else selection.design.residual)
+    )
     worst = _worst_storey(selection)
     squares = selection.groups.mean_square(selection.design.residual)
     p_values = stats.chi2.sf(squares * selection.groups.count, selection.groups.count)
@@ -163,20 +166,15 @@ def _json(value: FrameScore) -> dict[str, float]:
     return {"nrmse": value.nrmse, "fit_percent": value.fit_percent}
 
 
-def _over(groups: Groups, residual: FloatArray) -> FloatArray:
-    over = (groups.mean_square(residual) - 1.0) * groups.count
-    return np.where(groups.flagged, np.maximum(over, 0.0), 0.0)
-
-
 def _by_storey(selection: FrameSelection) -> list[float]:
-    over = _over(selection.groups, selection.design.residual)
+    over = selection.groups.over(selection.design.residual)
     n = len(selection.design.residual)
     sums = np.bincount(selection.groups.storey, weights=over, minlength=n)
     return [float(value) for value in sums / max(float(sums.sum()), 1e-300)]
 
 
 def _by_test(selection: FrameSelection, problem: FrameProblem) -> dict[str, float]:
-    over = _over(selection.groups, selection.design.residual)
+    over = selection.groups.over(selection.design.residual)
     sums = np.bincount(selection.groups.record, weights=over, minlength=len(problem.training))
     total = max(float(sums.sum()), 1e-300)
     return {item.record.name: float(value / total) for item, value in zip(problem.training, sums, strict=True)}
@@ -184,7 +182,7 @@ def _by_test(selection: FrameSelection, problem: FrameProblem) -> dict[str, floa
 
 def _worst_storey(selection: FrameSelection) -> int:
     residual = selection.residual if selection.chosen else selection.design.residual
-    over = _over(selection.groups, residual)
+    over = selection.groups.over(residual)
     return int(np.argmax(np.bincount(selection.groups.storey, weights=over)))
 
 
