@@ -32,6 +32,7 @@ from mrpipe.discrepancy.recordings import (
     record_tests,
     spread_tests,
 )
+from mrpipe.discrepancy.refine import with_richer_forms
 from mrpipe.discrepancy.select import Selection, Thresholds, forward_selection, share_of
 from mrpipe.discrepancy.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions
 from mrpipe.discrepancy.testability import untestable
@@ -88,7 +89,7 @@ def trace_campaign(
     validation = record_tests(judged, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
-    baseline, selection = _select(training, able, declared, options, jobs, progress)
+    baseline, selection = _select(training, able, declared, options, rng, jobs, progress)
     window = selection.base.problem.window_share
     if not baseline.model_error:
         window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
@@ -96,6 +97,8 @@ def trace_campaign(
     reason = unnamed_reason(selection, options.rules)
     if reason:
         selection = replace(selection, chosen=selection.without_effects)
+    elif not baseline.model_error:
+        selection = _refined(selection, len(declared), options, rng, jobs)
     progress(0.85, "ceiling")
     offsets = offset_between_tests(
         selection.chosen, effects.get("offset"), least_ratio=CLEAR_OFFSETS if reason and selection.structured else 0.0
@@ -118,6 +121,7 @@ def _select(
     effects: Mapping[str, Effect],
     declared: Sequence[Effect],
     options: TracingOptions,
+    rng: np.random.Generator,
     jobs: int,
     progress: Progress,
 ) -> tuple[Baseline, Selection]:
@@ -148,6 +152,10 @@ def _select(
         excess = selection.chosen.chi_square / max(baseline.noise, 1e-12)
         if floor > 0.0:
             return baseline, _judged_by_trees(with_play(selection, effects))
+        if excess >= MODEL_ERROR_CHI_SQUARE:
+            # the right effect in too plain a form may leave as much
+            richer = _refined(selection, len(own), options, rng, jobs).chosen
+            excess = richer.chi_square / max(baseline.noise, 1e-12)
         if excess < MODEL_ERROR_CHI_SQUARE:
             return _with_noise_of(selection.chosen, baseline, selection)
         # what is left on the force's own scale becomes the yardstick of the second pass
@@ -176,6 +184,14 @@ def _in_better_form(selection: Selection, select: Callable[[Fit], Selection], op
         return selection
     rounds = again.rounds if again.chosen is not ground else selection.rounds[:1]
     return replace(again, base=selection.base, ground=ground, rounds=rounds).with_floor(again.noise)
+
+
+def _refined(
+    selection: Selection, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
+) -> Selection:
+    return with_richer_forms(
+        selection, declared, folds=options.folds, draws=options.bootstrap_draws, rng=rng, jobs=jobs
+    )
 
 
 def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tuple[Baseline, Selection]:

@@ -178,6 +178,9 @@ class Effect:
         `damper` or `frame`.
     separated_by
         Other effect -> test that tells the two apart.
+    refinements
+        Richer forms of the same physics, too supple to name it by: once it is named, one of them takes the form's place
+        where it is better on tests left out.
     """
 
     name: str
@@ -191,7 +194,8 @@ class Effect:
     sensor: bool = False
     rig: Literal["damper", "frame"] = "damper"
     separated_by: Mapping[str, str] = field(default_factory=dict)
+    refinements: tuple[EffectForm, ...] = ()
 
     def form(self, name: str) -> EffectForm:
         """Return one form by name."""
-        return next(item for item in self.forms if item.name == name)
+        return next(item for item in (*self.forms, *self.refinements) if item.name == name)

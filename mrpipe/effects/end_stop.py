@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import DISPLACEMENT, FORCE, STEP_SIGNATURE, Phase, Step
+from mrpipe.dampers.plant import DISPLACEMENT, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
 
 
@@ -55,6 +55,31 @@ def _sides(values: Values) -> list[Step]:
 def _progressive_sides(values: Values) -> list[Step]:
     free = values["free_travel"]
     return [_step(values["stiffness_out"], free, 1.0, 1.0), _step(values["stiffness_in"], free, 1.0, -1.0)]
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def contact_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: coefficient, free travel [m], exponent, part (1 spring out, -1 spring in, 0 damping of both)."""
+    x = wire[DISPLACEMENT]
+    side = 1.0 if x > 0.0 else -1.0
+    inside = abs(x) - parameters[1]
+    if inside <= 0.0 or parameters[3] * side < 0.0:
+        return
+    force = (inside / parameters[1]) ** parameters[2]
+    if parameters[3] == 0.0:
+        force *= wire[VELOCITY]
+    else:
+        force *= side
+    wire[FORCE] += parameters[0] * force
+
+
+def _contact(values: Values) -> list[Step]:
+    free, power = values["free_travel"], values["exponent"]
+    parts = (("stiffness_out", 1.0), ("stiffness_in", -1.0), ("damping", 0.0))
+    return [
+        Step("contact", Phase.FORCE_EFFECT, contact_step, np.array([values[name], free, power, part]))
+        for name, part in parts
+    ]
 
 
 _FREE = shape("free_travel", "m", "travel before the contact", "stroke", 0.3, 0.995, (0.6, 0.8, 0.92))
@@ -104,4 +129,21 @@ EFFECT = Effect(
     ),
     needs=("several-positions",),
     separated_by={"accumulator": "the same motion at a smaller amplitude"},
+    refinements=(
+        EffectForm(
+            "contact",
+            "(k + d v) ((|x| - x0)/x0)^n beyond x0, k of either end, after Hunt and Crossley 1975",
+            (
+                _FREE,
+                shape("exponent", "1", "power of the indentation", "one", 0.7, 4.0, (1.5, 2.5)),
+                amplitude(
+                    "stiffness_out", "N", "at positive displacement, for an indentation of x0", "force", 0.0, 1e6
+                ),
+                amplitude("stiffness_in", "N", "at negative displacement", "force", 0.0, 1e6),
+                amplitude("damping", "N s/m", "loss of the contact", "force/speed", 0.0, 1e6),
+            ),
+            _contact,
+            {"stiffness_out": 0, "stiffness_in": 1, "damping": 2},
+        ),
+    ),
 )

@@ -4,21 +4,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, DISPLACEMENT, FORCE, HYSTERESIS, STEP_SIGNATURE, YIELD_FORCE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def pinching_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: amplitude, width [m], kind of dip (0 gaussian, 1 rational, 2 exponential), of amplitude (0, 1, 2)."""
-    ratio = wire[DISPLACEMENT] / parameters[1]
+    """Parameters: amplitude, width [m], kind of dip (0 gaussian, 1 rational, 2 exponential), of amplitude (0, 1, 2),
+    middle [m], exponent (of kind 3).
+    """
+    ratio = (wire[DISPLACEMENT] - parameters[4]) / parameters[1]
     if parameters[2] == 0.0:
         dip = math.exp(-ratio * ratio)
+    elif parameters[2] == 3.0:
+        dip = 1.0 / (1.0 + abs(ratio) ** parameters[5])
     elif parameters[2] == 1.0:
         dip = 1.0 / (1.0 + ratio * ratio)
     else:
@@ -31,8 +37,9 @@ def pinching_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
     wire[FORCE] -= parameters[0] * force * dip * wire[HYSTERESIS]
 
 
-def _step(value: float, width: float, dip: float, of: float = 0.0) -> Step:
-    return Step("pinching", Phase.FORCE_EFFECT, pinching_step, np.array([value, width, dip, of]))
+def _step(value: float, width: float, dip: float, of: float = 0.0, middle: float = 0.0, power: float = 2.0) -> Step:
+    numbers = np.array([value, width, dip, of, middle, power])
+    return Step("pinching", Phase.FORCE_EFFECT, pinching_step, numbers)
 
 
 def _gaussian(values: Values) -> list[Step]:
@@ -52,7 +59,17 @@ def _own(values: Values) -> list[Step]:
     return [_step(values["friction"], width, 0.0, 1.0), _step(values["friction_rate"], width, 0.0, 2.0)]
 
 
+def _aside(kind: float) -> Callable[[Values], list[Step]]:
+    def steps(values: Values) -> list[Step]:
+        power = values.get("exponent", 2.0)
+        return [_step(values["depth"], values["width"], kind, middle=values["middle"], power=power)]
+
+    return steps
+
+
 _WIDTH = shape("width", "m", "half width of the dip", "stroke", 0.02, 1.0, (0.12, 0.4))
+_MIDDLE = Parameter("middle", "m", "where the dip is deepest", "stroke", -0.8, 0.8, (-0.3, 0.3))
+_NEAR_MIDDLE = replace(_MIDDLE, starts=(0.0,))
 _DEPTH = amplitude("depth", "1", "share of the yield force that is missing in the middle", "one", 0.0, 1.0)
 
 EFFECT = Effect(
@@ -67,6 +84,9 @@ EFFECT = Effect(
         EffectForm("rational", "alpha (1 - d/(1 + (x/w)^2))", (_WIDTH, _DEPTH), _rational, {"depth": 0}),
         EffectForm("exponential", "alpha (1 - d exp(-|x|/w))", (_WIDTH, _DEPTH), _exponential, {"depth": 0}),
         EffectForm(
+            "off-centre", "alpha (1 - d exp(-((x - m)/w)^2))", (_WIDTH, _MIDDLE, _DEPTH), _aside(0.0), {"depth": 0}
+        ),
+        EffectForm(
             "own-friction",
             "alpha - (a + b u) exp(-(x/w)^2)",
             (
@@ -79,4 +99,14 @@ EFFECT = Effect(
         ),
     ),
     separated_by={"migration": "the same motion about another middle"},
+    refinements=(
+        EffectForm("cusp", "alpha (1 - d exp(-|x - m|/w))", (_WIDTH, _NEAR_MIDDLE, _DEPTH), _aside(2.0), {"depth": 0}),
+        EffectForm(
+            "flat",
+            "alpha (1 - d/(1 + (|x - m|/w)^n))",
+            (_WIDTH, _NEAR_MIDDLE, shape("exponent", "1", "flatness", "one", 1.0, 12.0, (3.0,)), _DEPTH),
+            _aside(3.0),
+            {"depth": 0},
+        ),
+    ),
 )

@@ -6,11 +6,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
     CURRENT,
+    FIRST,
     FORCE,
     HYSTERESIS,
     RATE_YIELD,
@@ -21,7 +22,7 @@ from mrpipe.dampers.plant import (
     Step,
 )
 from mrpipe.dampers.viscoplastic import follow_dashpot
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values, amplitude, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -56,6 +57,41 @@ def dashpot_blend_step(wire: FloatArray, state: FloatArray, parameters: FloatArr
     wire[HYSTERESIS] += parameters[0] * (
         follow_dashpot(wire, state, parameters[1], parameters[2], dt) - wire[HYSTERESIS]
     )
+
+
+@njit(float64(float64, float64, float64[::1]), cache=True)
+def _creep_rate(z: float, v: float, parameters: FloatArray) -> float:
+    size = abs(z)
+    ratio = parameters[3]
+    bends = ratio * abs(v) * z * size + (1.0 - ratio) * v * size * size
+    creeps = parameters[1] * size ** parameters[2] * (1.0 if z > 0.0 else -1.0)
+    return parameters[0] * (v - bends - creeps)
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def creeping_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: spring rate [1/m], creep speed [m/s], exponent, gamma over gamma plus beta. State: z, last velocity.
+
+    Bouc-Wen's z (2.2) with n = 2, less what creeps under load; midpoints small enough for its stiffest part.
+    """
+    if wire[FIRST] > 0.5:
+        state[0] = 0.0
+        state[1] = wire[VELOCITY]
+    first, change = state[1], wire[VELOCITY] - state[1]
+    fastest = parameters[0] * (2.0 * max(abs(first), abs(wire[VELOCITY])) + parameters[1] * parameters[2])
+    parts = min(int(fastest * dt / 0.5) + 1, 20)
+    h, z = dt / parts, state[0]
+    for k in range(parts):
+        middle = z + 0.5 * h * _creep_rate(z, first + change * k / parts, parameters)
+        z = min(max(z + h * _creep_rate(middle, first + change * (k + 0.5) / parts, parameters), -1.0), 1.0)
+    state[0] = z
+    state[1] = wire[VELOCITY]
+    wire[HYSTERESIS] = z
+
+
+def _creeping(values: Values) -> list[Step]:
+    names = ("elastic_rate", "creep_speed", "creep_exponent", "shape_ratio")
+    return [Step("creeping", Phase.HYSTERESIS, creeping_step, np.array([values[name] for name in names]), 2)]
 
 
 def _rounded(value: float, scale: float, power: float, kind: float = 0.0) -> Step:
@@ -163,4 +199,18 @@ EFFECT = Effect(
         "stribeck": "triangular displacement at log-spaced speeds",
         "quadratic-drag": "triangular displacement at log-spaced speeds",
     },
+    refinements=(
+        EffectForm(
+            "creeping",
+            "z' = q (v - r |v| z |z| - (1 - r) v z^2 - v0 |z|^m sign z), after Norton's law of creep",
+            (
+                shape("elastic_rate", "1/m", "stiffness over the yield force", "one/stroke", 2.0, 500.0, (10.0, 40.0)),
+                shape("creep_speed", "m/s", "creep under the full force", "speed", 0.002, 2.0, (0.03, 0.2)),
+                shape("creep_exponent", "1", "power of the force that drives it", "one", 1.0, 20.0, (3.0,)),
+                Parameter("shape_ratio", "1", "gamma over gamma plus beta", "one", 0.0, 1.0, (0.5,)),
+            ),
+            _creeping,
+            dissipative=True,
+        ),
+    ),
 )

@@ -1,16 +1,18 @@
 """Remanence: the core stays magnetised after the current has gone."""
 
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, FIRST, PAST_CURRENT, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -56,6 +58,25 @@ def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     if wire[CURRENT] < 0.0 and u >= 0.0:
         wire[CURRENT] = 0.0
     state[1] = u
+
+
+_PLAYS = 5
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def many_plays_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: gain, largest width [A], exponent of the weights. State: the plays."""
+    u = wire[CURRENT]
+    total, weights = 0.0, 0.0
+    for k in range(_PLAYS):
+        if wire[FIRST] > 0.5:
+            state[k] = u
+        part = (k + 1.0) / _PLAYS
+        state[k] = min(max(state[k], u), u + part * parameters[1])
+        weight = part ** parameters[2]
+        total += weight * (state[k] - u)
+        weights += weight
+    wire[CURRENT] = u + parameters[0] * total / weights
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -140,6 +161,11 @@ def _past(values: Values) -> list[Step]:
 
 def _play(values: Values) -> list[Step]:
     return _step(values["gain"], values["width"], 3.0)
+
+
+def _plays(values: Values) -> list[Step]:
+    numbers = np.array([values["gain"], values["width"], values["exponent"]])
+    return [Step("remanence", Phase.CURRENT_EFFECT, many_plays_step, numbers, _PLAYS)]
 
 
 def _loop(values: Values) -> list[Step]:
@@ -230,4 +256,16 @@ EFFECT = Effect(
     ),
     needs=("varying-drive",),
     separated_by={"delay": "current steps up and down at constant velocity", "saturation": "current steps up and down"},
+    refinements=(
+        EffectForm(
+            "many-plays",
+            "u + g sum of w_k (play_k(u) - u), w_k = (width_k/width)^n: domains that turn at their own threshold",
+            (
+                replace(_PLAY_GAIN, starts=(0.6,)),
+                shape("width", "drive", "width of the largest play", "drive", 0.01, 1.5, (0.3, 0.6)),
+                Parameter("exponent", "1", "which plays weigh most", "one", -2.0, 6.0, (0.0,)),
+            ),
+            _plays,
+        ),
+    ),
 )

@@ -9,13 +9,13 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import CURRENT, STEP_SIGNATURE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values
+from mrpipe.dampers.plant import CURRENT, DRIVE, FIRST, STEP_SIGNATURE, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def saturation_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: inverse of the saturation level [1/A], kind (0 sharp, 1 smooth, 2 tanh)."""
+    """Parameters: inverse of the saturation level [1/A], kind (0 sharp, 1 rounded, 2 tanh), exponent."""
     u = wire[CURRENT]
     inverse = parameters[0]
     if inverse <= 0.0:
@@ -24,14 +24,39 @@ def saturation_step(wire: FloatArray, state: FloatArray, parameters: FloatArray,
     if parameters[1] == 0.0:
         limited = min(max(ratio, -1.0), 1.0)
     elif parameters[1] == 1.0:
-        limited = ratio / (1.0 + abs(ratio) ** 6) ** (1.0 / 6.0)
+        power = parameters[2]
+        limited = ratio / (1.0 + abs(ratio) ** power) ** (1.0 / power)
     else:
         limited = math.tanh(ratio)
     wire[CURRENT] = limited / inverse
 
 
-def _step(inverse: float, kind: float) -> list[Step]:
-    return [Step("saturation", Phase.CURRENT_EFFECT, saturation_step, np.array([inverse, kind]))]
+@njit(STEP_SIGNATURE, cache=True)
+def command_limit_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: inverse of the largest command [1/A]."""
+    inverse = parameters[0]
+    if inverse > 0.0:
+        wire[DRIVE] = min(max(wire[DRIVE], -1.0 / inverse), 1.0 / inverse)
+        wire[CURRENT] = wire[DRIVE]
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def slewing_driver_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: inverse of the largest command [1/A], largest rate [A/s]. State: what the driver gives."""
+    inverse = parameters[0]
+    wanted = wire[DRIVE]
+    if inverse > 0.0:
+        wanted = min(max(wanted, -1.0 / inverse), 1.0 / inverse)
+    if wire[FIRST] > 0.5:
+        state[0] = wanted
+    change = parameters[1] * dt
+    state[0] += min(max(wanted - state[0], -change), change)
+    wire[DRIVE] = state[0]
+    wire[CURRENT] = state[0]
+
+
+def _step(inverse: float, kind: float, power: float = 6.0) -> list[Step]:
+    return [Step("saturation", Phase.CURRENT_EFFECT, saturation_step, np.array([inverse, kind, power]))]
 
 
 def _sharp(values: Values) -> list[Step]:
@@ -40,6 +65,20 @@ def _sharp(values: Values) -> list[Step]:
 
 def _smooth(values: Values) -> list[Step]:
     return _step(values["inverse_limit"], 1.0)
+
+
+def _knee(values: Values) -> list[Step]:
+    return _step(values["inverse_limit"], 1.0, values["exponent"])
+
+
+def _command(values: Values) -> list[Step]:
+    # before the lag of the base: what the driver never asks for
+    return [Step("command-limit", Phase.MOTION, command_limit_step, np.array([values["inverse_limit"]]))]
+
+
+def _slewing(values: Values) -> list[Step]:
+    numbers = np.array([values["inverse_limit"], values["rate"]])
+    return [Step("slewing-driver", Phase.MOTION, slewing_driver_step, numbers, 1)]
 
 
 def _tanh(values: Values) -> list[Step]:
@@ -80,6 +119,21 @@ EFFECT = Effect(
         EffectForm("sharp", "min(u, us)", (_INVERSE,), _sharp),
         EffectForm("smooth", "u/(1 + (u/us)^6)^(1/6)", (_INVERSE,), _smooth),
         EffectForm("tanh", "us tanh(u/us)", (_SOFT,), _tanh),
+        EffectForm("driver", "min(command, us), before the lag", (_INVERSE,), _command),
     ),
     separated_by={"remanence": "current steps up and down", "heating": "constant drives, each begun cold"},
+    refinements=(
+        EffectForm(
+            "knee",
+            "u/(1 + (u/us)^n)^(1/n)",
+            (_INVERSE, shape("exponent", "1", "sharpness of the knee", "one", 1.0, 40.0, (4.0, 12.0))),
+            _knee,
+        ),
+        EffectForm(
+            "slewing-driver",
+            "min(command, us) that changes at a limited rate, before the lag",
+            (_INVERSE, shape("rate", "drive/s", "largest rate of change", "drive", 3.0, 3000.0, (30.0, 200.0))),
+            _slewing,
+        ),
+    ),
 )

@@ -15,12 +15,14 @@ from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
 
 @njit(STEP_SIGNATURE, cache=True)
 def stribeck_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: amplitude, velocity scale [m/s], kind of fall (0, 1, 2), of amplitude (0, 1, 2)."""
+    """Parameters: amplitude, velocity scale [m/s], kind of fall (0..3), of amplitude (0, 1, 2), exponent."""
     ratio = abs(wire[VELOCITY]) / parameters[1]
     if parameters[2] == 0.0:
         fall = math.exp(-ratio)
     elif parameters[2] == 1.0:
         fall = math.exp(-ratio * ratio)
+    elif parameters[2] == 3.0:
+        fall = math.exp(-(ratio ** parameters[4]))
     else:
         fall = 1.0 / (1.0 + ratio * ratio)
     if parameters[3] == 0.0:
@@ -32,8 +34,8 @@ def stribeck_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
     wire[FORCE] += parameters[0] * force * fall * wire[HYSTERESIS]
 
 
-def _step(value: float, scale: float, fall: float, of: float) -> Step:
-    return Step("stribeck", Phase.FORCE_EFFECT, stribeck_step, np.array([value, scale, fall, of]))
+def _step(value: float, scale: float, fall: float, of: float, power: float = 1.0) -> Step:
+    return Step("stribeck", Phase.FORCE_EFFECT, stribeck_step, np.array([value, scale, fall, of, power]))
 
 
 def _exponential(values: Values) -> list[Step]:
@@ -56,6 +58,10 @@ def _own(values: Values) -> list[Step]:
 def _own_gaussian(values: Values) -> list[Step]:
     scale = values["velocity_scale"]
     return [_step(values["friction"], scale, 1.0, 1.0), _step(values["friction_rate"], scale, 1.0, 2.0)]
+
+
+def _stretched(values: Values) -> list[Step]:
+    return [_step(values["share"], values["velocity_scale"], 3.0, 0.0, values["exponent"])]
 
 
 _SCALE = shape("velocity_scale", "m/s", "speed at which the surplus has fallen", "speed", 0.004, 0.7, (0.06, 0.2))
@@ -92,4 +98,13 @@ EFFECT = Effect(
         "quadratic-drag": "triangular displacement at log-spaced speeds",
         "rate-dependent-yield": "triangular displacement at log-spaced speeds",
     },
+    refinements=(
+        EffectForm(
+            "stretched",
+            "alpha (1 + s exp(-(|v|/vs)^n))",
+            (_SCALE, shape("exponent", "1", "below 1 a cusp at rest", "one", 0.2, 4.0, (0.6, 1.5)), _SHARE),
+            _stretched,
+            {"share": 0},
+        ),
+    ),
 )

@@ -68,6 +68,9 @@ def force_of(x: np.ndarray, v: np.ndarray, a: np.ndarray, i: np.ndarray, t: np.n
         force = force + 1400.0 * x * (1.0 + 4.0 * x)
     if "end-stop" in planted:
         force = force + 3e7 * np.maximum(x - 8.2e-3, 0.0) ** 2
+    if "soft-stop" in planted:
+        pressed = np.maximum(np.abs(x) - 7.5e-3, 0.0)
+        force = force + 3e5 * pressed**1.5 * (np.sign(x) + 0.8 * v)
     if effect == "unknown-in-time":
         force = force + 8.0 * np.sin(2 * np.pi * 7.3 * t)
     if effect == "unknown-in-place":

@@ -35,7 +35,7 @@ CONTRACT = [
     "end-stop",
 ]
 SCALES = EffectScales(stroke=0.01, speed=0.12, acceleration=1.5, drive=4.0, force=120.0, time=5.0)
-FORMS = [(effect.name, form) for effect in damper_effects().values() for form in effect.forms]
+FORMS = [(effect.name, form) for effect in damper_effects().values() for form in (*effect.forms, *effect.refinements)]
 IDS = [f"{name}/{form.name}" for name, form in FORMS]
 
 
@@ -77,7 +77,7 @@ def test_an_effect_is_documented(name: str) -> None:
         assert len(text) > 3
     for other in effect.separated_by:
         assert other in all_effects()
-    for form in effect.forms:
+    for form in (*effect.forms, *effect.refinements):
         for parameter in form.parameters:
             assert parameter.unit
             assert parameter.meaning
@@ -88,8 +88,12 @@ def test_an_effect_is_documented(name: str) -> None:
         assert set(form.amplitude_steps) == {item.name for item in form.amplitudes}
 
 
+VANISHING = [item for item in FORMS if any(p.role != "shape" for p in item[1].parameters)]
+"""All but those that put their own hysteresis in the place of the base's."""
+
+
 @pytest.mark.property
-@pytest.mark.parametrize(("name", "form"), FORMS, ids=IDS)
+@pytest.mark.parametrize(("name", "form"), VANISHING, ids=[f"{name}/{form.name}" for name, form in VANISHING])
 @settings(max_examples=4, deadline=None)
 @given(frequency=st.floats(0.5, 2.5), amplitude=st.floats(0.002, 0.012))
 def test_zero_strength_changes_nothing(name: str, form: EffectForm, frequency: float, amplitude: float) -> None:
