@@ -21,11 +21,34 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.signals.prepared import write_prepared
 
     settings = context.settings.prepare
+    known = settings.corrections
     campaign = load_campaign(context.inputs["campaign:bench"])
     for finding in campaign.findings:
         context.warn(finding)
     options = PreparationOptions(
-        **settings.model_dump(exclude={"corrections"}), faults=KnownFaults(**settings.corrections.model_dump())
+        working_rate_hz=settings.working_rate_hz,
+        cutoff_hz=settings.cutoff_hz,
+        velocity_cutoff_hz=settings.velocity_cutoff_hz,
+        order=settings.order,
+        phase=settings.phase,
+        cutoff_choice=settings.cutoff_choice,
+        differentiation=settings.differentiation,
+        savitzky_golay_window_s=settings.savitzky_golay_window_s,
+        kalman_displacement_noise_m=settings.kalman_displacement_noise_m,
+        kalman_acceleration_noise_m_s2=settings.kalman_acceleration_noise_m_s2,
+        kalman_bias_drift_m_s3=settings.kalman_bias_drift_m_s3,
+        offset=settings.offset,
+        displacement_late_s=settings.displacement_late_s,
+        cycles=settings.cycles,
+        settle_cycles=settings.settle_cycles,
+        faults=KnownFaults(
+            force_late_s=known.force_late_s,
+            force_offset_n=known.force_offset_n,
+            force_per_drive_n=known.force_per_drive_n,
+            force_per_drive_squared_n=known.force_per_drive_squared_n,
+            drive_lag_s=known.drive_lag_s,
+            force_drift_n_s=known.force_drift_n_s,
+        ),
     )
     prepared = prepare_campaign(campaign, options, context.progress)
     preparations = prepared.tests
