@@ -17,10 +17,11 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from mrpipe.networks.assembly import History
+from mrpipe.networks.held_out import training_data
 from mrpipe.networks.levenberg_marquardt import Method, StoppingRules, fit
 from mrpipe.networks.network import FeatureSpec
 from mrpipe.networks.problem import Problem
-from mrpipe.networks.training import TrainingOptions, train, training_data
+from mrpipe.networks.training import TrainingOptions, train
 
 RATE = 200.0
 METHODS: tuple[Method, ...] = ("mu-identity", "mu-diagonal", "least-squares")
@@ -75,7 +76,7 @@ def main() -> None:
         biases=True, starts=arguments.starts, refined_starts=arguments.starts, iterations=50, held_out_share=0.0
     )
     rng = np.random.default_rng(2)
-    data = training_data(history, spec, options, rng)
+    data = training_data(history, spec, options.held_out_share, rng)
     with threadpool_limits(1):
         for rows in (min(20000, arguments.rows), arguments.rows):
             problem = data.problem((8, 6, 6, 1), True, np.arange(min(rows, len(data.fit_rows.target))))

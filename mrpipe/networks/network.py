@@ -23,6 +23,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 
@@ -155,7 +156,8 @@ class Network:
     @property
     def parameters(self) -> int:
         """Number of trained numbers."""
-        count = sum(matrix.size for matrix in self.weights)
+        # zeros between networks that stand side by side were never trained
+        count = sum(int(np.count_nonzero(matrix)) for matrix in self.weights)
         return count + sum(bias.size for bias in self.biases) if self.has_biases else count
 
     def predict(self, features: FloatArray) -> FloatArray:
@@ -206,6 +208,39 @@ class Network:
             feature_minimum=self.feature_minimum.reshape(by_channel).max(axis=1) if known else self.feature_minimum,
             feature_maximum=self.feature_maximum.reshape(by_channel).min(axis=1) if known else self.feature_maximum,
         )
+
+
+def averaged(networks: Sequence[Network]) -> Network:
+    """Return one network whose output is the mean of several: their layers stand side by side.
+
+    What single trainings got wrong by chance cancels in part; what the data do not tell stays.
+
+    Parameters
+    ----------
+    networks
+        Of the same features, scaling and number of layers.
+    """
+    first = networks[0]
+    if len(networks) == 1:
+        return first
+    layers = range(len(first.weights) - 1)
+    outputs = [network.weights[-1] for network in networks]
+    last = np.hstack(outputs) / len(networks) if layers else np.mean(outputs, axis=0)
+    # the first layers share their inputs, the next see those of their own network only
+    inner = [
+        np.asarray((block_diag if layer else _stacked)(*(network.weights[layer] for network in networks)))
+        for layer in layers
+    ]
+    biases = [np.concatenate([network.biases[layer] for network in networks]) for layer in layers]
+    return replace(
+        first,
+        weights=(*inner, last),
+        biases=(*biases, np.mean([network.biases[-1] for network in networks], axis=0)),
+    )
+
+
+def _stacked(*matrices: FloatArray) -> FloatArray:
+    return np.vstack(matrices)
 
 
 def write_network(artifact: ArtifactWriter, group: str, network: Network) -> None:

@@ -16,10 +16,11 @@ from threadpoolctl import threadpool_limits
 from mrpipe.artifacts import FloatArray, IntArray, Progress, atomic_path, no_progress
 from mrpipe.networks.assembly import History, rows_at, window_starts
 from mrpipe.networks.candidates import Candidate
+from mrpipe.networks.held_out import hold_out
 from mrpipe.networks.levenberg_marquardt import Method, StoppingRules, fit
 from mrpipe.networks.problem import Problem
 from mrpipe.networks.scaling import Normalisation, scaling_of
-from mrpipe.networks.training import hold_out, in_parallel, initial_parameters
+from mrpipe.networks.training import in_parallel, initial_parameters
 
 Crossings = Callable[[Mapping[Candidate, float]], list[Candidate]]
 """Errors of the candidates screened so far -> further candidates."""

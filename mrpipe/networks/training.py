@@ -12,12 +12,13 @@ import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-from mrpipe.artifacts import FloatArray, IntArray, Progress, no_progress
-from mrpipe.networks.assembly import History, Samples, samples
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.networks.assembly import History
+from mrpipe.networks.held_out import TrainingData, training_data
 from mrpipe.networks.levenberg_marquardt import FitResult, Method, StoppingRules, fit
-from mrpipe.networks.network import FeatureSpec, Network
+from mrpipe.networks.network import FeatureSpec, Network, averaged
 from mrpipe.networks.problem import Problem, pack, unpack
-from mrpipe.networks.scaling import Normalisation, Scaling, scaling_of
+from mrpipe.networks.scaling import Normalisation
 
 HELD_OUT_ROWS = 10000
 """Rows of the held-out records on which early stopping looks while a subsample is fitted."""
@@ -41,6 +42,11 @@ class TrainingOptions:
         See :mod:`mrpipe.networks.levenberg_marquardt`; `rules.iterations` is the limit of both phases together.
     subsample_rows, subsample_iterations, iterations
         Rows and iterations of the first phase, iterations of the second.
+    refined_rows, refine_on
+        Rows of the second phase (None: all), and whether it too is stopped by the held-out records (`fitted`) or learns
+        them (`every`): they have chosen between the starts by then, and a record left out is a condition not learned.
+    averaged
+        How many of the refined starts, the best, are averaged: one network that holds them side by side.
     initial
         `random` (uniform within +-0.5, thesis 2.3.3) or `perceptron` (scikit-learn's MLPRegressor with lbfgs).
     normalisation, whitened
@@ -60,6 +66,9 @@ class TrainingOptions:
     subsample_rows: int = 20000
     subsample_iterations: int = 150
     iterations: int = 50
+    refined_rows: int | None = None
+    refine_on: Literal["fitted", "every"] = "fitted"
+    averaged: int = 1
     initial: Literal["random", "perceptron"] = "random"
     normalisation: Normalisation = "maximum"
     whitened: bool = True
@@ -100,7 +109,7 @@ class Trained:
     Attributes
     ----------
     network
-        The best on the held-out records.
+        The best on the held-out records, or the average of some.
     starts
         One entry a start.
     held_out
@@ -117,93 +126,6 @@ class Trained:
     path: FloatArray
     iterations: int
     seconds: float
-
-
-@dataclass(frozen=True)
-class TrainingData:
-    """Normalised rows for fitting, and of the held-out records for stopping.
-
-    Attributes
-    ----------
-    fit_rows, held_rows
-        Feature rows and targets, SI.
-    scaling
-        Their normalisation, from all training records.
-    held_out
-        Names of the held-out records.
-    """
-
-    spec: FeatureSpec
-    fit_rows: Samples
-    held_rows: Samples
-    scaling: Scaling
-    held_out: tuple[str, ...]
-
-    def problem(
-        self, layers: tuple[int, ...], biases: bool, rows: IntArray | None = None, *, held: bool = False
-    ) -> Problem:
-        """Return the least-squares problem of some of the rows (all where `rows` is None)."""
-        source = self.held_rows if held else self.fit_rows
-        features = source.features if rows is None else source.features[rows]
-        target = source.target if rows is None else source.target[rows]
-        return Problem(self.scaling.inputs(features), self.scaling.target(target), layers, biases)
-
-    def layers(self, hidden: tuple[int, ...]) -> tuple[int, ...]:
-        """Return all layers of a network of these data."""
-        return (self.spec.width, *hidden, 1)
-
-    def relative(self, mean_square: float, *, held: bool = False) -> float:
-        """Turn a mean squared normalised error into RMS error over RMS of the target.
-
-        Where the held-out records have no drive at all, the fitted ones say what the target's size is.
-        """
-        target = self.held_rows.target if held else self.fit_rows.target
-        size = float(np.sqrt(np.mean(target**2))) if len(target) else float("nan")
-        size = size or float(np.sqrt(np.mean(self.fit_rows.target**2))) or 1.0
-        return float(np.sqrt(mean_square)) * self.scaling.output_scale / size
-
-
-def hold_out(history: History, share: float, rng: np.random.Generator) -> tuple[History, History]:
-    """Split a history by record into one for fitting and one for stopping.
-
-    The records are ranked by RMS force and one is drawn from each group of neighbours, so that the held-out ones span
-    the forces as the others do (14 of 95 drawn blindly misjudged networks by a third). A history of fewer than five
-    records is cut within: the last part of each record is held out, and no window of past values straddles the cut.
-    """
-    count = len(history.names)
-    if share <= 0.0:
-        return history, history.select([])
-    if count >= 5:
-        sizes = [float(np.sqrt(np.mean(history.record(index, "force") ** 2))) for index in range(count)]
-        groups = np.array_split(np.argsort(sizes, kind="stable"), max(1, round(share * count)))
-        held = sorted(int(rng.choice(group)) for group in groups)
-        return history.select([index for index in range(count) if index not in held]), history.select(held)
-    return _part(history, 0.0, 1.0 - share), _part(history, 1.0 - share, 1.0)
-
-
-def _part(history: History, first: float, last: float) -> History:
-    lengths = np.diff(history.starts)
-    ranges = [
-        np.arange(start + round(first * length), start + round(last * length))
-        for start, length in zip(history.starts[:-1], lengths, strict=True)
-    ]
-    places = np.concatenate([np.zeros(0, dtype=np.int64), *ranges]).astype(np.int64)
-    return replace(
-        history,
-        channels={name: values[places] for name, values in history.channels.items()},
-        starts=np.cumsum([0, *(len(part) for part in ranges)], dtype=np.int64),
-    )
-
-
-def training_data(
-    history: History, spec: FeatureSpec, options: TrainingOptions, rng: np.random.Generator
-) -> TrainingData:
-    """Split the history by record, build feature rows and normalise them."""
-    fit_history, held_history = hold_out(history, options.held_out_share, rng)
-    fit_rows = samples(fit_history, spec)
-    every = samples(history, spec)
-    scaling = scaling_of(every.features, every.target, spec, options.normalisation, whitened=options.whitened)
-    return TrainingData(spec, fit_rows, samples(held_history, spec), scaling, held_history.names)
 
 
 def initial_parameters(
@@ -295,7 +217,9 @@ def train(
         Told how far it is.
     """
     began = time.perf_counter()
-    data = training_data(history, spec, options, rng)
+    data = training_data(
+        history, spec, options.held_out_share, rng, normalisation=options.normalisation, whitened=options.whitened
+    )
     layers = data.layers(options.hidden)
     rows = np.sort(rng.permutation(len(data.fit_rows.target))[: options.subsample_rows])
     seeds = rng.spawn(options.starts)
@@ -315,8 +239,7 @@ def train(
     chosen = [int(index) for index in order[: max(1, options.refined_starts)]]
     late: list[tuple[FitResult, float]] = []
     if options.iterations > 0:
-        whole = replace(data.problem(layers, options.biases), weight_decay=options.weight_decay)
-        held = data.problem(layers, options.biases, held=True) if len(data.held_rows.target) else None
+        whole, held = _second_phase(data, layers, options, rng)
 
         def second(place: int) -> tuple[FitResult, float]:
             started = time.perf_counter()
@@ -331,6 +254,20 @@ def train(
     return _finish(data, options, early, chosen, late, time.perf_counter() - began)
 
 
+def _second_phase(
+    data: TrainingData, layers: tuple[int, ...], options: TrainingOptions, rng: np.random.Generator
+) -> tuple[Problem, Problem | None]:
+    """Return what the second phase fits, and what stops it."""
+    learns = options.refine_on == "every"
+    available = len((data.every_row if learns else data.fit_rows).target)
+    rows = None
+    if options.refined_rows is not None and options.refined_rows < available:
+        rows = np.sort(rng.permutation(available)[: options.refined_rows])
+    whole = data.problem(layers, options.biases, rows, part="every" if learns else "fit")
+    held = None if learns or not len(data.held_rows.target) else data.problem(layers, options.biases, part="held")
+    return replace(whole, weight_decay=options.weight_decay), held
+
+
 def _limited(rules: StoppingRules, iterations: int) -> StoppingRules:
     return replace(rules, iterations=min(rules.iterations, iterations))
 
@@ -339,7 +276,7 @@ def _monitor(data: TrainingData, layers: tuple[int, ...], biases: bool, rng: np.
     available = len(data.held_rows.target)
     if not available:
         return None
-    return data.problem(layers, biases, np.sort(rng.permutation(available)[:HELD_OUT_ROWS]), held=True)
+    return data.problem(layers, biases, np.sort(rng.permutation(available)[:HELD_OUT_ROWS]), part="held")
 
 
 def _judged(outcome: FitResult) -> float:
@@ -372,10 +309,12 @@ def _finish(
             )
         )
     finals = [refined[index][0] if index in refined else early[index][0] for index in chosen]
-    best = int(np.argmin([_judged(outcome) for outcome in finals]))
+    order = np.argsort([_judged(outcome) for outcome in finals], kind="stable")
+    best = int(order[0])
+    taken = [finals[int(place)] for place in order[: options.averaged]]
     path = list(early[chosen[best]][0].path) + (list(finals[best].path[1:]) if refined else [])
     return Trained(
-        network=to_network(finals[best].parameters, data, options.hidden, options.biases),
+        network=averaged([to_network(outcome.parameters, data, options.hidden, options.biases) for outcome in taken]),
         starts=tuple(starts),
         held_out=data.held_out,
         path=np.array([data.relative(value) for value in path]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.networks import FeatureSpec, Network, lagged, read_network, write_network
+from mrpipe.networks.network import averaged
 
 
 def random_network(sizes: tuple[int, ...], seed: int = 0, *, biases: bool = True) -> Network:
@@ -60,6 +62,28 @@ def test_steady_network_is_the_network_whose_past_equals_the_present() -> None:
     np.testing.assert_allclose(steady.predict(present), network.predict(np.repeat(present, 4, axis=1)), rtol=1e-10)
     assert steady.outside_training_range(np.array([[0.0, 0.9], [0.0, 1.5]])) == 0.5
     assert steady.steady() is steady
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("sizes", [(8, 6, 6, 1), (4, 5, 1), (4, 1)])
+def test_an_averaged_network_gives_the_mean_of_its_members(sizes: tuple[int, ...]) -> None:
+    first = random_network(sizes, 1)
+    others = [random_network(sizes, seed) for seed in (2, 3)]
+    members = [first, *(replace(first, weights=item.weights, biases=item.biases) for item in others)]
+    network = averaged(members)
+    rows = np.random.default_rng(4).normal(size=(30, sizes[0]))
+    np.testing.assert_allclose(
+        network.predict(rows), np.mean([item.predict(rows) for item in members], axis=0), rtol=1e-10
+    )
+    assert network.layers == (sizes[0], *(3 * count for count in sizes[1:-1]), 1)
+    assert averaged([first]) is first
+
+
+@pytest.mark.property
+def test_zeros_between_members_are_no_parameters() -> None:
+    one = random_network((8, 6, 6, 1), 1, biases=False)
+    two = random_network((8, 6, 6, 1), 2, biases=False)
+    assert averaged([one, replace(one, weights=two.weights)]).parameters == 2 * one.parameters
 
 
 @pytest.mark.property

@@ -9,9 +9,10 @@ import pytest
 
 from mrpipe.networks.assembly import samples
 from mrpipe.networks.evaluation import judge
+from mrpipe.networks.held_out import hold_out, training_data
 from mrpipe.networks.network import FeatureSpec
 from mrpipe.networks.scaling import channel_blocks, scaling_of
-from mrpipe.networks.training import TrainingOptions, hold_out, initial_parameters, to_network, train, training_data
+from mrpipe.networks.training import TrainingOptions, initial_parameters, to_network, train
 from tests.networks.rig import bench_history, bench_test
 
 FORWARD = FeatureSpec(("velocity", "drive"), 3, False, 200.0, "force")
@@ -60,7 +61,7 @@ def test_normalisation_does_what_it_says(normalisation: str) -> None:
 
 @pytest.mark.property
 def test_whitened_inputs_are_uncorrelated_and_the_basis_folds_away() -> None:
-    data = training_data(bench_history(), FORWARD, QUICK, np.random.default_rng(0))
+    data = training_data(bench_history(), FORWARD, QUICK.held_out_share, np.random.default_rng(0))
     every = samples(bench_history(), FORWARD)
     inputs = data.scaling.inputs(every.features)
     moments = inputs @ inputs.T / inputs.shape[1]
@@ -118,12 +119,35 @@ def test_training_without_held_out_records_or_second_phase() -> None:
     assert trained.path[-1] < 0.5 * trained.path[0]
 
 
+@pytest.mark.property
+def test_the_second_phase_can_learn_the_held_out_records_and_average_starts() -> None:
+    history = bench_history()
+    options = replace(QUICK, biases=True, refine_on="every", refined_rows=1500)
+    one = train(history, INVERSE, options, np.random.default_rng(7))
+    two = train(history, INVERSE, replace(options, averaged=2), np.random.default_rng(7))
+    # the held-out records chose between the starts all the same
+    assert one.held_out and one.held_out == two.held_out
+    assert [start.held_out_nrmse for start in one.starts] == [start.held_out_nrmse for start in two.starts]
+    assert one.network.architecture == "8-6-6-1" and two.network.architecture == "8-12-12-1"
+    held = hold_out(history, options.held_out_share, np.random.default_rng(7))[1]
+    assert held.names == one.held_out
+    rows = samples(held, INVERSE)
+    errors = {
+        name: float(np.sqrt(np.mean((trained.network.predict(rows.features) - rows.target) ** 2)))
+        for name, trained in {
+            "every": one,
+            "fitted": train(history, INVERSE, replace(QUICK, biases=True), np.random.default_rng(7)),
+        }.items()
+    }
+    assert errors["every"] < errors["fitted"]
+
+
 @pytest.mark.oracle
 @pytest.mark.parametrize("biases", [False, True])
 def test_a_start_from_scikit_learn_is_its_network(biases: bool) -> None:
     from sklearn.neural_network import MLPRegressor
 
-    data = training_data(bench_history(), FORWARD, QUICK, np.random.default_rng(0))
+    data = training_data(bench_history(), FORWARD, QUICK.held_out_share, np.random.default_rng(0))
     problem = data.problem((8, 6, 6, 1), biases, np.arange(800))
     parameters = initial_parameters(problem, np.random.default_rng(7), "perceptron")
     assert len(parameters) == problem.size

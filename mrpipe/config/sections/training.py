@@ -35,6 +35,18 @@ class TrainingSettings(Section):
     subsample_rows: int = Field(20000, ge=100, description="Rows of the first phase.")
     subsample_iterations: int = Field(150, ge=0, description="Iterations of the first phase at most.")
     iterations: int = Field(60, ge=0, description="Iterations with all rows at most (0: only the first phase).")
+    refined_rows: PositiveInt | None = Field(None, description="Rows of the second phase at most; null: all of them.")
+    refine_on: Literal["fitted", "every"] = Field(
+        "fitted",
+        description="`fitted`: the held-out records stop the second phase too. `every`: it learns them as well, for "
+        "`iterations` steps; once they have chosen between the starts, a record left out is a condition not learned.",
+    )
+    averaged: int = Field(
+        1,
+        ge=1,
+        description="How many of the refined starts, the best, are averaged into one network that holds them side by "
+        "side; what single trainings got wrong by chance cancels in part.",
+    )
     held_out_share: float = Field(
         0.15, ge=0.0, lt=0.9, description="Share of the training records held out for early stopping and choice."
     )
