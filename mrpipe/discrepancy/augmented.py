@@ -246,10 +246,11 @@ def retrain_inverse(
     rate = old.features.sampling_rate_hz
     history = simulated_history(chain, training, drive_limit, rate, rng)
     options = options or TrainingOptions(
-        hidden=old.layers[1:-1],
+        hidden=old.hidden_of_members,
         biases=old.has_biases,
         starts=3,
-        refined_starts=1,
+        refined_starts=min(3, old.members),
+        averaged=min(3, old.members),
         subsample_rows=12_000,
         subsample_iterations=100,
         iterations=20,

@@ -130,6 +130,8 @@ class Network:
         Range of each feature in the training set, shape (features,); empty where unknown.
     has_biases
         Whether the biases were trained (the thesis has none).
+    members
+        How many networks stand side by side in this one, see :func:`averaged`.
     """
 
     weights: tuple[FloatArray, ...]
@@ -142,11 +144,17 @@ class Network:
     feature_minimum: FloatArray = field(default_factory=lambda: np.zeros(0))
     feature_maximum: FloatArray = field(default_factory=lambda: np.zeros(0))
     has_biases: bool = True
+    members: int = 1
 
     @property
     def layers(self) -> tuple[int, ...]:
         """Neurons of every layer, input and output included."""
         return (self.weights[0].shape[1], *(len(matrix) for matrix in self.weights))
+
+    @property
+    def hidden_of_members(self) -> tuple[int, ...]:
+        """Neurons of the hidden layers of each member."""
+        return tuple(count // self.members for count in self.layers[1:-1])
 
     @property
     def architecture(self) -> str:
@@ -236,6 +244,7 @@ def averaged(networks: Sequence[Network]) -> Network:
         first,
         weights=(*inner, last),
         biases=(*biases, np.mean([network.biases[-1] for network in networks], axis=0)),
+        members=len(networks),
     )
 
 
@@ -254,7 +263,11 @@ def write_network(artifact: ArtifactWriter, group: str, network: Network) -> Non
         artifact.put(f"{group}/{name}", getattr(network, name), unit="SI of the target")
     artifact.put_json(f"{group}/features", spec_to_json(network.features))
     artifact.attributes(
-        group, architecture=network.architecture, layers=len(network.weights), has_biases=network.has_biases
+        group,
+        architecture=network.architecture,
+        layers=len(network.weights),
+        has_biases=network.has_biases,
+        members=network.members,
     )
 
 
@@ -273,4 +286,5 @@ def read_network(artifact: Artifact, group: str) -> Network:
         feature_minimum=artifact.array(f"{group}/feature_minimum"),
         feature_maximum=artifact.array(f"{group}/feature_maximum"),
         has_biases=bool(notes["has_biases"]),
+        members=int(notes.get("members", 1)),
     )

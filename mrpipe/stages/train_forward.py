@@ -10,7 +10,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 if TYPE_CHECKING:
     from mrpipe.networks.assembly import History
     from mrpipe.networks.evaluation import Judgement
-    from mrpipe.networks.network import FeatureSpec
+    from mrpipe.networks.network import FeatureSpec, Network
     from mrpipe.networks.training import Trained, TrainingOptions
 
 THESIS_HIDDEN = (6, 6)
@@ -71,6 +71,7 @@ def summary_of(trained: Trained, judged: Judgement) -> dict[str, Any]:
     held_out = [start.held_out_nrmse for start in trained.starts]
     return {
         "architecture": network.architecture,
+        "members": network.members,
         "training_nrmse": judged.training.nrmse,
         "validation_nrmse": judged.pooled.nrmse,
         "validation_fit_percent": judged.pooled.fit_percent,
@@ -104,7 +105,8 @@ def report_training(context: StageContext, trained: Trained, judged: Judgement, 
     spread = [start.held_out_nrmse for start in trained.starts]
     context.report.text(
         f"Network {network.architecture} ({network.parameters} parameters, {'with' if network.has_biases else 'no'} "
-        f"biases), the best of {len(trained.starts)} starts on {len(trained.held_out)} held-out training records. "
+        f"biases), {_taken(network)} of {len(trained.starts)} starts on {len(trained.held_out)} held-out training "
+        "records. "
         f"On the validation tests: NRMSE {pooled.nrmse:.4f}, fit {pooled.fit_percent:.1f} %, R2 {pooled.r2:.4f}; "
         f"a linear model of the same inputs reaches {judged.linear.nrmse:.3f}."
     )
@@ -138,6 +140,13 @@ def report_training(context: StageContext, trained: Trained, judged: Judgement, 
         context.warn(
             f"{100 * judged.outside_training_range:.1f} % of the validation samples lie outside the training range"
         )
+
+
+def _taken(network: Network) -> str:
+    if network.members == 1:
+        return "the best"
+    inner = "-".join(str(count) for count in network.hidden_of_members)
+    return f"the mean of {network.members} networks of {inner} that stand side by side in it, the best"
 
 
 def histories_of(context: StageContext) -> tuple[History, History]:

@@ -76,6 +76,7 @@ def test_an_averaged_network_gives_the_mean_of_its_members(sizes: tuple[int, ...
         network.predict(rows), np.mean([item.predict(rows) for item in members], axis=0), rtol=1e-10
     )
     assert network.layers == (sizes[0], *(3 * count for count in sizes[1:-1]), 1)
+    assert network.hidden_of_members == sizes[1:-1] and network.members == 3
     assert averaged([first]) is first
 
 
@@ -107,11 +108,11 @@ def test_labels_name_the_columns_in_their_order() -> None:
 
 @pytest.mark.property
 def test_a_network_comes_back_bit_for_bit(tmp_path: Path) -> None:
-    network = random_network((8, 6, 6, 1), seed=3)
+    network = averaged([random_network((8, 6, 6, 1), seed=3)] * 2)
     with ArtifactWriter.create(tmp_path / "net.h5", Provenance("train-forward")) as artifact:
         write_network(artifact, "network", network)
     again = read_network(Artifact(tmp_path / "net.h5"), "network")
-    assert again.features == network.features
+    assert again.features == network.features and again.members == network.members == 2
     features = np.random.default_rng(1).normal(size=(50, 8))
     assert again.predict(features).tobytes() == network.predict(features).tobytes()
     for old, new in zip(network.weights + network.biases, again.weights + again.biases, strict=True):
