@@ -40,9 +40,9 @@ class TrainInverseSettings(TrainingSettings):
         "without them it is bound to zero at zero force, where the damper holds its residual force.",
     )
     starts: int = Field(6, ge=1, description="Random starts; the best on held-out records go on.")
-    refined_starts: int = Field(3, ge=1, description="How many of the starts go on.")
+    refined_starts: int = Field(4, ge=1, description="How many of the starts go on.")
     averaged: int = Field(
-        3,
+        4,
         ge=1,
         description="How many of the refined starts, the best, are averaged into one network that holds them side by "
         "side; what single trainings got wrong by chance cancels in part.",
@@ -55,7 +55,7 @@ class TrainInverseSettings(TrainingSettings):
         description="`every`: the second phase learns the held-out records too, for `iterations` steps; once they have "
         "chosen between the starts, a record left out is a condition not learned. `fitted`: they stop it.",
     )
-    iterations: int = Field(120, ge=0, description="Iterations of the second phase at most (0: only the first phase).")
+    iterations: int = Field(160, ge=0, description="Iterations of the second phase at most (0: only the first phase).")
     held_out_failures: int = Field(
         30,
         ge=1,
