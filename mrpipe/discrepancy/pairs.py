@@ -19,6 +19,18 @@ from mrpipe.effects.yielding_parts import OWN_DASHPOT
 GAPS = (0.01, 0.03, 0.08)
 """Starts of the gap, in strokes."""
 
+ROUNDED_STARTS = ((0.0, 40.0), (0.0, 200.0), (0.003, 40.0), (0.003, 200.0))
+"""Starts of a rounded yield: yield displacement of the hysteresis beside it (0: as it is) and spring rate, in strokes.
+
+Which of the two parts, hysteresis or dashpot, takes the elastic path of a reversal makes two optima far apart.
+"""
+
+PLAY_STARTS = ((0.003, 40.0), (0.04, 60.0), (0.003, 400.0))
+"""The same beside a play, which may itself be what looked soft."""
+
+DASHPOT_SPEED = 0.12
+"""Start of the dashpot's speed, in largest speeds."""
+
 LEAST_GAIN = 0.15
 """The pair must leave less than all that was chosen one by one, by this share."""
 
@@ -34,18 +46,21 @@ def with_play(selection: Selection, effects: Mapping[str, Effect]) -> Selection:
         The effects considered, with the yielding parts among the forms of `rate-dependent-yield`.
     """
     rate, play = effects.get("rate-dependent-yield"), effects.get("backlash")
-    present = {term.effect.name for term in selection.chosen.problem.terms}
     of_base = {term.effect.name for term in selection.base.problem.terms}
-    if rate is None or play is None or play.name in present or rate.name in of_base:
+    if rate is None or play is None or {rate.name, play.name} & of_base:
         return selection
     small = draft(selection.base)
+    near = min(rounded_drafts(small, rate), key=lambda item: item.cost)
     trials = [
-        _trial(small, (Term(rate, OWN_DASHPOT), Term(play, form)), gap)
+        _trial(small, (Term(rate, OWN_DASHPOT), Term(play, form)), gap * small.problem.scales.stroke, start)
         for form in play.forms
         if form.name in ("held", "free")
         for gap in GAPS
+        for start in (near, *(_rounded_start(small, rate, *start) for start in PLAY_STARTS))
     ]
-    best = min(trials, key=lambda item: item.cost)
+    trials.sort(key=lambda item: item.cost)
+    drafts = [fit(item.problem, item.theta, iterations=10) for item in trials[:4]]
+    best = min(drafts, key=lambda item: item.cost)
     pair = fit(replace(selection.base.problem, terms=best.problem.terms), best.theta, iterations=10)
     alone = fit(replace(pair.problem, terms=pair.problem.terms[:-1]), pair.theta[:-1], iterations=8)
     least = min(selection.chosen.chi_square, alone.chi_square)
@@ -58,9 +73,32 @@ def with_play(selection: Selection, effects: Mapping[str, Effect]) -> Selection:
     return replace(selection, rounds=(*selection.rounds[:1], second), chosen=pair, proven=2)
 
 
-def _trial(small: Fit, terms: tuple[Term, ...], gap: float) -> Fit:
+def rounded_drafts(small: Fit, rate: Effect) -> list[Fit]:
+    """Return fits of a base with a yielding part of its own, from several starts.
+
+    Parameters
+    ----------
+    small
+        Base form on a share of its tests.
+    rate
+        The effect `rate-dependent-yield`.
+    """
+    starts = [_rounded_start(small, rate, *start) for start in ROUNDED_STARTS]
+    return [fit(item.problem, item.theta, iterations=8) for item in starts]
+
+
+def _rounded_start(small: Fit, rate: Effect, yield_share: float, spring: float) -> Fit:
+    """Return the base with the yielding part at a start; of the fit only problem and values count."""
+    scales = small.problem.scales
+    values = dict(small.base_values)
+    if yield_share:
+        values |= {"yield_displacement": yield_share * scales.stroke, "gamma_share": 1.0}
+    own = {"spring_rate": spring / scales.stroke, "velocity_scale": DASHPOT_SPEED * scales.speed}
+    problem = replace(small.problem, terms=(*small.problem.terms, Term(rate, OWN_DASHPOT)))
+    return replace(small, problem=problem, theta=start_of(problem, values, [*small.term_values, own]))
+
+
+def _trial(small: Fit, terms: tuple[Term, ...], gap: float, start: Fit) -> Fit:
     problem: Problem = replace(small.problem, terms=(*small.problem.terms, *terms))
-    width = {"gap": gap * problem.scales.stroke}
-    declared = small.term_values
-    start = start_of(problem, {}, [*declared, {}, width])
-    return fit(problem, start, iterations=8)
+    width = problem.encode([*start.problem.decode(start.theta), gap])
+    return fit(problem, width, iterations=4, tolerance=5e-3)

@@ -171,11 +171,13 @@ def candidates_after(
     *,
     refits: int,
     jobs: int,
+    drafted: Callable[[Fit], list[Fit]] | None = None,
     progress: Progress = no_progress,
 ) -> list[Candidate]:
     """Screen all terms after a fit and refit the families that promise most; best first.
 
-    Forms are tried on a share of the tests; those that may win are fitted on all of them.
+    Forms are tried on a share of the tests; those that may win are fitted on all of them. `drafted` adds drafts of
+    its own, made of the fit on that share.
     """
     present = {term.effect.name for term in before.problem.terms}
     small = draft(before)
@@ -188,6 +190,8 @@ def candidates_after(
     # the families in front get all their forms: a name is judged by the form that suits it best
     front = sorted(chosen, key=lambda name: min(item.cost for item in drafts if _name(item) == name))[:3]
     drafts += _each(lambda item: refit(small, item), [item for name in front for item in families[name][2:]], jobs)
+    if drafted is not None:
+        drafts += [item for item in drafted(small) if _name(item) in chosen]
     progress(0.7, f"{len(drafts)} forms tried")
     own = {name: sorted((item for item in drafts if _name(item) == name), key=_penalised) for name in chosen}
     least = min(items[0].chi_square for items in own.values())
@@ -280,6 +284,7 @@ def forward_selection(
     refits: int = 8,
     thresholds: Thresholds = Thresholds(),
     jobs: int = 1,
+    drafted: Callable[[Fit], list[Fit]] | None = None,
     progress: Progress = no_progress,
 ) -> Selection:
     """Add effects one after another while each recovers a fair share.
@@ -296,7 +301,10 @@ def forward_selection(
         little = chosen.chi_square - noise < min(FURTHER * excess, noise)
         if rounds and little and _nothing_more(chosen, terms, excess, jobs):
             break
-        found = candidates_after(chosen, base, noise, terms, refits=refits, jobs=jobs, progress=progress)
+        found = candidates_after(
+            chosen, base, noise, terms, refits=refits, jobs=jobs, progress=progress,
+            drafted=None if rounds else drafted,
+        )  # fmt: skip
         able = [item for item in found if admissible(item.fit)]
         if rounds and thresholds.lead > 1.0:
             # beside other effects a parameter that runs to its bound mends a form, and badly where motions are other

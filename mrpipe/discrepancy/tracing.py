@@ -23,7 +23,7 @@ from mrpipe.discrepancy.crossvalidation import Gain, gain_of, intervals, left_ou
 from mrpipe.discrepancy.engine import Fit
 from mrpipe.discrepancy.nuisances import observation_window, with_lag_apart
 from mrpipe.discrepancy.offsets import offset_between_tests
-from mrpipe.discrepancy.pairs import with_play
+from mrpipe.discrepancy.pairs import rounded_drafts, with_play
 from mrpipe.discrepancy.problem import Term
 from mrpipe.discrepancy.recordings import (
     MOST_JUDGED,
@@ -145,6 +145,7 @@ def _select(
             refits=options.refits,
             thresholds=REAL_THRESHOLDS if floor > 0.0 else Thresholds(),
             jobs=jobs,
+            drafted=_drafted(baseline.fit, effects) if floor > 0.0 else None,
         )
         selection = select(baseline.fit)
         if floor == 0.0:
@@ -163,6 +164,13 @@ def _select(
         used = chosen.problem.root_weight > 0.0
         left = chosen.residual[used] / chosen.problem.root_weight[used]
         floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
+
+
+def _drafted(base: Fit, effects: Mapping[str, Effect]) -> Callable[[Fit], list[Fit]] | None:
+    rate = effects.get("rate-dependent-yield")
+    if rate is None or any(term.effect.name == rate.name for term in base.problem.terms):
+        return None
+    return partial(rounded_drafts, rate=rate)
 
 
 def _in_better_form(selection: Selection, select: Callable[[Fit], Selection], options: TracingOptions) -> Selection:

@@ -58,11 +58,14 @@ def force_of(x: np.ndarray, v: np.ndarray, a: np.ndarray, i: np.ndarray, t: np.n
         memory = np.maximum.accumulate(u)
         u = u + 0.12 * np.sqrt(np.maximum(memory - u, 0.0) * 3.0)
     rod = play(x, 1.2e-4) if "backlash" in planted else x
-    moved = np.gradient(rod, dt) if "backlash" in planted else v
+    rod = play(x, 6e-4) if "wide-backlash" in planted else rod
+    moved = v if rod is x else np.gradient(rod, dt)
     z = dahl(rod, 3.7e-4) if "dahl" in planted else hysteresis(rod, 3.7e-4)
     yield_force = 20.0 + 8.0 * u + 14.0 * u**2
     if "pinching" in planted:
         yield_force = yield_force * (1.0 - 0.25 / np.cosh(x / 2.2e-3))
+    if "rounded" in planted:
+        z = 0.2 * z + 0.8 * np.tanh(moved / 0.008)
     force = yield_force * z + (50.0 + 75.0 * u) * moved
     if "accumulator" in planted:
         force = force + 1400.0 * x * (1.0 + 4.0 * x)

@@ -104,6 +104,16 @@ def test_offsets_of_tests_are_told_beside_an_unknown_rest() -> None:
     assert summary["unexplained"]["structured"]
 
 
+@pytest.mark.planted
+def test_play_beside_a_rounded_yield_comes_first() -> None:
+    options = TracingOptions(refits=2, bootstrap_draws=50, most_effects=2, model_error_share=0.1, fit_rate_hz=125.0)
+    library = {name: damper_effects()[name] for name in ("backlash", "rate-dependent-yield")}
+    tests = campaign("rounded+wide-backlash")[1:13:2] + campaign("rounded+wide-backlash")[11:13]
+    summary = trace_campaign(tests, library, [], options, rng=np.random.default_rng(1)).summary
+    assert [item["name"] for item in summary["effects"]] == ["backlash", "rate-dependent-yield"]
+    assert summary["effects"][0]["parameters"]["gap"]["value"] == pytest.approx(6e-4, rel=0.1)
+
+
 @pytest.mark.property
 def test_the_summary_has_what_the_contract_promises() -> None:
     summary = traced("none").summary
