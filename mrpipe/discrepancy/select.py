@@ -48,6 +48,9 @@ BETTER_OPTIMUM = 0.03
 """A fit that leaves less than another of the same terms by this share shows that the other had not arrived."""
 
 
+MAIN_PART = 0.2
+"""Of a form with corrections of either sign the main part must be at least this share of the largest of them."""
+
 _Item = TypeVar("_Item")
 
 
@@ -100,6 +103,12 @@ class Selection:
     def without_effects(self) -> Fit:
         """Return the fit that the rounds build on."""
         return self.base if self.ground is None else self.ground
+
+    @property
+    def proven_share(self) -> float:
+        """Share of the recoverable residual that the effects with a proven cause recover, without further terms."""
+        count = min(self.proven, len(self.rounds))
+        return self.rounds[count - 1][0].share if count else 0.0
 
     @property
     def recoverable(self) -> float:
@@ -243,10 +252,11 @@ def admissible(found: Fit) -> bool:
         if item.role in ("strength", "amplitude") and len(term.form.amplitudes) <= 1 and item.name in found.at_bound:
             return False
     amplitudes = term.form.amplitudes
-    corrected = len(amplitudes) > 1 and amplitudes[0].lower == 0.0 and all(item.lower < 0.0 for item in amplitudes[1:])
-    if corrected and values[amplitudes[0].name] <= 0.0:
+    if len(amplitudes) > 1 and amplitudes[0].lower == 0.0 and all(item.lower < 0.0 for item in amplitudes[1:]):
         # without the part of definite sign only its corrections are left: a spring of no stiffness is no spring
-        return False
+        main, *corrections = (abs(values[p.name]) / found.problem.scales.of(p.scale) for p in amplitudes)
+        if main <= MAIN_PART * max(corrections):
+            return False
     return any(values[item.name] != 0.0 for item in term.form.parameters if item.role != "shape")
 
 

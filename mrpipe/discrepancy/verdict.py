@@ -105,7 +105,7 @@ def unnamed_reason(selection: Selection, rules: Rules) -> str:
         return "the base form: a hysteresis with an exponent of its own explains what is missing, and no effect is"
     if not selection.rounds or selection.chosen is selection.base:
         return "no effect of the library changes the error"
-    if selection.share(selection.chosen) < rules.least_share:
+    if min(selection.share(selection.chosen), selection.proven_share) < rules.least_share:
         return "no effect of the library recovers enough of what is recoverable"
     return ""
 
