@@ -29,6 +29,9 @@ SEARCHED_S = 7.0
 
 STRONG_SHARE = 0.5
 
+LEAST_MOTION = 50.0
+"""A test whose rod moves less than so many times the noise of its motion tells nothing of the damper but that noise."""
+
 PIECES = 12
 """Closed-loop tests are cut into at least so many pieces."""
 
@@ -70,8 +73,25 @@ class BraceFinding:
 
 
 def prepared_loops(campaign: Campaign) -> list[PreparedTest]:
-    """Return closed-loop tests, given as a bench campaign, prepared as those of a bench are."""
-    return [item.test for item in prepare_campaign(campaign, PreparationOptions()).tests]
+    """Return closed-loop tests, given as a bench campaign, prepared as those of a bench are.
+
+    Tests whose rod hardly moves are left out where others are there to learn and to judge by.
+    """
+    noises = {
+        item.name: (
+            float(item.details.get("displacement_noise_m", 0.0)),
+            float(item.details.get("displacement_noise_band_hz", 0.0)),
+        )
+        for item in campaign.recordings
+    }
+    tests = [
+        replace(item.test, displacement_noise_m=noise, displacement_noise_band_hz=band)
+        for item in prepare_campaign(campaign, PreparationOptions()).tests
+        for noise, band in [noises.get(item.test.name, (0.0, 0.0))]
+    ]
+    moved = [test for test in tests if np.std(test.displacement_m) > LEAST_MOTION * test.displacement_noise_m]
+    whole = {test.role == "validation" for test in moved} == {True, False}
+    return moved if whole else tests
 
 
 def trace_damper(

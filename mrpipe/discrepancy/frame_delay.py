@@ -178,7 +178,7 @@ def _least(errors: Callable[[float], FloatArray], part: str, granted: float, lon
     values = np.stack([table[shift] for shift in shifts])
     own = shifts[np.argmin(values, axis=0)]
     lag = float(shifts[int(np.argmin(values.mean(axis=1)))])
-    before = float(values[shifts <= granted + LEAST_S + 1e-9].mean(axis=1).min())
+    before = float(values[shifts <= granted + 1e-9].mean(axis=1).min())
     spread = float(np.std(own)) / np.sqrt(len(own)) if len(own) > 1 else STEP_S
     half = max(2.0 * spread, STEP_S)
     return DelayFinding(

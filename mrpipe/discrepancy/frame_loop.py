@@ -12,9 +12,49 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.discrepancy.frame_delay import LoopSignals
 from mrpipe.discrepancy.frame_records import part_of
+from mrpipe.discrepancy.frame_spectra import noise_density
 
-CROSSOVER_HZ = 3.5
-"""Below it the laser tells the damper's motion, above it the accelerometer."""
+CROSSOVERS_HZ = (0.5, 15.0)
+"""Bounds of the frequency below which the laser tells the damper's motion, above which the accelerometer."""
+
+NOISE_ABOVE_SHARE = 0.25
+"""Share of the sampling rate above which noise is told."""
+
+
+LOWEST_HZ = 0.25
+"""Accelerometers alone tell no motion below it."""
+
+
+def crossover_of(recording: Recording) -> float:
+    """Return the frequency [Hz] above which floor 1's accelerometers tell its motion better than its laser."""
+    laser, relative = _densities(recording)
+    return float(np.clip((relative / max(laser, 1e-300)) ** 0.25 / (2.0 * np.pi), *CROSSOVERS_HZ))
+
+
+def motion_noise(recording: Recording) -> tuple[float, float]:
+    """Return standard deviation [m] and band [Hz] of the noise of :func:`damper_motion`.
+
+    Integrated accelerometers are noisy where the motion is and nowhere else, so that the motion itself does not tell.
+    Both are nought where one sensor alone tells the motion.
+    """
+    channels = recording.channels
+    if "damper_displacement" in channels or not {"floor_acceleration_1", "ground_acceleration"} <= set(channels):
+        return 0.0, 0.0
+    laser, relative = _densities(recording)
+    if "floor_displacement_1" not in channels:
+        return float(np.sqrt(relative / (3.0 * (2.0 * np.pi) ** 4 * LOWEST_HZ**3))), 2.0 * LOWEST_HZ
+    crossover = crossover_of(recording)
+    # of both, each weighed by the other's noise: the integral of laser / (1 + (f / crossover)^4)
+    return float(np.sqrt(laser * crossover * np.pi / np.sqrt(8.0))), crossover
+
+
+def _densities(recording: Recording) -> tuple[float, float]:
+    """Return the noise of floor 1's laser [m2/Hz] (nought without) and of its relative acceleration [(m/s2)^2/Hz]."""
+    channels, rate = recording.channels, recording.sampling_rate_hz
+    above = NOISE_ABOVE_SHARE * rate
+    laser = channels.get("floor_displacement_1")
+    relative = channels["floor_acceleration_1"] - channels["ground_acceleration"]
+    return 0.0 if laser is None else noise_density(laser, rate, above), noise_density(relative, rate, above)
 
 
 def damper_motion(recording: Recording, part: slice) -> FloatArray | None:
@@ -35,7 +75,7 @@ def damper_motion(recording: Recording, part: slice) -> FloatArray | None:
     longer = np.concatenate([2.0 * stack[0] - stack[:0:-1], stack, 2.0 * stack[-1] - stack[-2::-1]])
     lines, frequencies = fft.rfft(longer, axis=0), fft.rfftfreq(len(longer), 1.0 / rate)
     omega = 2.0 * np.pi * np.maximum(frequencies, 1e-9)
-    corner = 0.25 if laser is None else CROSSOVER_HZ
+    corner = LOWEST_HZ if laser is None else crossover_of(recording)
     share = (frequencies / corner) ** 4 / (1.0 + (frequencies / corner) ** 4)
     mixed = share * (-lines[:, 0] / omega**2) + (1.0 - share) * lines[:, 1]
     return np.asarray(fft.irfft(mixed, len(longer))[size - 1 : 2 * size - 1])
@@ -57,6 +97,8 @@ def bench_of(loops: Sequence[Recording], directory: Path, name: str, drive_unit:
                 part
             ]
         time = item.time_s[part]
+        noise, band = motion_noise(item)
+        details = {**item.details, "displacement_noise_m": noise, "displacement_noise_band_hz": band}
         found.append(
             Recording(
                 item.name,
@@ -66,7 +108,7 @@ def bench_of(loops: Sequence[Recording], directory: Path, name: str, drive_unit:
                 channels,
                 ((0, len(time)),),
                 "",
-                item.details,
+                details,
             )
         )
     if len(found) < 2 or not any(item.role == "validation" for item in found):

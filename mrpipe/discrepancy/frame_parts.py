@@ -12,6 +12,7 @@ from mrpipe.artifacts import Progress
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.discrepancy.frame_damper import BraceFinding, find_brace, prepared_loops, trace_damper
 from mrpipe.discrepancy.frame_delay import DelayFinding, drive_lag, law_lag
+from mrpipe.discrepancy.frame_groups import OF_FLOOR
 from mrpipe.discrepancy.frame_loop import bench_of, loop_signals
 from mrpipe.discrepancy.summary import TracingOptions
 from mrpipe.effects.contract import Effect
@@ -143,9 +144,19 @@ def damper_part(
         options = replace(options, model_error_share=max(options.model_error_share, found.nrmse_after), most_effects=1)
     summary = dict(trace_damper(tests, effects, declared, options, rng=rng, jobs=jobs, progress=progress).summary)
     summary["quantity"] = DAMPER_QUANTITY
+    if not summary["effects"] and summary["before"]["nrmse"] <= (1.0 + OF_FLOOR) * summary["noise_floor_nrmse"]:
+        _nothing_that_matters(summary)
     if brace is not None and found is not None:
         _with_brace(summary, found, brace, options)
     return Part("damper", summary)
+
+
+def _nothing_that_matters(summary: dict[str, Any]) -> None:
+    """Say of a damper part that it lacks nothing: its error is that of noise, to what clocks and held commands make."""
+    if summary["residual"]["structured"]:
+        summary["verdict"] = "what stands out of the noise is too little to matter: nothing is missing"
+    summary["residual"] = {**summary["residual"], "structured": False}
+    summary["unexplained"] = {"structured": False, "share_of_residual": 0.0, "depends_on": []}
 
 
 def _with_brace(

@@ -63,6 +63,8 @@ class Recordings:
         Period of the motion, shape (tests,); 0 where it is not periodic.
     cutoff_hz
         Cut-off of the displacement, shape (tests,).
+    noise_band_hz
+        Band of the displacement's noise, shape (tests,): up to the cut-off where no other is known.
     """
 
     displacement: FloatArray
@@ -81,6 +83,7 @@ class Recordings:
     force_offset: FloatArray
     period_s: FloatArray
     cutoff_hz: FloatArray
+    noise_band_hz: FloatArray
 
     @property
     def tests(self) -> int:
@@ -126,6 +129,7 @@ class Recordings:
             force_offset=self.force_offset[chosen],
             period_s=self.period_s[chosen],
             cutoff_hz=self.cutoff_hz[chosen],
+            noise_band_hz=self.noise_band_hz[chosen],
         )
 
     def scales(self) -> EffectScales:
@@ -210,6 +214,7 @@ def record_tests(
         force_offset=numbers("force_offset"),
         period_s=numbers("period_s"),
         cutoff_hz=numbers("cutoff_hz"),
+        noise_band_hz=numbers("noise_band_hz"),
     )
 
 
@@ -268,8 +273,10 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: floa
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(smooth)))])[chosen]
     edge = chosen / rate
     used = (path >= SETTLING_SHARE * np.ptp(smooth)) & (edge > 1.0 / cutoff) & (length / rate - edge > 1.0 / cutoff)
-    band = min(1.0, 2.0 * cutoff / rate)
-    noise = noise_level(test.displacement_raw_m, rate)
+    band = min(cutoff, test.displacement_noise_band_hz or cutoff)
+    noise = test.displacement_noise_m or noise_level(test.displacement_raw_m, rate) * np.sqrt(
+        min(1.0, 2.0 * band / rate)
+    )
     periods = np.diff(test.cycles)
     return {
         "displacement": smooth[chosen],
@@ -279,12 +286,13 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: floa
         "force": (test.force_raw_n + test.force_offset_n)[chosen],
         "used": used,
         "dt": stride / rate,
-        "displacement_noise": noise * np.sqrt(band),
-        "velocity_noise": noise * np.sqrt(band) * 2.0 * np.pi * cutoff / np.sqrt(3.0),
+        "displacement_noise": noise,
+        "velocity_noise": noise * 2.0 * np.pi * band / np.sqrt(3.0),
         "force_noise": force_noise(test.force_raw_n, rate),
         "force_offset": test.force_offset_n,
         "period_s": float(np.median(periods)) / rate if len(periods) else 0.0,
         "cutoff_hz": cutoff,
+        "noise_band_hz": band,
     }
 
 

@@ -53,7 +53,7 @@ def _noisy_motion(recordings: Recordings, rng: np.random.Generator) -> tuple[Flo
         piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
         dt = recordings.dt[test]
         white = rng.standard_normal(piece.stop - piece.start)
-        filtered = butterworth_lowpass(white, recordings.cutoff_hz[test], 1.0 / dt)
+        filtered = butterworth_lowpass(white, recordings.noise_band_hz[test], 1.0 / dt)
         noise = recordings.displacement_noise[test] * filtered / max(float(np.std(filtered)), 1e-12)
         displacement[piece] += noise
         velocity[piece] += np.gradient(noise, dt)

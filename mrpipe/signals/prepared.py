@@ -32,6 +32,9 @@ class PreparedTest:
         The drive is a set point and no record.
     displacement_offset_m, force_offset_n
         What was taken out of the channels as static offset (add it to have the records as measured).
+    displacement_noise_m, displacement_noise_band_hz
+        Standard deviation and band of the displacement's noise where it was put together from several sensors, so that
+        the channel itself does not tell; 0 where it does. Not written to the artifact.
     """
 
     name: str
@@ -51,6 +54,8 @@ class PreparedTest:
     drive_is_set_point: bool = False
     displacement_offset_m: float = 0.0
     force_offset_n: float = 0.0
+    displacement_noise_m: float = 0.0
+    displacement_noise_band_hz: float = 0.0
 
     @property
     def dt(self) -> float:
@@ -108,6 +113,8 @@ def read_prepared(artifact: Artifact) -> list[PreparedTest]:
                 drive_is_set_point=bool(notes["drive_is_set_point"]),
                 displacement_offset_m=float(notes["displacement_offset_m"]),
                 force_offset_n=float(notes["force_offset_n"]),
+                displacement_noise_m=0.0,
+                displacement_noise_band_hz=0.0,
                 **channels,
             )
         )

@@ -10,7 +10,7 @@ import pytest
 from mrpipe.campaigns.model import Recording
 from mrpipe.discrepancy.frame_damper import find_brace, prepared_loops, trace_damper
 from mrpipe.discrepancy.frame_delay import LoopSignals, drive_lag, law_lag
-from mrpipe.discrepancy.frame_loop import bench_of
+from mrpipe.discrepancy.frame_loop import bench_of, damper_motion, motion_noise
 from mrpipe.discrepancy.summary import TracingOptions
 from mrpipe.effects.library import damper_effects
 from tests.discrepancy.rig import RATE, campaign, force_of
@@ -88,6 +88,41 @@ def test_the_compliance_of_a_brace_comes_out(compliance: float) -> None:
     found = find_brace(prepared_loops(bench), OPTIONS, [])
     assert found.compliance_m_n == pytest.approx(compliance, rel=0.15, abs=1e-6)
     assert (found.share > 0.5 and found.nrmse_after < 0.6 * found.nrmse_before) == (compliance > 0.0)
+
+
+@pytest.mark.property
+def test_the_noise_of_laser_and_accelerometers_together_is_what_is_told() -> None:
+    rng = np.random.default_rng(8)
+    time = np.arange(int(60.0 * RATE)) / RATE
+    x, a = 5e-3 * np.sin(8.0 * time), -0.32 * np.sin(8.0 * time)
+    channels = {
+        "floor_displacement_1": x + 2e-5 * rng.standard_normal(len(x)),
+        "floor_acceleration_1": a + 0.05 * rng.standard_normal(len(x)),
+        "ground_acceleration": 0.05 * rng.standard_normal(len(x)),
+    }
+    whole = ((0, len(x)),)
+    record = Recording("a", "training", RATE, time, channels, whole, "closed-loop", {})
+    moved = damper_motion(record, slice(None))
+    assert moved is not None
+    inside = slice(2000, -2000)
+    assert np.std((moved - x)[inside]) == pytest.approx(motion_noise(record)[0], rel=0.15)
+
+
+@pytest.mark.property
+def test_tests_whose_rod_hardly_moves_are_left_out() -> None:
+    found = recordings("none", training=3)
+    rng = np.random.default_rng(9)
+    for number, item in enumerate(found):
+        place = item.channels["floor_displacement_1"]
+        if number == 1:
+            place = 1e-3 * place
+        item.channels["floor_displacement_1"] = place + 2e-5 * rng.standard_normal(len(place))
+        item.channels["floor_acceleration_1"] = np.gradient(np.gradient(place, 1.0 / RATE), 1.0 / RATE)
+        item.channels["floor_acceleration_1"] += 0.05 * rng.standard_normal(len(place))
+        item.channels["ground_acceleration"] = np.zeros(len(place))
+    bench = bench_of(found, Path("nowhere"), "loop", "A")
+    assert bench is not None
+    assert {test.name for test in prepared_loops(bench)} == {item.name for item in found} - {found[1].name}
 
 
 @pytest.mark.planted
