@@ -18,8 +18,9 @@ from mrpipe.control.kernel import (
     MEASURED_FLOORS,
     MEASURED_GROUND,
 )
-from mrpipe.dampers.drive import command_place
-from mrpipe.dampers.plant import Chain, build_chain, new_state
+from mrpipe.dampers.drive import command_place, lag_step, polynomial_step
+from mrpipe.dampers.hysteresis import hysteresis_step
+from mrpipe.dampers.plant import Chain, build_chain, new_state, sum_step
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import kernel, parts
 from mrpipe.simulation.excitation import Excitation
@@ -145,6 +146,16 @@ def no_damper() -> Chain:
     return build_chain([])
 
 
+def is_plain(chain: Chain) -> bool:
+    """Return whether a chain is the plain one of (2.1) to (2.4), whose parameters the compiled loop reads in place.
+
+    Steps of other make share names with these: a driver that lags apart, rising and falling, has two rates.
+    """
+    return chain.names == parts.BOUC_WEN and chain.functions[:4] == (
+        lag_step, polynomial_step, hysteresis_step, sum_step
+    )  # fmt: skip
+
+
 def simulate_law(
     frame: Frame,
     chain: Chain | None,
@@ -198,7 +209,7 @@ def simulate_law(
     every = max(1, round(1.0 / (dt * options.record_rate_hz)))
     counts, run = _run_numbers(controller, options, steps, per_sample, every, dt)
     counts[parts.I_COMMAND] = command_place(chain)
-    if options.tracking == "damper" and chain.names == parts.BOUC_WEN:
+    if options.tracking == "damper" and is_plain(chain):
         counts[parts.I_TRACK] = parts.TRACK_BOUC_WEN
     samples = steps // per_sample + 1
     commands = np.zeros((samples, COMMAND_SIZE))

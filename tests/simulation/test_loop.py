@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from mrpipe.control import ControllerOptions, Gains, build_controller
 from mrpipe.control.calibration import THESIS_GAINS
+from mrpipe.dampers.drive import driver_lag_apart
 from mrpipe.dampers.plant import Phase, Step, build_chain, idle_step
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import LoopOptions, SensorNoise, at_rest, harmonic, recorded, simulate_law, sweep
@@ -128,6 +129,21 @@ def test_the_plain_damper_runs_as_any_chain(rig, driver_lag_s):
     ours, theirs = (
         simulate_law(rig.frame, chain, rig.controller("vdns"), rig.excitation(0.7, 6), options)
         for chain in (damper.chain(), common)
+    )
+    np.testing.assert_allclose(ours.force, theirs.force, atol=1e-9 * np.max(np.abs(theirs.force)))
+
+
+@pytest.mark.property
+def test_a_driver_that_lags_apart_with_equal_rates_is_the_plain_one(rig):
+    """It has the plain chain's names and one parameter more."""
+    plain = rig.damper.chain()
+    others = [step for step in rig.damper.steps() if step.name not in ("sum", "driver-lag")]
+    eta = float(plain.parameters[0])
+    apart = build_chain([driver_lag_apart(eta, eta), *others])
+    assert apart.names == plain.names
+    ours, theirs = (
+        simulate_law(rig.frame, chain, rig.controller("vd"), rig.excitation(0.7, 4), LoopOptions())
+        for chain in (apart, plain)
     )
     np.testing.assert_allclose(ours.force, theirs.force, atol=1e-9 * np.max(np.abs(theirs.force)))
 
