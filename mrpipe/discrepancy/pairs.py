@@ -31,6 +31,9 @@ PLAY_STARTS = ((0.003, 40.0), (0.04, 60.0), (0.003, 400.0))
 DASHPOT_SPEED = 0.12
 """Start of the dashpot's speed, in largest speeds."""
 
+LEAST_ROUNDED = 0.2
+"""Share that a rounded yield alone must recover: where the base form is not in question no pair is tried."""
+
 LEAST_GAIN = 0.15
 """The pair must leave less than all that was chosen one by one, by this share."""
 
@@ -47,7 +50,9 @@ def with_play(selection: Selection, effects: Mapping[str, Effect]) -> Selection:
     """
     rate, play = effects.get("rate-dependent-yield"), effects.get("backlash")
     of_base = {term.effect.name for term in selection.base.problem.terms}
-    if rate is None or play is None or {rate.name, play.name} & of_base:
+    if rate is None or play is None or {rate.name, play.name} & of_base or not selection.rounds:
+        return selection
+    if all(item.share < LEAST_ROUNDED for item in selection.rounds[0] if item.name == rate.name):
         return selection
     small = draft(selection.base)
     near = min(rounded_drafts(small, rate), key=lambda item: item.cost)

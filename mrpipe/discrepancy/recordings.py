@@ -13,7 +13,7 @@ from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.effects.contract import EffectScales
 from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.signals.spectra import cutoff_by_criterion, noise_level
+from mrpipe.signals.spectra import cutoff_by_criterion, noise_level, signal_end
 
 SETTLING_SHARE = 0.3
 """Share of the peak-to-peak displacement travelled before forces are compared: the hysteresis begins unknown."""
@@ -32,6 +32,9 @@ MOST_JUDGED = 200_000
 
 JUMP_RATE_HZ = 500.0
 """Least rate of a test whose drive jumps: between samples it is taken to run straight, a jump must not be smeared."""
+
+CUTOFF_MARGIN = 1.5
+"""The displacement is cut off so much above the frequency where it sinks into its noise."""
 
 ACCELERATION_CUTOFF_HZ = 40.0
 """Least cut-off of a measured acceleration."""
@@ -315,5 +318,8 @@ def force_noise(force: FloatArray, rate_hz: float) -> float:
 
 def displacement_cutoff(test: PreparedTest) -> float:
     """Return the cut-off [Hz] of the displacement: where it sinks into its noise, at most a quarter of the rate."""
-    found = cutoff_by_criterion(test.displacement_raw_m, test.sampling_rate_hz, velocity_share=0.9995, margin=1.5)
+    raw, rate = test.displacement_raw_m, test.sampling_rate_hz
+    found = cutoff_by_criterion(raw, rate, velocity_share=0.9995, margin=CUTOFF_MARGIN)
+    # noise let through is differentiated twice where an effect asks for the acceleration
+    found = min(found, CUTOFF_MARGIN * signal_end(raw, rate))
     return float(min(max(found, 12.0), 0.25 * test.sampling_rate_hz, 250.0))

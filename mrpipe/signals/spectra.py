@@ -7,6 +7,9 @@ from scipy import signal
 
 from mrpipe.artifacts import FloatArray
 
+MEDIAN_OF_FEW = 0.87
+"""Median over mean of a density of three half-overlapping windows."""
+
 
 def power_spectrum(values: FloatArray, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
     """Return frequencies [Hz] and one-sided power density [unit^2/Hz] by Welch's method (Hann, mean removed)."""
@@ -90,11 +93,43 @@ def cutoff_by_criterion(
     return float(min(highest, max(lowest_hz, 3.0 * middle, cutoff)))
 
 
+def signal_end(values: FloatArray, sampling_rate_hz: float) -> float:
+    """Return the frequency [Hz] up to which a motion stands out of its noise; half the rate where it does all over.
+
+    Short windows smear a slow sine over tens of hertz, which then looks like signal. Here windows are half the record
+    long and fall off by 92 dB (Blackman-Harris); a density counts only where it exceeds what so few windows scatter.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    sampling_rate_hz
+        Rate.
+    """
+    length = min(values.size, max(256, values.size // 2))
+    frequencies, density = signal.welch(
+        values - np.mean(values), fs=sampling_rate_hz, nperseg=length, window="blackmanharris", detrend="linear"
+    )
+    floor = noise_floor(frequencies, density) / MEDIAN_OF_FEW
+    smooth, count = _averaged(frequencies, density, 0.12, 2)
+    above = np.flatnonzero(smooth > (1.0 + np.maximum(1.0, 4.0 / np.sqrt(0.5 * count))) * floor)
+    above = above[frequencies[above] <= 0.35 * sampling_rate_hz]
+    if above.size == 0:
+        return 0.0
+    found = float(frequencies[above[-1]])
+    return 0.5 * sampling_rate_hz if found >= 0.345 * sampling_rate_hz else found
+
+
 def _smooth_over_octave(frequencies: FloatArray, density: FloatArray) -> FloatArray:
+    return _averaged(frequencies, density, 0.06, 1)[0]
+
+
+def _averaged(frequencies: FloatArray, density: FloatArray, share: float, least: int) -> tuple[FloatArray, FloatArray]:
+    """Return the density averaged over a share of its frequency to either side, and over how many bins."""
     total = np.concatenate(([0.0], np.cumsum(density)))
     step = frequencies[1] - frequencies[0]
-    half = np.maximum((frequencies * 0.06 / step).astype(np.int64), 1)
+    half = np.maximum((frequencies * share / step).astype(np.int64), least)
     index = np.arange(density.size)
     low = np.maximum(index - half, 0)
     high = np.minimum(index + half + 1, density.size)
-    return np.asarray((total[high] - total[low]) / (high - low))
+    return np.asarray((total[high] - total[low]) / (high - low)), np.asarray(high - low, dtype=np.float64)
