@@ -9,10 +9,9 @@ import numpy as np
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.discrepancy.frame_fit import Base, Design, base_rows, coefficients, design_of
+from mrpipe.discrepancy.frame_fit import Base, Design, base_rows, coefficients, design_of, stacked
 from mrpipe.discrepancy.frame_records import FrameRecord
 from mrpipe.discrepancy.frame_spectra import Band, Spectra, motion_of, noise_of, spectra_of, storey_sums
-from mrpipe.structures.dynamics import ComplexArray
 
 HIGH_SHARE, LOW_SHARE = 1.3, 0.45
 """Band over the highest and the lowest mode."""
@@ -94,24 +93,19 @@ def coupled_stiffness(spectra: Sequence[Spectra], sheared: FloatArray) -> FloatA
     n = len(sheared)
     found = sheared.copy()
     for storey in range(n):
-        rows = [_weighted(base_rows("linear-frame", item, storey), item, storey) for item in spectra]
+        rows = [stacked(base_rows("linear-frame", item, storey) * item.weight[storey]) for item in spectra]
         width = max(len(item) for item in rows)
-        stacked = np.concatenate([np.pad(item, ((0, width - len(item)), (0, 0))) for item in rows], axis=1)
-        target = np.concatenate([_weighted(item.target[storey][None], item, storey)[0] for item in spectra])
-        left = target + sheared[storey] @ stacked[:n]
+        regressors = np.concatenate([np.pad(item, ((0, width - len(item)), (0, 0))) for item in rows], axis=1)
+        target = np.concatenate([stacked(item.target[storey] * item.weight[storey]) for item in spectra])
+        left = target + sheared[storey] @ regressors[:n]
         prior = np.zeros((width, width))
         prior[:n, :n] = np.eye(n) / (COUPLING_SHARE * sheared[storey, storey])
-        scale = np.linalg.norm(stacked, axis=1)
+        scale = np.linalg.norm(regressors, axis=1)
         prior[np.arange(n, width), np.arange(n, width)] = 1e-6 * scale[n:]
-        equations = np.concatenate([stacked, prior], axis=1).T
+        equations = np.concatenate([regressors, prior], axis=1).T
         numbers = np.linalg.lstsq(equations, np.concatenate([left, np.zeros(width)]), rcond=None)[0]
         found[storey] -= numbers[:n]
     return found
-
-
-def _weighted(lines: ComplexArray, spectra: Spectra, storey: int) -> FloatArray:
-    weighted = lines * spectra.weight[storey]
-    return np.asarray(np.concatenate([weighted.real, weighted.imag], axis=-1))
 
 
 def _band_of_power(records: Sequence[FrameRecord]) -> Band:

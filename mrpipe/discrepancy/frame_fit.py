@@ -45,7 +45,8 @@ def base_rows(base: Base, spectra: Spectra, storey: int) -> ComplexArray:
     return np.concatenate(parts)
 
 
-def _stacked(values: ComplexArray) -> FloatArray:
+def stacked(values: ComplexArray) -> FloatArray:
+    """Return real and imaginary parts one after another, shape (..., 2 b)."""
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
@@ -92,7 +93,7 @@ class Design:
 def weighted_columns(spectra: Sequence[Spectra], columns: Sequence[Columns]) -> FloatArray:
     """Return columns times weights, real and imaginary lines of all records one after another, shape (k, n, 2 b)."""
     parts = [c.lines * s.weight[None] for s, c in zip(spectra, columns, strict=True)]
-    return np.concatenate([_stacked(part) for part in parts], axis=-1)
+    return np.concatenate([stacked(part) for part in parts], axis=-1)
 
 
 def _rows_of(base: Base, spectra: Sequence[Spectra], storey: int, width: int) -> tuple[FloatArray, FloatArray]:
@@ -102,8 +103,8 @@ def _rows_of(base: Base, spectra: Sequence[Spectra], storey: int, width: int) ->
         # records without a damper or a shaker have no such load: their columns are nought
         full = np.zeros((width, own.shape[1]), dtype=np.complex128)
         full[: len(own)] = own
-        rows.append(_stacked(full * item.weight[storey]))
-        target.append(_stacked(item.target[storey] * item.weight[storey]))
+        rows.append(stacked(full * item.weight[storey]))
+        target.append(stacked(item.target[storey] * item.weight[storey]))
     return np.concatenate(rows, axis=-1), np.concatenate(target, axis=-1)
 
 

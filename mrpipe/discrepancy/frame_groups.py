@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
-from mrpipe.discrepancy.frame_fit import Design
+from mrpipe.discrepancy.frame_fit import Design, stacked
 
 LINES_OF_A_GROUP = 24
 
@@ -99,9 +99,6 @@ def groups_of(design: Design) -> Groups:
     limit = stats.chi2.isf(FLAG_P / len(count), count) / count
     # weights reckon with white noise: a tenth more is forgiven
     flagged = sums / scale[storey] > 1.1 * limit
-    target = np.concatenate(
-        [np.concatenate([part.real, part.imag], axis=1) for part in (s.target * s.weight for s in design.spectra)],
-        axis=1,
-    )
+    target = np.concatenate([stacked(item.target * item.weight) for item in design.spectra], axis=1)
     response = np.asarray(np.bincount(index.ravel(), weights=(target**2).ravel()), dtype=np.float64)
     return Groups(index, count, scale, storey, flagged, record, response)

@@ -155,8 +155,8 @@ class EffectForm:
 
 
 @dataclass(frozen=True)
-class Effect:
-    """A physical effect that a model may lack.
+class Described:
+    """What every effect says of itself, be it one of a damper or of a structure.
 
     Attributes
     ----------
@@ -166,6 +166,21 @@ class Effect:
         Sentences for the report: where it comes from, and what to do on the rig.
     source
         Where the law is described.
+    """
+
+    name: str
+    summary: str
+    physics: str
+    remedy: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Effect(Described):
+    """A physical effect that a model may lack.
+
+    Attributes
+    ----------
     acts_on
         What it modifies (`rod motion`, `effective drive`, `yield force`, `viscous force`, `force`, `time base`).
     forms
@@ -183,11 +198,6 @@ class Effect:
         where it is better on tests left out.
     """
 
-    name: str
-    summary: str
-    physics: str
-    remedy: str
-    source: str
     acts_on: str
     forms: tuple[EffectForm, ...]
     needs: tuple[Needs, ...] = ()

@@ -9,21 +9,29 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import TypeVar
 
 import mrpipe.effects as package
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.effects.contract import Effect
 from mrpipe.errors import UserError
 
+Kind = TypeVar("Kind")
+
+
+def effects_in(place: ModuleType, kind: type[Kind]) -> list[Kind]:
+    """Return the EFFECT of every module of a package that defines one of this kind."""
+    modules = (
+        importlib.import_module(f"{place.__name__}.{item.name}") for item in pkgutil.iter_modules(place.__path__)
+    )
+    found = (getattr(module, "EFFECT", None) for module in modules)
+    return [effect for effect in found if isinstance(effect, kind)]
+
 
 @cache
 def all_effects() -> dict[str, Effect]:
     """Return name -> effect of every module of the package that defines EFFECT, damper effects first."""
-    found = []
-    for module in pkgutil.iter_modules(package.__path__):
-        effect = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), "EFFECT", None)
-        if isinstance(effect, Effect):
-            found.append(effect)
+    found = effects_in(package, Effect)
     found.sort(key=lambda item: (item.rig != "damper", item.name))
     return {item.name: item for item in found}
 

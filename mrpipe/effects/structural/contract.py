@@ -7,7 +7,7 @@ bring:
   relative to the ground) into unit forces; the forces are proportional to amplitudes, which are solved for exactly.
 - `base`: the turn of the base, as columns of motion of unit storey height.
 - `damper-rod`, `command`: declared here with its parameters, found in the closed loop by
-  :mod:`mrpipe.discrepancy.frame_brace` and :mod:`mrpipe.discrepancy.frame_delay`.
+  :mod:`mrpipe.discrepancy.frame_damper` and :mod:`mrpipe.discrepancy.frame_delay`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any, Literal
 from numba import float64, void
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.effects.contract import Parameter, Values
+from mrpipe.effects.contract import Described, Parameter, Values
 
 STEP_SIGNATURE = void(float64, float64, float64[::1], float64[::1], float64, float64[::1])
 """`step(position [m], rate [m/s], state, parameters, dt [s], out)`: writes one unit force for each amplitude."""
@@ -61,15 +61,11 @@ class StructuralForm:
 
 
 @dataclass(frozen=True)
-class StructuralEffect:
+class StructuralEffect(Described):
     """A physical effect of a structure that a linear frame lacks.
 
     Attributes
     ----------
-    name, summary
-        As shared by all callers; what it does, in a line.
-    physics, remedy, source
-        Sentences for the report: where it comes from, what to do on the rig, where the law is described.
     acts_on
         Where it acts.
     places
@@ -80,11 +76,6 @@ class StructuralEffect:
         Other effect -> test that tells the two apart.
     """
 
-    name: str
-    summary: str
-    physics: str
-    remedy: str
-    source: str
     acts_on: Place
     forms: tuple[StructuralForm, ...]
     places: Literal["all", "one"] = "all"

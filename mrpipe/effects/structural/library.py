@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 import mrpipe.effects.structural as package
 from mrpipe.effects.contract import Effect
-from mrpipe.effects.library import effect_of_file
+from mrpipe.effects.library import effect_of_file, effects_in
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 
@@ -18,11 +16,7 @@ from mrpipe.errors import UserError
 @cache
 def all_structural_effects() -> dict[str, StructuralEffect]:
     """Return name -> effect of every module of the package that defines EFFECT."""
-    found = []
-    for module in pkgutil.iter_modules(package.__path__):
-        effect = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), "EFFECT", None)
-        if isinstance(effect, StructuralEffect):
-            found.append(effect)
+    found = effects_in(package, StructuralEffect)
     return {item.name: item for item in sorted(found, key=lambda item: item.name)}
 
 
