@@ -33,7 +33,7 @@ OF_FRAME = ("joint-friction", "cubic-stiffness", "impact", "base-rocking")
 OF_LOOP: dict[str, tuple[float, float]] = {"brace-flexibility": (1e-5, 3e-5), "controller-delay": (0.006, 0.015)}
 """Effects that show with a damper only: compliances [m/N] and dead times [s] of either strength."""
 
-SHARES = (0.03, 0.08)
+SHARES = (0.015, 0.04)
 """Either strength of impact and of the unknown: RMS of the change of all floor accelerations over their RMS. Friction,
 stiffness and rocking shift frequencies, which changes accelerations much and may leave no error at all."""
 

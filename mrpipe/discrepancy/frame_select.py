@@ -23,6 +23,9 @@ from mrpipe.effects.structural.contract import StructuralEffect
 SECOND_GAIN, SECOND_SHARE = 0.05, 0.5
 """A further effect must recover this share of what the frame lacked, and this share of what is left."""
 
+ROCKING_SHARE, ROCKING_LEAD = 0.8, 0.03
+"""A rocking base is taken where it explains as much as any linear frame but for this lead, or so much and more by it."""
+
 REFINED = 3
 """Families whose shape is searched downhill after screening."""
 
@@ -264,7 +267,10 @@ def _rocking(
     if np.all(own > 0.0):
         about = Surroundings(own)
         found = _round(simple, base_forms, about, jobs) or found
-    if found[0].share < max(rules.named_share, reachable - 0.03):
+    proven = found[0].share >= max(rules.named_share, reachable - ROCKING_LEAD)
+    # an edge that lifts is no linear frame: few numbers that do better than a general one's many tell as much
+    ahead = found[0].share >= max(ROCKING_SHARE, reachable + ROCKING_LEAD)
+    if not proven and not ahead:
         return None
     return _taken(replace(simple, rounds=(found,), storey_stiffness=about.storey_stiffness), found[0])
 
