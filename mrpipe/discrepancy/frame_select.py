@@ -24,7 +24,7 @@ SECOND_GAIN, SECOND_SHARE = 0.05, 0.5
 """A further effect must recover this share of what the frame lacked, and this share of what is left."""
 
 ROCKING_SHARE, ROCKING_LEAD = 0.8, 0.03
-"""A rocking base is taken where it explains as much as any linear frame but for this lead, or so much and more by it."""
+"""A rocking base is taken where it explains what any linear frame does less the lead, or so much and more by it."""
 
 REFINED = 3
 """Families whose shape is searched downhill after screening."""
