@@ -100,7 +100,7 @@ S_DISPLACEMENT = 12  # last measured displacement
 S_AGE = 13  # time since the last extremum
 S_HEAD = 16
 
-WIDEST = 64
+WIDEST = 256  # neurons of a layer, several networks side by side included
 
 
 @njit(void(float64[::1], float64[::1], float64[::1], int64), cache=True)

@@ -128,7 +128,8 @@ def report_training(context: StageContext, trained: Trained, judged: Judgement, 
                 }
                 for number, start in enumerate(trained.starts, start=1)
             ]
-        ),
+            # no held-out error after a second phase that learned the held-out records
+        ).dropna(axis="columns", how="all"),
         "Every start.",
     )
     context.report.figure(

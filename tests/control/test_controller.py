@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -23,7 +25,7 @@ from mrpipe.control.linearisation import equivalent_stiffness, friction_stiffnes
 from mrpipe.control.neural import ReferenceOptions, network_force, train_reference
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
-from mrpipe.networks.network import lagged
+from mrpipe.networks.network import averaged, lagged
 from tests.control.conftest import random_network
 
 SET_C = inverse_table(damper_from_parameter_set(load_parameter_set("dampers", "set-c")))
@@ -179,6 +181,20 @@ def test_steady_request_asks_for_what_would_hold_the_force():
     commands = run(build_controller("vdns", Gains(250.0, -4500.0), options, inverse=network), x, a, v)
     present = np.abs(commands[:, [COMMAND_VELOCITY, COMMAND_FORCE]])
     np.testing.assert_allclose(commands[:, COMMAND_INVERSE], network.predict(np.repeat(present, 4, axis=1)), atol=1e-10)
+
+
+@pytest.mark.property
+def test_several_networks_side_by_side_are_one_inverse():
+    """The mean of twelve, wider than any single one would be, is what the controller asks."""
+    first = random_network(("velocity", "force"), "drive", 3, True)
+    others = (random_network(("velocity", "force"), "drive", 3, True, seed) for seed in range(2, 13))
+    members = [first, *(replace(first, weights=item.weights, biases=item.biases) for item in others)]
+    _, x, a, v = motion(200.0, 2.0)
+    options = ControllerOptions(velocity="measured", residual_force_n=0.0)
+    commands = run(build_controller("vd", Gains(650.0), options, inverse=averaged(members)), x, a, v)
+    present = np.repeat(np.abs(commands[:, [COMMAND_VELOCITY, COMMAND_FORCE]]), 4, axis=1)
+    wanted = np.mean([member.predict(present) for member in members], axis=0)
+    np.testing.assert_allclose(commands[:, COMMAND_INVERSE], wanted, atol=1e-10)
 
 
 @pytest.mark.literature
