@@ -68,7 +68,7 @@ def _richest(chosen: Fit, place: int) -> Fit | None:
     ]
     best = min(trials, key=lambda item: item.cost)
     problem = replace(chosen.problem, terms=best.problem.terms)
-    found = fit(problem, best.theta, iterations=10)
+    found = fit(problem, best.theta, iterations=25)
     shapes = {item.name for item in best.problem.terms[place].form.parameters if item.role != "amplitude"}
     return None if shapes & (set(found.at_bound) - set(chosen.at_bound)) else found
 

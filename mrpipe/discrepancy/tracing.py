@@ -52,6 +52,9 @@ from mrpipe.signals.prepared import PreparedTest
 MODEL_ERROR_CHI_SQUARE = 6.0
 """Where the best composite leaves this many times the noise, sensors' noise is no measure: weights by force RMS."""
 
+TOO_PLAIN = 0.5
+"""But where a richer form of the same effect takes this share of it (up to thrice that) only the form was wrong."""
+
 REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25, lead=1.0)
 """What a further effect must recover where weights go by force RMS: noise is far below any model's error.
 
@@ -156,7 +159,9 @@ def _select(
         if excess >= MODEL_ERROR_CHI_SQUARE:
             # the right effect in too plain a form may leave as much
             richer = _refined(selection, len(own), options, rng, jobs).chosen
-            excess = richer.chi_square / max(baseline.noise, 1e-12)
+            before, excess = excess, richer.chi_square / max(baseline.noise, 1e-12)
+            if excess < min(3.0 * MODEL_ERROR_CHI_SQUARE, (1.0 - TOO_PLAIN) * before):
+                return _with_noise_of(selection.chosen, baseline, selection)
         if excess < MODEL_ERROR_CHI_SQUARE:
             return _with_noise_of(selection.chosen, baseline, selection)
         # what is left on the force's own scale becomes the yardstick of the second pass

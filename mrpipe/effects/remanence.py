@@ -124,6 +124,33 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
         wire[CURRENT] = u + gain * (state[0] - u) / (1.0 + (u / size) ** 2)
 
 
+@njit(STEP_SIGNATURE, cache=True)
+def charging_field_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: gain, limit [A], charging time [s], length [m], time [s], power of fading, corner.
+
+    State: what is kept.
+
+    What the drive can leave behind saturates; it is taken on with a lag, and fades by slip and time, the faster the
+    more there is of it. The core has the larger of drive and what is kept, with a rounded corner.
+    """
+    u = wire[CURRENT]
+    gain, limit, corner = parameters[0], parameters[1], parameters[6]
+    level = min(gain * u / (1.0 + max(u, 0.0) / limit), u) if u > 0.0 else 0.0
+    if wire[FIRST] > 0.5:
+        state[0] = level
+    if level >= state[0]:
+        state[0] += (level - state[0]) * (1.0 - math.exp(-dt / parameters[2]))
+    else:
+        excess = state[0] - level
+        path = abs(wire[VELOCITY]) * dt / parameters[3] + dt / parameters[4]
+        state[0] -= excess * (1.0 - math.exp(-path * (excess / limit) ** parameters[5]))
+    kept = state[0]
+    if u < 0.0 or kept <= 0.0:
+        return
+    larger = max(u, kept)
+    wire[CURRENT] = larger * (1.0 + (min(u, kept) / larger) ** corner) ** (1.0 / corner)
+
+
 def _step(gain: float, size: float, kind: float) -> list[Step]:
     return [Step("remanence", Phase.CURRENT_EFFECT, remanence_step, np.array([gain, size, kind]), 2)]
 
@@ -161,6 +188,14 @@ def _past(values: Values) -> list[Step]:
 
 def _play(values: Values) -> list[Step]:
     return _step(values["gain"], values["width"], 3.0)
+
+
+def _charging(values: Values) -> list[Step]:
+    names = (
+        "gain", "limit", "charging_time", "slip_length", "relaxation_time", "fading_power", "corner",
+    )  # fmt: skip
+    numbers = np.array([values[name] for name in names])
+    return [Step("remanence", Phase.CURRENT_EFFECT, charging_field_step, numbers, 1)]
 
 
 def _plays(values: Values) -> list[Step]:
@@ -266,6 +301,20 @@ EFFECT = Effect(
                 Parameter("exponent", "1", "which plays weigh most", "one", -2.0, 6.0, (0.0,)),
             ),
             _plays,
+        ),
+        EffectForm(
+            "charging",
+            "(u^p + k^p)^(1/p); k follows g u/(1 + u/s) with a lag and fades over L and tau, as (k/s)^m",
+            (
+                replace(_HELD, upper=2.0),
+                shape("limit", "drive", "drive at which half of it is reached", "drive", 0.1, 20.0, (1.0,)),
+                shape("charging_time", "s", "lag with which it is taken on", "time", 2e-4, 0.05, (0.003,)),
+                _LENGTH,
+                _TIME,
+                Parameter("fading_power", "1", "0: at an even rate; above 0 fast first", "one", 0.0, 2.0, (0.5,)),
+                shape("corner", "1", "sharpness of the corner", "one", 2.0, 20.0, (7.0,)),
+            ),
+            _charging,
         ),
     ),
 )
