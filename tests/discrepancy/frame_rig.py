@@ -44,8 +44,10 @@ def _slope(z: np.ndarray, ground: float, code: int, out: np.ndarray) -> None:
             load -= 3.0e4 * (x[s] - 0.004) + 30.0 * max(v[s], 0.0)
         out[s] = v[s]
         out[3 + s] = load / MASSES[s] - ground
-    if code == 4:
-        out[9], out[10] = turn_rate, (moment - 9.0e4 * turn - 60.0 * turn_rate) / 8.0
+    if code in (4, 5):
+        # an edge that lifts (5) gives up to half of the stiffness, by and by
+        lifted = turn - 4e-4 * np.tanh(turn / 4e-4) if code == 5 else 0.0
+        out[9], out[10] = turn_rate, (moment - 9.0e4 * (turn - 0.5 * lifted) - 60.0 * turn_rate) / 8.0
 
 
 @njit(cache=True)
@@ -67,7 +69,15 @@ def shake(ground: np.ndarray, dt: float, code: int, every: int) -> tuple[np.ndar
     return x, a
 
 
-CODES = {"clean": 0, "joint-friction": 1, "cubic-stiffness": 2, "impact": 3, "base-rocking": 4, "unknown": 6}
+CODES = {
+    "clean": 0,
+    "joint-friction": 1,
+    "cubic-stiffness": 2,
+    "impact": 3,
+    "base-rocking": 4,
+    "lifting-edge": 5,
+    "unknown": 6,
+}
 
 
 def frame_campaign(effect: str, seed: int = 0) -> Campaign:

@@ -36,6 +36,13 @@ def test_a_planted_effect_is_named_first(effect: str) -> None:
 
 
 @pytest.mark.planted
+def test_a_base_whose_edge_lifts_is_a_rocking_one() -> None:
+    found = summary("lifting-edge")
+    assert [item["name"] for item in found["effects"]] == ["base-rocking"]
+    assert found["after"]["nrmse"] < 0.3 * found["before"]["nrmse"]
+
+
+@pytest.mark.planted
 def test_the_storeys_and_the_floor_are_found() -> None:
     assert summary("cubic-stiffness")["effects"][0]["place"] == "storey 2"
     bumper = summary("impact")["effects"][0]
