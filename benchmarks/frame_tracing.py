@@ -256,7 +256,7 @@ def _values(row: dict[str, Any]) -> tuple[str, str]:
             if name in item.get("parameters", {}):
                 same = [e for e in row["effects"] if e["name"] == row["planted"] and own in e["parameters"]]
                 found = f"{same[0]['parameters'][own]['value']:.3g}" if same else ""
-                return f"{name} {item['parameters'][name]:.3g}", found
+                return f"{name} {item['parameters'][name]['value']:.3g}", found
     return "", ""
 
 
