@@ -135,6 +135,9 @@ def judged(summary: dict[str, Any], truth: dict[str, Any]) -> dict[str, Any]:
     return {
         "truth": planted,
         "truth_forms": [item.get("form", "") for item in truth["effects"]],
+        "truth_parameters": [
+            {name: number["value"] for name, number in item["parameters"].items()} for item in truth["effects"]
+        ],
         "found": found,
         "verdict": "+".join(found) or ("unknown" if structured else "none"),
         "right": right,

@@ -10,11 +10,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, TypeVar
 
 from benchmarks.tracing import read_rows
 
 Row = dict[str, Any]
+_Item = TypeVar("_Item")
 
 HEAD = """# How often planted effects are found
 
@@ -23,10 +24,10 @@ declare: a rig drawn from a seed, its numbers spread by a tenth, prepared and tr
 sealed truth read after the verdict. The laboratory has forms of its own. Seeds are used once: what failed on earlier
 seeds was mended, these were drawn afterwards.
 
-    python -m benchmarks.tracing --preset core --first-seed {first} --results RESULTS.jsonl
+    python -m benchmarks.tracing --preset core conditions --first-seed {first} --results RESULTS.jsonl
     python -m benchmarks.tracing_table RESULTS.jsonl
 
-The cases are run in random order; this table holds the {count} that were run of those that the preset lists.
+The cases are run in random order; this table holds the {count} that were run of those that the presets list.
 """
 
 
@@ -39,7 +40,7 @@ def kind_of(row: Row) -> str:
     return "pair" if "+" in row["planted"] else "single"
 
 
-def percent(rows: Iterable[Row], test: Callable[[Row], bool]) -> str:
+def percent(rows: Iterable[_Item], test: Callable[[_Item], bool]) -> str:
     """Return `hits of all (percent)`."""
     found = [test(row) for row in rows]
     return f"{sum(found)} of {len(found)} ({100 * sum(found) / len(found):.0f} %)" if found else "none run"
@@ -78,12 +79,12 @@ def by_effect(rows: list[Row]) -> list[str]:
         "| planted | share of force RMS | planted form | verdict | form named | before | after | noise floor |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for row in sorted(rows, key=lambda r: (kind_of(r) != "single", kind_of(r), r["planted"], r["share"], r["seed"])):
+    for row in sorted(rows, key=lambda r: (kind_of(r) != "single", kind_of(r), r["truth"], r["share"], r["seed"])):
         verdict = row["verdict"] if row["right"] else f"**{row['verdict']}**"
         forms = ", ".join(item["form"] for item in row["effects"])
         share = "" if row["planted"] == "none" else f"{row['share']:g}"
         lines.append(
-            f"| {row['planted']} | {share} | {', '.join(row['truth_forms'])} | {verdict} | {forms} "
+            f"| {'+'.join(row['truth']) or 'none'} | {share} | {', '.join(row['truth_forms'])} | {verdict} | {forms} "
             f"| {row['before']:.4f} | {row['after']:.4f} | {row['floor']:.4f} |"
         )
     return lines
@@ -108,9 +109,48 @@ def conditions_of(rows: list[Row]) -> list[str]:
     return lines
 
 
+SAME_MEANING = {
+    ("accumulator", "gas-spring", "gas"): ("stiffness", "stiffness"),
+    ("backlash", "free", "free"): ("gap", "gap"),
+    ("backlash", "held", "held"): ("gap", "gap"),
+    ("channel-skew", "constant", "late-force"): ("time", "skew"),
+    ("delay", "dead-time", "dead-time"): ("time", "delay"),
+    ("end-stop", "hertz", "contact"): ("clearance", "free_travel"),
+    ("inertia", "lagged", "mass"): ("mass", "mass"),
+    ("migration", "slip", "rational"): ("slip", "slip_length"),
+    ("pinching", "quartic", "flat"): ("width", "width"),
+    ("stribeck", "rational", "rational"): ("speed", "velocity_scale"),
+}
+"""(effect, planted form, form found) -> a number of the planted form, and the parameter that means the same."""
+
+
+def parameter_errors(rows: list[Row]) -> list[str]:
+    """Return the lines of the table of parameters where the form found says the same as the one planted."""
+    errors: dict[tuple[str, ...], list[float]] = {}
+    for row in rows:
+        for found in row["effects"]:
+            for name, form, values in zip(
+                row["truth"], row["truth_forms"], row.get("truth_parameters", ()), strict=False
+            ):
+                same = SAME_MEANING.get((found["name"], form, found["form"]))
+                if same and name == found["name"]:
+                    off = found["parameters"][same[1]] / values[same[0]] - 1.0
+                    errors.setdefault((found["name"], found["form"], same[1]), []).append(100.0 * off)
+    every = [abs(off) for offs in errors.values() for off in offs]
+    lines = [f"Within 15 %: {percent(every, lambda off: off <= 15.0)}.", ""] if every else ["None to compare."]
+    if every:
+        lines += ["| effect | form found | parameter | errors [%] |", "| --- | --- | --- | --- |"]
+    return lines + [
+        f"| {effect} | {form} | {name} | {', '.join(f'{off:+.0f}' for off in sorted(offs))} |"
+        for (effect, form, name), offs in sorted(errors.items())
+    ]
+
+
 def confusions(rows: list[Row]) -> list[str]:
     """Return the lines that say what was taken for what."""
-    wrong = Counter((row["planted"], row["verdict"]) for row in rows if not row["right"] or row["spurious"])
+    wrong = Counter(
+        ("+".join(row["truth"]) or "none", row["verdict"]) for row in rows if not row["right"] or row["spurious"]
+    )
     if not wrong:
         return ["None."]
     return ["| planted | verdict | times |", "| --- | --- | --- |"] + [
@@ -124,6 +164,7 @@ def main() -> None:
     first = min(row["seed"] for row in rows) // 1000 * 1000
     parts = [HEAD.format(first=first, count=len(rows)), "## Rates", "\n".join(rates(rows))]
     parts += ["## What was taken for what", "\n".join(confusions(rows))]
+    parts += ["## Parameters", "\n".join(parameter_errors(rows))]
     parts += ["## By condition", "\n".join(conditions_of(rows)), "## Every case", "\n".join(by_effect(rows))]
     print("\n\n".join(part.strip() for part in parts))
 
