@@ -8,11 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.discrepancy.engine import Fit, centred, fit, jacobian_of, predict, regressors, weighting
 from mrpipe.discrepancy.problem import Problem
 from mrpipe.discrepancy.recordings import Recordings
 from mrpipe.discrepancy.structure import BLOCK_S
+
+BEYOND = 0.01
+"""Share of its range by which a state may leave what a fit has seen before it counts as unknown to it."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +54,16 @@ def folds_of(recordings: Recordings, folds: int) -> list[list[int]]:
 
 
 def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
-    """Return the weighted residual of every training test by a fit that has not seen it, shape (n,)."""
+    """Return the weighted residual of every training test by a fit that has not seen it, shape (n,).
+
+    Zero where motion or drive go beyond all that the fit has seen: an end stop that one test alone touches cannot be
+    known from the others, and what they make of it says nothing against it.
+    """
     problem = found.problem
     recordings = problem.recordings
     parts = folds_of(recordings, folds)
 
-    def one(part: list[int]) -> tuple[list[int], FloatArray]:
+    def one(part: list[int]) -> tuple[list[int], FloatArray, BoolArray]:
         keep = [t for t in range(recordings.tests) if t not in part]
         within = np.isin(recordings.test, keep)
         learned = fit(
@@ -64,23 +71,36 @@ def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
             found.theta,
             iterations=2,
         )
-        return part, predict(learned, recordings.subset(part))
+        left_out = recordings.subset(part)
+        return part, predict(learned, left_out), seen_by(recordings.subset(keep), left_out)
 
     result = np.zeros(len(recordings.force))
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        for part, force in pool.map(one, [part for part in parts if part]):
+        known = np.ones(len(result), dtype=np.bool_)
+        for part, force, seen in pool.map(one, [part for part in parts if part]):
             within = np.isin(recordings.test, part)
             result[within] = recordings.force[within] - force
-    return _without_offsets(result, problem)
+            known[within] = seen
+    weights = np.where(known, problem.root_weight, 0.0)
+    return _without_offsets(result, problem.recordings.test, weights)
 
 
-def _without_offsets(error: FloatArray, problem: Problem) -> FloatArray:
+def seen_by(known: Recordings, other: Recordings) -> BoolArray:
+    """Return where motion and drive of `other` lie within what `known` has, shape (n of other,)."""
+    inside = np.ones(len(other.force), dtype=np.bool_)
+    for name in ("displacement", "velocity", "drive"):
+        have, ask = getattr(known, name), getattr(other, name)
+        margin = BEYOND * float(np.ptp(have))
+        inside &= (ask >= np.min(have) - margin) & (ask <= np.max(have) + margin)
+    return inside
+
+
+def _without_offsets(error: FloatArray, test: IntArray, root_weight: FloatArray) -> FloatArray:
     """Return the weighted error without each test's mean, which is a sensor's offset."""
-    weight = problem.root_weight**2
-    test = problem.recordings.test
+    weight = root_weight**2
     sums = np.bincount(test, weights=weight)
     means = np.bincount(test, weights=weight * error) / np.maximum(sums, 1e-300)
-    return np.asarray((error - means[test]) * problem.root_weight)
+    return np.asarray((error - means[test]) * root_weight)
 
 
 def gain_of(before: FloatArray, after: FloatArray, problem: Problem, *, draws: int, rng: np.random.Generator) -> Gain:

@@ -43,7 +43,7 @@ def training_progress(path: FloatArray, held_out: Sequence[float]) -> Figure:
     label(axes[0, 0], "iteration", "training NRMSE", "The chosen start")
     ordered = np.sort(np.asarray(held_out, dtype=np.float64))
     axes[0, 1].plot(np.arange(1, len(ordered) + 1), ordered, "o", color=COLOURS[0])
-    axes[0, 1].set_ylim(bottom=0.0)
+    axes[0, 1].set_ylim(0.0, 1.15 * float(ordered[-1]))
     label(axes[0, 1], "start, by rank", "held-out NRMSE", "Spread over starts")
     return figure
 

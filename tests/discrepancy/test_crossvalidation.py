@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from mrpipe.discrepancy.crossvalidation import folds_of
+from mrpipe.discrepancy.crossvalidation import folds_of, seen_by
 
 
 @pytest.mark.property
@@ -29,3 +29,15 @@ def test_no_fold_takes_a_drive_level_away(folds: int) -> None:
     assert sorted(index for part in parts for index in part) == list(range(9))
     for part in parts:
         assert {levels[index] for index in range(9) if index not in part} == {0.0, 1.0, 2.0}
+
+
+@pytest.mark.property
+def test_what_a_fold_has_not_seen_is_not_held_against_an_effect() -> None:
+    def recordings(stroke: float, drive: float) -> Any:
+        wave = np.sin(np.linspace(0.0, 6.28, 400))
+        return SimpleNamespace(force=wave, displacement=stroke * wave, velocity=0.1 * wave, drive=np.full(400, drive))
+
+    inside = seen_by(recordings(8e-3, 1.0), recordings(1e-2, 1.0))
+    assert np.array_equal(inside, np.abs(recordings(1e-2, 1.0).displacement) <= 8e-3 * 1.02)
+    assert seen_by(recordings(1e-2, 1.0), recordings(8e-3, 1.0)).all()
+    assert not seen_by(recordings(1e-2, 1.0), recordings(8e-3, 2.0)).any()
