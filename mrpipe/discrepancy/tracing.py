@@ -151,24 +151,28 @@ def _select(
             drafted=_drafted(baseline.fit, effects) if floor > 0.0 else None,
         )
         selection = select(baseline.fit)
-        if floor == 0.0:
-            selection = _in_better_form(selection, select, options)
-        excess = selection.chosen.chi_square / max(baseline.noise, 1e-12)
         if floor > 0.0:
             return baseline, _judged_by_trees(with_play(selection, effects))
-        if excess >= MODEL_ERROR_CHI_SQUARE:
-            # the right effect in too plain a form may leave as much
-            richer = _refined(selection, len(own), options, rng, jobs).chosen
-            before, excess = excess, richer.chi_square / max(baseline.noise, 1e-12)
-            if excess < min(3.0 * MODEL_ERROR_CHI_SQUARE, (1.0 - TOO_PLAIN) * before):
-                return _with_noise_of(selection.chosen, baseline, selection)
-        if excess < MODEL_ERROR_CHI_SQUARE:
+        selection = _in_better_form(selection, select, options)
+        if _near_the_noise(selection, baseline.noise, len(own), options, rng, jobs):
             return _with_noise_of(selection.chosen, baseline, selection)
         # what is left on the force's own scale becomes the yardstick of the second pass
         chosen = selection.chosen
         used = chosen.problem.root_weight > 0.0
         left = chosen.residual[used] / chosen.problem.root_weight[used]
         floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
+
+
+def _near_the_noise(
+    selection: Selection, noise: float, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
+) -> bool:
+    """Return whether the sensors' noise is the measure, for what was chosen or for a richer form of the same effect."""
+    plain = selection.chosen.chi_square / max(noise, 1e-12)
+    if plain < MODEL_ERROR_CHI_SQUARE:
+        return True
+    # the right effect in too plain a form may leave as much as a wrong base does
+    richer = _refined(selection, declared, options, rng, jobs).chosen.chi_square / max(noise, 1e-12)
+    return richer < max(MODEL_ERROR_CHI_SQUARE, min(3.0 * MODEL_ERROR_CHI_SQUARE, (1.0 - TOO_PLAIN) * plain))
 
 
 def _drafted(base: Fit, effects: Mapping[str, Effect]) -> Callable[[Fit], list[Fit]] | None:
