@@ -186,10 +186,10 @@ def run_case(case: Case) -> dict[str, Any]:
 
 def traced(case: Case, campaign: Campaign, truth: dict[str, Any]) -> dict[str, Any]:
     """Trace a campaign and judge the verdict."""
-    from mrpipe.discrepancy.frame_verdict import trace_structure
-    from mrpipe.discrepancy.summary import TracingOptions
     from mrpipe.effects.library import damper_effects
     from mrpipe.effects.structural.library import all_structural_effects
+    from mrpipe.tracing.bench.summary import TracingOptions
+    from mrpipe.tracing.structure.verdict import trace_structure
 
     options = TracingOptions(refits=4, observation_filter=False, drive_unit=campaign.drive_unit or "A")
     began = time.process_time()

@@ -103,11 +103,11 @@ def trace(campaign: Path, seed: int) -> dict[str, Any]:
     import numpy as np
 
     from mrpipe.campaigns import load_campaign
-    from mrpipe.discrepancy.summary import TracingOptions
-    from mrpipe.discrepancy.tracing import trace_campaign
     from mrpipe.effects.library import damper_effects
     from mrpipe.laboratory.sealing import sealed_path
     from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
+    from mrpipe.tracing.bench.summary import TracingOptions
+    from mrpipe.tracing.bench.trace import trace_campaign
 
     tests = [item.test for item in prepare_campaign(load_campaign(campaign), PreparationOptions()).tests]
     damper_effects()

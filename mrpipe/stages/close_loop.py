@@ -12,9 +12,9 @@ from mrpipe.stages.close_loop_report import report
 
 if TYPE_CHECKING:
     from mrpipe.config.sections.close_loop import CloseLoopSettings
-    from mrpipe.discrepancy.summary import Tracing, TracingOptions
     from mrpipe.effects.contract import Effect
     from mrpipe.signals.prepared import PreparedTest
+    from mrpipe.tracing.bench.summary import Tracing, TracingOptions
 
 CORRECTIONS = "corrections.yaml"
 NEXT_TESTS = "next-tests.yaml"
@@ -22,8 +22,8 @@ NEXT_TESTS = "next-tests.yaml"
 
 def tracing_options(settings: CloseLoopSettings, drive_unit: str) -> TracingOptions:
     """Return what the settings ask of a tracing, on a bench or behind a structure."""
-    from mrpipe.discrepancy.summary import TracingOptions
-    from mrpipe.discrepancy.verdict import Rules
+    from mrpipe.tracing.bench.summary import TracingOptions
+    from mrpipe.tracing.bench.verdict import Rules
 
     return TracingOptions(
         model=settings.model,
@@ -46,9 +46,9 @@ def tracing_options(settings: CloseLoopSettings, drive_unit: str) -> TracingOpti
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
-    from mrpipe.discrepancy.tracing import trace_campaign
     from mrpipe.effects.library import damper_effects, effects_named
     from mrpipe.signals.prepared import read_prepared
+    from mrpipe.tracing.bench.trace import trace_campaign
 
     settings = context.settings.close_loop
     campaign = load_campaign(context.inputs["campaign:bench"])
@@ -74,7 +74,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
     """Write what `prepare` should take out of the channels, as settings to be laid over the configuration."""
-    from mrpipe.discrepancy.corrections import Corrections, corrections_of
+    from mrpipe.tracing.bench.corrections import Corrections, corrections_of
 
     prepare = context.settings.prepare
     present = Corrections(**prepare.corrections.model_dump(), displacement_late_s=prepare.displacement_late_s)
@@ -94,7 +94,7 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
 
 def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Effect]) -> dict[str, Any]:
     """Write the tests that would decide what is open, as settings for `record`; those of before stay in the list."""
-    from mrpipe.discrepancy.extra_tests import wanted_tests
+    from mrpipe.tracing.bench.extra_tests import wanted_tests
 
     untestable = {name: library[name].needs for name in traced.summary["untestable"] if name in library}
     extra = wanted_tests(traced.summary, untestable, traced.training)

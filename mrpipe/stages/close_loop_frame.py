@@ -15,14 +15,14 @@ from mrpipe.stages.close_loop import tracing_options
 
 if TYPE_CHECKING:
     from mrpipe.config.sections.campaigns import CampaignsSettings
-    from mrpipe.discrepancy.frame_verdict import StructureTracing
+    from mrpipe.tracing.structure.verdict import StructureTracing
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
-    from mrpipe.discrepancy.frame_verdict import trace_structure
     from mrpipe.effects.library import damper_effects
     from mrpipe.effects.structural.library import all_structural_effects, structural_effects
+    from mrpipe.tracing.structure.verdict import trace_structure
 
     settings = context.settings.close_loop
     campaigns = [load_campaign(path) for name, path in context.inputs.items() if name.startswith("campaign:")]
@@ -67,7 +67,7 @@ def _report(context: StageContext, traced: StructureTracing) -> None:
     import pandas as pd
 
     from mrpipe.reporting import frame_tracing as figures
-    from mrpipe.reporting.discrepancy import candidate_ranking, errors_per_test
+    from mrpipe.reporting.bench_tracing import candidate_ranking, errors_per_test
 
     summary, settings = traced.summary, context.settings.close_loop
     context.report.text(figures.in_plain_words(summary))

@@ -12,11 +12,11 @@ from mrpipe.stages.simulate import LAWS, Rig, controller, excitation_of, loop_op
 if TYPE_CHECKING:
     from mrpipe.control.controller import Controller, Gains
     from mrpipe.control.inverse import InverseTable
-    from mrpipe.discrepancy.augmented import ForceInUse
-    from mrpipe.discrepancy.closed_loop import LoopRun
-    from mrpipe.discrepancy.summary import Tracing
     from mrpipe.networks.network import Network
     from mrpipe.signals.prepared import PreparedTest
+    from mrpipe.tracing.bench.summary import Tracing
+    from mrpipe.tracing.loop.augmented import ForceInUse
+    from mrpipe.tracing.loop.comparison import LoopRun
 
 PARTS = ("inverse", "switch", "gain")
 """What is renewed in a controller, one after another."""
@@ -30,10 +30,10 @@ _LACKING = {
 
 def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
     """Return the part `closed_loop` of the JSON: each law measured, before, after and recalibrated."""
-    from mrpipe.discrepancy.augmented import damper_of, plant_chain
-    from mrpipe.discrepancy.closed_loop import Arrangement, Bench, best_ways, compare_laws
     from mrpipe.reporting.closed_loop_words import in_words
     from mrpipe.structures import read_frame
+    from mrpipe.tracing.loop.augmented import damper_of, plant_chain
+    from mrpipe.tracing.loop.comparison import Arrangement, Bench, best_ways, compare_laws
 
     needed = ["identify-frame", "calibrate"]
     if context.settings.simulate.controller.inverse == "network":
@@ -72,7 +72,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
 def _runs(context: StageContext, rig: Rig) -> tuple[list[LoopRun], str]:
     """Return the recordings and every other law under their motion; without recordings all laws as simulate has it."""
     from mrpipe.campaigns import load_campaign
-    from mrpipe.discrepancy.closed_loop import measured_runs, simulated_runs, with_unrecorded
+    from mrpipe.tracing.loop.comparison import measured_runs, simulated_runs, with_unrecorded
 
     recorded = []
     if "campaign:closed-loop" in context.inputs:
@@ -125,8 +125,8 @@ class Renewed:
 
 def _renewed(context: StageContext, traced: Tracing, rig: Rig, tests: list[PreparedTest]) -> Renewed:
     """Return inverse, switch and gains for the damper with its effects."""
-    from mrpipe.discrepancy.augmented import CHANGED, changed_share, force_in_use, plant_chain
-    from mrpipe.discrepancy.recalibration import switch_threshold
+    from mrpipe.tracing.loop.augmented import CHANGED, changed_share, force_in_use, plant_chain
+    from mrpipe.tracing.loop.recalibration import switch_threshold
 
     settings = context.settings.simulate.controller
     calibrated = context.artifact("calibrate")
@@ -179,8 +179,8 @@ def _working_drive(rig: Rig, force_n: float, limit: float) -> float:
 def _retrained(
     context: StageContext, traced: Tracing, tests: list[PreparedTest], limit: float, summary: dict[str, Any]
 ) -> Network:
-    from mrpipe.discrepancy.augmented import plant_chain, retrain_inverse
     from mrpipe.networks.network import read_network
+    from mrpipe.tracing.loop.augmented import plant_chain, retrain_inverse
 
     again = retrain_inverse(
         read_network(context.artifact("train-inverse"), "network"),
@@ -203,7 +203,7 @@ def _factors(
 ) -> dict[str, float]:
     """Return by what the gain of each law moves, from the calibrated gains."""
     from mrpipe.control.storage import read_gains
-    from mrpipe.discrepancy.recalibration import LAWS_WITH_GAINS, gain_factor
+    from mrpipe.tracing.loop.recalibration import LAWS_WITH_GAINS, gain_factor
 
     calibrated = context.artifact("calibrate")
     return {
@@ -219,7 +219,7 @@ def _renewed_controller(
     """Return the controller of a run with some of its parts (`inverse`, `switch`, `gain`) renewed."""
     from mrpipe.control.controller import PASSIVE, Gains
     from mrpipe.control.storage import read_gains
-    from mrpipe.discrepancy.recalibration import scaled
+    from mrpipe.tracing.loop.recalibration import scaled
 
     factor = renewed.factors.get(run.law, 1.0) if "gain" in parts else 1.0
     gains = _given_gains(run)

@@ -9,12 +9,12 @@ from mrpipe.pipeline.stage import StageContext
 
 if TYPE_CHECKING:
     from mrpipe.artifacts import FloatArray
-    from mrpipe.discrepancy.summary import Tracing
+    from mrpipe.tracing.bench.summary import Tracing
 
 
 def report(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
     """Write the stage's part of the report."""
-    from mrpipe.reporting.discrepancy import in_plain_words
+    from mrpipe.reporting.bench_tracing import in_plain_words
 
     context.report.text(in_plain_words(summary))
     _effects(context, summary)
@@ -48,7 +48,7 @@ def _effects(context: StageContext, summary: Mapping[str, Any]) -> None:
 
 
 def _where(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
-    from mrpipe.reporting.discrepancy import residual_location, residual_maps
+    from mrpipe.reporting.bench_tracing import residual_location, residual_maps
 
     context.report.figure(
         "where",
@@ -83,7 +83,7 @@ def _drive_map(states: Mapping[str, FloatArray], drive: str, unit: str) -> tuple
 def _candidates(context: StageContext, summary: Mapping[str, Any]) -> None:
     import pandas as pd
 
-    from mrpipe.reporting.discrepancy import candidate_ranking
+    from mrpipe.reporting.bench_tracing import candidate_ranking
 
     candidates = summary["candidates"]
     if not candidates:
@@ -112,7 +112,7 @@ def _candidates(context: StageContext, summary: Mapping[str, Any]) -> None:
 def _before_and_after(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
     import pandas as pd
 
-    from mrpipe.reporting.discrepancy import MOST_BARS, ShownTest, errors_per_test, loops_before_and_after
+    from mrpipe.reporting.bench_tracing import MOST_BARS, ShownTest, errors_per_test, loops_before_and_after
 
     validation, rows = traced.validation, summary["tests"]
     errors = {row["name"]: row for row in rows}

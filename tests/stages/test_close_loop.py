@@ -17,8 +17,6 @@ from mrpipe.control.calibration import CalibrationOptions, calibrate
 from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceOptions, train_reference
 from mrpipe.control.storage import write_calibration
-from mrpipe.discrepancy.summary import UNATTRIBUTED, Tracing, TracingOptions
-from mrpipe.discrepancy.tracing import trace_campaign
 from mrpipe.effects.library import damper_effects
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import StageContext
@@ -30,7 +28,9 @@ from mrpipe.stages.close_loop_report import report
 from mrpipe.stages.simulate import LAWS
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
-from tests.discrepancy.rig import campaign
+from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing, TracingOptions
+from mrpipe.tracing.bench.trace import trace_campaign
+from tests.tracing.bench.rig import campaign
 
 SETTINGS: dict[str, Any] = {
     "simulate": {

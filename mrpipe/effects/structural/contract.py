@@ -7,7 +7,7 @@ bring:
   relative to the ground) into unit forces; the forces are proportional to amplitudes, which are solved for exactly.
 - `base`: the turn of the base, as columns of motion of unit storey height.
 - `damper-rod`, `command`: declared here with its parameters, found in the closed loop by
-  :mod:`mrpipe.discrepancy.frame_damper` and :mod:`mrpipe.discrepancy.frame_delay`.
+  :mod:`mrpipe.tracing.structure.damper` and :mod:`mrpipe.tracing.structure.delay`.
 """
 
 from __future__ import annotations

@@ -1,1 +1,0 @@
-"""From residual to effect."""

@@ -1,0 +1,99 @@
+"""Faults of sensors and time base that were named, as numbers that `prepare` takes out of the channels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mrpipe.signals.faults import KnownFaults
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.engine import predict
+from mrpipe.tracing.bench.recordings import record_tests
+from mrpipe.tracing.bench.summary import Tracing
+
+
+@dataclass(frozen=True)
+class Corrections(KnownFaults):
+    """What to take out of the channels: the faults that `prepare` knows, and the displacement's time.
+
+    Attributes
+    ----------
+    displacement_late_s
+        By how much the displacement is recorded later than force and drive (`prepare.displacement_late_s`).
+    """
+
+    displacement_late_s: float = 0.0
+
+    @property
+    def any(self) -> bool:
+        """Whether there is anything to take out."""
+        return self != Corrections()
+
+    def settings(self, present: Corrections) -> dict[str, Any]:
+        """Return the section `prepare` that has these on top of those present already."""
+        total = asdict(present + self)
+        late = total.pop("displacement_late_s")
+        return {"displacement_late_s": late, "corrections": {key: value for key, value in total.items() if value}}
+
+    def __add__(self, other: Corrections) -> Corrections:
+        """Return both together; the lag is that of `other` where it has one."""
+        numbers = {
+            name: getattr(self, name) + getattr(other, name)
+            for name in (
+                "displacement_late_s", "force_late_s", "force_per_drive_n", "force_per_drive_squared_n",
+                "force_drift_n_s",
+            )
+        }  # fmt: skip
+        names = dict.fromkeys([*self.force_offset_n, *other.force_offset_n])
+        offsets = {name: self.force_offset_n.get(name, 0.0) + other.force_offset_n.get(name, 0.0) for name in names}
+        return Corrections(**numbers, force_offset_n=offsets, drive_lag_s=other.drive_lag_s or self.drive_lag_s)
+
+
+def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Corrections:
+    """Return the corrections that the named faults of sensors ask for.
+
+    Parameters
+    ----------
+    tests
+        All prepared tests, so that those the tracing left out have their offset too.
+    """
+    found = Corrections()
+    chosen = traced.selection.chosen
+    named = {item.effect.name for item in traced.named}
+    for term, values in zip(chosen.problem.terms, chosen.term_values, strict=True):
+        if not term.effect.sensor or term.effect.name not in named:
+            continue
+        if term.effect.name == "channel-skew":
+            late = float(values["skew"])
+            if term.form.name == "late-force":
+                found = replace(found, force_late_s=late)
+            else:
+                found = replace(found, displacement_late_s=late)
+        elif term.form.name == "drift":
+            found = replace(found, force_drift_n_s=float(values["rate"]))
+        elif term.effect.name == "offset":
+            found = replace(
+                found,
+                force_per_drive_n=float(values["rate"]),
+                force_per_drive_squared_n=float(values.get("square", 0.0)),
+                drive_lag_s=1.0 / chosen.base_values["eta"]
+                if term.form.name == "with-effective-drive" and "eta" in chosen.base_values
+                else 0.0,
+            )
+    if any(item.effect.name == "offset" and item.form == "per-test" for item in traced.named):
+        found = replace(found, force_offset_n=_offsets(traced, tests))
+    return found
+
+
+def _offsets(traced: Tracing, tests: Sequence[PreparedTest]) -> dict[str, float]:
+    """Return by how much the offset of each test departs from that of the campaign, which prepare finds by itself."""
+    recordings = record_tests(tests, rate_hz=250.0)
+    left = recordings.force - predict(traced.selection.chosen, recordings)
+    used = recordings.used
+    counts = np.maximum(np.bincount(recordings.test[used], minlength=recordings.tests), 1)
+    means = np.bincount(recordings.test[used], weights=left[used], minlength=recordings.tests) / counts
+    means = means - np.median(means)
+    return {name: round(float(value), 4) for name, value in zip(recordings.names, means, strict=True)}

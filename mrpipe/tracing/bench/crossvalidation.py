@@ -1,0 +1,150 @@
+"""Is an effect worth having: error on whole training tests left out, with a block bootstrap; intervals."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from mrpipe.artifacts import BoolArray, FloatArray, IntArray
+from mrpipe.tracing.bench.engine import Fit, centred, fit, jacobian_of, predict, regressors, weighting
+from mrpipe.tracing.bench.problem import Problem
+from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.tracing.bench.residual_structure import BLOCK_S
+
+BEYOND = 0.01
+"""Share of its range by which a state may leave what a fit has seen before it counts as unknown to it."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What an effect gains on tests that its fit has not seen.
+
+    Attributes
+    ----------
+    share
+        Share of the squared error that goes, cross-validated.
+    interval
+        95 % interval of it by block bootstrap.
+    """
+
+    share: float
+    interval: tuple[float, float]
+
+    @property
+    def significant(self) -> bool:
+        """Whether the interval lies above nothing."""
+        return self.interval[0] > 0.0
+
+
+def folds_of(recordings: Recordings, folds: int) -> list[list[int]]:
+    """Return the tests of each fold: every k-th in the order of drive level, then stroke.
+
+    A campaign steps through its drive levels in turn; folds in its own order could take all of one level away, and
+    what is then learnt of the others says nothing of it.
+    """
+    keys = [
+        (round(float(np.mean(np.abs(recordings.drive[part]))), 2), float(np.ptp(recordings.displacement[part])))
+        for part in (recordings.test == index for index in range(recordings.tests))
+    ]
+    order = sorted(range(recordings.tests), key=lambda index: keys[index])
+    return [sorted(order[k::folds]) for k in range(folds)]
+
+
+def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
+    """Return the weighted residual of every training test by a fit that has not seen it, shape (n,).
+
+    Zero where motion or drive go beyond all that the fit has seen: an end stop that one test alone touches cannot be
+    known from the others, and what they make of it says nothing against it.
+    """
+    problem = found.problem
+    recordings = problem.recordings
+    parts = folds_of(recordings, folds)
+
+    def one(part: list[int]) -> tuple[list[int], FloatArray, BoolArray]:
+        keep = [t for t in range(recordings.tests) if t not in part]
+        within = np.isin(recordings.test, keep)
+        learned = fit(
+            replace(problem, recordings=recordings.subset(keep), root_weight=problem.root_weight[within]),
+            found.theta,
+            iterations=2,
+        )
+        left_out = recordings.subset(part)
+        return part, predict(learned, left_out), seen_by(recordings.subset(keep), left_out)
+
+    result = np.zeros(len(recordings.force))
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        known = np.ones(len(result), dtype=np.bool_)
+        for part, force, seen in pool.map(one, [part for part in parts if part]):
+            within = np.isin(recordings.test, part)
+            result[within] = recordings.force[within] - force
+            known[within] = seen
+    weights = np.where(known, problem.root_weight, 0.0)
+    return _without_offsets(result, problem.recordings.test, weights)
+
+
+def seen_by(known: Recordings, other: Recordings) -> BoolArray:
+    """Return where motion and drive of `other` lie within what `known` has, shape (n of other,)."""
+    inside = np.ones(len(other.force), dtype=np.bool_)
+    for name in ("displacement", "velocity", "drive"):
+        have, ask = getattr(known, name), getattr(other, name)
+        margin = BEYOND * float(np.ptp(have))
+        inside &= (ask >= np.min(have) - margin) & (ask <= np.max(have) + margin)
+    return inside
+
+
+def _without_offsets(error: FloatArray, test: IntArray, root_weight: FloatArray) -> FloatArray:
+    """Return the weighted error without each test's mean, which is a sensor's offset."""
+    weight = root_weight**2
+    sums = np.bincount(test, weights=weight)
+    means = np.bincount(test, weights=weight * error) / np.maximum(sums, 1e-300)
+    return np.asarray((error - means[test]) * root_weight)
+
+
+def gain_of(before: FloatArray, after: FloatArray, problem: Problem, *, draws: int, rng: np.random.Generator) -> Gain:
+    """Return the share of the left-out squared error that goes from `before` to `after`, with its interval."""
+    recordings = problem.recordings
+    length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
+    within = (np.arange(len(before)) - recordings.starts[recordings.test]) // length[recordings.test]
+    block = np.unique(recordings.test * 100_000 + within, return_inverse=True)[1]
+    first = np.bincount(block, weights=before**2)
+    second = np.bincount(block, weights=after**2)
+    chosen = rng.integers(len(first), size=(draws, len(first)))
+    shares = 1.0 - second[chosen].sum(axis=1) / np.maximum(first[chosen].sum(axis=1), 1e-300)
+    low, high = np.quantile(shares, [0.025, 0.975])
+    return Gain(float(1.0 - second.sum() / max(first.sum(), 1e-300)), (float(low), float(high)))
+
+
+def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
+    """Return 95 % intervals of every parameter of the effects, from the Jacobian and blocks of the residual."""
+    problem = found.problem
+    w = weighting(problem)
+    low, high = problem.bounds()
+    residual = found.residual[w.at]
+    # the Jacobian of the projected residual gives the searched values; amplitudes are differentiated with them
+    searched = jacobian_of(problem, found.theta, residual, w, low, high)
+    linear = centred(regressors(problem, found.theta)[:, w.at], w)[0]
+    first = problem.base.yield_order + problem.base.viscosity_order + 2
+    recordings = problem.recordings
+    length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
+    within = ((np.arange(len(recordings.force)) - recordings.starts[recordings.test]) // length[recordings.test])[w.at]
+    block = np.unique(recordings.test[w.at] * 100_000 + within, return_inverse=True)[1]
+    rows = np.concatenate([-searched, linear])
+    inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
+    scores = np.stack([np.bincount(block, weights=row * residual) for row in rows])
+    deviation = np.sqrt(np.maximum(np.diag(inverse @ (scores @ scores.T) @ inverse), 0.0))
+    factor = float(stats.norm.ppf(0.975))
+    result: list[dict[str, tuple[float, float]]] = [{} for _ in problem.terms]
+    for k, (index, parameter) in enumerate(problem.searched):
+        if index >= 0:
+            edges = [found.theta[k] - factor * deviation[k], found.theta[k] + factor * deviation[k]]
+            unit = problem.scales.of(parameter.scale)
+            pair = [float(np.exp(min(e, 60.0))) if parameter.logarithmic else float(e * unit) for e in edges]
+            result[index][parameter.name] = (pair[0], pair[1])
+    for k, (index, parameter) in enumerate(problem.amplitudes):
+        half = factor * deviation[len(problem.searched) + first + k]
+        value = float(found.linear[first + k])
+        result[index][parameter.name] = (value - half, value + half)
+    return result

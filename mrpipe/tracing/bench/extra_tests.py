@@ -1,0 +1,263 @@
+"""Which further bench tests would tell rivals apart, sized for the campaign at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrpipe.tracing.bench.recordings import Recordings
+
+_KINDS = (
+    ("triangular displacement", "speeds"),
+    ("slow small triangles", "reversal"),
+    ("current steps", "steps"),
+    ("varying-drive", "steps"),
+    ("dwell at several positions", "positions"),
+    ("several-positions", "positions"),
+    ("about another middle", "middle"),
+    ("several frequencies", "frequencies"),
+    ("frequency sweep", "frequencies"),
+    ("several-frequencies", "frequencies"),
+    ("varying-speed", "speeds"),
+    ("smaller amplitude", "amplitudes"),
+    ("long run", "long"),
+    ("long-tests", "long"),
+    ("constant drive", "constants"),
+    ("rest at several drives", "rest"),
+)
+"""Words of the effects' own advice and needs -> kind of test."""
+
+_BY_STATE = {
+    "displacement": "positions",
+    "past of displacement": "reversal",
+    "hysteresis": "reversal",
+    "velocity": "speeds",
+    "direction": "constants",
+    "acceleration": "frequencies",
+    "past of velocity": "reversal",
+    "drive": "constants",
+    "past of drive": "steps",
+    "rate of drive": "steps",
+    "time in test": "long",
+    "work": "long",
+}
+"""State that an unknown residual depends on -> kind of test."""
+
+_IN_DOUBT = ("speeds", "steps", "amplitudes")
+
+
+@dataclass(frozen=True)
+class ExtraTests:
+    """Tests worth making.
+
+    Attributes
+    ----------
+    tests
+        As `laboratory.bench.tests` takes them.
+    reasons
+        A line for each thing they decide: what (`accumulator or inertia`), kind, the names of the tests.
+    """
+
+    tests: tuple[dict[str, Any], ...] = ()
+    reasons: tuple[dict[str, Any], ...] = ()
+
+
+@dataclass(frozen=True)
+class Range:
+    """What the campaign's motions span; the tests stay within it.
+
+    Attributes
+    ----------
+    stroke_m, speed_m_s, drive
+        Largest displacement, speed, and drive (A or V).
+    frequency_hz
+        Its usual frequency.
+    duration_s
+        Its usual length of a test.
+    """
+
+    stroke_m: float
+    speed_m_s: float
+    drive: float
+    frequency_hz: float
+    duration_s: float
+
+
+def range_of(recordings: Recordings) -> Range:
+    """Return what the tests of a campaign span."""
+    scales = recordings.scales()
+    periods = recordings.period_s[recordings.period_s > 0.0]
+    frequency = 1.0 / float(np.median(periods)) if len(periods) else scales.speed / (2.0 * np.pi * scales.stroke)
+    lengths = np.diff(recordings.starts) * recordings.dt
+    return Range(scales.stroke, scales.speed, scales.drive, frequency, float(np.clip(np.median(lengths), 4.0, 20.0)))
+
+
+def kinds_in(advice: str) -> list[str]:
+    """Return the kinds of test that a sentence of advice or a need asks for."""
+    return list(dict.fromkeys(kind for words, kind in _KINDS if words in advice))
+
+
+def wanted_tests(summary: Mapping[str, Any], needs: Mapping[str, Sequence[str]], recordings: Recordings) -> ExtraTests:
+    """Return the tests that a verdict leaves to be wished for.
+
+    Parameters
+    ----------
+    summary
+        Contract section 4: rivals of each effect, and what an unknown residual depends on.
+    needs
+        Effect that the campaign can't show -> what it needs for it.
+    recordings
+        Training tests.
+    """
+    span = range_of(recordings)
+    wanted: list[tuple[str, str]] = []
+    for effect in summary["effects"]:
+        advice = effect.get("separating_tests", {})
+        for rival in effect["tied_with"]:
+            kinds = kinds_in(advice.get(rival, "")) or list(_IN_DOUBT)
+            wanted += [(f"{effect['name']} or {rival}", kind) for kind in kinds]
+    if summary["unexplained"]["structured"]:
+        states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
+        kinds = list(dict.fromkeys(_BY_STATE[state] for state in states if state in _BY_STATE)) or list(_IN_DOUBT)
+        wanted += [("what is unexplained", kind) for kind in kinds]
+    for name, asked in needs.items():
+        wanted += [(f"whether there is {name}", kind) for need in asked for kind in kinds_in(need)]
+    tests: dict[str, list[dict[str, Any]]] = {}
+    reasons: dict[str, dict[str, Any]] = {}
+    for decides, kind in wanted:
+        tests.setdefault(kind, _MAKERS[kind](span))
+        entry = reasons.setdefault(decides, {"decides": decides, "kinds": [], "tests": []})
+        if kind not in entry["kinds"]:
+            entry["kinds"].append(kind)
+            entry["tests"] += [item["name"] for item in tests[kind]]
+    return ExtraTests(tuple(item for made in tests.values() for item in made), tuple(reasons.values()))
+
+
+def _test(name: str, motion: str, amplitude: float, frequency: float, duration: float, **more: Any) -> dict[str, Any]:
+    made = {
+        "name": f"extra-{name}",
+        "role": "training",
+        "motion": motion,
+        "amplitude_m": float(f"{amplitude:.3g}"),
+        "frequency_hz": float(f"{frequency:.3g}"),
+        "duration_s": float(f"{max(duration, 2.5 / frequency):.3g}"),
+        # the rig stays what it is
+        "later": True,
+    }
+    return made | {key: float(f"{value:.3g}") if isinstance(value, float) else value for key, value in more.items()}
+
+
+def _speeds(span: Range) -> list[dict[str, Any]]:
+    amplitude = 0.8 * span.stroke_m
+    # beyond the largest speed so far too: a bend that looks like another within it does not outside
+    speeds = span.speed_m_s * np.geomspace(0.03, 1.5, 5)
+    return [
+        _test(
+            f"speed-{number}-{drive:.3g}", "triangle", amplitude, speed / (4.0 * amplitude), span.duration_s,
+            current_a=drive,
+        )
+        for number, speed in enumerate(speeds, start=1)
+        for drive in (0.0, 0.5 * span.drive)
+    ]  # fmt: skip
+
+
+def _steps(span: Range) -> list[dict[str, Any]]:
+    return [
+        _test(
+            f"steps-{factor:g}", "triangle", 0.8 * span.stroke_m, factor * span.frequency_hz, 2.0 * span.duration_s,
+            current="steps", current_a=span.drive, pause_s=0.5 / span.frequency_hz,
+        )
+        for factor in (0.5, 1.0)
+    ]  # fmt: skip
+
+
+def _positions(span: Range) -> list[dict[str, Any]]:
+    return [
+        _test(f"dwell-{drive:.3g}", "dwell", span.stroke_m, span.frequency_hz, 2.0 * span.duration_s, current_a=drive)
+        for drive in (0.0, 0.5 * span.drive)
+    ]
+
+
+def _middle(span: Range) -> list[dict[str, Any]]:
+    return [
+        _test(
+            f"middle-{1e3 * middle:.3g}mm", "sine", 0.4 * span.stroke_m, span.frequency_hz, span.duration_s,
+            current_a=0.5 * span.drive, middle_m=float(middle),
+        )
+        for middle in (-0.5 * span.stroke_m, 0.5 * span.stroke_m)
+    ]  # fmt: skip
+
+
+def _frequencies(span: Range) -> list[dict[str, Any]]:
+    amplitude = 0.5 * span.stroke_m
+    highest = span.speed_m_s / (2.0 * np.pi * amplitude)
+    return [
+        _test(f"frequency-{number}-{drive:.3g}", "sine", amplitude, frequency, span.duration_s, current_a=drive)
+        for number, frequency in enumerate(highest * np.geomspace(0.15, 1.5, 4), start=1)
+        for drive in (0.0, 0.5 * span.drive)
+    ]
+
+
+def _amplitudes(span: Range) -> list[dict[str, Any]]:
+    return [
+        _test(
+            f"amplitude-{share:g}-{drive:.3g}", "sine", share * span.stroke_m, span.frequency_hz, span.duration_s,
+            current_a=drive,
+        )
+        for share in (0.2, 0.5)
+        for drive in (0.0, 0.5 * span.drive)
+    ]  # fmt: skip
+
+
+def _long(span: Range) -> list[dict[str, Any]]:
+    amplitude = min(0.8 * span.stroke_m, span.speed_m_s / (2.0 * np.pi * span.frequency_hz))
+    long = min(max(5.0 * span.duration_s, 30.0), 60.0)
+    common: dict[str, Any] = {"current_a": 0.7 * span.drive}
+    return [
+        _test("long", "sine", amplitude, span.frequency_hz, long, **common),
+        _test("cooling", "hold", amplitude, span.frequency_hz, long, pause_s=0.3 * long, **common),
+        _test("long-again", "sine", amplitude, span.frequency_hz, long, **common)
+        | {"role": "repeat", "repeat_of": "extra-long"},
+    ]
+
+
+def _reversal(span: Range) -> list[dict[str, Any]]:
+    return [
+        _test(f"reversal-{drive:.3g}", "triangle", 0.2 * span.stroke_m, 0.5 * span.frequency_hz, span.duration_s,
+              current_a=drive)
+        for drive in (0.2 * span.drive, span.drive)
+    ]  # fmt: skip
+
+
+def _constants(span: Range) -> list[dict[str, Any]]:
+    amplitude = 0.7 * span.stroke_m
+    return [
+        _test(f"constant-{drive:.3g}-{factor:g}", "sine", amplitude, factor * span.frequency_hz, span.duration_s,
+              current_a=drive)
+        for drive in (0.0, 0.3 * span.drive, 0.6 * span.drive, span.drive)
+        for factor in (0.5, 1.0)
+    ]  # fmt: skip
+
+
+def _rest(span: Range) -> list[dict[str, Any]]:
+    return [
+        _test("rest-in-steps", "hold", 0.3 * span.stroke_m, span.frequency_hz, 3.0 * span.duration_s,
+              pause_s=2.0 * span.duration_s, current="steps", current_a=span.drive)
+    ]  # fmt: skip
+
+
+_MAKERS: Mapping[str, Callable[[Range], list[dict[str, Any]]]] = {
+    "speeds": _speeds,
+    "steps": _steps,
+    "positions": _positions,
+    "middle": _middle,
+    "frequencies": _frequencies,
+    "amplitudes": _amplitudes,
+    "long": _long,
+    "reversal": _reversal,
+    "constants": _constants,
+    "rest": _rest,
+}

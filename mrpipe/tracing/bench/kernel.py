@@ -1,0 +1,174 @@
+"""One compiled loop over all tests that records what a fit needs of a chain: few columns, and the share of steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import float64, int64, njit, void
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.plant import (
+    ACCELERATION,
+    CHAIN_FUNCTIONS,
+    CURRENT,
+    DISPLACEMENT,
+    DRIVE,
+    EXTRA_FORCE,
+    FIRST,
+    FORCE,
+    HYSTERESIS,
+    HYSTERETIC_FORCE,
+    PAST_CURRENT,
+    RATE_YIELD,
+    SINCE_REVERSAL,
+    SLIP,
+    TIME,
+    VELOCITY,
+    VISCOSITY,
+    VISCOUS_FORCE,
+    WIRE_SIZE,
+    WORK,
+    YIELD_FORCE,
+    Chain,
+)
+from mrpipe.dampers.timing import look_ahead
+from mrpipe.tracing.bench.recordings import Recordings
+
+COLUMNS = 8
+CURRENT_AT, VELOCITY_AT, HYSTERESIS_AT, YIELD_AT, VISCOSITY_AT, FORCE_AT, WORK_AT, DISPLACEMENT_AT = range(COLUMNS)
+"""Rows of what :func:`run_recordings` returns: effective drive, velocity and displacement of the damper, z, factors by
+which effects change yield force and viscosity, force, work."""
+
+
+@njit(
+    void(
+        CHAIN_FUNCTIONS,
+        float64[::1],
+        int64[::1],
+        int64[::1],
+        float64[::1],
+        float64[::1],
+        float64[::1],
+        float64[::1],
+        int64[::1],
+        float64[::1],
+        int64,
+        int64[::1],
+        float64[:, ::1],
+    ),
+    cache=True,
+    nogil=True,
+)
+def _run(
+    functions: Any,
+    parameters: FloatArray,
+    parameter_offsets: IntArray,
+    state_offsets: IntArray,
+    displacement: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    drive: FloatArray,
+    starts: IntArray,
+    dt: FloatArray,
+    coefficients_at: int,
+    tapped: IntArray,
+    result: FloatArray,
+) -> None:
+    memory = state_offsets[-1]
+    count = parameter_offsets.shape[0] - 1
+    state = np.zeros(memory + 1)
+    wire = np.zeros(WIRE_SIZE)
+    for test in range(starts.shape[0] - 1):
+        step = dt[test]
+        state[:] = 0.0
+        wire[:] = 0.0
+        last = 0.0
+        slip = 0.0
+        since = 0.0
+        work = 0.0
+        past = 0.0
+        for index in range(starts[test], starts[test + 1]):
+            first = index == starts[test]
+            v = velocity[index]
+            if not first:
+                if v * last < 0.0:
+                    slip = 0.0
+                    since = 0.0
+                slip += abs(v) * step
+                since += step
+            if v != 0.0:
+                last = v
+            wire[TIME] = (index - starts[test]) * step
+            wire[FIRST] = 1.0 if first else 0.0
+            wire[DISPLACEMENT] = displacement[index]
+            wire[VELOCITY] = v
+            wire[ACCELERATION] = acceleration[index]
+            wire[DRIVE] = drive[index]
+            wire[CURRENT] = drive[index]
+            wire[WORK] = work
+            wire[SLIP] = slip
+            wire[SINCE_REVERSAL] = since
+            wire[PAST_CURRENT] = past
+            wire[RATE_YIELD] = 1.0
+            wire[EXTRA_FORCE] = 0.0
+            yields = 1.0
+            viscous = 1.0
+            tap = 0
+            for k in range(count):
+                before = wire[FORCE]
+                functions[k](
+                    wire,
+                    state[state_offsets[k] : state_offsets[k + 1]],
+                    parameters[parameter_offsets[k] : parameter_offsets[k + 1]],
+                    step,
+                )
+                if k == coefficients_at:
+                    yields = wire[YIELD_FORCE]
+                    viscous = wire[VISCOSITY]
+                if tap < tapped.shape[0] and k == tapped[tap]:
+                    result[COLUMNS + tap, index] = wire[FORCE] - before
+                    tap += 1
+            work += (wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]) * wire[VELOCITY] * step
+            past = max(past, abs(wire[CURRENT]))
+            result[CURRENT_AT, index] = wire[CURRENT]
+            result[VELOCITY_AT, index] = wire[VELOCITY]
+            result[HYSTERESIS_AT, index] = wire[HYSTERESIS] * wire[RATE_YIELD]
+            result[YIELD_AT, index] = wire[YIELD_FORCE] / yields if abs(yields) > 1e-12 else 1.0
+            result[VISCOSITY_AT, index] = wire[VISCOSITY] / viscous if abs(viscous) > 1e-12 else 1.0
+            result[FORCE_AT, index] = wire[FORCE]
+            result[WORK_AT, index] = work
+            result[DISPLACEMENT_AT, index] = wire[DISPLACEMENT]
+
+
+def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...] = ()) -> FloatArray:
+    """Run a chain over all tests.
+
+    Parameters
+    ----------
+    chain
+        With one step named `polynomial-coefficients`.
+    recordings
+        The tests.
+    tapped
+        Places in the chain, rising: the force that each of these steps adds is recorded in a row of its own.
+
+    Returns
+    -------
+    Shape (COLUMNS + len(tapped), n).
+    """
+    result = np.empty((COLUMNS + len(tapped), len(recordings.force)))
+    motion = recordings.displacement, recordings.velocity, recordings.acceleration
+    if chain.ahead_s:
+        motion = look_ahead(*motion, recordings.starts, recordings.dt, chain.ahead_s)
+    _run(
+        *chain.arguments,
+        *motion,
+        recordings.drive,
+        recordings.starts,
+        recordings.dt,
+        chain.names.index("polynomial-coefficients"),
+        np.array(tapped, dtype=np.int64),
+        result,
+    )
+    return result

@@ -1,0 +1,89 @@
+"""A richer form for an effect that has its name: which equation it follows is asked after which effect it is.
+
+Supple forms explain many things; among the candidates they would blur the names. Once a family is named they cost
+nothing of that, and bring the error down to the noise where the plain forms do not fit.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.effects.contract import EffectForm, EffectScales
+from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
+from mrpipe.tracing.bench.engine import Fit, fit, start_of
+from mrpipe.tracing.bench.problem import Term
+from mrpipe.tracing.bench.select import Selection, draft
+
+WORTH_A_TRY = 0.1
+"""Excess over the noise, in units of it, below which the plain form is good enough."""
+
+LEAST_GAIN = 0.05
+"""A richer form must lower the squared error on tests left out by this share."""
+
+
+def with_richer_forms(
+    selection: Selection, declared: int, *, folds: int, draws: int, rng: np.random.Generator, jobs: int = 1
+) -> Selection:
+    """Return the selection with the forms of its named effects refined where tests left out are predicted better.
+
+    Parameters
+    ----------
+    declared
+        How many terms the campaign declares: they keep their forms.
+    folds, draws
+        Of the cross-validation and its bootstrap.
+    """
+    chosen = selection.chosen
+    unseen: FloatArray | None = None
+    for place in range(declared, min(declared + selection.proven, len(chosen.problem.terms))):
+        if chosen.chi_square < (1.0 + WORTH_A_TRY) * selection.noise:
+            break
+        richer = _richest(chosen, place)
+        if richer is None or richer.chi_square > (1.0 - LEAST_GAIN) * chosen.chi_square:
+            continue
+        if unseen is None:
+            unseen = left_out_residual(chosen, folds, jobs=jobs)
+        trial = left_out_residual(richer, folds, jobs=jobs)
+        gain = gain_of(unseen, trial, chosen.problem, draws=draws, rng=rng)
+        if gain.significant and gain.share > LEAST_GAIN:
+            chosen, unseen = richer, trial
+    return replace(selection, chosen=chosen)
+
+
+def _richest(chosen: Fit, place: int) -> Fit | None:
+    """Return the best fit with a richer form of one term, on all tests; None where there is none to be had."""
+    effect = chosen.problem.terms[place].effect
+    if not effect.refinements:
+        return None
+    small = draft(chosen)
+    trials = [
+        _trial(small, place, form, given)
+        for form in effect.refinements
+        for given in _starts(form, small.term_values[place], small.problem.scales)
+    ]
+    best = min(trials, key=lambda item: item.cost)
+    problem = replace(chosen.problem, terms=best.problem.terms)
+    found = fit(problem, best.theta, iterations=25)
+    shapes = {item.name for item in best.problem.terms[place].form.parameters if item.role != "amplitude"}
+    return None if shapes & (set(found.at_bound) - set(chosen.at_bound)) else found
+
+
+def _starts(form: EffectForm, known: Mapping[str, float], scales: EffectScales) -> Iterator[dict[str, float]]:
+    """Yield starts: what the plain form has found where a parameter has the same name, else those of the form."""
+    choices = [(known[p.name],) if p.name in known else p.start_values(scales) for p in form.searched]
+    for values in itertools.product(*choices):
+        yield dict(zip((p.name for p in form.searched), values, strict=True))
+
+
+def _trial(small: Fit, place: int, form: EffectForm, given: Mapping[str, float]) -> Fit:
+    terms = list(small.problem.terms)
+    terms[place] = Term(terms[place].effect, form)
+    values = list(small.term_values)
+    values[place] = dict(given)
+    problem = replace(small.problem, terms=tuple(terms))
+    return fit(problem, start_of(problem, small.base_values, values), iterations=6, tolerance=2e-3)

@@ -1,0 +1,150 @@
+"""Is there anything in a residual but noise, and what does it vary with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from mrpipe.artifacts import BoolArray, FloatArray, IntArray
+from mrpipe.tracing.bench.engine import Fit, chain_of
+from mrpipe.tracing.bench.kernel import CURRENT_AT, HYSTERESIS_AT, WORK_AT, run_recordings
+from mrpipe.tracing.bench.recordings import Recordings
+
+BLOCK_S = 0.4
+"""Length of the blocks whose means are taken as independent."""
+
+BINS = 16
+
+
+@dataclass(frozen=True)
+class States:
+    """States of a recording that a residual may depend on, each of shape (n,), and blocks of samples."""
+
+    values: dict[str, FloatArray]
+    block: IntArray
+
+
+def states_of(found: Fit, recordings: Recordings) -> States:
+    """Return the states of the simulated damper: motion, drive, their past, memory."""
+    wires = run_recordings(chain_of(found.problem, found.theta)[0], recordings)
+    x, v, u = recordings.displacement, recordings.velocity, wires[CURRENT_AT]
+    slip, since, past, drive_rate = memory_of(recordings)
+    values = {
+        "displacement": x,
+        "velocity": v,
+        "drive": u,
+        "acceleration": recordings.acceleration,
+        "direction": np.sign(v),
+        "hysteresis": wires[HYSTERESIS_AT],
+        "past of displacement": slip,
+        "past of velocity": since,
+        "past of drive": past - np.abs(u),
+        "rate of drive": drive_rate,
+        "time in test": recordings.time,
+        "work": wires[WORK_AT],
+    }
+    length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
+    within = (np.arange(len(x)) - recordings.starts[recordings.test]) // length[recordings.test]
+    block = recordings.test * 100_000 + within
+    return States(values, block)
+
+
+def memory_of(recordings: Recordings) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return slip and time since the last reversal, the largest drive so far, the rate of the drive; shape (n,)."""
+    slip, since = np.zeros(len(recordings.force)), np.zeros(len(recordings.force))
+    past, rate = np.zeros(len(recordings.force)), np.zeros(len(recordings.force))
+    for test in range(recordings.tests):
+        piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
+        v, dt = recordings.velocity[piece], recordings.dt[test]
+        path = np.cumsum(np.abs(v)) * dt
+        time = np.arange(len(v)) * dt
+        turned = np.flatnonzero(np.diff(np.sign(v)) != 0) + 1
+        marks = np.concatenate([[0], turned])
+        which = np.searchsorted(marks, np.arange(len(v)), side="right") - 1
+        slip[piece] = path - path[marks][which]
+        since[piece] = time - time[marks][which]
+        past[piece] = np.maximum.accumulate(np.abs(recordings.drive[piece]))
+        rate[piece] = np.gradient(recordings.drive[piece]) / dt
+    return slip, since, past, rate
+
+
+def structure_p_value(residual: FloatArray, states: States) -> float:
+    """Return the probability that noise alone hangs together with the states as this residual does.
+
+    For each state and its product with direction the covariance with the residual is summed in blocks; blocks are
+    independent where samples are not, so the bounds allow for autocorrelation. Corrected for the number of states.
+    """
+    used = residual != 0.0
+    blocks, index = np.unique(states.block[used], return_inverse=True)
+    r = residual[used]
+    direction = np.sign(states.values["velocity"][used])
+    best, count = 1.0, 0
+    for name, values in states.values.items():
+        feature = values[used]
+        spread = float(np.std(feature))
+        if spread <= 0.0:
+            continue
+        standard = (feature - np.mean(feature)) / spread
+        for column in (standard, standard * direction, standard**2 * direction) if name != "direction" else (standard,):
+            sums = np.bincount(index, weights=r * column, minlength=len(blocks))
+            deviation = float(np.std(sums, ddof=1)) / np.sqrt(len(sums))
+            if deviation > 0.0:
+                t = abs(float(np.mean(sums))) / deviation
+                best = min(best, float(2.0 * stats.t.sf(t, len(sums) - 1)))
+            count += 1
+    return float(max(min(1.0, best * count), 1e-300))
+
+
+def dependence(residual: FloatArray, states: States) -> list[tuple[str, float]]:
+    """Return (state, share of the residual's variance that it explains by itself), largest first.
+
+    The share is that of a step function of the state, separately for both directions, judged on blocks left out.
+    """
+    used = residual != 0.0
+    r = residual[used]
+    half = (np.unique(states.block[used], return_inverse=True)[1] % 2).astype(np.bool_)
+    positive = states.values["velocity"][used] > 0.0
+    found = []
+    for name, values in states.values.items():
+        feature = values[used]
+        edges = np.unique(np.quantile(feature, np.linspace(0, 1, BINS + 1)[1:-1]))
+        bins = np.searchsorted(edges, feature) * 2 + (0 if name == "direction" else positive)
+        explained = 0.0
+        for train in (half, ~half):
+            size = int(bins.max()) + 1
+            counts = np.bincount(bins[train], minlength=size)
+            sums = np.bincount(bins[train], weights=r[train], minlength=size)
+            mean = sums / np.maximum(counts, 1)
+            test = ~train
+            explained += float(np.sum(r[test] ** 2) - np.sum((r[test] - mean[bins[test]]) ** 2))
+        found.append((name, max(0.0, explained / max(float(r @ r), 1e-300))))
+    return sorted(found, key=lambda item: -item[1])
+
+
+def location(residual: FloatArray, found: Fit, recordings: Recordings, states: States) -> dict[str, dict[str, float]]:
+    """Return where the residual lives: shares of its sum of squares by stage of the cycle, drive, direction, time."""
+    squares = residual**2
+    total = max(float(np.sum(squares)), 1e-300)
+    z, v = states.values["hysteresis"], states.values["velocity"]
+    y = np.sign(v) * z
+    length = found.base_values["yield_displacement"]
+    reversal = (y < 0.0) | (states.values["past of displacement"] < 0.5 * length)
+    post = (y > 0.9) & ~reversal
+    rate = states.values["rate of drive"]
+    scale = max(float(np.max(np.abs(recordings.drive))), 1e-12)
+    rising, falling = rate > 0.05 * scale, rate < -0.05 * scale
+    thirds = recordings.time / np.maximum(np.diff(recordings.starts) * recordings.dt, 1e-12)[recordings.test]
+
+    def shares(parts: dict[str, BoolArray]) -> dict[str, float]:
+        return {name: float(np.sum(squares[mask])) / total for name, mask in parts.items()}
+
+    return {
+        "cycle": shares({"pre_yield": ~reversal & ~post, "post_yield": post, "reversal": reversal}),
+        "drive": shares({"rising": rising, "falling": falling, "constant": ~rising & ~falling}),
+        "direction": shares({"positive": v > 0.0, "negative": v <= 0.0}),
+        "time": shares(
+            {"first": thirds < 1 / 3, "second": (thirds >= 1 / 3) & (thirds < 2 / 3), "third": thirds >= 2 / 3}
+        ),
+    }

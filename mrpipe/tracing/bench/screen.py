@@ -1,0 +1,136 @@
+"""Cheap screening: how much of the residual each effect could take, to first order, beyond a refit."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.tracing.bench.engine import (
+    Fit,
+    Weighting,
+    bounded_solution,
+    centred,
+    jacobian_of,
+    regressors,
+    weighting,
+)
+from mrpipe.tracing.bench.problem import Problem, Term
+
+
+@dataclass(frozen=True)
+class Screened:
+    """One form at one point of its grid.
+
+    Attributes
+    ----------
+    gain
+        Share of the residual's sum of squares that it takes to first order.
+    values
+        Start values for a joint fit.
+    """
+
+    term: Term
+    gain: float
+    values: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """What refitting the present model can absorb: an orthonormal basis of its weighted tangent, shape (t, m)."""
+
+    fit: Fit
+    basis: FloatArray
+    weighting: Weighting
+    residual: FloatArray
+
+
+def tangent_of(found: Fit) -> Tangent:
+    """Return the tangent of a fit at its optimum."""
+    problem = found.problem
+    w = weighting(problem)
+    residual = found.residual[w.at]
+    low, high = problem.bounds()
+    searched = jacobian_of(problem, found.theta, residual, w, low, high)
+    linear = centred(regressors(problem, found.theta)[:, w.at], w)[0]
+    rows = np.concatenate([linear, searched])
+    norms = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = rows[norms[:, 0] > 0] / norms[norms[:, 0] > 0]
+    values, vectors = np.linalg.eigh(rows @ rows.T)
+    keep = values > 1e-9 * values[-1]
+    basis = (vectors[:, keep] / np.sqrt(values[keep])).T @ rows
+    return Tangent(found, basis, w, residual - basis.T @ (basis @ residual))
+
+
+def grid(term: Term, problem: Problem) -> Iterable[dict[str, float]]:
+    """Yield start values of a form: every combination of the starts of its shapes, strengths small."""
+    names = [item.name for item in term.form.searched]
+    choices = [item.start_values(problem.scales) for item in term.form.searched]
+    for combination in itertools.product(*choices):
+        yield dict(zip(names, combination, strict=True))
+
+
+def sensitivity(term: Term, values: dict[str, float], tangent: Tangent) -> Screened:
+    """Return the first-order gain of a form at one point of its grid."""
+    found, w = tangent.fit, tangent.weighting
+    problem = replace(found.problem, terms=(*found.problem.terms, term))
+    scales = problem.scales
+    extended = np.concatenate([found.theta, _encode(term, values, problem)])
+    columns = regressors(problem, extended)[:, w.at]
+    before = len(found.linear)
+    count = len(term.form.amplitudes)
+    level = False
+    low = np.array([item.bounds(scales)[0] for item in term.form.amplitudes])
+    high = np.array([item.bounds(scales)[1] for item in term.form.amplitudes])
+    if count:
+        rows = columns[len(columns) - count :]
+        if any(item.role == "strength" for item in term.form.searched):
+            low, high = np.zeros(count), np.full(count, np.inf)
+    else:
+        strengths = [item for item in term.form.searched if item.role in ("strength", "level")]
+        level = strengths[0].role == "level"
+        start = 1.0 if level else values[strengths[0].name]
+        base = found.linear @ regressors(found.problem, found.theta)[:, w.at]
+        rows = ((found.linear @ columns[:before]) - base)[None] / start
+        low, high = (np.array([item]) for item in ((0.0, 3.0) if level else strengths[0].bounds(scales)))
+    if not np.all(np.isfinite(rows)):
+        return Screened(term, 0.0, values)
+    rows = centred(rows, w)[0]
+    rows = rows - (rows @ tangent.basis.T) @ tangent.basis
+    gram, right = rows @ rows.T, rows @ tangent.residual
+    if not np.all(np.diag(gram) > 0.0):
+        return Screened(term, 0.0, values)
+    solution, _ = bounded_solution(gram, right, low, high)
+    total = float(found.residual @ found.residual)
+    gain = float(2.0 * solution @ right - solution @ gram @ solution) / max(total, 1e-300)
+    started = dict(values)
+    if not count and not level:
+        limit = high[0]
+        started[strengths[0].name] = float(np.clip(solution[0], 0.2 * start if low[0] >= 0 else low[0], 0.7 * limit))
+    return Screened(term, gain, started)
+
+
+def _encode(term: Term, values: dict[str, float], problem: Problem) -> FloatArray:
+    return np.array(
+        [
+            np.log(values[p.name]) if p.logarithmic else values[p.name] / problem.scales.of(p.scale)
+            for p in term.form.searched
+        ]
+    )
+
+
+def screen(found: Fit, terms: Sequence[Term], *, jobs: int = 1) -> list[Screened]:
+    """Return the best grid point of every form, best first."""
+    tangent = tangent_of(found)
+    points = [(term, values) for term in terms for values in grid(term, found.problem)]
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        results = list(pool.map(lambda item: sensitivity(item[0], item[1], tangent), points))
+    best: dict[str, Screened] = {}
+    for item in results:
+        if item.term.key not in best or item.gain > best[item.term.key].gain:
+            best[item.term.key] = item
+    return sorted(best.values(), key=lambda item: -item.gain)

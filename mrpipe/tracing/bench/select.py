@@ -1,0 +1,359 @@
+"""Which effects: screening, joint refits from several starts, forward selection, each kept only for a fair share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from mrpipe.artifacts import Progress, no_progress
+from mrpipe.tracing.bench.crossvalidation import folds_of
+from mrpipe.tracing.bench.engine import Fit, fit, solve, start_of, weighting
+from mrpipe.tracing.bench.problem import Term
+from mrpipe.tracing.bench.screen import Screened, screen
+
+NOTHING_MISSING = 0.2
+"""Excess of the chi-square over the noise, in units of the noise, below which nothing is missing."""
+
+SECOND_GAIN = 0.05
+"""A further effect must recover at least this share of what the base lacked ..."""
+
+SECOND_SHARE = 0.5
+"""... and at least this share of what the effects before it left."""
+
+TERM_SHARE = 0.25
+"""A term that recovers this share of what is left improves the model; unless it is proven, no cause is named for it."""
+
+PROVEN_LEAD = 1.25
+"""A further effect is named where every other family leaves at least so many times what it leaves."""
+
+
+DRAFT_SAMPLES = 12_000
+"""Of this many samples, or a little more, the drafts of all forms are made ..."""
+
+MOST_PARTS = 3
+"""... but of no smaller share of the tests than one in three."""
+
+CONTENDER_SHARE = 0.3
+"""Forms that leave more than the best draft by this share of what the best takes are not fitted on all tests."""
+
+FURTHER = 0.15
+"""Where less than this share is left, and less than the noise, a further effect must promise its share in screening."""
+
+
+BETTER_OPTIMUM = 0.03
+"""A fit that leaves less than another of the same terms by this share shows that the other had not arrived."""
+
+
+MAIN_PART = 0.2
+"""Of a form with corrections of either sign the main part must be at least this share of the largest of them."""
+
+_Item = TypeVar("_Item")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A family in its best form, fitted jointly.
+
+    Attributes
+    ----------
+    fit
+        With the terms chosen before and this one, which is the last.
+    share
+        Share of the recoverable residual of the base that the whole set recovers.
+    forms
+        Share of each form that was tried.
+    """
+
+    name: str
+    fit: Fit
+    share: float
+    forms: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What forward selection found.
+
+    Attributes
+    ----------
+    base, noise
+        Fit of the base; chi-square of the noise.
+    rounds
+        Candidates of each round, best first.
+    chosen
+        The fit kept (the base where none was).
+    proven
+        How many of the rounds name a cause; terms of later rounds improve the model, their cause is not proven.
+    ground
+        Fit without effects that the rounds build on: the base, or the base in the form that the tests ask for.
+    """
+
+    base: Fit
+    noise: float
+    rounds: tuple[tuple[Candidate, ...], ...]
+    chosen: Fit
+    proven: int = 3
+    ground: Fit | None = None
+
+    @property
+    def without_effects(self) -> Fit:
+        """Return the fit that the rounds build on."""
+        return self.base if self.ground is None else self.ground
+
+    @property
+    def proven_share(self) -> float:
+        """Share of the recoverable residual that the effects with a proven cause recover, without further terms."""
+        count = min(self.proven, len(self.rounds))
+        return self.rounds[count - 1][0].share if count else 0.0
+
+    @property
+    def recoverable(self) -> float:
+        """Excess of the base's chi-square over the noise."""
+        return max(self.base.chi_square - self.noise, 0.0)
+
+    @property
+    def structured(self) -> bool:
+        """Whether anything is missing at all."""
+        return self.recoverable > NOTHING_MISSING * self.noise
+
+    def with_floor(self, floor: float) -> Selection:
+        """Return the same with another estimate of what cannot be recovered; shares follow."""
+        rounds = tuple(
+            tuple(replace(item, share=share_of(self.base, item.fit, floor)) for item in candidates)
+            for candidates in self.rounds
+        )
+        return replace(self, noise=floor, rounds=rounds)
+
+    def share(self, found: Fit) -> float:
+        """Return the share of the recoverable residual that a fit recovers."""
+        return share_of(self.base, found, self.noise)
+
+
+def share_of(base: Fit, found: Fit, noise: float) -> float:
+    """Return the share of the base's excess over noise that a fit recovers, at most 1."""
+    excess = max(base.chi_square - noise, 1e-12)
+    return float(min(1.0, (base.chi_square - found.chi_square) / excess))
+
+
+def draft(found: Fit) -> Fit:
+    """Return the fit on a share of its tests that still holds every drive level: enough to screen and to rank forms."""
+    recordings = found.problem.recordings
+    parts = min(-(-len(recordings.force) // DRAFT_SAMPLES), MOST_PARTS, recordings.tests // 4)
+    if parts < 2:
+        return found
+    keep = folds_of(recordings, parts)[0]
+    within = np.isin(recordings.test, keep)
+    problem = replace(found.problem, recordings=recordings.subset(keep), root_weight=found.problem.root_weight[within])
+    return fit(problem, found.theta, iterations=4)
+
+
+def refit(before: Fit, screened: Screened, *, iterations: int = 7) -> Fit:
+    """Fit the terms of `before` and a screened one jointly."""
+    problem = replace(before.problem, terms=(*before.problem.terms, screened.term))
+    start = start_of(problem, before.base_values, [*before.term_values, screened.values])
+    start[: len(before.theta)] = before.theta
+    return fit(problem, start, iterations=iterations, tolerance=2e-3)
+
+
+def on_all(before: Fit, drafted: Fit, *, iterations: int) -> Fit:
+    """Fit the terms of a draft on all tests of `before`, from where the draft ended.
+
+    What both share starts from the draft or from `before`, whichever is nearer: on a share of the tests it may have
+    gone where the others do not follow.
+    """
+    problem = replace(before.problem, terms=(*before.problem.terms, drafted.problem.terms[-1]))
+    both = [drafted.theta, np.concatenate([before.theta, drafted.theta[len(before.theta) :]])]
+    w = weighting(problem)
+    start = min(both, key=lambda theta: float(np.sum(solve(problem, theta, w)[0] ** 2)))
+    return fit(problem, start, iterations=iterations)
+
+
+def candidates_after(
+    before: Fit,
+    base: Fit,
+    noise: float,
+    terms: Sequence[Term],
+    *,
+    refits: int,
+    jobs: int,
+    drafted: Callable[[Fit], list[Fit]] | None = None,
+    progress: Progress = no_progress,
+) -> list[Candidate]:
+    """Screen all terms after a fit and refit the families that promise most; best first.
+
+    Forms are tried on a share of the tests; those that may win are fitted on all of them. `drafted` adds drafts of
+    its own, made of the fit on that share.
+    """
+    present = {term.effect.name for term in before.problem.terms}
+    small = draft(before)
+    ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
+    families: dict[str, list[Screened]] = {}
+    for item in ranked:
+        families.setdefault(item.term.effect.name, []).append(item)
+    chosen = list(families)[:refits]
+    drafts = _each(lambda item: refit(small, item), [item for name in chosen for item in families[name][:2]], jobs)
+    # the families in front get all their forms: a name is judged by the form that suits it best
+    front = sorted(chosen, key=lambda name: min(item.cost for item in drafts if _name(item) == name))[:3]
+    drafts += _each(lambda item: refit(small, item), [item for name in front for item in families[name][2:]], jobs)
+    if drafted is not None:
+        drafts += [item for item in drafted(small) if _name(item) in chosen]
+    progress(0.7, f"{len(drafts)} forms tried")
+    own = {name: sorted((item for item in drafts if _name(item) == name), key=_penalised) for name in chosen}
+    least = min(items[0].chi_square for items in own.values())
+    within = least + CONTENDER_SHARE * max(small.chi_square - least, 0.0)
+    contenders = [item for items in own.values() for item in items[:3] if item.chi_square <= within]
+    others = [items[0] for items in own.values() if items[0].chi_square > within]
+    fits = _each(lambda item: on_all(before, item, iterations=10), contenders, jobs)
+    fits += _each(lambda item: on_all(before, item, iterations=1), others, jobs)
+    already = share_of(base, before, noise)
+    found = []
+    for name in chosen:
+        winner = min((item for item in fits if _name(item) == name), key=_penalised)
+        shares = {_form(item): already + (1.0 - already) * share_of(small, item, noise) for item in own[name]}
+        shares |= {_form(item): share_of(base, item, noise) for item in fits if _name(item) == name}
+        found.append(Candidate(name, winner, share_of(base, winner, noise), shares))
+    return sorted(found, key=lambda item: item.fit.chi_square)
+
+
+def _name(found: Fit) -> str:
+    return found.problem.terms[-1].effect.name
+
+
+def _form(found: Fit) -> str:
+    return found.problem.terms[-1].form.name
+
+
+def _penalised(found: Fit) -> float:
+    # of forms that fit alike the simpler one
+    searched = sum(len(term.form.parameters) for term in found.problem.terms)
+    return found.chi_square * (1.0 + 0.01 * searched)
+
+
+def _each(work: Callable[[_Item], Fit], items: Sequence[_Item], jobs: int) -> list[Fit]:
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        return list(pool.map(work, items))
+
+
+def _nothing_more(before: Fit, terms: Sequence[Term], excess: float, jobs: int) -> bool:
+    present = {term.effect.name for term in before.problem.terms}
+    small = draft(before)
+    ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
+    return ranked[0].gain * small.chi_square < SECOND_GAIN * excess
+
+
+def admissible(found: Fit) -> bool:
+    """Return whether the last term of a fit may be named: it does something and no strength sits at a bound."""
+    term, values = found.problem.terms[-1], found.term_values[-1]
+    for item in term.form.parameters:
+        if item.role in ("strength", "amplitude") and len(term.form.amplitudes) <= 1 and item.name in found.at_bound:
+            return False
+    amplitudes = term.form.amplitudes
+    if len(amplitudes) > 1 and amplitudes[0].lower == 0.0 and all(item.lower < 0.0 for item in amplitudes[1:]):
+        # without the part of definite sign only its corrections are left: a spring of no stiffness is no spring
+        main, *corrections = (abs(values[p.name]) / found.problem.scales.of(p.scale) for p in amplitudes)
+        if main <= MAIN_PART * max(corrections):
+            return False
+    return any(values[item.name] != 0.0 for item in term.form.parameters if item.role != "shape")
+
+
+def stuck(found: Fit) -> set[str]:
+    """Return what sits at a bound; but one of several amplitudes of a form at zero is a part that is not there."""
+    absent = {
+        item.name
+        for term, values in zip(found.problem.terms, found.term_values, strict=True)
+        for item in term.form.amplitudes
+        if item.lower == 0.0 and values[item.name] == 0.0 and len(term.form.amplitudes) > 1
+    }
+    return set(found.at_bound) - absent
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What a further effect must recover: of what the base lacked, and of what is left.
+
+    To be named it must recover `named_share` of what is left, and every other family must leave `lead` times what it
+    leaves.
+    """
+
+    gain: float = SECOND_GAIN
+    term_share: float = TERM_SHARE
+    named_share: float = SECOND_SHARE
+    lead: float = PROVEN_LEAD
+
+
+def forward_selection(
+    base: Fit,
+    noise: float,
+    terms: Sequence[Term],
+    *,
+    most: int = 3,
+    refits: int = 8,
+    thresholds: Thresholds = Thresholds(),
+    jobs: int = 1,
+    drafted: Callable[[Fit], list[Fit]] | None = None,
+    progress: Progress = no_progress,
+) -> Selection:
+    """Add effects one after another while each recovers a fair share.
+
+    A further term is a cause of its own only where it recovers much of what is left and leads the other families;
+    else it may as well mend the form of the effect before it, and so may all that follow.
+    """
+    rounds: list[tuple[Candidate, ...]] = []
+    chosen, proven, sure, again = base, 0, True, False
+    excess = max(base.chi_square - noise, 0.0)
+    if excess <= NOTHING_MISSING * noise or most == 0:
+        return Selection(base, noise, (), base)
+    while len(rounds) < most:
+        little = chosen.chi_square - noise < min(FURTHER * excess, noise)
+        if rounds and little and _nothing_more(chosen, terms, excess, jobs):
+            break
+        found = candidates_after(
+            chosen, base, noise, terms, refits=refits, jobs=jobs, progress=progress,
+            drafted=None if rounds else drafted,
+        )  # fmt: skip
+        able = [item for item in found if admissible(item.fit)]
+        if rounds and thresholds.lead > 1.0:
+            # beside other effects a parameter that runs to its bound mends a form, and badly where motions are other
+            able = [item for item in able if stuck(item.fit) <= stuck(chosen)]
+        ordered = tuple(able + [item for item in found if item not in able])
+        gain = chosen.chi_square - able[0].fit.chi_square if able else 0.0
+        left = chosen.chi_square - noise
+        if not able or (rounds and (gain < thresholds.gain * excess or gain < thresholds.term_share * left)):
+            rounds.append(ordered)
+            break
+        nearer = chosen if not rounds or again else _nearer(chosen, able[0].fit)
+        again = nearer is not chosen
+        if again:
+            # the term had only shown the way to a better optimum of the others: look again from there
+            rounds[-1] = tuple(_with_fit(item, chosen, nearer, base, noise) for item in rounds[-1])
+            chosen = nearer
+            continue
+        rounds.append(ordered)
+        if len(rounds) > 1:
+            sure = sure and gain >= thresholds.named_share * left and _leads(ordered, noise, thresholds.lead)
+        proven += int(sure)
+        chosen = able[0].fit
+        if chosen.chi_square - noise < max(NOTHING_MISSING * noise, SECOND_GAIN * excess):
+            break
+    return Selection(base, noise, tuple(rounds), chosen, proven)
+
+
+def _nearer(chosen: Fit, best: Fit) -> Fit:
+    """Return the fit without the last term of `best`, begun where that ended, if it is clearly better than before."""
+    trial = fit(chosen.problem, best.theta[: len(chosen.theta)], iterations=6)
+    return trial if trial.chi_square < (1.0 - BETTER_OPTIMUM) * chosen.chi_square else chosen
+
+
+def _with_fit(item: Candidate, old: Fit, new: Fit, base: Fit, noise: float) -> Candidate:
+    return replace(item, fit=new, share=share_of(base, new, noise)) if item.fit is old else item
+
+
+def _leads(candidates: Sequence[Candidate], noise: float, lead: float) -> bool:
+    if len(candidates) < 2:
+        return True
+    best, second = (max(item.fit.chi_square - noise, 0.0) + 0.05 * noise for item in candidates[:2])
+    return second >= lead * best

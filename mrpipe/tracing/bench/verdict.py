@@ -1,0 +1,152 @@
+"""From candidates to a verdict: what is named, with what confidence, what it is tied with, what stays unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mrpipe.effects.contract import Effect
+from mrpipe.tracing.bench.crossvalidation import Gain, gain_of
+from mrpipe.tracing.bench.engine import Fit
+from mrpipe.tracing.bench.select import Candidate, Selection, share_of
+
+
+@dataclass(frozen=True)
+class Rules:
+    """When a cause is named.
+
+    Attributes
+    ----------
+    named_share
+        Share of the recoverable residual that proves a name.
+    least_share
+        Share below which the cause is unknown.
+    lead
+        A family that leaves at most this share more than the best leaves is tied with it.
+    """
+
+    named_share: float = 0.9
+    least_share: float = 0.5
+    lead: float = 0.3
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect of the verdict."""
+
+    effect: Effect
+    form: str
+    parameters: dict[str, dict[str, Any]]
+    confidence: float
+    tied_with: tuple[str, ...] = ()
+    separating_tests: dict[str, str] = field(default_factory=dict)
+    gain: Gain | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as contract section 4 has it."""
+        found: dict[str, Any] = {
+            "name": self.effect.name,
+            "form": self.form,
+            "parameters": self.parameters,
+            "confidence": self.confidence,
+            "tied_with": list(self.tied_with),
+            "physics": self.effect.physics,
+            "remedy": self.effect.remedy,
+            "corrected_in": "prepare" if self.effect.sensor else "plant",
+        }
+        if self.separating_tests:
+            found["separating_tests"] = self.separating_tests
+        if self.gain is not None:
+            found["cross_validated_gain"] = {"share": self.gain.share, "interval": list(self.gain.interval)}
+        return found
+
+
+def tied(
+    candidates: Sequence[Candidate], noise: float, rules: Rules, *, draws: int, rng: np.random.Generator
+) -> tuple[str, ...]:
+    """Return the families that cannot be told from the best of a round.
+
+    Told apart is one that leaves clearly more than the best does (see :class:`Rules`), in a difference that holds when
+    the blocks of the residual are drawn again, in pairs.
+    """
+    if not candidates:
+        return ()
+    best = candidates[0].fit
+    rivals = []
+    for item in candidates[1:]:
+        alike = left_of(item.fit, noise) <= (1.0 + rules.lead) * left_of(best, noise)
+        if not alike:
+            alike = not gain_of(item.fit.residual, best.residual, best.problem, draws=draws, rng=rng).significant
+        if alike:
+            rivals.append(item.name)
+    return tuple(rivals)
+
+
+def left_of(found: Fit, noise: float) -> float:
+    """Return the excess of the chi-square over noise, and a tenth of the noise: differences below it tell nothing."""
+    return max(found.chi_square - noise, 0.0) + 0.1 * noise
+
+
+def clear_lead(candidates: Sequence[Candidate], noise: float) -> float:
+    """Return 0..1: by how much the best leaves less than the next family does."""
+    if len(candidates) < 2:
+        return 1.0
+    return max(0.0, 1.0 - left_of(candidates[0].fit, noise) / left_of(candidates[1].fit, noise))
+
+
+def unnamed_reason(selection: Selection, rules: Rules) -> str:
+    """Return why nothing may be named, or nothing where something may."""
+    if not selection.structured:
+        return "the residual is noise: nothing is missing"
+    if selection.ground is not None and selection.chosen is selection.ground:
+        return "the base form: a hysteresis with an exponent of its own explains what is missing, and no effect is"
+    if not selection.rounds or selection.chosen is selection.base:
+        return "no effect of the library changes the error"
+    if min(selection.share(selection.chosen), selection.proven_share) < rules.least_share:
+        return "no effect of the library recovers enough of what is recoverable"
+    return ""
+
+
+def confidence_of(share: float, lead: float, gain: Gain | None, rules: Rules) -> float:
+    """Return a confidence 0..1: high for a large share, a clear lead (0..1) and a gain that holds on left-out tests."""
+    proven = min(1.0, share / rules.named_share)
+    clear = min(1.0, 2.0 * lead)
+    held = 1.0 if gain is None or gain.significant else 0.4
+    return round(float(proven * (0.5 + 0.5 * clear) * held * 0.99), 3)
+
+
+def parameter_table(
+    found: Fit, index: int, limits: Mapping[str, tuple[float, float]], drive_unit: str
+) -> dict[str, dict[str, Any]]:
+    """Return value, unit and interval of every parameter of one effect."""
+    term, values = found.problem.terms[index], found.term_values[index]
+    return {
+        item.name: {
+            "value": float(values[item.name]),
+            "unit": item.unit.replace("drive", drive_unit),
+            "interval": [float(edge) for edge in limits.get(item.name, (values[item.name], values[item.name]))],
+        }
+        for item in term.form.parameters
+    }
+
+
+def ranking(selection: Selection, errors: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return the whole ranking of the first round: error on validation tests, evidence, share, forms tried."""
+    if not selection.rounds:
+        return []
+    base, noise = selection.base, selection.noise
+    return [
+        {
+            "name": item.name,
+            "form": item.fit.problem.terms[-1].form.name,
+            "nrmse": float(errors.get(item.name, float("nan"))),
+            "evidence": float(0.5 * (base.cost - item.fit.cost) / max(noise, 1e-12)),
+            "share": float(share_of(base, item.fit, noise)),
+            "forms": {name: float(value) for name, value in item.forms.items()},
+            "at_bound": list(item.fit.at_bound),
+        }
+        for item in selection.rounds[0]
+    ]

@@ -1,0 +1,265 @@
+"""The damper with its effects as a plant: what force it gives in use, the inverse that follows, its residual force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.control.inverse import InverseTable
+from mrpipe.dampers.model import DamperModel
+from mrpipe.dampers.plant import FORCE, Chain, build_chain, run_chain
+from mrpipe.networks.assembly import History, join, samples
+from mrpipe.networks.network import Network
+from mrpipe.networks.training import TrainingOptions, train
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.engine import Fit
+
+SPEEDS_M_S = (0.01, 0.03, 0.08, 0.2, 0.4)
+"""Speeds at which the force in use is tabulated."""
+
+DRIVES = 11
+"""Drives at which it is tabulated, from 0 to the limit."""
+
+STEP_S = 2e-3
+"""Longest step of these simulations."""
+
+SETTLING_SHARE = 0.2
+"""Share of a half period after a change of drive that is left out."""
+
+MOST_MOTIONS = 40
+"""Of campaigns with more training tests, so many motions are simulated for the inverse."""
+
+CYCLES = 4
+"""Steady cycles of each."""
+
+CHANGED = 0.01
+"""RMS change of the force over its RMS at which an effect counts as changing the inverse."""
+
+
+def damper_of(found: Fit, drive_unit: str) -> DamperModel:
+    """Return the base of a fit as a damper model, as controllers and their inverse want it."""
+    values = found.base_values
+    base = found.problem.base
+    yield_force, viscosity = found.polynomials
+    numbers = {
+        "yield_displacement": values["yield_displacement"],
+        "gamma_share": values.get("gamma_share", base.gamma_share),
+        "exponent": values.get("exponent", base.exponent),
+        "eta": values.get("eta", 100.0),
+    }
+    numbers |= {f"yield_force_{letter}": float(v) for letter, v in zip("abcd", yield_force, strict=False)}
+    numbers |= {f"c0_{letter}": float(v) for letter, v in zip("abcd", viscosity, strict=False)}
+    return DamperModel(base.name, numbers, drive_unit, found.problem.scales.drive)
+
+
+def plant_chain(found: Fit) -> Chain:
+    """Return the chain for the closed loop; faults of sensors stay out of the plant, a lag unknown is left out."""
+    problem = found.problem
+    steps = problem.base.steps(found.base_values, *found.polynomials)
+    for term, values in zip(problem.terms, found.term_values, strict=True):
+        if not term.effect.sensor:
+            steps.extend(term.form.steps(values))
+    return build_chain(steps)
+
+
+@dataclass(frozen=True)
+class ForceInUse:
+    """The force that a damper gives while a controller works it.
+
+    Attributes
+    ----------
+    speeds_m_s, drives
+        Shape (s,) and (d,).
+    force_n
+        Post-yield force at constant speed, shape (s, d) [N]: the mean of both directions, and of the drive come to
+        from nothing and from the working drive, so that a memory of the drive counts as it does in the loop.
+    from_above_n
+        The same, come to from the working drive alone.
+    """
+
+    speeds_m_s: FloatArray
+    drives: FloatArray
+    force_n: FloatArray
+    from_above_n: FloatArray
+
+    def residual_n(self, speed_m_s: float) -> float:
+        """Return the force [N] that is left at no drive after the damper has worked."""
+        return float(np.interp(speed_m_s, self.speeds_m_s, self.from_above_n[:, 0]))
+
+    def smallest_n(self, speed_m_s: FloatArray) -> FloatArray:
+        """Return the least force [N] in use, of the shape of `speed_m_s`."""
+        return np.interp(speed_m_s, self.speeds_m_s, self.from_above_n[:, 0])
+
+    def largest_n(self, speed_m_s: FloatArray) -> FloatArray:
+        """Return the largest force [N], of the shape of `speed_m_s`."""
+        return np.interp(speed_m_s, self.speeds_m_s, self.force_n[:, -1])
+
+    def table(self, speeds: int = 101, drives: int = 81) -> InverseTable:
+        """Return the inverse of it for controllers that invert the model."""
+        speed = np.linspace(0.0, float(self.speeds_m_s[-1]), speeds)
+        drive = np.linspace(0.0, float(self.drives[-1]), drives)
+        over_drive = np.array([np.interp(drive, self.drives, row) for row in self.force_n])
+        forces = np.array([np.interp(speed, self.speeds_m_s, column) for column in over_drive.T]).T
+        return InverseTable(np.maximum.accumulate(forces, axis=1), float(speed[-1]), float(drive[-1]))
+
+
+def force_in_use(
+    chain: Chain, drive_limit: float, *, stroke_m: float, omega: float, working_drive: float
+) -> ForceInUse:
+    """Tabulate what a chain gives at constant speeds and drives, as a controller meets it.
+
+    Parameters
+    ----------
+    drive_limit
+        Largest drive.
+    stroke_m
+        Largest displacement of the motions [m]: that of the campaign.
+    omega
+        Of the motion to be damped [rad/s]; a drive is held for half a period before the force is taken.
+    working_drive
+        What the drive has been before, where it comes from above.
+    """
+    speeds, drives = np.array(SPEEDS_M_S), np.linspace(0.0, drive_limit, DRIVES)
+    branches = np.empty((2, len(speeds), len(drives)))
+    for row, speed in enumerate(speeds):
+        for column, drive in enumerate(drives):
+            for branch, before in enumerate((0.0, working_drive)):
+                branches[branch, row, column] = _held(chain, float(speed), float(drive), before, stroke_m, omega)
+    return ForceInUse(speeds, drives, branches.mean(axis=0), branches[1])
+
+
+def _held(chain: Chain, speed: float, drive: float, before: float, stroke: float, omega: float) -> float:
+    """Return the mean post-yield force over two half periods at constant speed, after the drive has changed."""
+    whole = np.pi / omega
+    half = min(whole, 2.0 * stroke / speed)
+    dt = min(STEP_S, half / 40.0)
+    # the drive changes at a reversal, when a memory of it has had two half periods to build up
+    change = 2.0 * np.ceil(whole / half) * half
+    time = np.arange(0.0, change + 2.0 * whole + half, dt)
+    turns = time / half
+    ramp = np.abs(np.mod(turns, 2.0) - 1.0)
+    out = np.mod(turns, 2.0) < 1.0
+    x, v = speed * half * (0.5 - ramp), np.where(out, speed, -speed)
+    force = run_chain(chain, x, v, np.zeros_like(x), np.where(time < change, before, drive), dt)[:, FORCE]
+    # about the middle of the stroke, so that springs drop out; the lag of the drive has died out by then
+    part = (time > change + SETTLING_SHARE * whole) & (time < change + 2.0 * whole) & (np.abs(ramp - 0.5) < 0.3)
+    moved = force * np.sign(v)
+    return 0.5 * float(np.mean(moved[part & out]) + np.mean(moved[part & ~out]))
+
+
+def changed_share(base: Chain, augmented: Chain, tests: Sequence[PreparedTest]) -> float:
+    """Return by how much the force over the motions of tests differs (RMS over RMS)."""
+    difference, size = 0.0, 0.0
+    for test in spread(tests):
+        first, second = force_over(base, test, test.drive), force_over(augmented, test, test.drive)
+        difference += float(np.sum((second - first) ** 2))
+        size += float(np.sum(first**2))
+    return float(np.sqrt(difference / max(size, 1e-30)))
+
+
+def spread(tests: Sequence[PreparedTest]) -> list[PreparedTest]:
+    """Return at most :data:`MOST_MOTIONS` of the tests, evenly picked."""
+    return list(tests[:: max(1, -(-len(tests) // MOST_MOTIONS))])
+
+
+def force_over(chain: Chain, test: PreparedTest, drive: FloatArray) -> FloatArray:
+    """Return the force [N] of a chain over the motion of a test, shape (n,)."""
+    return run_chain(chain, test.displacement_m, test.velocity_m_s, test.acceleration_m_s2, drive, test.dt)[:, FORCE]
+
+
+def simulated_history(
+    chain: Chain, tests: Sequence[PreparedTest], drive_limit: float, rate_hz: float, rng: np.random.Generator
+) -> History:
+    """Return what an inverse network learns from: the damper over the motions of tests, twice.
+
+    Each motion is run with its own drive, and again with a drive that moves between nothing and its limit as a
+    controller's does: a campaign has few of these, a model gives them for nothing.
+    """
+    made = []
+    for test in spread(tests):
+        for name, drive in (("", test.drive), ("-worked", worked_drive(test.time_s, drive_limit, rng))):
+            made.append(replace(test, name=f"{test.name}{name}", drive=drive, force_n=force_over(chain, test, drive)))
+    return join(made, cycles=CYCLES, sampling_rate_hz=rate_hz)
+
+
+def worked_drive(time_s: FloatArray, limit: float, rng: np.random.Generator) -> FloatArray:
+    """Return a drive as controllers make it: ramps of 0.1 to 0.6 s between levels, every third of them nothing."""
+    count = int((time_s[-1] - time_s[0]) / 0.1) + 2
+    edges = time_s[0] + np.cumsum(rng.uniform(0.1, 0.6, count)) - 0.1
+    levels = limit * rng.uniform(0.0, 1.0, count) * (rng.uniform(size=count) > 0.33)
+    return np.asarray(np.interp(time_s, edges, levels), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Retrained:
+    """An inverse network for the augmented damper.
+
+    Attributes
+    ----------
+    network
+        The better of both.
+    before_nrmse, after_nrmse
+        Error of the drive over its RMS of the old and of the retrained network, on simulated validation motions.
+    seconds
+        That the training took.
+    """
+
+    network: Network
+    before_nrmse: float
+    after_nrmse: float
+    seconds: float
+
+    @property
+    def replaced(self) -> bool:
+        """Whether the retrained network is the better."""
+        return self.after_nrmse < self.before_nrmse
+
+
+def retrain_inverse(
+    old: Network,
+    chain: Chain,
+    training: Sequence[PreparedTest],
+    validation: Sequence[PreparedTest],
+    drive_limit: float,
+    rng: np.random.Generator,
+    *,
+    options: TrainingOptions | None = None,
+    jobs: int = 1,
+    progress: Progress = no_progress,
+) -> Retrained:
+    """Train an inverse network of the old one's layout on the augmented damper, and judge both on other motions.
+
+    Parameters
+    ----------
+    old
+        The controller's inverse, trained on what was measured.
+    chain
+        Damper with its effects.
+    training, validation
+        Prepared tests whose motions are used; of validation tests the motions only.
+    options
+        How it is trained; a few starts on a subsample, seconds in all, where nothing is given.
+    """
+    rate = old.features.sampling_rate_hz
+    history = simulated_history(chain, training, drive_limit, rate, rng)
+    options = options or TrainingOptions(
+        hidden=old.hidden_of_members,
+        biases=old.has_biases,
+        starts=3,
+        refined_starts=min(3, old.members),
+        averaged=min(3, old.members),
+        subsample_rows=12_000,
+        subsample_iterations=100,
+        iterations=20,
+    )
+    trained = train(history, old.features, options, rng, jobs=jobs, progress=progress)
+    judged = samples(simulated_history(chain, validation or training, drive_limit, rate, rng), old.features)
+    errors = [
+        float(np.sqrt(np.mean((item.predict(judged.features) - judged.target) ** 2) / np.mean(judged.target**2)))
+        for item in (old, trained.network)
+    ]
+    better = trained.network if errors[1] < errors[0] else old
+    return Retrained(better, errors[0], errors[1], trained.seconds)

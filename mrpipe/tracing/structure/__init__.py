@@ -1,0 +1,1 @@
+"""Tracing on the structure: residual of the linear frame against measured vibration."""

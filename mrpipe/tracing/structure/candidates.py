@@ -1,0 +1,225 @@
+"""Effects of a structure fitted to what a linear frame leaves: histories, columns, search of shapes and places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import float64, int64, njit, types, void
+from scipy import optimize
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.effects.contract import EffectScales, Parameter
+from mrpipe.effects.structural.contract import STEP_SIGNATURE, StructuralEffect, StructuralForm
+from mrpipe.tracing.structure.fit import Columns, Design, Solved, solve
+from mrpipe.tracing.structure.spectra import Spectra
+
+
+@njit(
+    void(
+        types.FunctionType(STEP_SIGNATURE), float64[::1], float64[::1], float64[::1], float64, int64, float64[:, ::1]
+    ),
+    cache=True,
+)  # fmt: skip
+def _run_step(
+    step: Any,
+    position: FloatArray,
+    rate: FloatArray,
+    parameters: FloatArray,
+    dt: float,
+    state_size: int,
+    out: FloatArray,
+) -> None:
+    state = np.zeros(state_size + 1)
+    for k in range(position.shape[0]):
+        step(position[k], rate[k], state, parameters, dt, out[k])
+
+
+def unit_forces(
+    form: StructuralForm, position: FloatArray, rate: FloatArray, dt: float, numbers: FloatArray
+) -> FloatArray:
+    """Return the unit forces of a form along a history, shape (m, amplitudes)."""
+    out = np.zeros((len(position), len(form.amplitudes)))
+    parameters = np.array([*numbers, *form.constants, 0.0], dtype=np.float64)
+    _run_step(
+        form.step, np.ascontiguousarray(position), np.ascontiguousarray(rate), parameters, dt, form.state_size, out
+    )
+    return out
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A form at a place: `floor` from 1 for a floor effect, 0 for all storeys at once."""
+
+    effect: StructuralEffect
+    form: StructuralForm
+    floor: int = 0
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A placed form with its searched numbers; amplitudes follow from the design."""
+
+    placed: Placed
+    numbers: FloatArray
+    at_bound: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.placed.effect.name
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What columns need beside the records: relative stiffness of the storeys (for the turn of a base)."""
+
+    storey_stiffness: FloatArray
+
+
+@dataclass(frozen=True)
+class Histories:
+    """Unit forces in time.
+
+    Attributes
+    ----------
+    force
+        Shape (m, h).
+    which
+        History of each amplitude, shape (k,).
+    on_storey
+        What one unit of an amplitude adds to the shear force of each storey, shape (k, n).
+    """
+
+    force: FloatArray
+    which: IntArray
+    on_storey: FloatArray
+
+    def shear(self, amplitudes: FloatArray) -> FloatArray:
+        """Return what the effect adds to the shear force that inertia shows, shape (m, n) [N]."""
+        return np.asarray(self.force[:, self.which] @ (amplitudes[:, None] * self.on_storey))
+
+
+def histories_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Histories:
+    """Return the unit forces of an effect along a record: amplitude after amplitude, each storey after the other."""
+    effect, form = fitted.placed.effect, fitted.placed.form
+    motion, dt, n = spectra.motion, spectra.record.dt, spectra.record.floors
+    kinds = len(form.amplitudes)
+    if effect.acts_on == "floor":
+        place = fitted.placed.floor - 1
+        position, rate = motion.state_displacement[:, place], motion.state_velocity[:, place]
+        # a force on a floor is carried by all storeys below it
+        below = np.where(np.arange(n) <= place, -1.0, 0.0)
+        return Histories(
+            unit_forces(form, position, rate, dt, fitted.numbers), np.arange(kinds), np.tile(below, (kinds, 1))
+        )
+    if effect.acts_on == "base" and form.columns is not None:
+        weight = about.storey_stiffness / np.sum(about.storey_stiffness)
+        names = [item.name for item in form.searched]
+        turn = np.diff(motion.displacement, axis=1, prepend=0.0) @ weight
+        turns = form.columns(turn, dt, dict(zip(names, fitted.numbers, strict=True)))
+        # every storey of equal height bends by the same turn less
+        return Histories(turns, np.arange(kinds), np.tile(about.storey_stiffness, (kinds, 1)))
+    drift, drift_rate = motion.drift, motion.drift_rate
+    forces = [unit_forces(form, drift[storey], drift_rate[storey], dt, fitted.numbers) for storey in range(n)]
+    return Histories(np.concatenate(forces, axis=1), np.arange(kinds * n), -np.repeat(np.eye(n), kinds, axis=0))
+
+
+def columns_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Columns:
+    """Return the lines of the unit forces of an effect in a record."""
+    found = histories_of(fitted, spectra, about)
+    lines = spectra.lines_of(found.force)
+    return Columns(found.on_storey[:, :, None] * lines[found.which][:, None, :])
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A candidate after its search."""
+
+    fitted: Fitted
+    solved: Solved
+
+
+def scales_of(spectra: Sequence[Spectra], place: Placed) -> EffectScales:
+    """Return what bounds and starts are multiples of, at a place."""
+    drifts, rates, forces, length = [], [], [], 0.0
+    for item in spectra:
+        x, v = item.motion.drift, item.motion.drift_rate
+        if place.floor:
+            x, v = item.motion.state_displacement[:, place.floor - 1], item.motion.state_velocity[:, place.floor - 1]
+        drifts.append(float(np.quantile(np.abs(x), 0.9995)))
+        rates.append(float(np.quantile(np.abs(v), 0.9995)))
+        forces.append(float(np.std(item.motion.acceleration)))
+        length = max(length, len(x) * item.record.dt)
+    return EffectScales(max(drifts), max(rates), 1.0, 1.0, max(forces), length)
+
+
+def search(
+    placed: Placed,
+    design: Design,
+    before: FloatArray | None,
+    about: Surroundings,
+    *,
+    evaluations: int = 30,
+    screen_only: bool = False,
+) -> Outcome:
+    """Search the shape of a form: every combination of starts, then downhill from the best.
+
+    Parameters
+    ----------
+    before
+        Projected columns of the effects chosen before, shape (k, n, 2 b).
+    """
+    scales = scales_of(design.spectra, placed)
+    bounds = [item.bounds(scales) for item in placed.form.searched]
+
+    def outcome(numbers: FloatArray) -> Outcome:
+        fitted = Fitted(placed, numbers, _at_bound(placed.form.searched, numbers, bounds))
+        own = design.project([columns_of(fitted, item, about) for item in design.spectra])
+        return Outcome(fitted, solve(design, own if before is None else np.concatenate([before, own])))
+
+    starts = [np.zeros(0)]
+    for item in placed.form.searched:
+        starts = [np.append(start, value) for start in starts for value in item.start_values(scales)]
+    tried = sorted((outcome(start) for start in starts), key=_chi_square)
+    best = tried[0]
+    if screen_only or not placed.form.searched:
+        return best
+    return _downhill(outcome, best, bounds, evaluations)
+
+
+def _downhill(
+    outcome: Callable[[FloatArray], Outcome], best: Outcome, bounds: Sequence[tuple[float, float]], evaluations: int
+) -> Outcome:
+    kept = [best]
+    low, high = np.log([low for low, _ in bounds]), np.log([high for _, high in bounds])
+
+    def cost(position: FloatArray) -> float:
+        found = outcome(np.exp(np.clip(position, low, high)))
+        if found.solved.chi_square < kept[0].solved.chi_square:
+            kept[0] = found
+        return found.solved.chi_square
+
+    start = np.log(best.fitted.numbers)
+    simplex = np.vstack([start, *(start + 0.25 * unit for unit in np.eye(len(start)))])
+    optimize.minimize(
+        cost, start, method="Nelder-Mead",
+        options={"maxfev": evaluations, "xatol": 0.01, "fatol": 1e-7, "initial_simplex": simplex},
+    )  # fmt: skip
+    return kept[0]
+
+
+def _chi_square(item: Outcome) -> float:
+    return item.solved.chi_square
+
+
+def _at_bound(
+    parameters: Sequence[Parameter], numbers: FloatArray, bounds: Sequence[tuple[float, float]]
+) -> tuple[str, ...]:
+    return tuple(
+        item.name
+        for item, value, (low, high) in zip(parameters, numbers, bounds, strict=True)
+        if value < 1.02 * low or value > 0.98 * high
+    )

@@ -1,0 +1,77 @@
+"""A fitted frame with its effects: what it predicts of any record, in lines and in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.structures.dynamics import ComplexArray
+from mrpipe.tracing.structure.candidates import Fitted, Surroundings, columns_of, histories_of
+from mrpipe.tracing.structure.fit import Base, Columns, Design, coefficients, predicted, solve
+from mrpipe.tracing.structure.spectra import Spectra
+
+
+@dataclass(frozen=True)
+class FrameModel:
+    """Linear numbers of every storey, effects and their amplitudes.
+
+    Attributes
+    ----------
+    linear
+        For each storey: displacements (or its drift), velocities of all floors, ground acceleration and its second
+        derivative, loads.
+    """
+
+    base: Base
+    linear: tuple[FloatArray, ...]
+    chosen: tuple[Fitted, ...]
+    amplitudes: FloatArray
+    about: Surroundings
+
+    def columns(self, record: Spectra) -> Columns | None:
+        """Return the columns of all effects in a record."""
+        return joined([columns_of(item, record, self.about) for item in self.chosen]) if self.chosen else None
+
+    def predict(self, record: Spectra) -> ComplexArray:
+        """Return the lines of each storey's shear force, shape (n, b)."""
+        return predicted(self.base, record, self.linear, self.columns(record), self.amplitudes)
+
+    def effect_shear(self, record: Spectra) -> FloatArray:
+        """Return what all effects add to each storey's shear force in time, shape (m, n) [N]."""
+        total = np.zeros_like(record.motion.acceleration)
+        first = 0
+        for item in self.chosen:
+            found = histories_of(item, record, self.about)
+            last = first + len(found.which)
+            total += found.shear(self.amplitudes[first:last])
+            first = last
+        return total
+
+
+def joined(parts: Sequence[Columns]) -> Columns:
+    """Return the columns of several effects, one after another."""
+    return Columns(np.concatenate([item.lines for item in parts]))
+
+
+def model_of(design: Design, chosen: Sequence[Fitted], about: Surroundings) -> FrameModel:
+    """Solve amplitudes and linear numbers on the records of a design; the shapes of the effects are kept."""
+    columns, amplitudes = None, np.zeros(0)
+    if chosen:
+        columns = [joined([columns_of(item, record, about) for item in chosen]) for record in design.spectra]
+        amplitudes = solve(design, design.project(columns)).amplitudes
+    linear = coefficients(design, columns, amplitudes)
+    return FrameModel(design.base, tuple(linear), tuple(chosen), amplitudes, about)
+
+
+def in_time(lines: ComplexArray, record: Spectra) -> FloatArray:
+    """Return lines of shape (n, b) as tapered histories in the band, shape (m, n)."""
+    samples = len(record.taper)
+    size = fft.next_fast_len(samples, real=True)
+    full = np.zeros((len(lines), size // 2 + 1), dtype=np.complex128)
+    first = round(float(record.frequencies_hz[0]) * size * record.record.dt)
+    full[:, first : first + lines.shape[1]] = lines / np.sqrt(2.0 * record.record.dt / np.sum(record.taper**2))
+    return np.asarray(fft.irfft(full, size, axis=1)[:, :samples].T)

@@ -1,0 +1,223 @@
+"""What is judged on a structure's campaign, part by part, each with the keys of contract section 4."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import Progress
+from mrpipe.campaigns.model import Campaign, Recording
+from mrpipe.effects.contract import Effect
+from mrpipe.effects.structural.contract import StructuralEffect
+from mrpipe.tracing.bench.summary import TracingOptions
+from mrpipe.tracing.structure.damper import BraceFinding, find_brace, prepared_loops, trace_damper
+from mrpipe.tracing.structure.delay import DelayFinding, drive_lag, law_lag
+from mrpipe.tracing.structure.groups import OF_FLOOR
+from mrpipe.tracing.structure.loop import bench_of, loop_signals
+
+COMMAND_QUANTITY = (
+    "drive from desired force and motion, or desired force from motion, whichever is late, over its spread"
+)
+DAMPER_QUANTITY = "damper force from the motion of floor 1 (or of its rod) and the drive, over its RMS"
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of the rig.
+
+    Attributes
+    ----------
+    name
+        `frame`, `command` or `damper`.
+    summary
+        Keys of contract section 4.
+    """
+
+    name: str
+    summary: dict[str, Any]
+
+    @property
+    def named(self) -> bool:
+        """Whether an effect is named."""
+        return bool(self.summary["effects"])
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether something is missing that has no name."""
+        return bool(self.summary["unexplained"]["structured"])
+
+
+def command_part(
+    loops: Sequence[Recording], effects: Mapping[str, StructuralEffect], declared: Sequence[str]
+) -> Part | None:
+    """Return the verdict on the controller's command; None where no test records what it is judged by."""
+    effect = effects.get("controller-delay")
+    signals = loop_signals(loops)
+    if effect is None or effect.name in declared or not signals:
+        return None
+    laws = {item.name: str(item.details.get("law", "")) for item in loops}
+    found = [item for item in (drive_lag(signals), law_lag(signals, laws)) if item is not None]
+    if not found:
+        return None
+    late = [item for item in found if item.late]
+    worst = max(late or found, key=lambda item: item.before / max(item.after, 1e-12))
+    return Part("command", _command_summary(worst, found, effect))
+
+
+def _command_summary(worst: DelayFinding, found: Sequence[DelayFinding], effect: StructuralEffect) -> dict[str, Any]:
+    share = 1.0 - (worst.after / max(worst.before, 1e-12)) ** 2
+    named: list[dict[str, Any]] = []
+    if worst.late:
+        half = 0.5 * (worst.interval_s[1] - worst.interval_s[0])
+        named.append(
+            {
+                "name": effect.name,
+                "form": worst.part,
+                "place": "controller",
+                "parameters": {
+                    "time": {
+                        "value": worst.delay_s, "unit": "s",
+                        "interval": [max(0.0, worst.delay_s - half), worst.delay_s + half],
+                    }
+                },
+                "confidence": round(float(np.clip(share, 0.0, 0.99)), 3),
+                "tied_with": [],
+                "physics": effect.physics,
+                "remedy": effect.remedy,
+                "corrected_in": "controller",
+            }
+        )  # fmt: skip
+    return {
+        "model": "controller-as-declared",
+        "quantity": COMMAND_QUANTITY,
+        "noise_floor_nrmse": worst.after,
+        "noise_from": "error at the best shift of the clock",
+        "before": _score(worst.before),
+        "residual": {"structured": worst.late, "p_value": 0.0 if worst.late else 1.0, "where": {}},
+        "base_form": {
+            "name": "controller-as-declared", "best": "controller-as-declared",
+            "nrmse": {"controller-as-declared": worst.before},
+        },
+        "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
+        "effects": named,
+        "verdict": f"{effect.name}: explains what is missing" if named else "command and motion agree",
+        "candidates": [
+            {
+                "name": effect.name, "form": item.part, "nrmse": item.after, "evidence": item.before / item.after,
+                "share": 1.0 - (item.after / max(item.before, 1e-12)) ** 2, "lag_s": item.lag_s, "at_bound": [],
+            }
+            for item in found
+        ],
+        "after": _score(worst.after if named else worst.before),
+        "ceiling": {"nrmse": worst.after, "recovered": 1.0 if named else 0.0},
+        "unexplained": {"structured": False, "share_of_residual": 0.0, "depends_on": []},
+        "tests": [],
+    }  # fmt: skip
+
+
+def damper_part(
+    loops: Sequence[Recording],
+    campaign: Campaign,
+    effects: Mapping[str, Effect],
+    brace: StructuralEffect | None,
+    options: TracingOptions,
+    *,
+    rng: np.random.Generator,
+    jobs: int,
+    progress: Progress,
+) -> Part | None:
+    """Return the verdict on the damper behind floor 1; None where motion, drive and force are not all recorded."""
+    bench = bench_of(loops, campaign.directory, campaign.name, campaign.drive_unit)
+    if bench is None:
+        return None
+    tests = prepared_loops(bench)
+    declared = [effects[name] for name in campaign.declared_effects if name in effects]
+    measured = any("damper_displacement" in item.channels for item in loops)
+    found = None
+    if brace is not None and not measured and brace.name not in campaign.declared_effects:
+        found = find_brace(tests, options, declared)
+    if found is not None and found.strong:
+        # sensors' noise is no yardstick for a rigid brace: rivals are weighed by what the brace leaves, one at a time
+        options = replace(options, model_error_share=max(options.model_error_share, found.nrmse_after), most_effects=1)
+    summary = dict(trace_damper(tests, effects, declared, options, rng=rng, jobs=jobs, progress=progress).summary)
+    summary["quantity"] = DAMPER_QUANTITY
+    if not summary["effects"] and summary["before"]["nrmse"] <= (1.0 + OF_FLOOR) * summary["noise_floor_nrmse"]:
+        _nothing_that_matters(summary)
+    if brace is not None and found is not None:
+        _with_brace(summary, found, brace, options)
+    return Part("damper", summary)
+
+
+def _nothing_that_matters(summary: dict[str, Any]) -> None:
+    """Say of a damper part that it lacks nothing: its error is that of noise, to what clocks and held commands make."""
+    if summary["residual"]["structured"]:
+        summary["verdict"] = "what stands out of the noise is too little to matter: nothing is missing"
+    summary["residual"] = {**summary["residual"], "structured": False}
+    summary["unexplained"] = {"structured": False, "share_of_residual": 0.0, "depends_on": []}
+
+
+def _with_brace(
+    summary: dict[str, Any], found: BraceFinding, effect: StructuralEffect, options: TracingOptions
+) -> None:
+    """Put the brace among the candidates, and name it where it explains more than any effect within the damper."""
+    rules = options.rules
+    share = float(np.clip(found.share, 0.0, 1.0)) if found.compliance_m_n > 0.0 else 0.0
+    entry = {
+        "name": effect.name, "form": "spring", "nrmse": found.nrmse_after, "evidence": found.rigid / found.chi_square,
+        "share": share, "at_bound": [],
+    }  # fmt: skip
+    summary["candidates"] = sorted([*summary["candidates"], entry], key=lambda item: -item["share"])
+    better = found.nrmse_after < min([summary["after"]["nrmse"], 0.8 * found.nrmse_before])
+    if not summary["residual"]["structured"] or share < rules.least_share or not better:
+        return
+    rivals = [
+        item["name"] for item in summary["candidates"] if item is not entry and item["share"] > share - rules.lead
+    ]
+    summary["effects"] = [
+        {
+            "name": effect.name,
+            "form": "spring",
+            "place": "damper",
+            "parameters": {
+                "compliance": {"value": found.compliance_m_n, "unit": "m/N", "interval": list(found.interval)}
+            },
+            "confidence": round(0.99 * min(1.0, share / rules.named_share) * (0.5 if rivals else 1.0), 3),
+            "tied_with": rivals,
+            "physics": effect.physics,
+            "remedy": effect.remedy,
+            "corrected_in": "plant",
+        }
+    ]
+    summary["verdict"] = f"{effect.name}: explains {'' if share >= rules.named_share else 'part of '}what is missing"
+    summary["before"], summary["after"] = _score(found.nrmse_before), _score(found.nrmse_after)
+    summary["unexplained"] = {
+        "structured": share < rules.named_share, "share_of_residual": 1.0 - share, "depends_on": []
+    }  # fmt: skip
+
+
+def _score(nrmse: float) -> dict[str, float]:
+    return {"nrmse": nrmse, "fit_percent": 100.0 * (1.0 - nrmse)}
+
+
+def merged(parts: Sequence[Part]) -> dict[str, Any]:
+    """Return one verdict: that of the part that names an effect, with the effects of all and the parts beside it."""
+    order = sorted(parts, key=lambda part: (not part.named, not part.unexplained))
+    first = order[0]
+    summary = dict(first.summary)
+    summary["part"] = first.name
+    summary["effects"] = [effect for part in order for effect in part.summary["effects"]]
+    summary["verdict"] = "; ".join(f"{part.name}: {part.summary['verdict']}" for part in order)
+    if not first.named:
+        open_part = next((part for part in order if part.unexplained), first)
+        summary["unexplained"] = open_part.summary["unexplained"]
+    summary["parts"] = {
+        part.name: {
+            key: part.summary[key]
+            for key in ("model", "quantity", "verdict", "noise_floor_nrmse", "before", "after", "effects", "candidates")
+        }
+        for part in parts
+    }
+    return summary

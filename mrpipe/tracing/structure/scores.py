@@ -1,0 +1,131 @@
+"""Errors on validation records, what is recoverable at all, and on what a residual depends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from sklearn.ensemble import HistGradientBoostingRegressor
+from threadpoolctl import threadpool_limits
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.tracing.structure.model import FrameModel, in_time
+from mrpipe.tracing.structure.spectra import Spectra
+
+LAGS_S = (0.02, 0.06, 0.2, 0.5)
+MOST_ROWS = 8000
+BINS = 16
+
+
+@dataclass(frozen=True)
+class FrameScore:
+    """Errors of the storeys' shear force, pooled over storeys and records, lines weighted by the sensors' noise."""
+
+    nrmse: float
+    fit_percent: float
+    by_test: Mapping[str, float]
+
+
+def frame_score(model: FrameModel, records: Sequence[Spectra]) -> FrameScore:
+    """Return RMS of error over RMS of the storeys' shear force on records."""
+    errors, wholes, own = 0.0, 0.0, {}
+    for record in records:
+        error = float(np.sum(np.abs((record.target - model.predict(record)) * record.weight) ** 2))
+        whole = float(np.sum(np.abs(record.target * record.weight) ** 2))
+        own[record.record.name] = float(np.sqrt(error / max(whole, 1e-300)))
+        errors, wholes = errors + error, wholes + whole
+    nrmse = float(np.sqrt(errors / max(wholes, 1e-300)))
+    return FrameScore(nrmse, 100.0 * (1.0 - nrmse), own)
+
+
+def noise_floor(records: Sequence[Spectra], scale: FloatArray) -> float:
+    """Return the NRMSE that the sensors' noise alone makes; `scale` is the noise's mean square a storey."""
+    errors = sum(2.0 * float(np.sum(scale)) * item.frequencies_hz.size for item in records)
+    wholes = sum(float(np.sum(np.abs(item.target * item.weight) ** 2)) for item in records)
+    return float(np.sqrt(errors / max(wholes, 1e-300)))
+
+
+def residual_in_time(model: FrameModel, record: Spectra) -> FloatArray:
+    """Return what a model leaves of each storey's shear force in the band, shape (m, n) [N]."""
+    return in_time(record.target - model.predict(record), record)
+
+
+def states_of(record: Spectra, storey: int) -> dict[str, FloatArray]:
+    """Return what the residual of a storey may depend on, each of shape (m,)."""
+    motion, dt = record.motion, record.record.dt
+    drift, rate = motion.drift[storey], motion.drift_rate[storey]
+    time = np.arange(len(drift)) * dt
+    turned = np.concatenate([[0], np.flatnonzero(np.diff(np.sign(rate)) != 0) + 1])
+    which = np.searchsorted(turned, np.arange(len(drift)), side="right") - 1
+    path = np.cumsum(np.abs(rate)) * dt
+    floor = motion.state_displacement[:, storey]
+    return {
+        "drift": drift,
+        "drift rate": rate,
+        "slip since reversal": (path - path[turned][which]) * np.sign(rate),
+        "floor displacement": floor,
+        "floor velocity": motion.state_velocity[:, storey],
+        "ground acceleration": motion.ground,
+        "time in test": time,
+    }
+
+
+def _features(record: Spectra, storey: int) -> FloatArray:
+    states = states_of(record, storey)
+    columns = list(states.values())[:6]
+    for lag in LAGS_S:
+        shift = round(lag * record.record.rate_hz)
+        columns += [np.concatenate([np.full(shift, values[0]), values[:-shift]]) for values in columns[:2]]
+    return np.column_stack(columns)
+
+
+def flexible_score(
+    model: FrameModel, training: Sequence[Spectra], validation: Sequence[Spectra], storeys: Sequence[int]
+) -> float:
+    """Return the NRMSE on validation records of the model with boosted trees on the residual of some storeys."""
+    extra = [np.zeros_like(item.motion.acceleration) for item in validation]
+    for storey in storeys:
+        x = np.concatenate([_features(item, storey) for item in training])
+        y = np.concatenate([residual_in_time(model, item)[:, storey] for item in training])
+        step = max(1, len(y) // MOST_ROWS)
+        trees = HistGradientBoostingRegressor(
+            max_iter=40,
+            learning_rate=0.15,
+            max_leaf_nodes=24,
+            min_samples_leaf=60,
+            random_state=0,
+            early_stopping=False,
+        )
+        with threadpool_limits(1):
+            trees.fit(x[::step], y[::step])
+            for item, force in zip(validation, extra, strict=True):
+                force[:, storey] = trees.predict(_features(item, storey))
+    errors = wholes = 0.0
+    for item, force in zip(validation, extra, strict=True):
+        # trees learn a tapered, band-limited residual: their own sum is brought to the same lines
+        left = item.target - model.predict(item) - item.lines_of(force)
+        errors += float(np.sum(np.abs(left * item.weight) ** 2))
+        wholes += float(np.sum(np.abs(item.target * item.weight) ** 2))
+    return float(np.sqrt(errors / max(wholes, 1e-300)))
+
+
+def dependence(model: FrameModel, records: Sequence[Spectra], storey: int) -> list[tuple[str, float]]:
+    """Return (state, share of a storey's residual that a step function of it explains), judged on left-out seconds."""
+    residual = np.concatenate([residual_in_time(model, item)[:, storey] for item in records])
+    block = np.concatenate([(np.arange(len(item.taper)) * item.record.dt).astype(int) for item in records])
+    parts = [states_of(item, storey) for item in records]
+    sign = np.concatenate([part["drift rate"] > 0.0 for part in parts])
+    found = []
+    for name in parts[0]:
+        values = np.concatenate([part[name] for part in parts])
+        edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
+        place = 2 * np.searchsorted(edges, values) + sign
+        explained = 0.0
+        for half in (0, 1):
+            learn = block % 2 == half
+            count = np.maximum(np.bincount(place[learn], minlength=2 * BINS + 2), 1)
+            mean = np.bincount(place[learn], weights=residual[learn], minlength=2 * BINS + 2) / count
+            explained += float(np.sum(residual[~learn] ** 2) - np.sum((residual[~learn] - mean[place[~learn]]) ** 2))
+        found.append((name, max(0.0, explained / max(float(residual @ residual), 1e-300))))
+    return sorted(found, key=lambda item: -item[1])

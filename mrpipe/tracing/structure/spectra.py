@@ -1,0 +1,330 @@
+"""The equation of motion of each storey as weighted spectra: what the floors' inertia says, and what motion explains.
+
+With every floor's acceleration measured, the shear force of storey s is known: the sum of mass times absolute
+acceleration of the floors above it. Displacement and velocity come from the same accelerometers, integrated twice in
+the frequency domain, so that the equation holds sample by sample; it is multiplied by a taper, transformed, and each
+line of the spectrum weighted by what the accelerometers' noise makes of it (integrated noise rules at low frequencies).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import fft, signal, stats
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.structures.dynamics import ComplexArray
+from mrpipe.tracing.structure.records import FrameRecord
+
+MODEL_FLOOR = 0.001
+"""No line is trusted better than this share of the storey's own force: errors of clocks and gains below it are of no
+interest."""
+
+INTEGRATION_SHARE = 0.6
+"""Corner of the integration over the lower edge of the band."""
+
+
+NOISE_BLOCKS = 14
+"""Least number of blocks that the spectrum of a sensor's noise is averaged over."""
+
+NOISE_PARTS, LEAST_PART, QUIETEST = 8, 250, 0.1
+"""Parts of a record whose noise is told apart, least samples of one, and the least share of the whole's noise that the
+quieter ones may show."""
+
+SAME_GAIN = 0.02
+"""Gains of laser and accelerometer that differ by less are taken as one."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Frequencies that are compared [Hz]."""
+
+    low_hz: float
+    high_hz: float
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Power densities of a record's sensors.
+
+    Attributes
+    ----------
+    acceleration
+        Of ground and floors, shape (1 + n,) [(m/s2)^2/Hz].
+    displacement
+        Floor -> of its laser [m2/Hz].
+    loads
+        Floor -> of the load cell there [N2/Hz].
+    """
+
+    acceleration: FloatArray
+    displacement: dict[int, float]
+    loads: dict[int, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motion of a record in time, relative to the ground; shape (m, n), SI.
+
+    `acceleration` is absolute and without what lies below the band; `state_displacement` and `state_velocity` carry the
+    slow part of lasers where there are any: what memories and gaps of effects are judged by; `drift` and
+    `drift_rate` are theirs, storey after storey, shape (n, m).
+    """
+
+    displacement: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    ground: FloatArray
+    state_displacement: FloatArray
+    state_velocity: FloatArray
+    drift: FloatArray
+    drift_rate: FloatArray
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """A record's lines in the band.
+
+    Attributes
+    ----------
+    target
+        Shear force of each storey from inertia, shape (n, b) [N/sqrt(Hz)].
+    regressors
+        Displacements, velocities (relative, n each), ground acceleration and its second derivative, then known loads;
+        shape (p, b).
+    weight
+        Inverse of the standard deviation of a line's real or imaginary part, shape (n, b).
+    variance
+        Mean square of the noise of a line, shape (n, b).
+    """
+
+    record: FrameRecord
+    motion: Motion
+    frequencies_hz: FloatArray
+    taper: FloatArray
+    target: ComplexArray
+    regressors: ComplexArray
+    weight: FloatArray
+    variance: FloatArray
+
+    def lines_of(self, history: FloatArray) -> ComplexArray:
+        """Return the lines of a history of shape (m,) or (m, k): shape (b,) or (k, b)."""
+        return spectrum_of(history, self.taper, self.record.dt, self.frequencies_hz)
+
+
+def spectrum_of(history: FloatArray, taper: FloatArray, dt: float, frequencies: FloatArray) -> ComplexArray:
+    """Return the tapered Fourier lines, scaled so that their mean square is the one-sided power density."""
+    columns = history if history.ndim == 2 else history[:, None]
+    centred = columns - np.sum(columns * taper[:, None], axis=0) / np.sum(taper)
+    size = fft.next_fast_len(len(taper), real=True)
+    lines = fft.rfft((centred * taper[:, None]).T, size, axis=1)
+    first = round(float(frequencies[0]) * size * dt)
+    chosen = lines[:, first : first + len(frequencies)] * np.sqrt(2.0 * dt / np.sum(taper**2))
+    return np.asarray(chosen if history.ndim == 2 else chosen[0])
+
+
+def lines_in_band(samples: int, dt: float, band: Band) -> FloatArray:
+    """Return the frequencies of the lines in the band [Hz]."""
+    size = fft.next_fast_len(samples, real=True)
+    frequencies = fft.rfftfreq(size, dt)
+    return np.asarray(frequencies[(frequencies >= band.low_hz) & (frequencies <= band.high_hz)])
+
+
+def taper_of(samples: int, dt: float, low_hz: float) -> FloatArray:
+    """Return a window that is flat but for a few periods of the lower edge at either end.
+
+    The first and last of these are left out altogether: what integration makes of a record's ends dies away there.
+    """
+    margin = int(min(1.5 / (low_hz * dt), 0.06 * samples))
+    inner = samples - 2 * margin
+    share = min(1.0, 2.0 * 3.0 / (low_hz * inner * dt))
+    return np.pad(signal.windows.tukey(inner, share), margin)
+
+
+def motion_of(record: FrameRecord, band: Band, noise: Noise) -> Motion:
+    """Return the motion of a record: accelerations integrated, mixed with lasers by what either's noise makes of it.
+
+    What lies below the band is taken away smoothly from what the equation of motion is written in.
+    """
+    dt, corner = record.dt, INTEGRATION_SHARE * band.low_hz
+    size, n = record.acceleration.shape
+    pad = _padding(size, int(6.0 / (corner * dt)))
+    lines, frequencies = _padded_lines(np.column_stack([record.relative, record.acceleration, record.ground]), pad, dt)
+    keep = _high_pass(frequencies, corner)[:, None]
+    omega = 2.0 * np.pi * np.maximum(frequencies, 1e-9)[:, None]
+    total = size + 2 * pad
+
+    def back(values: ComplexArray) -> FloatArray:
+        return np.asarray(fft.irfft(values, total, axis=0)[pad : pad + size])
+
+    integrated = -lines[:, :n] / omega**2
+    moved = integrated * keep
+    slow = np.zeros_like(moved)
+    if record.measured_displacement:
+        floors = sorted(record.measured_displacement)
+        seen = _laser_lines(record, floors, pad)
+        for k, floor in enumerate(floors):
+            share = laser_share(omega[:, 0], noise, floor)[:, None]
+            own = seen[:, k : k + 1] * _gain_of(seen[:, k], integrated[:, floor - 1], frequencies, band)
+            moved[:, floor - 1 : floor] = keep * (share * own + (1.0 - share) * integrated[:, floor - 1 : floor])
+        slow = (seen * (1.0 - keep)) @ _over_floors(n, floors)
+    displacement, velocity = back(moved), back(moved * 1j * omega)
+    filtered = back(lines[:, n:] * keep)
+    state, rate = displacement + back(slow), velocity + back(slow * 1j * omega)
+    drift = np.ascontiguousarray(np.diff(state, axis=1, prepend=0.0).T)
+    drift_rate = np.ascontiguousarray(np.diff(rate, axis=1, prepend=0.0).T)
+    return Motion(displacement, velocity, filtered[:, :n], filtered[:, n], state, rate, drift, drift_rate)
+
+
+def laser_share(omega: FloatArray, noise: Noise, floor: int) -> FloatArray:
+    """Return the weight of a floor's laser beside its integrated acceleration, shape (f,)."""
+    if floor not in noise.displacement:
+        return np.zeros_like(omega)
+    accelerometer = noise.acceleration[floor] + noise.acceleration[0]
+    return np.asarray(accelerometer / (accelerometer + noise.displacement[floor] * omega**4))
+
+
+def _laser_lines(record: FrameRecord, floors: Sequence[int], pad: int) -> ComplexArray:
+    seen = np.column_stack([record.measured_displacement[floor] for floor in floors])
+    return _padded_lines(seen - np.mean(seen[_at_rest(record)], axis=0), pad, record.dt)[0]
+
+
+def _gain_of(laser: ComplexArray, integrated: ComplexArray, frequencies: FloatArray, band: Band) -> float:
+    """Return what a laser is to be multiplied by to agree with the accelerometer; 1 where they disagree altogether."""
+    inside = (frequencies > 1.5 * band.low_hz) & (frequencies < band.high_hz)
+    power = np.where(inside, np.abs(laser) ** 2, 0.0)
+    # the strongest lines alone: elsewhere the noise of one or the other would pass for a gain
+    strong = power > 0.1 * float(power.max())
+    gain = float(np.sum((np.conj(laser[strong]) * integrated[strong]).real)) / max(float(power[strong].sum()), 1e-300)
+    return gain if 0.8 < gain < 1.25 and abs(gain - 1.0) > SAME_GAIN else 1.0
+
+
+def _over_floors(n: int, floors: Sequence[int]) -> FloatArray:
+    """Return how the slow motion of lasers is carried to all floors, shape (lasers, n).
+
+    It has about the shape of the first mode of a uniform frame: between lasers its factor is interpolated.
+    """
+    shape = np.sin(np.pi * np.arange(1, n + 1) / (2 * n + 1))
+    own = shape[np.array(floors) - 1]
+    return np.stack([shape * np.interp(np.arange(1, n + 1), floors, unit / own) for unit in np.eye(len(floors))])
+
+
+def _padding(size: int, wanted: int) -> int:
+    """Return by how much to lengthen a record at either end, so that its transform is quick."""
+    for pad in range(min(size - 1, wanted), size - 1):
+        if fft.next_fast_len(size + 2 * pad, real=True) == size + 2 * pad:
+            return pad
+    return size - 1
+
+
+def _padded_lines(stack: FloatArray, pad: int, dt: float) -> tuple[ComplexArray, FloatArray]:
+    longer = np.concatenate([2.0 * stack[0] - stack[pad:0:-1], stack, 2.0 * stack[-1] - stack[-2 : -pad - 2 : -1]])
+    return np.asarray(fft.rfft(longer, axis=0)), np.asarray(fft.rfftfreq(len(longer), dt))
+
+
+def _high_pass(frequencies: FloatArray, corner: float) -> FloatArray:
+    ratio = np.maximum(frequencies, 1e-9) / corner
+    return np.asarray(ratio**8 / (1.0 + ratio**8))
+
+
+def _at_rest(record: FrameRecord) -> slice:
+    """Return the quietest second of a record where it is quiet; all of it otherwise."""
+    size = max(8, round(record.rate_hz))
+    strength = np.sum(record.relative - np.mean(record.relative, axis=0), axis=1) ** 2
+    blocks = strength[: len(strength) // size * size].reshape(-1, size).mean(axis=1)
+    if len(blocks) < 2 or blocks.min() > 1e-2 * blocks.mean():
+        return slice(None)
+    quiet = int(np.argmin(blocks))
+    return slice(quiet * size, (quiet + 1) * size)
+
+
+def noise_density(values: FloatArray, rate_hz: float, above_hz: float) -> float:
+    """Return the power density of the noise on a channel, told by what lies above the band [unit^2/Hz].
+
+    Slip and impact reach far above the band, but not while a frame rests or moves little: the quieter parts of a record
+    tell the noise, never less than a share of what all of it would tell.
+    """
+    whole = _density_above(values, rate_hz, above_hz)
+    parts = min(NOISE_PARTS, len(values) // LEAST_PART)
+    if parts < 3:
+        return whole
+    pieces = np.array_split(values, parts)
+    levels = sorted(_density_above(piece, rate_hz, above_hz) for piece in pieces)
+    # by how many deviations the second least lies below the mean (Blom); that of a level goes by its number of lines
+    below = -float(stats.norm.ppf((2.0 - 0.375) / (parts + 0.25)))
+    inside = len(pieces[0]) * max(0.9 - 2.0 * min(above_hz / rate_hz, 0.3), 0.1)
+    quiet = levels[1] / (1.0 - below * min(0.7, np.sqrt(3.5 / inside)))
+    return float(min(max(quiet, QUIETEST * whole), whole))
+
+
+def _density_above(values: FloatArray, rate_hz: float, above_hz: float) -> float:
+    length = min(2048, max(64, len(values) // NOISE_BLOCKS), len(values))
+    frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=length)
+    high = (frequencies > min(above_hz, 0.3 * rate_hz)) & (frequencies < 0.45 * rate_hz)
+    # the lower quartile passes by resonances of what the model does not hold; its place below the mean goes by how many
+    # blocks were averaged (half overlapping Hann windows: 1.06 of the variance of separate ones)
+    freedom = 2.0 * max(1.0, 2.0 * len(values) / length - 1.0) / 1.06
+    return float(np.quantile(density[high], 0.25)) / float(stats.chi2.ppf(0.25, freedom) / freedom)
+
+
+def noise_of(record: FrameRecord, band: Band) -> Noise:
+    """Return the noise of a record's sensors, told by what lies above the band."""
+    above, rate = 1.25 * band.high_hz, record.rate_hz
+    channels = (record.ground, *record.acceleration.T)
+    return Noise(
+        np.array([noise_density(channel, rate, above) for channel in channels]),
+        {floor: noise_density(x, rate, above) for floor, x in record.measured_displacement.items()},
+        {floor: noise_density(x, rate, above) for floor, x in record.known_loads.items()},
+    )
+
+
+def storey_sums(floors: int) -> FloatArray:
+    """Return the matrix that sums floors from the top down to a storey, shape (n, n)."""
+    return np.triu(np.ones((floors, floors)))
+
+
+def spectra_of(
+    record: FrameRecord, masses: FloatArray, band: Band, noise: Noise, stiffness: FloatArray, motion: Motion
+) -> Spectra:
+    """Return the lines of a record.
+
+    Parameters
+    ----------
+    masses
+        Shape (n,) [kg].
+    stiffness
+        Row a storey, column a floor's displacement, shape (n, n) [N/m]: for the weights alone.
+    """
+    n, dt = record.floors, record.dt
+    frequencies = lines_in_band(len(record.ground), dt, band)
+    taper = taper_of(len(record.ground), dt, band.low_hz)
+    sums = storey_sums(n)
+    omega = 2.0 * np.pi * frequencies
+    shear = motion.acceleration @ (sums * masses).T
+    ground = spectrum_of(motion.ground, taper, dt, frequencies)
+    parts = [
+        spectrum_of(motion.displacement, taper, dt, frequencies),
+        spectrum_of(motion.velocity, taper, dt, frequencies),
+        ground[None],
+        (-ground * omega**2 / omega[-1] ** 2)[None],
+    ]
+    loads = record.known_loads
+    for floor in range(1, n + 1):
+        if floor in loads:
+            parts.append(spectrum_of(loads[floor], taper, dt, frequencies)[None])
+    target = spectrum_of(shear, taper, dt, frequencies)
+    lasers = np.stack([laser_share(omega, noise, floor) for floor in range(1, n + 1)])
+    inverse = (1.0 - lasers) / omega**2
+    by_floor = sums[:, :, None] * masses[None, :, None] - stiffness[:, :, None] * inverse
+    of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
+    variance = np.einsum("slb,l->sb", by_floor**2, noise.acceleration[1:])
+    variance += noise.acceleration[0] * np.einsum("sl,lb->sb", stiffness, inverse) ** 2
+    variance += np.einsum("sl,lb->sb", stiffness**2, of_lasers)
+    # a measured load brings the noise of its cell to every storey below it
+    for floor, density in noise.loads.items():
+        variance[:floor] += density
+    own = np.mean(np.abs(target) ** 2, axis=1, keepdims=True)
+    variance = variance + MODEL_FLOOR**2 * own
+    return Spectra(record, motion, frequencies, taper, target, np.concatenate(parts), np.sqrt(2.0 / variance), variance)

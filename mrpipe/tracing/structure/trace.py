@@ -1,0 +1,288 @@
+"""The whole tracing of a structure: linear frame, what stands out, effects, errors before and after, verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.effects.structural.contract import StructuralEffect
+from mrpipe.tracing.bench.verdict import Rules, confidence_of
+from mrpipe.tracing.structure.base import FrameProblem, frame_problem
+from mrpipe.tracing.structure.candidates import Fitted
+from mrpipe.tracing.structure.model import FrameModel, model_of
+from mrpipe.tracing.structure.records import FrameData
+from mrpipe.tracing.structure.scores import FrameScore, dependence, flexible_score, frame_score, noise_floor
+from mrpipe.tracing.structure.select import FrameCandidate, FrameSelection, select
+
+QUANTITY = (
+    "shear force of every storey (mass times absolute acceleration, summed from the top) from the measured motion, "
+    "pooled over storeys; lines of the spectrum weighted by the accelerometers' noise"
+)
+
+LEAST_STOREY = 0.05
+"""Storeys with a smaller share of what stands out are not worth a flexible model."""
+
+
+@dataclass(frozen=True)
+class FrameTracing:
+    """What was found of the structure; `summary` is the JSON of contract section 4."""
+
+    summary: dict[str, Any]
+    problem: FrameProblem
+    selection: FrameSelection
+    before: FrameModel
+    after: FrameModel
+
+
+def trace_frame(
+    data: FrameData,
+    effects: Sequence[StructuralEffect],
+    declared: Sequence[StructuralEffect],
+    rules: Rules,
+    *,
+    most: int = 3,
+    draws: int = 400,
+    rng: np.random.Generator,
+    jobs: int = 1,
+    progress: Progress = no_progress,
+) -> FrameTracing:
+    """Trace the residual of a linear frame on the records that hold every floor.
+
+    Parameters
+    ----------
+    effects, declared
+        The library, and what the campaign declares of it.
+    most
+        Most effects that are named together.
+    """
+    training = data.with_role("training", "repeat")
+    problem = frame_problem(training, data.with_role("validation") or training, data.masses_kg)
+    progress(0.2, "spectra")
+    selection = select(
+        problem, effects, rules, most=most, declared=declared, rng=rng, draws=draws, jobs=jobs, progress=progress
+    )
+    about = selection.about
+    reason = _unnamed(selection, rules)
+    chosen = selection.chosen[: selection.declared] if reason else selection.chosen
+    before = model_of(selection.design, selection.chosen[: selection.declared], about)
+    after = model_of(selection.design, chosen, about)
+    progress(0.85, "errors on validation tests")
+    summary = _summary(problem, selection, before, after, declared, rules, reason)
+    return FrameTracing(summary, problem, selection, before, after)
+
+
+def _unnamed(selection: FrameSelection, rules: Rules) -> str:
+    if not selection.structured:
+        return "the residual is noise: nothing is missing"
+    if len(selection.chosen) <= selection.declared:
+        return "no effect of the library changes the error"
+    if selection.share(selection.residual) < rules.least_share:
+        return "no effect of the library recovers enough of what stands out of the noise"
+    return ""
+
+
+def _summary(
+    problem: FrameProblem,
+    selection: FrameSelection,
+    before: FrameModel,
+    after: FrameModel,
+    declared: Sequence[StructuralEffect],
+    rules: Rules,
+    reason: str,
+) -> dict[str, Any]:
+    scores = frame_score(before, problem.validation), frame_score(after, problem.validation)
+    named = [] if reason else _named(selection, after, rules)
+    structured = selection.structured
+    lacking = [k for k, value in enumerate(_by_storey(selection)) if value > LEAST_STOREY]
+    ceiling = flexible_score(before, problem.training, problem.validation, lacking) if lacking else scores[0].nrmse
+    best = min(ceiling, scores[1].nrmse)
+    gain = scores[0].nrmse ** 2 - best**2
+    recovered = (scores[0].nrmse ** 2 - scores[1].nrmse ** 2) / gain if gain > 1e-12 else 0.0
+    share = selection.share(selection.residual) if named else 0.0
+    still = (
+        structured
+        and share < rules.named_share
+        and selection.groups.material(selection.residual if named else selection.design.residual)
+    )
+    worst = _worst_storey(selection)
+    squares = selection.groups.mean_square(selection.design.residual)
+    p_values = stats.chi2.sf(squares * selection.groups.count, selection.groups.count)
+    return {
+        "model": selection.base,
+        "quantity": QUANTITY,
+        "declared_effects": [item.name for item in declared],
+        "noise_floor_nrmse": noise_floor(problem.validation, selection.groups.scale),
+        "noise_from": "accelerometers above the highest mode",
+        "before": _json(scores[0]),
+        "residual": {
+            "structured": structured,
+            "p_value": float(max(min(1.0, float(np.min(p_values)) * len(p_values)), 1e-300)),
+            "where": {f"storey_{k + 1}": value for k, value in enumerate(_by_storey(selection))},
+            "by_test": _by_test(selection, problem),
+            "chi_square": selection.design.chi_square,
+            "chi_square_of_noise": float(np.mean(selection.groups.scale)),
+        },
+        "base_form": {
+            "name": selection.base,
+            "best": selection.base,
+            "chi_square": selection.chi_squares,
+            "nrmse": {selection.base: scores[0].nrmse},
+        },
+        "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
+        "effects": named,
+        "verdict": reason or _verdict(named, share, rules),
+        "candidates": ranking(selection, problem),
+        "after": _json(scores[1]),
+        "ceiling": {"nrmse": best, "recovered": float(np.clip(recovered, 0.0, 1.0))},
+        "unexplained": {
+            "structured": bool(still),
+            "share_of_residual": float(np.clip(1.0 - share, 0.0, 1.0)) if structured else 0.0,
+            "depends_on": [
+                {"state": f"{name} of storey {worst + 1}", "share": value}
+                for name, value in dependence(after, problem.training, worst)[:6]
+                if value > 0.002
+            ]
+            if still
+            else [],
+        },
+        "tests": [
+            {"name": name, "nrmse_before": value, "nrmse_after": scores[1].by_test[name]}
+            for name, value in scores[0].by_test.items()
+        ],
+        "frame": {
+            "frequencies_hz": problem.frequencies_hz.tolist(),
+            "storey_stiffness_n_m": problem.storey_stiffness.tolist(),
+            "band_hz": [problem.band.low_hz, problem.band.high_hz],
+        },
+    }
+
+
+def _json(value: FrameScore) -> dict[str, float]:
+    return {"nrmse": value.nrmse, "fit_percent": value.fit_percent}
+
+
+def _by_storey(selection: FrameSelection) -> list[float]:
+    over = selection.groups.over(selection.design.residual)
+    n = len(selection.design.residual)
+    sums = np.bincount(selection.groups.storey, weights=over, minlength=n)
+    return [float(value) for value in sums / max(float(sums.sum()), 1e-300)]
+
+
+def _by_test(selection: FrameSelection, problem: FrameProblem) -> dict[str, float]:
+    over = selection.groups.over(selection.design.residual)
+    sums = np.bincount(selection.groups.record, weights=over, minlength=len(problem.training))
+    total = max(float(sums.sum()), 1e-300)
+    return {item.record.name: float(value / total) for item, value in zip(problem.training, sums, strict=True)}
+
+
+def _worst_storey(selection: FrameSelection) -> int:
+    residual = selection.residual if selection.chosen else selection.design.residual
+    over = selection.groups.over(residual)
+    return int(np.argmax(np.bincount(selection.groups.storey, weights=over)))
+
+
+def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[dict[str, Any]]:
+    found, first = [], 0
+    total = selection.share(selection.residual)
+    for place, item in enumerate(selection.chosen):
+        count = _amplitudes_of(item, len(selection.design.residual))
+        own = after.amplitudes[first : first + count]
+        first += count
+        if place < selection.declared:
+            continue
+        candidates = selection.rounds[place - selection.declared]
+        lead = candidates[0].share - max((other.share for other in candidates[1:]), default=0.0)
+        rivals = [other.name for other in candidates[1:] if other.share > candidates[0].share - rules.lead]
+        gain = selection.gains[place - selection.declared] if selection.gains else None
+        effect = item.placed.effect
+        entry: dict[str, Any] = {
+            "name": effect.name,
+            "form": item.placed.form.name,
+            "place": place_in_words(item, own),
+            "parameters": parameters_of(item, own),
+            "confidence": confidence_of(total, lead, None, rules),
+            "tied_with": rivals,
+            "physics": effect.physics,
+            "remedy": effect.remedy,
+            "corrected_in": "structure",
+        }
+        tests = {name: effect.separated_by[name] for name in rivals if name in effect.separated_by}
+        if tests:
+            entry["separating_tests"] = tests
+        if gain is not None:
+            entry["cross_validated_gain"] = {"share": gain.share, "interval": list(gain.interval)}
+        found.append(entry)
+    return found
+
+
+def _amplitudes_of(item: Fitted, floors: int) -> int:
+    kinds = len(item.placed.form.amplitudes)
+    return kinds * floors if item.placed.effect.acts_on == "storey" else kinds
+
+
+def place_in_words(item: Fitted, amplitudes: FloatArray) -> str:
+    """Return where an effect acts: a floor, all storeys alike, or the storeys that carry it."""
+    if item.placed.floor:
+        return f"floor {item.placed.floor}"
+    if item.placed.effect.acts_on == "base":
+        return "base"
+    by_storey = amplitudes.reshape(-1, len(item.placed.form.amplitudes)).sum(axis=1)
+    strong = np.flatnonzero(by_storey > 0.25 * float(by_storey.max()))
+    if len(strong) == len(by_storey):
+        return "every storey"
+    return "storey " + ", ".join(str(k + 1) for k in strong)
+
+
+def parameters_of(item: Fitted, amplitudes: FloatArray) -> dict[str, dict[str, Any]]:
+    """Return value and unit of every number; amplitudes of several storeys by storey, with their median as value."""
+    found: dict[str, dict[str, Any]] = {}
+    for parameter, value in zip(item.placed.form.searched, item.numbers, strict=True):
+        found[parameter.name] = {"value": float(value), "unit": parameter.unit, "interval": [float(value)] * 2}
+    kinds = len(item.placed.form.amplitudes)
+    for k, parameter in enumerate(item.placed.form.amplitudes):
+        own = amplitudes[k::kinds]
+        found[parameter.name] = {"value": float(np.max(own)) if len(own) < 3 else _typical(own), "unit": parameter.unit}
+        found[parameter.name]["interval"] = [float(np.min(own)), float(np.max(own))]
+        if len(own) > 1:
+            found[parameter.name]["by_storey"] = [float(value) for value in own]
+    if item.placed.floor:
+        found["floor"] = {"value": item.placed.floor, "unit": "1", "interval": [item.placed.floor] * 2}
+    return found
+
+
+def _typical(values: FloatArray) -> float:
+    strong = values[values > 0.25 * float(values.max())] if float(values.max()) > 0.0 else values
+    return float(np.median(strong))
+
+
+def ranking(selection: FrameSelection, problem: FrameProblem) -> list[dict[str, Any]]:
+    """Return the ranking of the first round: share, evidence, error on validation records, forms tried."""
+    if not selection.rounds:
+        return []
+    return [_ranked(item, selection, problem) for item in selection.rounds[0]]
+
+
+def _ranked(item: FrameCandidate, selection: FrameSelection, problem: FrameProblem) -> dict[str, Any]:
+    design = selection.design
+    model = model_of(design, (*selection.chosen[: selection.declared], item.outcome.fitted), selection.about)
+    return {
+        "name": item.name,
+        "form": item.outcome.fitted.placed.form.name,
+        "nrmse": frame_score(model, problem.validation).nrmse,
+        "evidence": 0.5 * (design.chi_square - item.outcome.solved.chi_square) * design.size,
+        "share": item.share,
+        "forms": item.forms,
+        "at_bound": list(item.outcome.fitted.at_bound),
+    }
+
+
+def _verdict(named: Sequence[dict[str, Any]], share: float, rules: Rules) -> str:
+    names = " and ".join(f"{item['name']} ({item['place']})" for item in named)
+    if share >= rules.named_share:
+        return f"{names}: explains what is missing"
+    return f"{names}: explains part of what is missing, its form is not proven"

@@ -1,0 +1,145 @@
+"""One verdict on a structure's campaign: the frame's own residual, the command's, and the damper's seen through it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.campaigns.model import Campaign
+from mrpipe.effects.contract import Effect
+from mrpipe.effects.structural.contract import StructuralEffect
+from mrpipe.errors import UserError
+from mrpipe.tracing.bench.summary import TracingOptions
+from mrpipe.tracing.structure.parts import Part, command_part, damper_part, merged
+from mrpipe.tracing.structure.records import FrameData, frame_data
+from mrpipe.tracing.structure.scores import residual_in_time
+from mrpipe.tracing.structure.trace import FrameTracing, trace_frame
+
+
+@dataclass(frozen=True)
+class History:
+    """An array for the artifact."""
+
+    values: FloatArray
+    unit: str
+    dims: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class StructureTracing:
+    """What was found.
+
+    Attributes
+    ----------
+    summary
+        The JSON of contract section 4.
+    histories
+        Name in the artifact -> array.
+    maps
+        (storey, drift [m], rate [m/s], residual shear force [N]) of the training records, before any effect.
+    shown
+        (test, storey, time [s], measured, before, after) of validation records: residual shear forces [N].
+    """
+
+    summary: dict[str, Any]
+    histories: dict[str, History] = field(default_factory=dict)
+    maps: list[tuple[int, FloatArray, FloatArray, FloatArray]] = field(default_factory=list)
+    shown: list[tuple[str, int, FloatArray, FloatArray, FloatArray, FloatArray]] = field(default_factory=list)
+    findings: list[str] = field(default_factory=list)
+
+
+def trace_structure(
+    campaigns: Sequence[Campaign],
+    effects: Mapping[str, StructuralEffect],
+    damper_effects: Mapping[str, Effect],
+    options: TracingOptions,
+    *,
+    rng: np.random.Generator,
+    jobs: int = 1,
+    progress: Progress = no_progress,
+) -> StructureTracing:
+    """Trace what a structure's recordings lack: in the frame, in the command, in the damper seen through it.
+
+    Parameters
+    ----------
+    campaigns
+        Of one and the same rig.
+    effects, damper_effects
+        The libraries.
+    """
+    data, campaign = joined_data(campaigns), campaigns[0]
+    findings = [f"test {name} does not record every floor: it is not judged for the frame" for name in data.left_out]
+    names = campaign.declared_effects
+    declared = [effects[name] for name in names if name in effects]
+    parts, frame = [], None
+    if any(item.role != "validation" for item in data.records):
+        library = [item for item in effects.values() if item not in declared]
+        frame = trace_frame(
+            data, library, declared, options.rules, most=options.most_effects, draws=options.bootstrap_draws, rng=rng,
+            jobs=jobs, progress=progress,
+        )  # fmt: skip
+        parts.append(Part("frame", frame.summary))
+    found = [
+        command_part(data.loops, effects, names),
+        damper_part(
+            data.loops, campaign, damper_effects, effects.get("brace-flexibility"), options, rng=rng, jobs=jobs,
+            progress=progress,
+        ),
+    ]  # fmt: skip
+    parts += [item for item in found if item is not None]
+    if not parts:
+        raise UserError(
+            campaign.directory / "campaign.yaml", "tests", "no test can be judged: floors or drive are missing",
+            "record every floor's acceleration, or damper_force, drive and floor 1",
+        )  # fmt: skip
+    summary = {"campaign": campaign.name, **merged(parts), "declared_effects": list(names)}
+    if frame is None:
+        return StructureTracing(summary, findings=findings)
+    return StructureTracing(summary, _histories(frame), _maps(frame), _shown(frame), findings)
+
+
+def joined_data(campaigns: Sequence[Campaign]) -> FrameData:
+    """Return the recordings of several campaigns of one rig."""
+    parts = [frame_data(item) for item in campaigns]
+    masses = next((item.masses_kg for item in parts if item.masses_kg.size), np.zeros(0))
+    return FrameData(
+        masses,
+        tuple(record for item in parts for record in item.records),
+        tuple(record for item in parts for record in item.loops),
+        tuple(name for item in parts for name in item.left_out),
+    )
+
+
+def _histories(frame: FrameTracing) -> dict[str, History]:
+    found = {}
+    for record in frame.problem.validation:
+        for when, model in (("before", frame.before), ("after", frame.after)):
+            found[f"validation/{record.record.name}/residual_{when}"] = History(
+                residual_in_time(model, record), "N", ("sample", "storey")
+            )
+        motion = record.motion
+        found[f"validation/{record.record.name}/drift"] = History(motion.drift.T.copy(), "m", ("sample", "storey"))
+    return found
+
+
+def _maps(frame: FrameTracing) -> list[tuple[int, FloatArray, FloatArray, FloatArray]]:
+    residual = np.concatenate([residual_in_time(frame.before, item) for item in frame.problem.training])
+    drift = np.concatenate([item.motion.drift for item in frame.problem.training], axis=1)
+    rate = np.concatenate([item.motion.drift_rate for item in frame.problem.training], axis=1)
+    return [(k + 1, drift[k], rate[k], residual[:, k]) for k in range(residual.shape[1])]
+
+
+def _shown(frame: FrameTracing) -> list[tuple[str, int, FloatArray, FloatArray, FloatArray, FloatArray]]:
+    where = frame.summary["residual"]["where"]
+    storey = max(range(len(where)), key=lambda k: list(where.values())[k])
+    found = []
+    for record in frame.problem.validation[:3]:
+        time = np.arange(len(record.taper), dtype=np.float64) * record.record.dt
+        shear = record.motion.acceleration @ (np.triu(np.ones((len(where),) * 2)) * frame.problem.masses_kg).T
+        before, after = (residual_in_time(model, record)[:, storey] for model in (frame.before, frame.after))
+        found.append((record.record.name, storey + 1, time, shear[:, storey], before, after))
+    return found

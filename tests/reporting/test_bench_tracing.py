@@ -1,0 +1,53 @@
+"""What the report says of a tracing in plain words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from mrpipe.reporting.bench_tracing import in_plain_words
+
+
+def _effect(name: str, tied_with: list[str]) -> dict[str, Any]:
+    return {
+        "name": name,
+        "form": "plain",
+        "parameters": {"gain": {"value": 0.5, "unit": "1", "interval": [0.4, 0.6]}},
+        "confidence": 0.9,
+        "tied_with": tied_with,
+        "physics": "It remembers.",
+        "remedy": "Demagnetise.",
+    }
+
+
+@pytest.fixture
+def summary() -> dict[str, Any]:
+    return {
+        "model": "bouc-wen",
+        "noise_floor_nrmse": 0.004,
+        "before": {"nrmse": 0.08},
+        "after": {"nrmse": 0.01},
+        "residual": {"structured": True},
+        "effects": [_effect("remanence", [])],
+        "further_terms": [],
+        "ceiling": {"nrmse": 0.009, "recovered": 0.97},
+        "unexplained": {"structured": False, "depends_on": []},
+    }
+
+
+def test_a_term_that_counts_in_the_error_but_is_not_proven_is_told(summary: dict[str, Any]) -> None:
+    assert "not proven" not in in_plain_words(summary)
+    summary["further_terms"] = [_effect("migration", ["stribeck"])]
+    text = in_plain_words(summary)
+    assert (
+        "Beside that migration (plain) lowers the error and is part of it, but is not proven against stribeck." in text
+    )
+    assert "lacks **remanence**." in text
+
+
+def test_noise_alone_and_the_unknown_are_said_to_be_so(summary: dict[str, Any]) -> None:
+    unknown = {**summary, "effects": [], "unexplained": {"structured": True, "depends_on": [{"state": "displacement"}]}}
+    assert "no known effect explains it. It varies with displacement." in in_plain_words(unknown)
+    noise = {**unknown, "residual": {"structured": False}}
+    assert in_plain_words(noise).endswith("nothing is missing.")

@@ -1,0 +1,46 @@
+"""What the public recordings ask of a base form, and the session whose gain differs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mrpipe.artifacts import config_directory
+from mrpipe.campaigns import load_campaign
+from mrpipe.effects.library import damper_effects
+from mrpipe.effects.yielding_parts import with_yielding_parts
+from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
+from mrpipe.tracing.bench.baseline import base_form, first_problem, with_form
+from mrpipe.tracing.bench.engine import fit, predict, start_of
+from mrpipe.tracing.bench.error_measures import measured_force, score
+from mrpipe.tracing.bench.nuisances import record_gains, session_gain
+from mrpipe.tracing.bench.recordings import record_tests
+
+
+@pytest.mark.real
+def test_a_yield_in_parts_fits_labcontrol_and_leaves_the_gain_of_its_held_out_session(public_data: Path) -> None:
+    campaign = load_campaign(config_directory() / "campaigns" / "labcontrol.yaml")
+    tests = [item.test for item in prepare_campaign(campaign, PreparationOptions()).tests]
+    training = record_tests([test for test in tests if test.role == "training"][::2], longest_s=10.0)
+    validation = record_tests([test for test in tests if test.role == "validation"], longest_s=15.0)
+    problem = first_problem(training, base_form(training, "bouc-wen", 3, 1))
+    base = fit(problem, start_of(problem, {"yield_displacement": 3e-4}, []), iterations=8)
+    rate = with_yielding_parts(damper_effects())["rate-dependent-yield"]
+    rounded = with_form(base, rate, "own-dashpot", iterations=8)
+
+    errors = {}
+    for name, found in (("bouc-wen", base), ("own-dashpot", rounded)):
+        simulated = predict(found, validation)
+        measured = measured_force(validation, simulated, None)
+        errors[name] = score(validation, measured, simulated).nrmse
+    assert errors["own-dashpot"] < 0.8 * errors["bouc-wen"]
+    assert errors["own-dashpot"] < 0.11
+
+    own = measured_force(training, predict(rounded, training), None)
+    session = session_gain(validation, measured, simulated, record_gains(training, own, predict(rounded, training)))
+    assert session is not None
+    # seven of the nine are 9 to 11 % weaker
+    assert {f"ensaio.vali.{k}" for k in range(3, 10)} <= set(session.tests)
+    assert session.value == pytest.approx(0.91, abs=0.025)
+    assert session.with_it < 0.75 * session.without

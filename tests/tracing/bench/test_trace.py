@@ -1,0 +1,124 @@
+"""Planted effects, in forms that the library does not hold, are named; a clean rig and an unknown shape are not."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrpipe.effects.library import damper_effects
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.summary import Tracing, TracingOptions
+from mrpipe.tracing.bench.trace import trace_campaign
+from tests.tracing.bench.rig import campaign
+
+
+@functools.cache
+def traced(effect: str) -> Tracing:
+    options = TracingOptions(refits=2, bootstrap_draws=100, most_effects=1 + effect.count("+"))
+    names = ("accumulator", "backlash", "channel-skew", "heating", "inertia", "remanence", "stribeck")
+    library = {name: damper_effects()[name] for name in names}
+    return trace_campaign(campaign(effect), library, [], options, rng=np.random.default_rng(1))
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("effect", ["remanence", "accumulator"])
+def test_a_planted_effect_is_named_first(effect: str) -> None:
+    summary = traced(effect).summary
+    assert summary["residual"]["structured"]
+    assert summary["effects"][0]["name"] == effect
+    assert summary["candidates"][0]["name"] == effect
+    assert [item["name"] for item in summary["effects"]] == [effect]
+    assert summary["effects"][0]["tied_with"] == []
+    assert summary["after"]["nrmse"] < 0.6 * summary["before"]["nrmse"]
+
+
+@pytest.mark.planted
+def test_the_stiffness_of_the_accumulator_comes_out() -> None:
+    stiffness = traced("accumulator").summary["effects"][0]["parameters"]["stiffness"]
+    assert stiffness["unit"] == "N/m"
+    assert stiffness["value"] == pytest.approx(1400.0, rel=0.15)
+
+
+@pytest.mark.planted
+def test_a_clean_rig_lacks_nothing() -> None:
+    summary = traced("none").summary
+    assert summary["effects"] == []
+    assert not summary["residual"]["structured"]
+    assert not summary["unexplained"]["structured"]
+    assert summary["before"]["nrmse"] < 1.25 * summary["noise_floor_nrmse"]
+
+
+@pytest.mark.planted
+def test_both_of_a_pair_are_named() -> None:
+    summary = traced("accumulator+remanence").summary
+    assert {item["name"] for item in summary["effects"]} == {"accumulator", "remanence"}
+    assert summary["further_terms"] == []
+    assert summary["after"]["nrmse"] < 0.4 * summary["before"]["nrmse"]
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("shape", ["unknown-in-time", "unknown-in-place"])
+def test_a_shape_of_no_family_stays_unknown(shape: str) -> None:
+    summary = traced(shape).summary
+    assert summary["effects"] == []
+    assert summary["residual"]["structured"]
+    assert summary["unexplained"]["structured"]
+
+
+def traced_with(effect: str, names: tuple[str, ...], tests: list[PreparedTest] | None = None) -> Tracing:
+    options = TracingOptions(refits=2, bootstrap_draws=100, most_effects=2)
+    library = {name: damper_effects()[name] for name in names}
+    return trace_campaign(tests or campaign(effect), library, [], options, rng=np.random.default_rng(1))
+
+
+@pytest.mark.planted
+def test_a_hysteresis_of_another_shape_is_a_base_form_and_no_effect() -> None:
+    # Dahl's law under a declared exponent of 2 looks like a late rise
+    summary = traced_with("dahl", ("migration", "accumulator")).summary
+    assert summary["effects"] == []
+    assert summary["base_form"]["taken"] == "bouc-wen-free-exponent"
+    assert summary["after"]["nrmse"] < 0.4 * summary["before"]["nrmse"]
+    assert not summary["unexplained"]["structured"]
+    assert "base form" in summary["verdict"]
+
+
+@pytest.mark.planted
+def test_a_stop_on_one_side_is_named_beside_another_effect() -> None:
+    summary = traced_with("accumulator+end-stop", ("accumulator", "end-stop", "inertia")).summary
+    found = {item["name"]: item for item in summary["effects"]}
+    assert set(found) == {"accumulator", "end-stop"}
+    assert found["end-stop"]["parameters"]["free_travel"]["value"] == pytest.approx(8.2e-3, rel=0.06)
+
+
+@pytest.mark.planted
+def test_offsets_of_tests_are_told_beside_an_unknown_rest() -> None:
+    shifts = np.random.default_rng(3).normal(0.0, 40.0, 20)
+    tests = [
+        replace(test, force_offset_n=shift) for test, shift in zip(campaign("unknown-in-time"), shifts, strict=False)
+    ]
+    summary = traced_with("", ("accumulator", "offset"), tests).summary
+    assert [item["name"] for item in summary["effects"]] == ["offset"]
+    assert summary["unexplained"]["structured"]
+
+
+@pytest.mark.planted
+def test_play_beside_a_rounded_yield_comes_first() -> None:
+    options = TracingOptions(refits=2, bootstrap_draws=50, most_effects=2, model_error_share=0.1, fit_rate_hz=125.0)
+    library = {name: damper_effects()[name] for name in ("backlash", "rate-dependent-yield")}
+    tests = campaign("rounded+wide-backlash")[1:13:2] + campaign("rounded+wide-backlash")[11:13]
+    summary = trace_campaign(tests, library, [], options, rng=np.random.default_rng(1)).summary
+    assert [item["name"] for item in summary["effects"]] == ["backlash", "rate-dependent-yield"]
+    assert summary["effects"][0]["parameters"]["gap"]["value"] == pytest.approx(6e-4, rel=0.1)
+
+
+@pytest.mark.property
+def test_the_summary_has_what_the_contract_promises() -> None:
+    summary = traced("none").summary
+    keys = "model declared_effects noise_floor_nrmse before residual base_form nuisances effects candidates after"
+    assert set(keys.split()) | {"ceiling", "unexplained"} <= set(summary)
+    assert {"pre_yield", "post_yield", "reversal"} == set(summary["residual"]["where"])
+    assert sum(summary["residual"]["where"].values()) == pytest.approx(1.0)
+    assert {"gain", "channel_skew_s", "observation_filter_s"} <= set(summary["nuisances"])
