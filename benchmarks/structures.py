@@ -15,18 +15,18 @@ from functools import partial
 import numpy as np
 
 from mrpipe.artifacts import load_parameter_set
+from mrpipe.case_studies.base_isolated.design import LqgWeights
+from mrpipe.case_studies.base_isolated.structure import surrogate_building
+from mrpipe.case_studies.base_isolated.study import isolation_study
+from mrpipe.case_studies.inverse import train_inverse
+from mrpipe.case_studies.motion import spectrum_compatible_motion
+from mrpipe.case_studies.run import BinghamDevice
+from mrpipe.case_studies.ten_storey.structure import ten_storey
+from mrpipe.case_studies.ten_storey.study import ten_storey_study
+from mrpipe.case_studies.wind.load import synthetic_wind
+from mrpipe.case_studies.wind.structure import HEIGHT_M, WIDTH_M, surrogate_tower
+from mrpipe.case_studies.wind.study import wind_study
 from mrpipe.dampers.model import damper_from_parameter_set
-from mrpipe.simulation.benchmark_base_isolated import isolation_study
-from mrpipe.simulation.benchmark_inverse import train_inverse
-from mrpipe.simulation.benchmark_isolation_design import LqgWeights
-from mrpipe.simulation.benchmark_run import BinghamDevice
-from mrpipe.simulation.benchmark_ten_storey import ten_storey_study
-from mrpipe.simulation.benchmark_wind import wind_study
-from mrpipe.structures.benchmark_base_isolated import surrogate_building
-from mrpipe.structures.benchmark_motion import spectrum_compatible_motion
-from mrpipe.structures.benchmark_ten_storey import ten_storey
-from mrpipe.structures.benchmark_wind import HEIGHT_M, WIDTH_M, surrogate_tower
-from mrpipe.structures.wind import synthetic_wind
 
 
 def best(work: Callable[[], object], repeats: int) -> tuple[float, float]:

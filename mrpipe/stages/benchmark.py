@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.simulation.benchmark_run import BinghamDevice, Response
+    from mrpipe.case_studies.run import BinghamDevice, Response
+    from mrpipe.case_studies.wind.load import WindLoad
     from mrpipe.structures.records import GroundMotion
-    from mrpipe.structures.wind import WindLoad
 
 
 def _motion(context: StageContext, settings: Any, components: int) -> GroundMotion:
-    from mrpipe.structures.benchmark_motion import load_motion
+    from mrpipe.case_studies.motion import load_motion
 
     motion = load_motion(
         settings.file,
@@ -50,7 +50,7 @@ def _digest(context: StageContext) -> str:
 
 def _bingham(name: str) -> BinghamDevice:
     from mrpipe.artifacts import load_parameter_set
-    from mrpipe.simulation.benchmark_run import BinghamDevice
+    from mrpipe.case_studies.run import BinghamDevice
 
     values = load_parameter_set("dampers", name)
     parts = ("yield_force_a", "yield_force_b", "c0_a", "c0_b", "drive_limit")
@@ -74,10 +74,10 @@ def _write_response(artifact: Any, group: str, response: Response) -> None:
 
 def _ten_storey(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.artifacts import load_parameter_set
+    from mrpipe.case_studies.ten_storey import report
+    from mrpipe.case_studies.ten_storey import study as bench
+    from mrpipe.case_studies.ten_storey.structure import ten_storey
     from mrpipe.dampers.model import damper_from_parameter_set
-    from mrpipe.reporting import benchmark_ten_storey as report
-    from mrpipe.simulation import benchmark_ten_storey as bench
-    from mrpipe.structures.benchmark_ten_storey import ten_storey
 
     settings = context.settings.benchmark.ten_storey
     bench.check_laws(settings.laws)
@@ -112,12 +112,12 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
 
 
 def _base_isolated(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.reporting import benchmark_base_isolated as report
-    from mrpipe.simulation import benchmark_base_isolated as bench
-    from mrpipe.simulation.benchmark_inverse import train_inverse
-    from mrpipe.simulation.benchmark_isolation_design import LqgWeights
-    from mrpipe.structures.benchmark_base_isolated import building_of
-    from mrpipe.structures.benchmark_motion import SEVEN_MOTIONS, load_motion
+    from mrpipe.case_studies.base_isolated import report
+    from mrpipe.case_studies.base_isolated import study as bench
+    from mrpipe.case_studies.base_isolated.design import LqgWeights
+    from mrpipe.case_studies.base_isolated.structure import building_of
+    from mrpipe.case_studies.inverse import train_inverse
+    from mrpipe.case_studies.motion import SEVEN_MOTIONS, load_motion
 
     settings = context.settings.benchmark.base_isolated
     bench.check_laws(settings.laws)
@@ -168,8 +168,8 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
 def _wind_load(context: StageContext, settings: Any) -> WindLoad:
     from pathlib import Path
 
-    from mrpipe.structures.benchmark_wind import FLOORS, HEIGHT_M, WIDTH_M
-    from mrpipe.structures.wind import WindClimate, read_wind, synthetic_wind
+    from mrpipe.case_studies.wind.load import WindClimate, read_wind, synthetic_wind
+    from mrpipe.case_studies.wind.structure import FLOORS, HEIGHT_M, WIDTH_M
 
     if settings.file != "synthetic":
         return read_wind(Path(settings.file), FLOORS, unit=settings.unit, interval_s=settings.interval_s)
@@ -195,11 +195,11 @@ def _wind_load(context: StageContext, settings: Any) -> WindLoad:
 
 
 def _wind(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.reporting import benchmark_wind as report
-    from mrpipe.simulation import benchmark_wind as bench
-    from mrpipe.simulation.benchmark_inverse import train_inverse
-    from mrpipe.simulation.benchmark_isolation_design import LqgWeights
-    from mrpipe.structures.benchmark_wind import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of
+    from mrpipe.case_studies.base_isolated.design import LqgWeights
+    from mrpipe.case_studies.inverse import train_inverse
+    from mrpipe.case_studies.wind import report
+    from mrpipe.case_studies.wind import study as bench
+    from mrpipe.case_studies.wind.structure import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of
 
     settings = context.settings.benchmark.wind
     bench.check_laws(settings.laws)

@@ -66,7 +66,7 @@ def _write(context: StageContext, traced: StructureTracing) -> None:
 def _report(context: StageContext, traced: StructureTracing) -> None:
     import pandas as pd
 
-    from mrpipe.reporting import frame_tracing as figures
+    from mrpipe.reporting import structure_tracing as figures
     from mrpipe.reporting.bench_tracing import candidate_ranking, errors_per_test
 
     summary, settings = traced.summary, context.settings.close_loop

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from mrpipe.artifacts import public_data_directory
-from mrpipe.errors import UserError
-from mrpipe.structures.benchmark_motion import (
+from mrpipe.case_studies.motion import (
     PERIODS_S,
     SEVEN_MOTIONS,
     design_spectrum,
@@ -20,6 +19,7 @@ from mrpipe.structures.benchmark_motion import (
     response_spectrum,
     spectrum_compatible_motion,
 )
+from mrpipe.errors import UserError
 from mrpipe.structures.records import GRAVITY, GroundMotion, read_motion
 
 TIME = np.arange(400) * 0.01

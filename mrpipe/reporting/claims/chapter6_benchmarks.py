@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from mrpipe.artifacts import load_parameter_set, public_data_directory
+from mrpipe.case_studies.base_isolated.structure import published_building
+from mrpipe.case_studies.base_isolated.study import isolated_response
+from mrpipe.case_studies.model import modal_model
+from mrpipe.case_studies.motion import load_motion
+from mrpipe.case_studies.run import BinghamDevice, simulate
+from mrpipe.case_studies.ten_storey.structure import ten_storey
+from mrpipe.case_studies.ten_storey.study import THESIS, ten_storey_study
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.reporting.claims.claim import Claim, cannot, compare
-from mrpipe.simulation.benchmark_base_isolated import isolated_response
-from mrpipe.simulation.benchmark_run import BinghamDevice, simulate
-from mrpipe.simulation.benchmark_ten_storey import THESIS, ten_storey_study
-from mrpipe.structures.benchmark_base_isolated import published_building
-from mrpipe.structures.benchmark_model import modal_model
-from mrpipe.structures.benchmark_motion import load_motion
-from mrpipe.structures.benchmark_ten_storey import ten_storey
 
 _MISSING = "the public records are not here: set MRPIPE_DATA to their folder"
 _PRINTED_J6 = [0.67, 0.48, 0.33, 0.12]

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrpipe.control.benchmark_lqg import observer_gain
+from mrpipe.case_studies.base_isolated.design import LqgWeights
+from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
+from mrpipe.case_studies.laws import LAWS
+from mrpipe.case_studies.lqg import observer_gain
+from mrpipe.case_studies.run import BinghamDevice, Controller, simulate
+from mrpipe.case_studies.wind.design import CORRELATION_S, SENSOR_DENSITY, wind_outputs
+from mrpipe.case_studies.wind.load import WindLoad, synthetic_wind
+from mrpipe.case_studies.wind.structure import HEIGHT_M, WIDTH_M, Tower, place_device, surrogate_tower
+from mrpipe.case_studies.wind.study import WindStudy, wind_response, wind_sensitivity, wind_study
 from mrpipe.errors import UserError
-from mrpipe.simulation.benchmark_indices import WIND_FLOORS, WindResponse, wind_indices
-from mrpipe.simulation.benchmark_isolation_design import LqgWeights
-from mrpipe.simulation.benchmark_laws import LAWS
-from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, simulate
-from mrpipe.simulation.benchmark_wind import WindStudy, wind_response, wind_sensitivity, wind_study
-from mrpipe.simulation.benchmark_wind_design import CORRELATION_S, SENSOR_DENSITY, wind_outputs
-from mrpipe.structures.benchmark_wind import HEIGHT_M, WIDTH_M, Tower, place_device, surrogate_tower
 from mrpipe.structures.dynamics import discretise_first_order
-from mrpipe.structures.wind import WindLoad, synthetic_wind
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ import pytest
 from scipy.signal import lfilter
 
 from mrpipe.artifacts import FloatArray, load_parameter_set, public_data_directory
-from mrpipe.control.benchmark_gains import two_component
+from mrpipe.case_studies.gains import two_component
+from mrpipe.case_studies.indices import FloorResponse, ten_storey_indices
+from mrpipe.case_studies.model import BenchmarkModel, ModalModel, modal_model
+from mrpipe.case_studies.motion import load_motion, spectrum_compatible_motion
+from mrpipe.case_studies.run import BinghamDevice, Controller, simulate
+from mrpipe.case_studies.ten_storey.structure import ten_storey
+from mrpipe.case_studies.ten_storey.study import TenStoreyStudy, stiffness_share, ten_storey_study
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
-from mrpipe.simulation.benchmark_indices import FloorResponse, ten_storey_indices
-from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, simulate
-from mrpipe.simulation.benchmark_ten_storey import TenStoreyStudy, stiffness_share, ten_storey_study
-from mrpipe.structures.benchmark_model import BenchmarkModel, ModalModel, modal_model
-from mrpipe.structures.benchmark_motion import load_motion, spectrum_compatible_motion
-from mrpipe.structures.benchmark_ten_storey import ten_storey
 from mrpipe.structures.dynamics import discretise_first_order
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.structures.public_files import named_file
+from mrpipe.case_studies.public_files import named_file
 from mrpipe.structures.records import GRAVITY, GroundMotion, read_motion
 
 SEVEN_MOTIONS = ("elcentro", "erzikan", "jiji", "kobe", "newhall", "rinaldi", "sylmar")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mrpipe.simulation.benchmark_devices import dissipative_force, sliding_force
+from mrpipe.case_studies.devices import dissipative_force, sliding_force
 
 
 def friction_decay(push: float, steps: int) -> tuple[list[float], float]:

@@ -12,18 +12,7 @@ import numpy as np
 from numba import float64, int64, njit, types, void
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import (
-    ACCELERATION,
-    CHAIN_FUNCTIONS,
-    DISPLACEMENT,
-    DRIVE,
-    FIRST,
-    FORCE,
-    VELOCITY,
-    WIRE_SIZE,
-    advance,
-)
-from mrpipe.simulation.benchmark_devices import (
+from mrpipe.case_studies.devices import (
     ACTIVE,
     ALPHA,
     BINGHAM,
@@ -59,6 +48,17 @@ from mrpipe.simulation.benchmark_devices import (
     inverse_bingham,
     network_voltage,
     update_amplitude,
+)
+from mrpipe.dampers.plant import (
+    ACCELERATION,
+    CHAIN_FUNCTIONS,
+    DISPLACEMENT,
+    DRIVE,
+    FIRST,
+    FORCE,
+    VELOCITY,
+    WIRE_SIZE,
+    advance,
 )
 
 REST = 1e-12
@@ -294,7 +294,7 @@ def chain_force(
 
 @njit(void(_V, _STRUCTURE, _CONTROL, _NETWORK, _CHAIN, _RESULT), cache=True, nogil=True)
 def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain: Any, result: Any) -> None:
-    """Run the structure from rest; see :mod:`mrpipe.simulation.benchmark_run` for what the arrays hold.
+    """Run the structure from rest; see :mod:`mrpipe.case_studies.run` for what the arrays hold.
 
     Matrices whose product with a vector is wanted are passed transposed (a row a column), for contiguous inner loops.
     """

@@ -14,9 +14,9 @@ from scipy.io import loadmat
 from scipy.linalg import block_diag, eigh
 
 from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set
+from mrpipe.case_studies.model import BenchmarkModel, Origin
+from mrpipe.case_studies.public_files import named_file
 from mrpipe.errors import UserError
-from mrpipe.structures.benchmark_model import BenchmarkModel, Origin
-from mrpipe.structures.public_files import named_file
 
 FLOORS = 8
 BEARINGS = 92

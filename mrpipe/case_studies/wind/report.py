@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mrpipe.reporting import benchmarks as figures
-from mrpipe.simulation.benchmark_indices import WIND_FLOORS
-from mrpipe.simulation.benchmark_wind import REASON, THESIS, WindCase, WindStudy, wind_response
+from mrpipe.case_studies import report as figures
+from mrpipe.case_studies.indices import WIND_FLOORS
+from mrpipe.case_studies.wind.study import REASON, THESIS, WindCase, WindStudy, wind_response
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,16 @@ import numpy as np
 import pandas as pd
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.reporting import benchmarks as figures
-from mrpipe.simulation.benchmark_base_isolated import (
+from mrpipe.case_studies import report as figures
+from mrpipe.case_studies.base_isolated.study import (
     REASON,
     THESIS,
     IsolationCase,
     IsolationStudy,
     isolated_response,
 )
-from mrpipe.simulation.benchmark_run import Response
-from mrpipe.structures.benchmark_model import natural_periods
+from mrpipe.case_studies.model import natural_periods
+from mrpipe.case_studies.run import Response
 from mrpipe.structures.records import GroundMotion
 
 

@@ -9,14 +9,14 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.control.benchmark_lqg import SampledController
+from mrpipe.case_studies.base_isolated.design import IsolationGains, LqgWeights, isolation_gains, isolation_lqg
+from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
+from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
+from mrpipe.case_studies.laws import require_known, unknown_law
+from mrpipe.case_studies.lqg import SampledController
+from mrpipe.case_studies.model import ModalModel, modal_model
+from mrpipe.case_studies.run import BinghamDevice, Controller, Response, simulate
 from mrpipe.networks.network import Network
-from mrpipe.simulation.benchmark_indices import IsolatedResponse, base_isolated_indices
-from mrpipe.simulation.benchmark_isolation_design import IsolationGains, LqgWeights, isolation_gains, isolation_lqg
-from mrpipe.simulation.benchmark_laws import require_known, unknown_law
-from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, Response, simulate
-from mrpipe.structures.benchmark_base_isolated import FLOORS, IsolatedBuilding
-from mrpipe.structures.benchmark_model import ModalModel, modal_model
 from mrpipe.structures.records import GroundMotion
 
 _NAMES = tuple(f"J{number}" for number in range(1, 10))
@@ -44,7 +44,7 @@ STRUCTURE = "the base-isolated building"
 
 
 def check_laws(laws: Sequence[str]) -> None:
-    """Raise UserError if one of them is not in :data:`~mrpipe.simulation.benchmark_laws.LAWS`."""
+    """Raise UserError if one of them is not in :data:`~mrpipe.case_studies.laws.LAWS`."""
     require_known(laws, STRUCTURE)
 
 
@@ -62,7 +62,7 @@ class IsolationStudy:
     dampers: float = 1.0
 
     def controller(self, law: str) -> Controller:
-        """Return the controller of a law of :data:`~mrpipe.simulation.benchmark_laws.LAWS`.
+        """Return the controller of a law of :data:`~mrpipe.case_studies.laws.LAWS`.
 
         Raises
         ------
@@ -200,7 +200,7 @@ def run_cases(
     motion
         Two components.
     laws
-        Of :data:`~mrpipe.simulation.benchmark_laws.LAWS`.
+        Of :data:`~mrpipe.case_studies.laws.LAWS`.
     jobs
         Threads: the compiled loop runs free of the interpreter.
     """

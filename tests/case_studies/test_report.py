@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrpipe.reporting.benchmarks import histories, index_bars, sensitivity
+from mrpipe.case_studies.report import histories, index_bars, sensitivity
 
 
 @pytest.mark.golden

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.control.benchmark_gains import damped_modes, viscous_for_damping
-from mrpipe.control.benchmark_lqg import (
+from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
+from mrpipe.case_studies.gains import damped_modes, viscous_for_damping
+from mrpipe.case_studies.lqg import (
     Outputs,
     SampledController,
     observer_gain,
     output_regulator_gain,
     sampled_controller,
 )
-from mrpipe.structures.benchmark_base_isolated import FLOORS, IsolatedBuilding
-from mrpipe.structures.benchmark_model import ModalModel
+from mrpipe.case_studies.model import ModalModel
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,17 @@ import pytest
 from scipy.signal import csd, welch
 
 from mrpipe.artifacts import public_data_directory
-from mrpipe.errors import UserError
-from mrpipe.structures.benchmark_model import modal_model
-from mrpipe.structures.benchmark_wind import (
+from mrpipe.case_studies.model import modal_model
+from mrpipe.case_studies.wind.load import (
+    AIR_DENSITY,
+    WindClimate,
+    lateral_spectrum,
+    read_wind,
+    shedding_correlation,
+    shedding_spectrum,
+    synthetic_wind,
+)
+from mrpipe.case_studies.wind.structure import (
     HEIGHT_M,
     REDUCED_FLOORS,
     WIDTH_M,
@@ -23,15 +31,7 @@ from mrpipe.structures.benchmark_wind import (
     with_outrigger,
     with_tuned_mass,
 )
-from mrpipe.structures.wind import (
-    AIR_DENSITY,
-    WindClimate,
-    lateral_spectrum,
-    read_wind,
-    shedding_correlation,
-    shedding_spectrum,
-    synthetic_wind,
-)
+from mrpipe.errors import UserError
 
 FIVE_HZ = [0.160, 0.765, 1.992, 3.790, 6.395]
 

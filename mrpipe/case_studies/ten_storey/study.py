@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from joblib import Parallel, delayed
 
-from mrpipe.control.benchmark_gains import TwoComponent, exact_viscous, lowest_damping, two_component
+from mrpipe.case_studies.gains import TwoComponent, exact_viscous, lowest_damping, two_component
+from mrpipe.case_studies.indices import FloorResponse, largest, ten_storey_indices
+from mrpipe.case_studies.model import BenchmarkModel, ModalModel, modal_model
+from mrpipe.case_studies.run import BinghamDevice, Controller, Realisation, Response, simulate
 from mrpipe.dampers.plant import Chain
 from mrpipe.errors import UserError
-from mrpipe.simulation.benchmark_indices import FloorResponse, largest, ten_storey_indices
-from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, Realisation, Response, simulate
-from mrpipe.structures.benchmark_model import BenchmarkModel, ModalModel, modal_model
 from mrpipe.structures.records import GroundMotion
 
 REASON = (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.control.benchmark_lqg import (
+from mrpipe.case_studies.lqg import (
     Outputs,
     closed_loop_poles,
     observer_gain,

@@ -9,7 +9,7 @@ from scipy.linalg import eigh, null_space
 from scipy.optimize import minimize_scalar
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.structures.benchmark_model import ModalModel
+from mrpipe.case_studies.model import ModalModel
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.networks.assembly import History
 from mrpipe.networks.network import FeatureSpec
 from mrpipe.networks.training import Trained, TrainingOptions, train
-from mrpipe.simulation.benchmark_run import BinghamDevice
 
 KINDS = ("sine", "triangle", "step", "gaussian")
 """Displacement inputs of the training set (6.1)."""

@@ -12,9 +12,9 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 
 from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set
+from mrpipe.case_studies.model import BenchmarkModel, ModalModel, Origin
+from mrpipe.case_studies.public_files import named_file
 from mrpipe.errors import UserError
-from mrpipe.structures.benchmark_model import BenchmarkModel, ModalModel, Origin
-from mrpipe.structures.public_files import named_file
 
 FLOORS = 76
 HEIGHT_M, WIDTH_M = 306.1, 42.0

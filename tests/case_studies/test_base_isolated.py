@@ -10,29 +10,29 @@ import pytest
 from scipy.io import loadmat
 
 from mrpipe.artifacts import FloatArray, public_data_directory
-from mrpipe.control.benchmark_gains import damped_modes
-from mrpipe.control.benchmark_lqg import observer_gain, output_regulator_gain, sampled_loop_radius
-from mrpipe.errors import UserError
-from mrpipe.simulation.benchmark_base_isolated import (
-    IsolationStudy,
-    capacity_sensitivity,
-    isolation_study,
-    run_cases,
-)
-from mrpipe.simulation.benchmark_indices import IsolatedResponse, base_isolated_indices
-from mrpipe.simulation.benchmark_inverse import inverse_validation, train_inverse
-from mrpipe.simulation.benchmark_isolation_design import LqgWeights, isolation_outputs
-from mrpipe.simulation.benchmark_laws import LAWS
-from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, Response
-from mrpipe.structures.benchmark_base_isolated import (
+from mrpipe.case_studies.base_isolated.design import LqgWeights, isolation_outputs
+from mrpipe.case_studies.base_isolated.structure import (
     IsolatedBuilding,
     bearing_grid,
     location_matrix,
     published_building,
     surrogate_building,
 )
-from mrpipe.structures.benchmark_model import modal_model, natural_periods
-from mrpipe.structures.benchmark_motion import load_motion, spectrum_compatible_motion
+from mrpipe.case_studies.base_isolated.study import (
+    IsolationStudy,
+    capacity_sensitivity,
+    isolation_study,
+    run_cases,
+)
+from mrpipe.case_studies.gains import damped_modes
+from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
+from mrpipe.case_studies.inverse import inverse_validation, train_inverse
+from mrpipe.case_studies.laws import LAWS
+from mrpipe.case_studies.lqg import observer_gain, output_regulator_gain, sampled_loop_radius
+from mrpipe.case_studies.model import modal_model, natural_periods
+from mrpipe.case_studies.motion import load_motion, spectrum_compatible_motion
+from mrpipe.case_studies.run import BinghamDevice, Controller, Response
+from mrpipe.errors import UserError
 from mrpipe.structures.records import GroundMotion
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mrpipe.reporting import benchmarks as figures
-from mrpipe.simulation.benchmark_ten_storey import REASON, THESIS, VARIANTS, TenStoreyCase, TenStoreyStudy
+from mrpipe.case_studies import report as figures
+from mrpipe.case_studies.ten_storey.study import REASON, THESIS, VARIANTS, TenStoreyCase, TenStoreyStudy
 
 Studies = Mapping[str, tuple[TenStoreyStudy, Sequence[TenStoreyCase]]]
 

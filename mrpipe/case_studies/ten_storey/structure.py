@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import ParameterSet, load_parameter_set
+from mrpipe.case_studies.model import BenchmarkModel
 from mrpipe.errors import UserError
-from mrpipe.structures.benchmark_model import BenchmarkModel
 from mrpipe.structures.dynamics import floor_position
 from mrpipe.structures.shear_frame import shear_stiffness
 

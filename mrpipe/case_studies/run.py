@@ -9,13 +9,13 @@ import numpy as np
 from scipy.linalg import expm
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.control.benchmark_lqg import SampledController
+from mrpipe.case_studies import devices as packed
+from mrpipe.case_studies.kernel import run
+from mrpipe.case_studies.lqg import SampledController
+from mrpipe.case_studies.model import ModalModel
 from mrpipe.dampers.plant import Chain, build_chain
 from mrpipe.errors import DivergedError
 from mrpipe.networks.network import Network
-from mrpipe.simulation import benchmark_devices as packed
-from mrpipe.simulation.benchmark_kernel import run
-from mrpipe.structures.benchmark_model import ModalModel
 from mrpipe.structures.dynamics import discretise_first_order, discretise_zero_order
 
 Law = Literal["none", "kelvin", "friction", "lqg", "constant"]

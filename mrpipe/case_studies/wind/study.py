@@ -9,16 +9,16 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.control.benchmark_lqg import SampledController
+from mrpipe.case_studies.base_isolated.design import LqgWeights
+from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
+from mrpipe.case_studies.laws import require_known, unknown_law
+from mrpipe.case_studies.lqg import SampledController
+from mrpipe.case_studies.model import ModalModel, modal_model
+from mrpipe.case_studies.run import BinghamDevice, Controller, Response, simulate
+from mrpipe.case_studies.wind.design import WindGains, wind_gains, wind_lqg
+from mrpipe.case_studies.wind.load import WindLoad
+from mrpipe.case_studies.wind.structure import REDUCED_FLOORS, Tower
 from mrpipe.networks.network import Network
-from mrpipe.simulation.benchmark_indices import WIND_FLOORS, WindResponse, wind_indices
-from mrpipe.simulation.benchmark_isolation_design import LqgWeights
-from mrpipe.simulation.benchmark_laws import require_known, unknown_law
-from mrpipe.simulation.benchmark_run import BinghamDevice, Controller, Response, simulate
-from mrpipe.simulation.benchmark_wind_design import WindGains, wind_gains, wind_lqg
-from mrpipe.structures.benchmark_model import ModalModel, modal_model
-from mrpipe.structures.benchmark_wind import REDUCED_FLOORS, Tower
-from mrpipe.structures.wind import WindLoad
 
 _NAMES = tuple(f"J{number}" for number in range(1, 13))
 _PRINTED = {
@@ -47,7 +47,7 @@ STRUCTURE = "the tower"
 
 
 def check_laws(laws: Sequence[str]) -> None:
-    """Raise UserError if one of them is not in :data:`~mrpipe.simulation.benchmark_laws.LAWS`."""
+    """Raise UserError if one of them is not in :data:`~mrpipe.case_studies.laws.LAWS`."""
     require_known(laws, STRUCTURE)
 
 
@@ -89,7 +89,7 @@ class WindStudy:
         return self.optimum.within(self.dampers * force, velocity, displacement)
 
     def controller(self, law: str) -> Controller:
-        """Return the controller of a law of :data:`~mrpipe.simulation.benchmark_laws.LAWS`.
+        """Return the controller of a law of :data:`~mrpipe.case_studies.laws.LAWS`.
 
         Raises
         ------

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrpipe.control.benchmark_gains import exact_viscous, lowest_damping, two_component
-from mrpipe.control.benchmark_lqg import (
+from mrpipe.case_studies.base_isolated.design import LqgWeights
+from mrpipe.case_studies.gains import exact_viscous, lowest_damping, two_component
+from mrpipe.case_studies.indices import WIND_FLOORS
+from mrpipe.case_studies.lqg import (
     Outputs,
     SampledController,
     observer_gain,
@@ -15,12 +17,10 @@ from mrpipe.control.benchmark_lqg import (
     sampled_controller,
     sampled_loop_radius,
 )
+from mrpipe.case_studies.model import ModalModel
+from mrpipe.case_studies.wind.load import WindLoad
+from mrpipe.case_studies.wind.structure import Tower
 from mrpipe.errors import UserError
-from mrpipe.simulation.benchmark_indices import WIND_FLOORS
-from mrpipe.simulation.benchmark_isolation_design import LqgWeights
-from mrpipe.structures.benchmark_model import ModalModel
-from mrpipe.structures.benchmark_wind import Tower
-from mrpipe.structures.wind import WindLoad
 
 CORRELATION_S = 4.0
 """Time over which the observer takes the wind as white [s]."""

@@ -1,0 +1,1 @@
+"""Base-isolated eight-storey building of the ASCE benchmark (thesis chapter 6)."""

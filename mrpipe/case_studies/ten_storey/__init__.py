@@ -1,0 +1,1 @@
+"""Ten-storey shear frame with a damper between ground and first floor (paper P4)."""
