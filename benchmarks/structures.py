@@ -15,10 +15,10 @@ from functools import partial
 import numpy as np
 
 from mrpipe.artifacts import load_parameter_set
-from mrpipe.case_studies.base_isolated.design import LqgWeights
 from mrpipe.case_studies.base_isolated.structure import surrogate_building
 from mrpipe.case_studies.base_isolated.study import isolation_study
 from mrpipe.case_studies.inverse import train_inverse
+from mrpipe.case_studies.lqg import LqgWeights
 from mrpipe.case_studies.motion import spectrum_compatible_motion
 from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.case_studies.ten_storey.structure import ten_storey

@@ -114,9 +114,9 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
 def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.base_isolated import report
     from mrpipe.case_studies.base_isolated import study as bench
-    from mrpipe.case_studies.base_isolated.design import LqgWeights
     from mrpipe.case_studies.base_isolated.structure import building_of
     from mrpipe.case_studies.inverse import train_inverse
+    from mrpipe.case_studies.lqg import LqgWeights
     from mrpipe.case_studies.motion import SEVEN_MOTIONS, load_motion
 
     settings = context.settings.benchmark.base_isolated
@@ -195,8 +195,8 @@ def _wind_load(context: StageContext, settings: Any) -> WindLoad:
 
 
 def _wind(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.case_studies.base_isolated.design import LqgWeights
     from mrpipe.case_studies.inverse import train_inverse
+    from mrpipe.case_studies.lqg import LqgWeights
     from mrpipe.case_studies.wind import report
     from mrpipe.case_studies.wind import study as bench
     from mrpipe.case_studies.wind.structure import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of

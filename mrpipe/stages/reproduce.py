@@ -12,8 +12,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     import pandas as pd
 
     from mrpipe.artifacts import atomic_write_text
-    from mrpipe.reporting import reproduce as page
-    from mrpipe.reporting.claims import ClaimOptions, collect_claims
+    from mrpipe.thesis import ClaimOptions, collect_claims, page
 
     settings = context.settings.reproduce
     options = ClaimOptions(tuple(settings.chapters), settings.frame, settings.duration_s)

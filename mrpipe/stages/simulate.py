@@ -381,7 +381,7 @@ def _words(law: str, excitation: Excitation, values: Mapping[str, Any]) -> str:
 def _table(law: str, values: Mapping[str, Any], viscous: Mapping[str, Any] | None) -> Any:
     import pandas as pd
 
-    from mrpipe.simulation.printed import PRINTED
+    from mrpipe.thesis.printed import PRINTED
 
     numbers = {key: value for key, value in values.items() if isinstance(value, float)}
     frame = pd.DataFrame({"index": list(numbers), law: list(numbers.values())})

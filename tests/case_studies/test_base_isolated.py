@@ -10,7 +10,6 @@ import pytest
 from scipy.io import loadmat
 
 from mrpipe.artifacts import FloatArray, public_data_directory
-from mrpipe.case_studies.base_isolated.design import LqgWeights, isolation_outputs
 from mrpipe.case_studies.base_isolated.structure import (
     IsolatedBuilding,
     bearing_grid,
@@ -28,7 +27,13 @@ from mrpipe.case_studies.gains import damped_modes
 from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
 from mrpipe.case_studies.inverse import inverse_validation, train_inverse
 from mrpipe.case_studies.laws import LAWS
-from mrpipe.case_studies.lqg import observer_gain, output_regulator_gain, sampled_loop_radius
+from mrpipe.case_studies.lqg import (
+    LqgWeights,
+    isolation_outputs,
+    observer_gain,
+    output_regulator_gain,
+    sampled_loop_radius,
+)
 from mrpipe.case_studies.model import modal_model, natural_periods
 from mrpipe.case_studies.motion import load_motion, spectrum_compatible_motion
 from mrpipe.case_studies.run import BinghamDevice, Controller, Response

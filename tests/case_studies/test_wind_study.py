@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrpipe.case_studies.base_isolated.design import LqgWeights
 from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
 from mrpipe.case_studies.laws import LAWS
-from mrpipe.case_studies.lqg import observer_gain
+from mrpipe.case_studies.lqg import LqgWeights, observer_gain
 from mrpipe.case_studies.run import BinghamDevice, Controller, simulate
 from mrpipe.case_studies.wind.design import CORRELATION_S, SENSOR_DENSITY, wind_outputs
 from mrpipe.case_studies.wind.load import WindLoad, synthetic_wind

@@ -10,7 +10,7 @@ from mrpipe.networks import FeatureSpec, Network
 from mrpipe.networks.assembly import join
 from mrpipe.networks.training import TrainingOptions, train
 from mrpipe.simulation import LoopOptions, SensorNoise
-from mrpipe.simulation.printed import PRINTED
+from mrpipe.thesis.printed import PRINTED
 from tests.networks.rig import bench_test
 
 IDEAL = LoopOptions(tracking="ideal", record_rate_hz=2000.0)

@@ -11,6 +11,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.gains import damped_modes, viscous_for_damping
 from mrpipe.case_studies.lqg import (
+    LqgWeights,
     Outputs,
     SampledController,
     observer_gain,
@@ -18,26 +19,6 @@ from mrpipe.case_studies.lqg import (
     sampled_controller,
 )
 from mrpipe.case_studies.model import ModalModel
-
-
-@dataclass(frozen=True)
-class LqgWeights:
-    """What an LQG design weighs.
-
-    Attributes
-    ----------
-    displacement, acceleration
-        Weights of the regulated outputs [1/m^2], [s^4/m^2].
-    force_n
-        A force of this size weighs 1 (R is the identity in these units).
-    interval_s
-        Sample of the controller [s].
-    """
-
-    displacement: float = 100.0
-    acceleration: float = 1.0
-    force_n: float = 1e6
-    interval_s: float = 0.001
 
 
 @dataclass(frozen=True)

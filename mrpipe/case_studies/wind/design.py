@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrpipe.case_studies.base_isolated.design import LqgWeights
 from mrpipe.case_studies.gains import exact_viscous, lowest_damping, two_component
 from mrpipe.case_studies.indices import WIND_FLOORS
 from mrpipe.case_studies.lqg import (
+    LqgWeights,
     Outputs,
     SampledController,
     observer_gain,

@@ -9,10 +9,9 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.case_studies.base_isolated.design import LqgWeights
 from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
 from mrpipe.case_studies.laws import require_known, unknown_law
-from mrpipe.case_studies.lqg import SampledController
+from mrpipe.case_studies.lqg import LqgWeights, SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
 from mrpipe.case_studies.run import BinghamDevice, Controller, Response, simulate
 from mrpipe.case_studies.wind.design import WindGains, wind_gains, wind_lqg

@@ -6,7 +6,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set
 from mrpipe.dampers.model import DamperModel, bouc_wen_limits, damper_from_parameter_set, parameter_unit
-from mrpipe.reporting.claims.claim import Claim, cannot, compare
+from mrpipe.thesis.claim import Claim, cannot, compare
 
 FREQUENCIES_HZ = (0.5, 1.0, 1.27, 1.8, 2.2)
 AMPLITUDES_M = (5e-3, 10e-3)

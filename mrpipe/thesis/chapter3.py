@@ -6,7 +6,6 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray, load_parameter_set
 from mrpipe.modal.checks import modal_coupling, wrong_signs
-from mrpipe.reporting.claims.claim import Claim, compare
 from mrpipe.structures import (
     Frame,
     complex_modes,
@@ -15,6 +14,7 @@ from mrpipe.structures import (
     natural_modes,
     shear_frame,
 )
+from mrpipe.thesis.claim import Claim, compare
 
 OMEGA = [8.0, 24.2, 38.4, 49.9, 58.3]
 HERTZ = [1.23, 3.83, 6.13, 8.05, 9.34]

@@ -12,12 +12,12 @@ from mrpipe.control.calibration import THESIS_GAINS
 from mrpipe.control.controller import Controller, ControllerOptions, Gains, build_controller
 from mrpipe.control.inverse import inverse_table
 from mrpipe.dampers.model import DamperModel, damper_from_parameter_set
-from mrpipe.reporting.claims.claim import Claim, cannot, compare
 from mrpipe.simulation import Excitation, LoopOptions, amplitude_for, harmonic, simulate_law
 from mrpipe.simulation.adjustment import adjusted_amplitude
 from mrpipe.simulation.indices import indices
-from mrpipe.simulation.printed import PRINTED
 from mrpipe.structures import Frame, floor_position
+from mrpipe.thesis.claim import Claim, cannot, compare
+from mrpipe.thesis.printed import PRINTED
 
 OMEGA = 8.0
 RMS_TOP_M = 24.3e-3

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mrpipe.artifacts import Progress, no_progress
-from mrpipe.reporting.claims.chapter2 import chapter_2
-from mrpipe.reporting.claims.chapter3 import chapter_3
-from mrpipe.reporting.claims.chapter4 import chapter_4
-from mrpipe.reporting.claims.chapter5 import chapter_5
-from mrpipe.reporting.claims.chapter6 import chapter_6
-from mrpipe.reporting.claims.claim import Claim
 from mrpipe.structures import frame_from_parameter_set
+from mrpipe.thesis.chapter2 import chapter_2
+from mrpipe.thesis.chapter3 import chapter_3
+from mrpipe.thesis.chapter4 import chapter_4
+from mrpipe.thesis.chapter5 import chapter_5
+from mrpipe.thesis.chapter6 import chapter_6
+from mrpipe.thesis.claim import Claim
 
 
 @dataclass(frozen=True)

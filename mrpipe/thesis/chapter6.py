@@ -9,9 +9,9 @@ from scipy.linalg import eigh
 from mrpipe.artifacts import load_parameter_set, public_data_directory
 from mrpipe.case_studies.ten_storey.structure import ten_storey
 from mrpipe.control.lqg import Weights, regulator_gain
-from mrpipe.reporting.claims.chapter6_benchmarks import isolated_claims, ten_storey_claims
-from mrpipe.reporting.claims.claim import Claim, cannot, compare
 from mrpipe.structures import Frame, floor_position, shear_stiffness, state_space
+from mrpipe.thesis.chapter6_benchmarks import isolated_claims, ten_storey_claims
+from mrpipe.thesis.claim import Claim, cannot, compare
 from mrpipe.units import same_dimension
 
 _FLOORS, _MASS, _STIFFNESS = 10, 5000.0, 1.5e7

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from mrpipe.reporting.claims.claim import Claim, Verdict, deviation
 from mrpipe.reporting.style import COLOURS, figure_with_axes, label
+from mrpipe.thesis.claim import Claim, Verdict, deviation
 
 VERDICTS: tuple[Verdict, ...] = ("holds", "differs", "cannot-be-recomputed")
 _SMALLEST = 1e-7

@@ -15,7 +15,7 @@ from mrpipe.case_studies.run import BinghamDevice, simulate
 from mrpipe.case_studies.ten_storey.structure import ten_storey
 from mrpipe.case_studies.ten_storey.study import THESIS, ten_storey_study
 from mrpipe.dampers.model import damper_from_parameter_set
-from mrpipe.reporting.claims.claim import Claim, cannot, compare
+from mrpipe.thesis.claim import Claim, cannot, compare
 
 _MISSING = "the public records are not here: set MRPIPE_DATA to their folder"
 _PRINTED_J6 = [0.67, 0.48, 0.33, 0.12]

@@ -8,8 +8,8 @@ from mrpipe.control import exact, limits
 from mrpipe.control.calibration import CalibrationOptions, LawCalibration, calibrate
 from mrpipe.control.kalman import continuous_kalman_gains
 from mrpipe.control.linearisation import clipped_force
-from mrpipe.reporting.claims.claim import Claim, cannot, compare
 from mrpipe.structures import Frame, floor_position
+from mrpipe.thesis.claim import Claim, cannot, compare
 
 
 def _limits(modes: limits.LimitingModes) -> list[Claim]:

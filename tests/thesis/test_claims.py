@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from mrpipe.errors import UserError
-from mrpipe.reporting import reproduce as page
-from mrpipe.reporting.claims import Claim, ClaimOptions, cannot, collect_claims, compare
+from mrpipe.thesis import Claim, ClaimOptions, cannot, collect_claims, compare, page
 
 
 @pytest.fixture(scope="module")
