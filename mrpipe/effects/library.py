@@ -15,6 +15,7 @@ import mrpipe.effects as package
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.effects.contract import Effect
 from mrpipe.errors import UserError
+from mrpipe.numba_cache import cache_of_file
 
 Kind = TypeVar("Kind")
 
@@ -57,7 +58,8 @@ def effect_of_file(path: Path) -> object:
         raise UserError(path, "close_loop.effect_files", "is no Python file", "name a .py file that defines EFFECT")
     module: ModuleType = importlib.util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
+        with cache_of_file(path):
+            spec.loader.exec_module(module)
     except Exception as error:
         # compilers say much: the first line tells what it is
         said = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)

@@ -1,0 +1,180 @@
+"""Where numba keeps compiled code: one folder for each state of the sources that it was compiled from.
+
+numba discards compiled code when the file of the function itself changes. It does not notice that a function of another
+module changed which was compiled into the caller, so a simulation could run with a mixture of old and new code. The
+folder is therefore named by a hash of all modules that hold compiled functions and of all modules that these import.
+Any edit leads to another folder, and everything in it is compiled again.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from types import ModuleType
+
+VARIABLE = "NUMBA_CACHE_DIR"
+_PREFIX = "mrpipe-"
+_KEPT_FOR_S = 30 * 86400.0
+_COMPILED = re.compile(rb"^\s*(?:from|import)\s+numba\b", re.MULTILINE)
+_IMPORT = re.compile(
+    rb"^[ \t]*(?:from[ \t]+(mrpipe[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+(mrpipe[\w.]*))", re.MULTILINE
+)
+
+
+def use_keyed_cache() -> None:
+    """Make numba use the folder of the present sources, now or as soon as numba is imported.
+
+    The sources are read only when numba is needed, so that commands without computation start at once.
+    """
+    if "numba" in sys.modules:
+        _point_numba_to(cache_folder())
+    elif not any(isinstance(item, _BeforeNumba) for item in sys.meta_path):
+        sys.meta_path.insert(0, _BeforeNumba())
+
+
+class _BeforeNumba(MetaPathFinder):
+    """Sets the cache folder at the first import of numba, then leaves the list of finders."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        del path, target
+        if fullname == "numba":
+            sys.meta_path.remove(self)
+            _point_numba_to(cache_folder())
+        return None
+
+
+def compiled_sources(package: Path) -> list[Path]:
+    """Return the modules of a package that hold compiled functions, and all modules that these import at any depth.
+
+    Parameters
+    ----------
+    package
+        Folder of the package `mrpipe`.
+    """
+    texts: dict[Path, bytes] = {path: path.read_bytes() for path in sorted(package.rglob("*.py"))}
+    own = package / Path(__file__).name
+    waiting = [path for path, text in texts.items() if path != own and _COMPILED.search(text)]
+    found = set(waiting)
+    while waiting:
+        for path in _imported_by(texts[waiting.pop()], package):
+            if path in texts and path not in found:
+                found.add(path)
+                waiting.append(path)
+    return sorted(found)
+
+
+def _imported_by(text: bytes, package: Path) -> Iterator[Path]:
+    """Yield the files of the modules that a text imports; constants of theirs may be part of compiled code."""
+    for module, names, plain in _IMPORT.findall(text):
+        parts = (module or plain).decode().split(".")[1:]
+        places = [parts, *([*parts, name.decode()] for name in re.findall(rb"\w+", names))]
+        for place in places:
+            base = package.joinpath(*place)
+            yield base.with_suffix(".py") if place else base / "__init__.py"
+            yield base / "__init__.py"
+
+
+def key_of(package: Path) -> str:
+    """Return the hash of all compiled sources of a package."""
+    digest = hashlib.sha256()
+    for path in compiled_sources(package):
+        digest.update(f"{path.relative_to(package).as_posix()}\0".encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path | None:
+    """Return the folder of the present sources, made if missing; None where no folder can be written.
+
+    A folder that the user names in `NUMBA_CACHE_DIR` is the parent; otherwise it is the user's cache directory, or a
+    private temporary directory where that cannot be written. Folders that nobody used for 30 days are removed.
+    """
+    name = _PREFIX + key_of(Path(__file__).resolve().parent)
+    for parent in _parents():
+        folder = parent / name
+        try:
+            new = not folder.is_dir()
+            folder.mkdir(parents=True, exist_ok=True)
+            if not os.access(folder, os.W_OK | os.X_OK):
+                continue
+            os.utime(folder)
+        except OSError:
+            continue
+        if new:
+            _remove_old(parent, folder)
+        return folder
+    return None
+
+
+def _parents() -> Iterator[Path]:
+    named = os.environ.get(VARIABLE)
+    if named:
+        given = Path(named)
+        # a parent process has set the variable already: do not nest the folders
+        yield given.parent if given.name.startswith(_PREFIX) else given
+    caches = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    if caches:
+        yield Path(caches) / "mrpipe" / "numba"
+    elif home := os.path.expanduser("~"):  # noqa: PTH111 - Path.home() fails where no home directory is known
+        yield Path(home) / ".cache" / "mrpipe" / "numba"
+    private = Path(tempfile.gettempdir()) / f"mrpipe-numba-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
+    with suppress(OSError):
+        private.mkdir(mode=0o700, exist_ok=True)
+        # numba loads pickles from here: a folder that somebody else made is not used
+        if not hasattr(os, "getuid") or (private.stat().st_uid == os.getuid() and not private.is_symlink()):
+            yield private
+    with suppress(OSError):
+        temporary = Path(tempfile.mkdtemp(prefix="mrpipe-numba-"))
+        atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+        yield temporary
+
+
+def _remove_old(parent: Path, present: Path) -> None:
+    """Remove the folders of sources that no process has used for a while."""
+    oldest = time.time() - _KEPT_FOR_S
+    for folder in parent.glob(f"{_PREFIX}*"):
+        with suppress(OSError):
+            if folder != present and folder.is_dir() and folder.stat().st_mtime < oldest:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def _point_numba_to(folder: Path | None) -> None:
+    """Set the variable for this process and its children, and the configuration of numba where it is imported."""
+    if folder is None:
+        return
+    os.environ[VARIABLE] = str(folder)
+    numba = sys.modules.get("numba")
+    if numba is not None:
+        numba.config.CACHE_DIR = str(folder)
+
+
+@contextmanager
+def cache_of_file(path: Path) -> Iterator[None]:
+    """Keep what a user's own file compiles in a folder named by the content of the file.
+
+    numba itself compares size and time of change only; both stay the same when a file is restored from a backup.
+    """
+    import numba  # noqa: F401 - sets the folder of the package first
+
+    before = os.environ.get(VARIABLE)
+    if before is None:
+        yield
+        return
+    _point_numba_to(Path(before) / f"file-{hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]}")
+    try:
+        yield
+    finally:
+        _point_numba_to(Path(before))
