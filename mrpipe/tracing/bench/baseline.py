@@ -9,9 +9,9 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.effects.contract import Effect
-from mrpipe.tracing.bench.engine import Fit, fit, start_of
-from mrpipe.tracing.bench.problem import BaseForm, Problem, Term
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.problem import BaseForm, Problem, Term
+from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.screen import screen
 from mrpipe.tracing.bench.weights import force_deviation, noise_of_repeats, repeated_pairs, sensor_deviation
 

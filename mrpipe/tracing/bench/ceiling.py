@@ -7,9 +7,9 @@ from sklearn.ensemble import HistGradientBoostingRegressor
 from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
+from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.crossvalidation import folds_of
-from mrpipe.tracing.bench.engine import Fit
-from mrpipe.tracing.bench.recordings import Recordings
 from mrpipe.tracing.bench.residual_structure import states_of
 
 LAGS_S = (0.01, 0.03, 0.1, 0.3)

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from mrpipe.fitting.engine import predict
+from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.faults import KnownFaults
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.engine import predict
-from mrpipe.tracing.bench.recordings import record_tests
 from mrpipe.tracing.bench.summary import Tracing
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
-from mrpipe.tracing.bench.engine import Fit, centred, fit, jacobian_of, predict, regressors, weighting
-from mrpipe.tracing.bench.problem import Problem
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.engine import Fit, centred, fit, jacobian_of, predict, regressors, weighting
+from mrpipe.fitting.problem import Problem
+from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.residual_structure import BLOCK_S
 
 BEYOND = 0.01

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.recordings import Recordings
 
 STEADY_SHARE = 0.02
 """Offsets of the training tests that spread by less than this share of the force RMS are one of the whole campaign."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.recordings import Recordings
 
 _KINDS = (
     ("triangular displacement", "speeds"),

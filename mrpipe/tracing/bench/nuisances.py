@@ -10,8 +10,8 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray
-from mrpipe.tracing.bench.engine import Fit, fit, start_of
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.residual_structure import BLOCK_S
 
 WINDOW_SHARES = (0.05, 0.1, 0.15)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrpipe.effects.contract import Effect
-from mrpipe.tracing.bench.engine import Fit, fit
+from mrpipe.fitting.engine import Fit, fit
 from mrpipe.tracing.bench.verdict import Named
 
 LEAST_SPREAD_SHARE = 0.01

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.yielding_parts import OWN_DASHPOT
-from mrpipe.tracing.bench.engine import Fit, fit, start_of
-from mrpipe.tracing.bench.problem import Problem, Term
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.problem import Problem, Term
 from mrpipe.tracing.bench.select import Candidate, Selection, draft, share_of
 
 GAPS = (0.01, 0.03, 0.08)

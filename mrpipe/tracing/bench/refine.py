@@ -14,9 +14,9 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.effects.contract import EffectForm, EffectScales
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
-from mrpipe.tracing.bench.engine import Fit, fit, start_of
-from mrpipe.tracing.bench.problem import Term
 from mrpipe.tracing.bench.select import Selection, draft
 
 WORTH_A_TRY = 0.1

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
-from mrpipe.tracing.bench.engine import Fit, chain_of
-from mrpipe.tracing.bench.kernel import CURRENT_AT, HYSTERESIS_AT, WORK_AT, run_recordings
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.engine import Fit, chain_of
+from mrpipe.fitting.kernel import CURRENT_AT, HYSTERESIS_AT, WORK_AT, run_recordings
+from mrpipe.fitting.recordings import Recordings
 
 BLOCK_S = 0.4
 """Length of the blocks whose means are taken as independent."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.tracing.bench.engine import (
+from mrpipe.fitting.engine import (
     Fit,
     Weighting,
     bounded_solution,
@@ -19,7 +19,7 @@ from mrpipe.tracing.bench.engine import (
     regressors,
     weighting,
 )
-from mrpipe.tracing.bench.problem import Problem, Term
+from mrpipe.fitting.problem import Problem, Term
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from typing import TypeVar
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
+from mrpipe.fitting.engine import Fit, fit, solve, start_of, weighting
+from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.crossvalidation import folds_of
-from mrpipe.tracing.bench.engine import Fit, fit, solve, start_of, weighting
-from mrpipe.tracing.bench.problem import Term
 from mrpipe.tracing.bench.screen import Screened, screen
 
 NOTHING_MISSING = 0.2

@@ -10,13 +10,13 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.effects.contract import Effect
+from mrpipe.fitting.engine import predict
+from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import FREE_EXPONENT, Baseline, ladder
 from mrpipe.tracing.bench.ceiling import flexible_residual
-from mrpipe.tracing.bench.engine import predict
 from mrpipe.tracing.bench.error_measures import Score, campaign_offset, measured_force, score
 from mrpipe.tracing.bench.nuisances import RecordGain, mean_drives, record_gains, session_gain
 from mrpipe.tracing.bench.offsets import OffsetFinding
-from mrpipe.tracing.bench.recordings import Recordings
 from mrpipe.tracing.bench.residual_structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.verdict import Named, Rules, ranking

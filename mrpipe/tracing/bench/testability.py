@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrpipe.effects.contract import Effect
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.recordings import Recordings
 
 
 def untestable(recordings: Recordings, effects: Mapping[str, Effect]) -> tuple[dict[str, Effect], dict[str, str]]:

@@ -12,6 +12,15 @@ import numpy as np
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.yielding_parts import with_yielding_parts
+from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.problem import Term
+from mrpipe.fitting.recordings import (
+    MOST_JUDGED,
+    Recordings,
+    enough_tests,
+    record_tests,
+    spread_tests,
+)
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import (
     Baseline,
@@ -23,18 +32,9 @@ from mrpipe.tracing.bench.baseline import (
 )
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
-from mrpipe.tracing.bench.engine import Fit
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.pairs import rounded_drafts, with_play
-from mrpipe.tracing.bench.problem import Term
-from mrpipe.tracing.bench.recordings import (
-    MOST_JUDGED,
-    Recordings,
-    enough_tests,
-    record_tests,
-    spread_tests,
-)
 from mrpipe.tracing.bench.refine import with_richer_forms
 from mrpipe.tracing.bench.select import Selection, Thresholds, forward_selection, share_of
 from mrpipe.tracing.bench.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions

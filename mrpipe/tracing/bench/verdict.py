@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from mrpipe.effects.contract import Effect
+from mrpipe.fitting.engine import Fit
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of
-from mrpipe.tracing.bench.engine import Fit
 from mrpipe.tracing.bench.select import Candidate, Selection, share_of
 
 

@@ -10,10 +10,10 @@ from scipy import ndimage
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import build_chain
+from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.kernel import FORCE_AT, run_recordings
+from mrpipe.fitting.recordings import Recordings
 from mrpipe.signals.filters import butterworth_lowpass
-from mrpipe.tracing.bench.engine import Fit
-from mrpipe.tracing.bench.kernel import FORCE_AT, run_recordings
-from mrpipe.tracing.bench.recordings import Recordings
 
 LEAST_SHARE = 0.002
 """No sample is trusted better than this share of the force RMS: model error below it is of no interest."""

@@ -11,11 +11,11 @@ from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.control.inverse import InverseTable
 from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import FORCE, Chain, build_chain, run_chain
+from mrpipe.fitting.engine import Fit
 from mrpipe.networks.assembly import History, join, samples
 from mrpipe.networks.network import Network
 from mrpipe.networks.training import TrainingOptions, train
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.engine import Fit
 
 SPEEDS_M_S = (0.01, 0.03, 0.08, 0.2, 0.4)
 """Speeds at which the force in use is tabulated."""

@@ -14,12 +14,12 @@ import numpy as np
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.campaigns.model import Campaign
 from mrpipe.effects.contract import Effect
+from mrpipe.fitting.engine import Fit, predict
+from mrpipe.fitting.recordings import enough_tests, record_tests
 from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import base_form, fit_baseline
-from mrpipe.tracing.bench.engine import Fit, predict
-from mrpipe.tracing.bench.recordings import enough_tests, record_tests
 from mrpipe.tracing.bench.summary import Tracing, TracingOptions
 from mrpipe.tracing.bench.trace import trace_campaign
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import base_form, best_start, first_problem
 from mrpipe.tracing.bench.nuisances import RecordGain, record_gains, session_gain, with_lag_apart
-from mrpipe.tracing.bench.recordings import Recordings, record_tests
 from tests.tracing.bench.rig import RATE, hysteresis
 
 

@@ -10,12 +10,12 @@ from mrpipe.artifacts import config_directory
 from mrpipe.campaigns import load_campaign
 from mrpipe.effects.library import damper_effects
 from mrpipe.effects.yielding_parts import with_yielding_parts
+from mrpipe.fitting.engine import fit, predict, start_of
+from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
 from mrpipe.tracing.bench.baseline import base_form, first_problem, with_form
-from mrpipe.tracing.bench.engine import fit, predict, start_of
 from mrpipe.tracing.bench.error_measures import measured_force, score
 from mrpipe.tracing.bench.nuisances import record_gains, session_gain
-from mrpipe.tracing.bench.recordings import record_tests
 
 
 @pytest.mark.real

@@ -9,8 +9,8 @@ import pytest
 
 from mrpipe.effects.contract import EffectScales
 from mrpipe.effects.library import damper_effects
-from mrpipe.tracing.bench.engine import Fit
-from mrpipe.tracing.bench.problem import Term
+from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.select import Candidate, Selection, admissible
 from mrpipe.tracing.bench.verdict import Rules, unnamed_reason
 

@@ -12,7 +12,7 @@ from mrpipe.dampers.drive import driver_lag, driver_lag_apart, polynomial_coeffi
 from mrpipe.dampers.hysteresis import hysteresis
 from mrpipe.dampers.plant import Step
 from mrpipe.effects.contract import Effect, EffectForm, EffectScales, Parameter, shape
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.recordings import Recordings
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from mrpipe.dampers.plant import (
     Chain,
 )
 from mrpipe.dampers.timing import look_ahead
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.recordings import Recordings
 
 COLUMNS = 8
 CURRENT_AT, VELOCITY_AT, HYSTERESIS_AT, YIELD_AT, VISCOSITY_AT, FORCE_AT, WORK_AT, DISPLACEMENT_AT = range(COLUMNS)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.dampers.plant import Chain, Step, build_chain
-from mrpipe.tracing.bench.kernel import (
+from mrpipe.fitting.kernel import (
     COLUMNS,
     CURRENT_AT,
     HYSTERESIS_AT,
@@ -18,8 +18,8 @@ from mrpipe.tracing.bench.kernel import (
     YIELD_AT,
     run_recordings,
 )
-from mrpipe.tracing.bench.problem import Problem
-from mrpipe.tracing.bench.recordings import Recordings
+from mrpipe.fitting.problem import Problem
+from mrpipe.fitting.recordings import Recordings
 
 OLDEST_JACOBIAN = 3
 """After so many steps the Jacobian is taken by differences again."""

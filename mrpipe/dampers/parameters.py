@@ -1,0 +1,110 @@
+"""Numbers of base forms and effects: their bounds and starts are multiples of scales that the campaign provides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What bounds and starts of parameters are multiples of.
+
+    Attributes
+    ----------
+    stroke
+        Half the largest peak-to-peak displacement [m].
+    speed, acceleration
+        Largest of the motions [m/s], [m/s^2].
+    drive
+        Largest drive [A or V].
+    force
+        RMS of the force [N].
+    time
+        Longest test [s].
+    """
+
+    stroke: float
+    speed: float
+    acceleration: float
+    drive: float
+    force: float
+    time: float
+
+    def of(self, expression: str) -> float:
+        """Return a product or quotient of scales such as `force/stroke` or `force/speed^2`."""
+        result = 1.0
+        for position, part in enumerate(expression.split("/")):
+            for factor in part.split("*"):
+                name, _, power = factor.partition("^")
+                value = 1.0 if name == "one" else float(getattr(self, name)) ** int(power or 1)
+                result = result * value if position == 0 else result / value
+        return result
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a form.
+
+    Attributes
+    ----------
+    name, unit
+        SI; `drive` stands for A or V.
+    meaning
+        What it is, in a few words.
+    scale
+        Product of :class:`Scales` that `lower`, `upper` and `starts` are multiples of, such as `force/stroke`.
+    lower, upper, starts
+        Bounds and starts; a strength starts at the first.
+    role
+        `shape` (searched), `strength` (searched; the effect vanishes at 0), `level` (searched; the effect acts only
+        beyond it, and vanishes at 0), `amplitude` (a force proportional to it; the fit solves for it exactly; vanishes
+        at 0) or `constant` (a reference that fixes the meaning of other numbers: the first start, never fitted).
+    logarithmic
+        Searched as its logarithm.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    scale: str
+    lower: float
+    upper: float
+    starts: tuple[float, ...]
+    role: Literal["shape", "strength", "level", "amplitude", "constant"] = "shape"
+    logarithmic: bool = False
+
+    def bounds(self, scales: Scales) -> tuple[float, float]:
+        """Return lower and upper bound in SI."""
+        unit = scales.of(self.scale)
+        return self.lower * unit, self.upper * unit
+
+    def start_values(self, scales: Scales) -> tuple[float, ...]:
+        """Return the starts in SI."""
+        unit = scales.of(self.scale)
+        return tuple(start * unit for start in self.starts)
+
+
+def shape(
+    name: str, unit: str, meaning: str, scale: str, lower: float, upper: float, starts: tuple[float, ...]
+) -> Parameter:
+    """Return a positive shape parameter, searched as its logarithm."""
+    return Parameter(name, unit, meaning, scale, lower, upper, starts, "shape", True)
+
+
+def strength(name: str, unit: str, meaning: str, scale: str, lower: float, upper: float, start: float) -> Parameter:
+    """Return a strength at which the effect vanishes for 0; `start` is the small value that screening uses."""
+    return Parameter(name, unit, meaning, scale, lower, upper, (start,), "strength")
+
+
+def amplitude(name: str, unit: str, meaning: str, scale: str, lower: float = 0.0, upper: float = 50.0) -> Parameter:
+    """Return an amplitude that the force is proportional to; a lower bound below 0 allows either sign."""
+    return Parameter(name, unit, meaning, scale, lower, upper, (1.0,), "amplitude")
+
+
+def constant(name: str, unit: str, meaning: str, scale: str) -> Parameter:
+    """Return a reference that the scale fixes; it is never fitted."""
+    return Parameter(name, unit, meaning, scale, 1.0, 1.0, (1.0,), "constant")
