@@ -56,8 +56,7 @@ def pipeline_of(options: CommonOptions, loaded: LoadedConfig, *, to_log: bool = 
 
     from mrpipe.pipeline.progress import LOGGER_NAME, make_logger
     from mrpipe.pipeline.runner import Pipeline
-    from mrpipe.stages.close_loop_frame import structure_stage
-    from mrpipe.stages.registry import all_stages, stage_named
+    from mrpipe.stages.registry import stage_named, stages_for
 
     for name in loaded.config.stages:
         if name != "report":
@@ -69,13 +68,9 @@ def pipeline_of(options: CommonOptions, loaded: LoadedConfig, *, to_log: bool = 
         if to_log
         else logging.getLogger(LOGGER_NAME)
     )
-    stages = all_stages()
-    structure = structure_stage(loaded.config.campaigns, rig_key(options.campaign) if options.campaign else "")
-    if structure is not None:
-        stages = {**stages, structure.name: structure}
     return Pipeline(
         loaded=loaded,
-        stages=stages,
+        stages=stages_for(loaded.config.campaigns, rig_key(options.campaign) if options.campaign else ""),
         run_directory=directory,
         logger=logger,
         jobs=options.jobs or execution.jobs or os.cpu_count() or 1,

@@ -1,4 +1,4 @@
-"""One command a stage."""
+"""One command for each stage; stages of one family share a command."""
 
 from __future__ import annotations
 
@@ -10,18 +10,6 @@ import typer
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
 
-_PLAIN = {
-    "prepare": "Filter, remove offsets, differentiate, cut cycles.",
-    "assemble": "Build the training set from the prepared tests.",
-    "sweep": "Compare network architectures.",
-    "train-forward": "Train the forward network: current to force.",
-    "train-inverse": "Train the inverse network: force to current.",
-    "identify-damper": "Fit the parametric damper model.",
-    "identify-frame": "Identify the frame: M, C, K and modes.",
-    "calibrate": "Compute the gains of every control law.",
-    "close-loop": "Trace the residual to the effect the model lacks.",
-    "reproduce": "Put every printed figure of the thesis beside ours.",
-}
 _RIGS = ("bench", "frame", "closed-loop")
 
 
@@ -115,11 +103,18 @@ def export(
     build_and_print(["export-controller"], options)
 
 
+_FAMILIES: dict[str, Callable[..., None]] = {"record": record, "simulate": simulate, "export": export}
+"""Commands that run one stage of a family, chosen by an option (`benchmark` has a module of its own)."""
+
+
 def register(app: typer.Typer) -> None:
-    """Add the commands to the program."""
-    app.command(name="record")(record)
-    for name, text in _PLAIN.items():
-        app.command(name=name, help=text)(_plain_command(name))
-        if name == "calibrate":
-            app.command(name="simulate")(simulate)
-    app.command(name="export")(export)
+    """Add the commands to the program, in the order of the pipeline."""
+    from mrpipe.stages.registry import all_stages
+
+    families: set[str] = set()
+    for name, stage in all_stages().items():
+        if not stage.family:
+            app.command(name=name, help=stage.summary)(_plain_command(name))
+        elif stage.family in _FAMILIES and stage.family not in families:
+            families.add(stage.family)
+            app.command(name=stage.family)(_FAMILIES[stage.family])

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from mrpipe.artifacts import config_directory
 from mrpipe.artifacts.yaml_source import YamlSource, nearest, read_yaml
 from mrpipe.config.errors import explain, section_of
-from mrpipe.config.model import Config
+from mrpipe.config.model import RunSettings, config_model
 from mrpipe.config.sections.campaigns import LABORATORY, CampaignsSettings
 from mrpipe.errors import UserError
 
@@ -22,7 +22,7 @@ from mrpipe.errors import UserError
 class LoadedConfig:
     """A validated configuration and where it came from."""
 
-    config: Config
+    config: RunSettings
     path: Path
     overrides: tuple[str, ...] = ()
 
@@ -64,13 +64,13 @@ def load_config(path: Path, overrides: Sequence[str] = (), overlays: Sequence[Pa
     for override in overrides:
         _apply(content, override)
     try:
-        config = Config.model_validate(content)
+        config = config_model().model_validate(content)
     except ValidationError as error:
         at = tuple(error.errors()[0]["loc"])
         if any(_override_path(item) == at[: len(_override_path(item))] for item in overrides):
-            raise explain(error, Config, "--set", {}) from error
+            raise explain(error, config_model(), "--set", {}) from error
         origin = next((item for item in reversed(laid) if at in item[1].lines), (path, source))
-        raise explain(error, Config, origin[0], origin[1].lines) from error
+        raise explain(error, config_model(), origin[0], origin[1].lines) from error
     return LoadedConfig(_with_absolute_campaigns(config, path.resolve().parent), path.resolve(), tuple(overrides))
 
 
@@ -90,7 +90,7 @@ def _lay_over(content: dict[str, Any], over: dict[str, Any]) -> None:
             content[key] = value
 
 
-def _with_absolute_campaigns(config: Config, base: Path) -> Config:
+def _with_absolute_campaigns(config: RunSettings, base: Path) -> RunSettings:
     """Resolve campaign paths against the configuration's folder, so that a kept copy means the same campaigns."""
     resolved = {
         rig: source if source in (None, LABORATORY) else str((base / source).resolve())
@@ -120,7 +120,7 @@ def _apply(content: dict[str, Any], override: str) -> None:
         raise UserError("--set", override, "is no assignment", "write section.key=value")
     path = _override_path(override)
     for depth, key in enumerate(path):
-        section = section_of(Config, path[:depth])
+        section = section_of(config_model(), path[:depth])
         if section is None:
             break
         if key not in section.model_fields:

@@ -1,31 +1,26 @@
-"""The whole configuration."""
+"""The whole configuration: the settings of the run and one section for each module of `config/sections`.
+
+A section adds itself: the module `sections/train_forward.py` holds the class `TrainForwardSettings`, which becomes the
+section `train_forward`; the first line of its docstring is the section's description. Modules whose names begin with an
+underscore hold what several sections share.
+"""
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, create_model
 
+import mrpipe.config.sections
 from mrpipe.config.errors import model_in
 from mrpipe.config.section import Section
-from mrpipe.config.sections.assemble import AssembleSettings
-from mrpipe.config.sections.benchmark import BenchmarkSettings
-from mrpipe.config.sections.calibrate import CalibrateSettings
 from mrpipe.config.sections.campaigns import CampaignsSettings
-from mrpipe.config.sections.close_loop import CloseLoopSettings
 from mrpipe.config.sections.execution import ExecutionSettings
-from mrpipe.config.sections.export import ExportSettings
-from mrpipe.config.sections.identify_damper import IdentifyDamperSettings
-from mrpipe.config.sections.identify_frame import IdentifyFrameSettings
-from mrpipe.config.sections.laboratory import LaboratorySettings
-from mrpipe.config.sections.prepare import PrepareSettings
 from mrpipe.config.sections.report import ReportSettings
-from mrpipe.config.sections.reproduce import ReproduceSettings
-from mrpipe.config.sections.simulate import SimulateSettings
-from mrpipe.config.sections.sweep import SweepSettings
-from mrpipe.config.sections.train_forward import TrainForwardSettings
-from mrpipe.config.sections.train_inverse import TrainInverseSettings
 
 DEFAULT_STAGES = (
     "record-bench",
@@ -50,8 +45,8 @@ DEFAULT_STAGES = (
 )
 
 
-class Config(Section):
-    """Everything that can be set, a section a stage; defaults are the thesis' own run on the virtual laboratory."""
+class RunSettings(Section):
+    """What the program itself reads; the sections of the stages are added by name (:func:`config_model`)."""
 
     name: str = Field("", description="Name of the run: its directory is runs/<name> unless --run says otherwise.")
     description: str = Field("", description="What this configuration is for, in a sentence; shown in the report.")
@@ -60,29 +55,58 @@ class Config(Section):
         DEFAULT_STAGES, description="Stages of `mrpipe run`, by name; what they need is built too."
     )
     campaigns: CampaignsSettings = Field(CampaignsSettings(), description="Where the measurements come from.")
-    laboratory: LaboratorySettings = Field(LaboratorySettings(), description="The virtual rig.")
-    prepare: PrepareSettings = Field(PrepareSettings(), description="Filtering, offsets, differentiation, cycles.")
-    assemble: AssembleSettings = Field(AssembleSettings(), description="The training set.")
-    sweep: SweepSettings = Field(SweepSettings(), description="The architecture sweep.")
-    train_forward: TrainForwardSettings = Field(TrainForwardSettings(), description="The forward network.")
-    train_inverse: TrainInverseSettings = Field(TrainInverseSettings(), description="The inverse network.")
-    identify_damper: IdentifyDamperSettings = Field(IdentifyDamperSettings(), description="The parametric damper.")
-    identify_frame: IdentifyFrameSettings = Field(IdentifyFrameSettings(), description="The frame's M, C, K and modes.")
-    calibrate: CalibrateSettings = Field(CalibrateSettings(), description="Gains of the control laws.")
-    simulate: SimulateSettings = Field(SimulateSettings(), description="The closed loop.")
-    close_loop: CloseLoopSettings = Field(CloseLoopSettings(), description="From residual to missing effect.")
-    benchmark: BenchmarkSettings = Field(BenchmarkSettings(), description="The benchmark structures of chapter 6.")
-    reproduce: ReproduceSettings = Field(ReproduceSettings(), description="The thesis' figures beside ours.")
-    export: ExportSettings = Field(ExportSettings(), description="The controller as C.")
     report: ReportSettings = Field(ReportSettings(), description="The report.")
     execution: ExecutionSettings = Field(
         ExecutionSettings(), description="How the program runs; changes no result and makes no stage stale."
     )
 
 
-def options(model: type[BaseModel] = Config, prefix: str = "") -> Iterator[tuple[str, str, Any]]:
+@cache
+def sections() -> dict[str, type[Section]]:
+    """Return name -> model of every section of a stage, in the order of the default stages, then by name.
+
+    Raises
+    ------
+    ValueError
+        If a module of the folder holds no class of the expected name.
+    """
+    found: dict[str, type[Section]] = {}
+    for item in pkgutil.iter_modules(mrpipe.config.sections.__path__):
+        if item.name.startswith("_") or item.name in RunSettings.model_fields:
+            continue
+        module = importlib.import_module(f"mrpipe.config.sections.{item.name}")
+        expected = "".join(part.capitalize() for part in item.name.split("_")) + "Settings"
+        if not hasattr(module, expected):
+            raise ValueError(f"{module.__name__} holds no class {expected}")
+        found[item.name] = getattr(module, expected)
+    return dict(sorted(found.items(), key=lambda entry: (_place(entry[0]), entry[0])))
+
+
+def _place(section: str) -> int:
+    name = section.replace("_", "-")
+    known = [index for index, stage in enumerate(DEFAULT_STAGES) if stage == name or stage.startswith(f"{name}-")]
+    return min(known, default=len(DEFAULT_STAGES))
+
+
+@cache
+def config_model() -> type[RunSettings]:
+    """Return the model of the whole configuration: the settings of the run and every section."""
+    fields: dict[str, Any] = {
+        name: (model, Field(model(), description=(model.__doc__ or "").strip().splitlines()[0]))
+        for name, model in sections().items()
+    }
+    return create_model("Config", __base__=RunSettings, __doc__="Everything that can be set.", **fields)
+
+
+def forget() -> None:
+    """Forget the sections found, so that the next call looks into the folder again."""
+    sections.cache_clear()
+    config_model.cache_clear()
+
+
+def options(model: type[BaseModel] | None = None, prefix: str = "") -> Iterator[tuple[str, str, Any]]:
     """Yield (dotted name, description, default) of every setting, sections first; `[]` marks the items of a list."""
-    for name, field in model.model_fields.items():
+    for name, field in (model or config_model()).model_fields.items():
         dotted = f"{prefix}{name}"
         yield dotted, field.description or "", field.get_default(call_default_factory=True)
         inner = model_in(field.annotation)

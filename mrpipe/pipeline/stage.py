@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-import numpy as np
-
-from mrpipe.artifacts import Artifact, ArtifactWriter, Progress, Provenance
-
 if TYPE_CHECKING:
+    # the command line reads every stage for its help text, so nothing heavy is imported here
+    import numpy as np
     import pandas as pd
     from matplotlib.figure import Figure
+
+    from mrpipe.artifacts import Artifact, ArtifactWriter, Progress, Provenance
 
 
 class ReportSink(Protocol):
@@ -75,11 +75,15 @@ class StageContext:
 
     def artifact(self, name: str) -> Artifact:
         """Open a declared input artifact."""
+        from mrpipe.artifacts import Artifact
+
         return Artifact(self.inputs[name])
 
     @contextmanager
     def write(self, file: str) -> Iterator[ArtifactWriter]:
         """Write an output artifact of this name in the run directory, atomically and with its provenance."""
+        from mrpipe.artifacts import ArtifactWriter
+
         with ArtifactWriter.create(self.run_directory / file, self.provenance) as artifact:
             yield artifact
 
@@ -112,6 +116,11 @@ class Stage:
         Files (or directories) written, relative to the run directory; the first is the stage's artifact.
     modules
         Modules whose source, with all of mrpipe that they import, makes up the stage's code version.
+    after
+        Stages (or families of stages) that `mrpipe run` and `status` list before this one, in addition to those whose
+        results it reads.
+    family
+        Command that this stage is one choice of (`simulate` for `simulate-vd`). Empty: the stage is a command itself.
     check
         Looks at the declared settings before anything is built for the stage; raises UserError where it cannot work.
     """
@@ -124,4 +133,6 @@ class Stage:
     settings: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     modules: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
+    family: str = ""
     check: Callable[[Any], None] | None = None

@@ -111,7 +111,7 @@ def _report(context: StageContext, histories: Mapping[str, History], jumps: Mapp
 
 STAGE = Stage(
     name="assemble",
-    summary="Training set: steady cycles joined at zero crossings, decimated, with past values.",
+    summary="Build the training set: steady cycles joined at zero crossings, decimated, with past values.",
     run=_run,
     inputs=("prepare",),
     settings=("assemble",),

@@ -257,6 +257,8 @@ STAGES = (
         summary="The ten-storey frame of paper P4 under a ground motion, one 1000 kN damper at the bottom.",
         run=_ten_storey,
         settings=("benchmark.ten_storey", "benchmark.inputs_digest"),
+        after=("close-loop",),
+        family="benchmark",
         outputs=("benchmark-ten-storey.h5",),
     ),
     Stage(
@@ -264,6 +266,8 @@ STAGES = (
         summary="The base-isolated building under two-component ground motions, two 1000 kN dampers at its base.",
         run=_base_isolated,
         settings=("benchmark.base_isolated", "benchmark.inputs_digest"),
+        after=("close-loop",),
+        family="benchmark",
         outputs=("benchmark-base-isolated.h5",),
     ),
     Stage(
@@ -271,6 +275,8 @@ STAGES = (
         summary="The 76-storey tower in across-wind, dampers at the ground, on an outrigger or at a tuned mass.",
         run=_wind,
         settings=("benchmark.wind", "benchmark.inputs_digest"),
+        after=("close-loop",),
+        family="benchmark",
         outputs=("benchmark-wind.h5",),
     ),
 )

@@ -236,7 +236,7 @@ def _maps(context: StageContext, frame: Frame, position: FloatArray, calibration
 
 STAGE = Stage(
     name="calibrate",
-    summary="limiting frequencies, gains of every law",
+    summary="Compute the limiting frequencies and the gains of every control law.",
     run=_run,
     inputs=("identify-frame", "identify-damper"),
     settings=("calibrate",),

@@ -159,7 +159,7 @@ def _check(settings: Any) -> None:
 
 STAGE = Stage(
     name="close-loop",
-    summary="Trace the residual of a model to a missing effect, add it, and judge it before and after.",
+    summary="Trace the residual to the effect that the model lacks, add it, and report the error before and after.",
     run=_run,
     inputs=("prepare", "campaign:bench"),
     optional_inputs=("identify-frame", "calibrate", "train-inverse", "campaign:closed-loop"),

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from mrpipe.config.sections.campaigns import LABORATORY
 from mrpipe.pipeline.stage import Stage, StageContext
 from mrpipe.stages.close_loop import tracing_options
 
@@ -103,14 +102,18 @@ def _stage(*inputs: str) -> Stage:
     )
 
 
-def structure_stage(campaigns: CampaignsSettings, given: str = "") -> Stage | None:
+def variant(campaigns: CampaignsSettings, given: str = "") -> Stage | None:
     """Return the stage on a structure's campaign where there is one to trace, None where the bench is meant.
 
     Parameters
     ----------
+    campaigns
+        Campaigns of the configuration.
     given
         Entry of `campaigns` that the user named on the command line, empty for none.
     """
+    from mrpipe.config.sections.campaigns import LABORATORY
+
     if given in ("frame", "closed_loop"):
         return _stage(f"campaign:{given.replace('_', '-')}")
     own = [name for name in ("frame", "closed_loop") if getattr(campaigns, name) not in (None, LABORATORY)]

@@ -41,10 +41,12 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 STAGE = Stage(
     name="export-controller",
-    summary="the calibrated controller as C and JSON",
+    summary="Write the calibrated controller as C and JSON.",
     run=_run,
     inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
     settings=("export", "simulate.controller"),
+    after=("reproduce",),
+    family="export",
     outputs=(f"{FOLDER}/controller.json", f"{FOLDER}/controller.c", f"{FOLDER}/controller.h", f"{FOLDER}/README.md"),
     modules=("mrpipe.stages.export_controller",),
 )

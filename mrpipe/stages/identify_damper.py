@@ -181,9 +181,10 @@ def _report(
 
 STAGE = Stage(
     name="identify-damper",
-    summary="parametric damper model from bench tests",
+    summary="Fit the parametric damper model to the bench tests.",
     run=_run,
     inputs=("prepare",),
+    after=("train-inverse",),
     settings=("identify_damper",),
     outputs=("damper.h5",),
     modules=(

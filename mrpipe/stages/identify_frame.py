@@ -93,9 +93,10 @@ def _report(context: StageContext, result: FrameIdentification, values: Mapping[
 
 STAGE = Stage(
     name="identify-frame",
-    summary="identify mass, damping, stiffness and modes of the frame",
+    summary="Identify mass, damping, stiffness and modes of the frame.",
     run=_run,
     inputs=("campaign:frame",),
+    after=("identify-damper",),
     settings=("identify_frame",),
     outputs=("frame.h5",),
     modules=("mrpipe.stages.identify_frame",),

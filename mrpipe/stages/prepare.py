@@ -174,6 +174,7 @@ STAGE = Stage(
     summary="Filter, remove offsets, differentiate, find the steady cycles.",
     run=_run,
     inputs=("campaign:bench",),
+    after=("record-frame",),
     settings=("prepare",),
     outputs=("prepared.h5",),
 )

@@ -201,21 +201,26 @@ def _summary(
 
 RECORD_BENCH = Stage(
     name="record-bench",
-    summary="The virtual bench records a damper campaign.",
+    summary="Record a damper campaign on the virtual bench.",
+    family="record",
     run=_record_bench,
     settings=(*_DAMPER, "laboratory.bench"),
     outputs=("campaigns/bench",),
 )
 RECORD_FRAME = Stage(
     name="record-frame",
-    summary="The virtual shaking table records sweeps and free decays of the frame.",
+    summary="Record sweeps and free decays of the frame on the virtual shaking table.",
+    after=("record-bench",),
+    family="record",
     run=_record_frame,
     settings=("laboratory.frame",),
     outputs=("campaigns/frame",),
 )
 RECORD_CLOSED_LOOP = Stage(
     name="record-closed-loop",
-    summary="The virtual shaking table records the closed loop under every law.",
+    summary="Record the closed loop under every law on the virtual shaking table.",
+    after=("simulate",),
+    family="record",
     run=_record_closed_loop,
     inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
     settings=(*_DAMPER, "laboratory.frame", "laboratory.bench", "laboratory.closed_loop", "simulate.controller"),

@@ -33,9 +33,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 STAGE = Stage(
     name="reproduce",
-    summary="recompute the printed figures of the thesis and say which hold",
+    summary="Recompute the printed figures of the thesis and say which hold.",
     run=_run,
     settings=("reproduce",),
+    after=("benchmark",),
     outputs=("reproduce.h5", "reproduce.md"),
     modules=("mrpipe.stages.reproduce",),
 )

@@ -45,10 +45,11 @@ def simulate_stage(law: str) -> Stage:
     """Return the stage that runs the loop under `law`."""
     return Stage(
         name=f"simulate-{law}",
-        summary=f"closed loop under law {law}",
+        summary=f"Run the closed loop under law {law}.",
         run=lambda context: _run(context, law),
         inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
         settings=("simulate",),
+        family="simulate",
         outputs=(f"response-{law}.h5",),
         modules=("mrpipe.stages.simulate", "mrpipe.stages.simulate_ranges"),
     )

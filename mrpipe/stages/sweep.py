@@ -182,7 +182,7 @@ def _report(context: StageContext, run: SweepRun, chosen: Outcome, verdicts: lis
 
 STAGE = Stage(
     name="sweep",
-    summary="Architecture sweep: input states, past values, layers, neurons.",
+    summary="Compare network architectures: input states, past values, layers, neurons.",
     run=_run,
     inputs=("assemble",),
     settings=("sweep",),

@@ -188,7 +188,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 STAGE = Stage(
     name="train-forward",
-    summary="Forward network: motion and drive to force.",
+    summary="Train the forward network: motion and drive to force.",
     run=_run,
     inputs=("assemble", "sweep"),
     settings=("train_forward",),

@@ -123,7 +123,7 @@ def _tracking(
 
 STAGE = Stage(
     name="train-inverse",
-    summary="Inverse network: motion and force to drive.",
+    summary="Train the inverse network: motion and force to drive.",
     run=_run,
     inputs=("assemble", "sweep"),
     optional_inputs=("train-forward",),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mrpipe.config.model import Config, options
+from mrpipe.config.model import config_model, options
 from mrpipe.stages.registry import all_stages
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -62,4 +62,4 @@ def test_documentation_lists_every_option() -> None:
 
 
 def test_default_stages_exist() -> None:
-    assert set(Config().stages) - {"report"} <= set(all_stages())
+    assert set(config_model()().stages) - {"report"} <= set(all_stages())

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mrpipe.config.loader import LoadedConfig
-from mrpipe.config.model import Config
+from mrpipe.config.model import config_model
 from mrpipe.errors import StageSkipped
 from mrpipe.pipeline.runner import Pipeline
 from mrpipe.pipeline.stage import Stage, StageContext
@@ -65,7 +65,7 @@ def make_pipeline(tmp_path: Path) -> MakePipeline:
 
     def make(stages: Mapping[str, Stage] | None = None, **changes: Any) -> Pipeline:
         content = {"campaigns": {"bench": None, "frame": None, "closed_loop": None}, **changes}
-        loaded = LoadedConfig(Config.model_validate(content), tmp_path / "config.yaml")
+        loaded = LoadedConfig(config_model().model_validate(content), tmp_path / "config.yaml")
         return Pipeline(loaded, stages or STAGES, tmp_path / "run", logging.getLogger("test"), quiet=True)
 
     return make

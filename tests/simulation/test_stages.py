@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, load_parameter_set, no_progress
-from mrpipe.config.model import Config
+from mrpipe.config.model import config_model
 from mrpipe.dampers.model import damper_from_parameter_set, write_damper, write_tested
 from mrpipe.errors import UserError
 from mrpipe.networks.network import write_network
@@ -74,7 +74,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     def go(stage: Stage, settings: dict[str, Any] | None = None) -> dict:
         context = StageContext(
             stage=stage.name,
-            settings=SettingsView(Config.model_validate(settings or {}), stage.settings, stage.name),
+            settings=SettingsView(config_model().model_validate(settings or {}), stage.settings, stage.name),
             inputs={name: directory / files[name] for name in stage.inputs},
             run_directory=directory,
             rng=np.random.default_rng(1),

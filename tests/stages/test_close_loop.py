@@ -12,7 +12,7 @@ import pytest
 
 from mrpipe.artifacts import ArtifactWriter, Provenance
 from mrpipe.config.loader import load_config
-from mrpipe.config.model import Config
+from mrpipe.config.model import config_model
 from mrpipe.control.calibration import CalibrationOptions, calibrate
 from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceOptions, train_reference
@@ -88,7 +88,7 @@ def traced(tests: list[PreparedTest]) -> Tracing:
 
 
 def context(tmp_path: Path, inputs: dict[str, Path], **changes: Any) -> StageContext:
-    config = Config.model_validate({**SETTINGS, **changes})
+    config = config_model().model_validate({**SETTINGS, **changes})
     return StageContext(
         "close-loop", SettingsView(config, close_loop.STAGE.settings, "close-loop"), inputs, tmp_path,
         np.random.default_rng(0), 0, 1, lambda fraction, text="": None, Sink(), logging.getLogger("test"),

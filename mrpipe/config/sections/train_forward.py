@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mrpipe.config.sections.training import TrainingSettings
+from mrpipe.config.sections._training import TrainingSettings
 
 
 class TrainForwardSettings(TrainingSettings):

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, PositiveInt
 
 from mrpipe.config.section import Section
-from mrpipe.config.sections.training import TrainingSettings
+from mrpipe.config.sections._training import TrainingSettings
 
 
 class ViscousEmulationSettings(Section):
