@@ -10,6 +10,7 @@ import pytest
 from scipy.io import loadmat
 
 from mrpipe.artifacts import FloatArray, public_data_directory
+from mrpipe.case_studies.base_isolated.design import isolation_outputs
 from mrpipe.case_studies.base_isolated.structure import (
     IsolatedBuilding,
     bearing_grid,
@@ -29,7 +30,6 @@ from mrpipe.case_studies.inverse import inverse_validation, train_inverse
 from mrpipe.case_studies.laws import LAWS
 from mrpipe.case_studies.lqg import (
     LqgWeights,
-    isolation_outputs,
     observer_gain,
     output_regulator_gain,
     sampled_loop_radius,
