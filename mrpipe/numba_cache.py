@@ -23,13 +23,12 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
 
+from mrpipe.source_scan import imported_modules
+
 VARIABLE = "NUMBA_CACHE_DIR"
 _PREFIX = "mrpipe-"
 _KEPT_FOR_S = 30 * 86400.0
 _COMPILED = re.compile(rb"^\s*(?:from|import)\s+numba\b", re.MULTILINE)
-_IMPORT = re.compile(
-    rb"^[ \t]*(?:from[ \t]+(mrpipe[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+(mrpipe[\w.]*))", re.MULTILINE
-)
 
 
 def use_keyed_cache() -> None:
@@ -64,27 +63,22 @@ def compiled_sources(package: Path) -> list[Path]:
     package
         Folder of the package `mrpipe`.
     """
-    texts: dict[Path, bytes] = {path: path.read_bytes() for path in sorted(package.rglob("*.py"))}
-    own = package / Path(__file__).name
-    waiting = [path for path, text in texts.items() if path != own and _COMPILED.search(text)]
+    texts = {_module_of(path, package): (path, path.read_bytes()) for path in sorted(package.rglob("*.py"))}
+    waiting = [name for name, (_, text) in texts.items() if name != __name__ and _COMPILED.search(text)]
     found = set(waiting)
     while waiting:
-        for path in _imported_by(texts[waiting.pop()], package):
-            if path in texts and path not in found:
-                found.add(path)
-                waiting.append(path)
-    return sorted(found)
+        name = waiting.pop()
+        path, text = texts[name]
+        # constants of an imported module may be part of compiled code
+        new = {item for item in imported_modules(text, name, path.name == "__init__.py") if item in texts} - found
+        found |= new
+        waiting.extend(new)
+    return sorted(texts[name][0] for name in found)
 
 
-def _imported_by(text: bytes, package: Path) -> Iterator[Path]:
-    """Yield the files of the modules that a text imports; constants of theirs may be part of compiled code."""
-    for module, names, plain in _IMPORT.findall(text):
-        parts = (module or plain).decode().split(".")[1:]
-        places = [parts, *([*parts, name.decode()] for name in re.findall(rb"\w+", names))]
-        for place in places:
-            base = package.joinpath(*place)
-            yield base.with_suffix(".py") if place else base / "__init__.py"
-            yield base / "__init__.py"
+def _module_of(path: Path, package: Path) -> str:
+    parts = path.relative_to(package).with_suffix("").parts
+    return ".".join(["mrpipe", *(parts[:-1] if parts[-1] == "__init__" else parts)])
 
 
 def key_of(package: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -47,8 +46,7 @@ def overrides_of(
         if name != "base-isolated":
             raise UserError("--all", name, "has no set of motions", "use it with base-isolated, or give --motion")
         result.append(f"{section}.all_motions=true")
-    digest = _digest([item for item in (model, motion) if item is not None])
-    return [*result, f"benchmark.inputs_digest={json.dumps(digest)}"] if digest else result
+    return result
 
 
 def table_of(name: str, summary: Mapping[str, Any]) -> list[str]:
@@ -112,16 +110,6 @@ def _file(option: str, value: str, needs_file: bool = False) -> str:
     if needs_file or path.suffix or "/" in value:
         raise UserError(option, value, "no such file", "give the path of a file that is there")
     return value
-
-
-def _digest(values: list[str]) -> str:
-    digest = hashlib.sha256()
-    found = False
-    for value in values:
-        if Path(value).is_file():
-            digest.update(Path(value).read_bytes())
-            found = True
-    return digest.hexdigest()[:16] if found else ""
 
 
 @with_common_options("campaign")

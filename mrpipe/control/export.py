@@ -12,6 +12,8 @@ import numpy as np
 from mrpipe.control import kernel
 from mrpipe.control.controller import Controller
 
+LOADS_FROM = ("mrpipe/control/controller_template.c",)
+"""Files of the program that are read at run time: they belong to the code version of a stage."""
 _TEMPLATE = Path(__file__).with_name("controller_template.c")
 
 _MACROS = (

@@ -17,6 +17,8 @@ from mrpipe.effects.contract import Effect
 from mrpipe.errors import UserError
 from mrpipe.numba_cache import cache_of_file
 
+LOADS_FROM = ("mrpipe.effects",)
+"""Packages that are walked at run time: their modules belong to the code version of a stage."""
 Kind = TypeVar("Kind")
 
 

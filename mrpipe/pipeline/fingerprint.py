@@ -1,19 +1,20 @@
-"""Content hashes of everything a result depends on: files, artifacts, settings and code."""
+"""Content hashes of what a result depends on: files, artifacts and settings.
+
+The hashes of code are those of :mod:`mrpipe.pipeline.code_version`.
+"""
 
 from __future__ import annotations
 
-import ast
 import hashlib
-import importlib.util
 import json
-from collections.abc import Iterable, Mapping
-from functools import cache
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-# running, configuring and the command line change no result
-_NOT_CODE = ("mrpipe.pipeline", "mrpipe.config", "mrpipe.cli")
-# told by the artifact about its making, not part of what it says
+MISSING = "missing"
+"""Stands for the digest of a file that is not there."""
+# how the artifact was made; not part of what it says
 _NOT_CONTENT = {
     "created_utc",
     "config",
@@ -26,9 +27,14 @@ _NOT_CONTENT = {
 
 
 def digest_of_artifact(path: Path) -> str:
-    """Return the SHA-256 of what an HDF5 artifact says: names, units, dims and numbers, not when it was made.
+    """Return the SHA-256 of what an HDF5 artifact says: names, units, dims, shapes, types and values, not its date.
 
     An artifact that is built again with the same numbers has the same digest, so nothing after it becomes stale.
+
+    Raises
+    ------
+    OSError, RuntimeError, KeyError, ValueError
+        If the file is damaged.
     """
     import h5py
     import numpy as np
@@ -42,8 +48,14 @@ def digest_of_artifact(path: Path) -> str:
                 continue
             digest.update(f"{key}={item.attrs[key]!r}".encode())
         if isinstance(item, h5py.Dataset):
+            digest.update(f"{item.dtype.str if item.dtype.kind != 'O' else 'text'}{item.shape}".encode())
             value = item[()]
-            digest.update(value if isinstance(value, bytes) else np.ascontiguousarray(value).tobytes())
+            if isinstance(value, bytes):
+                digest.update(value)
+            elif item.dtype.kind == "O":  # texts of any length: the array holds pointers, not their content
+                digest.update(repr(np.asarray(value).tolist()).encode())
+            else:
+                digest.update(np.ascontiguousarray(value).tobytes())
 
     with h5py.File(path, "r") as handle:
         visit("/", handle)
@@ -55,29 +67,39 @@ def digest_of_artifact(path: Path) -> str:
 
 
 class FileHashes:
-    """Digests of files, remembered by size and time of change, so that an unchanged gigabyte is read once."""
+    """Digests of files, remembered by size, times and inode, so that an unchanged gigabyte is read once.
+
+    A file whose content changed keeps its size and may get its old time of modification back (`cp -p`, `rsync -t`); its
+    time of status change and its inode tell that it is another one.
+    """
 
     def __init__(self, memory: Path) -> None:
         self._memory = memory
         try:
-            self._known: dict[str, list[Any]] = json.loads(memory.read_text(encoding="utf-8"))
+            known = json.loads(memory.read_text(encoding="utf-8"))
         except (OSError, ValueError):
-            self._known = {}
+            known = None
+        self._known: dict[str, Any] = known if isinstance(known, dict) else {}
         self._changed = False
 
     def digest(self, path: Path) -> str:
-        """Return the digest of a file, or of all files below a directory with their names."""
+        """Return the digest of a file, or of all files below a directory with their names; `missing` for neither.
+
+        A damaged artifact has the digest of its bytes, so it differs from what was recorded when it was written.
+        """
         if path.is_dir():
             return self.digest_many(sorted(item for item in path.rglob("*") if item.is_file()), path)
-        stat = path.stat()
+        try:
+            stat = path.stat()
+        except FileNotFoundError:
+            return MISSING
+        state = [stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino]
         key = str(path.resolve())
         entry = self._known.get(key)
-        if entry is not None and entry[:2] == [stat.st_size, stat.st_mtime_ns]:
-            return str(entry[2])
-        from mrpipe.artifacts import sha256_of
-
-        value = digest_of_artifact(path) if _is_artifact(path) else sha256_of(path)
-        self._known[key] = [stat.st_size, stat.st_mtime_ns, value]
+        if isinstance(entry, list) and len(entry) == 5 and entry[:4] == state and isinstance(entry[4], str):
+            return entry[4]
+        value = _digest_of_file(path)
+        self._known[key] = [*state, value]
         self._changed = True
         return value
 
@@ -90,48 +112,65 @@ class FileHashes:
         return digest.hexdigest()
 
     def save(self) -> None:
-        """Write what was learnt to the memory file."""
+        """Write what was learnt to the memory file; a directory that cannot be written only costs time later."""
         if self._changed:
             from mrpipe.artifacts import atomic_write_text
 
-            atomic_write_text(self._memory, json.dumps(self._known))
+            with suppress(OSError):
+                atomic_write_text(self._memory, json.dumps(self._known))
             self._changed = False
 
 
-def _is_artifact(path: Path) -> bool:
-    if path.suffix != ".h5":
-        return False
-    import h5py
+def _digest_of_file(path: Path) -> str:
+    from mrpipe.artifacts import sha256_of
 
-    try:
-        with h5py.File(path, "r") as handle:
-            return "mrpipe_version" in handle.attrs
-    except OSError:
-        return False
+    if path.suffix == ".h5":
+        import h5py
+
+        try:
+            with h5py.File(path, "r") as handle:
+                is_artifact = "mrpipe_version" in handle.attrs
+            if is_artifact:
+                return digest_of_artifact(path)
+        except (OSError, RuntimeError, KeyError, ValueError):
+            pass
+    return sha256_of(path)
 
 
-def plain_settings(config: Any, names: Iterable[str]) -> dict[str, Any]:
+def plain_settings(config: Any, names: Iterable[str], hashes: FileHashes) -> dict[str, Any]:
     """Return dotted name -> JSON-able value of the named settings of a pydantic configuration.
 
-    Files that they name count by their content: a user's own effect that was edited is another effect.
+    Every file that a setting names counts by its content, whatever the type of the setting: a ground motion that was
+    edited is another ground motion.
     """
-    content, typed = config.model_dump(mode="json"), config.model_dump()
+    content = config.model_dump(mode="json")
     chosen: dict[str, Any] = {}
     files: dict[str, str] = {}
     for name in names:
-        value, same = content, typed
+        value = content
         for part in name.split("."):
-            value, same = value[part], same[part]
+            value = value[part]
         chosen[name] = value
-        files |= {str(path): hashlib.sha256(path.read_bytes()).hexdigest()[:16] for path in _files_in(same)}
+        files |= {str(path): hashes.digest(path)[:16] for path in _files_in(value)}
     return {**chosen, "content of files": files} if files else chosen
 
 
-def _files_in(value: Any) -> list[Path]:
-    if isinstance(value, Path):
-        return [value] if value.is_file() else []
-    inner = value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else ()
-    return [path for item in inner for path in _files_in(item)]
+def _files_in(value: Any) -> Iterator[Path]:
+    """Yield the files that texts at any depth of a setting name; a bare word is a name and no file."""
+    if isinstance(value, str):
+        path = Path(value)
+        if (path.suffix or path.name != value) and _is_file(path):
+            yield path
+    elif isinstance(value, Mapping | list | tuple):
+        for item in value.values() if isinstance(value, Mapping) else value:
+            yield from _files_in(item)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a text that no file system takes for a name
+        return False
 
 
 def flatten(value: Any, prefix: str = "") -> dict[str, Any]:
@@ -142,49 +181,3 @@ def flatten(value: Any, prefix: str = "") -> dict[str, Any]:
     for key, inner in value.items():
         flat.update(flatten(inner, f"{prefix}.{key}" if prefix else str(key)))
     return flat
-
-
-@cache
-def code_version(module: str, further: tuple[str, ...] = ()) -> dict[str, str]:
-    """Return module -> hash of source for a module and all of mrpipe that it imports, at any depth."""
-    found: dict[str, str] = {}
-    waiting = [module, *further]
-    while waiting:
-        name = waiting.pop()
-        if name in found or name.startswith(_NOT_CODE):
-            continue
-        source = _source_of(name)
-        if source is None:
-            continue
-        text = source.read_bytes()
-        found[name] = hashlib.sha256(text).hexdigest()[:16]
-        waiting.extend(_imports_of(text.decode("utf-8"), name, source.name == "__init__.py"))
-    return found
-
-
-def _source_of(name: str) -> Path | None:
-    """Find the source of a module without importing it; None if there is no such module."""
-    root = importlib.util.find_spec("mrpipe")
-    if root is None or not root.submodule_search_locations:
-        return None
-    base = Path(root.submodule_search_locations[0]).joinpath(*name.split(".")[1:])
-    for candidate in (base.with_suffix(".py"), base / "__init__.py"):
-        if candidate.is_file():
-            return candidate
-    return None
-
-
-def _imports_of(text: str, module: str, is_package: bool) -> list[str]:
-    package = module if is_package else module.rpartition(".")[0]
-    names: list[str] = []
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            names.extend(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = node.module or ""
-            if node.level:
-                parent = package.split(".")[: len(package.split(".")) - node.level + 1]
-                base = ".".join([*parent, *([node.module] if node.module else [])])
-            names.append(base)
-            names.extend(f"{base}.{alias.name}" for alias in node.names)
-    return [name for name in names if name == "mrpipe" or name.startswith("mrpipe.")]

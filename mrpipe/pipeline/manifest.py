@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,15 @@ class StageKey:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a finished stage left: its key, outputs, summary and warnings; `skipped` says why it had nothing to do."""
+    """What a finished stage left: its key, outputs, summary and warnings.
+
+    Attributes
+    ----------
+    outputs
+        File, relative to the run directory -> digest: artifacts, and the stage's part of the report.
+    skipped
+        Why the stage had nothing to do; empty where it ran.
+    """
 
     stage: str
     key: StageKey
@@ -54,10 +63,16 @@ class Manifest:
     def load(cls, directory: Path, stage: str) -> Manifest | None:
         """Read the manifest of a stage, or None where there is none that can be read."""
         try:
-            content = json.loads((directory / f"{stage}.json").read_text(encoding="utf-8"))
-            return cls(**{**content, "key": StageKey(**content["key"])})
-        except (OSError, ValueError, TypeError, KeyError):
+            return _adapter().validate_json((directory / f"{stage}.json").read_bytes())
+        except (OSError, ValueError):
             return None
+
+
+@cache
+def _adapter() -> Any:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Manifest)
 
 
 def reasons_stale(manifest: Manifest | None, key: StageKey, run_directory: Path, hashes: FileHashes) -> list[str]:
@@ -90,7 +105,7 @@ def reasons_stale(manifest: Manifest | None, key: StageKey, run_directory: Path,
         if not path.exists():
             reasons.append(f"output {name} is missing")
         elif hashes.digest(path) != digest:
-            reasons.append(f"output {name} was changed by other hands")
+            reasons.append(f"output {name} was changed or damaged after it was written")
     return reasons
 
 

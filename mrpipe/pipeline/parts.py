@@ -43,6 +43,11 @@ class PartWriter:
             figure.savefig(temporary, format="png", dpi=120, metadata={"Software": None})
         self.items.append({"kind": "figure", "file": file, "caption": caption})
 
+    @property
+    def files(self) -> list[str]:
+        """Files of the part, relative to the run directory."""
+        return [f"{PARTS}/{self.stage}.json", *(str(item["file"]) for item in self.items if "file" in item)]
+
     def save(self) -> None:
         """Write the part."""
         atomic_write_text(
@@ -52,8 +57,14 @@ class PartWriter:
 
 
 def read_part(run_directory: Path, stage: str) -> list[dict[str, Any]]:
-    """Return the items of a stage's part; empty where it left none."""
+    """Return the items of a stage's part; empty where it left none, and one sentence where the file is damaged."""
     path = run_directory / PARTS / f"{stage}.json"
     if not path.is_file():
         return []
-    return list(json.loads(path.read_text(encoding="utf-8"))["items"])
+    try:
+        items = json.loads(path.read_text(encoding="utf-8"))["items"]
+        if all(isinstance(item, dict) and "kind" in item for item in items):
+            return list(items)
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    return [{"kind": "text", "text": f"The file {PARTS}/{stage}.json is damaged; `mrpipe run` builds it again."}]

@@ -12,12 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from mrpipe.artifacts import Provenance, atomic_write_text
+from mrpipe.artifacts import Provenance, atomic_write_text, public_data_directory
 from mrpipe.artifacts.plain import plain
 from mrpipe.config.loader import LoadedConfig
 from mrpipe.config.sections.campaigns import LABORATORY
 from mrpipe.errors import StageSkipped
-from mrpipe.pipeline.fingerprint import FileHashes, code_version, plain_settings
+from mrpipe.pipeline.code_version import code_version
+from mrpipe.pipeline.fingerprint import FileHashes, plain_settings
 from mrpipe.pipeline.manifest import Manifest, StageKey, reasons_stale
 from mrpipe.pipeline.parts import PartWriter
 from mrpipe.pipeline.progress import stage_progress
@@ -26,6 +27,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 CAMPAIGN_RECORDERS = {"bench": "record-bench", "frame": "record-frame", "closed-loop": "record-closed-loop"}
 ABSENT = "absent"
+PUBLIC_DATA = "public data"
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,11 @@ class Pipeline:
             base = path if path.is_dir() else path.parent
             return self._hashes.digest_many(files, base)
         return self._hashes.digest(path)
+
+    def _digest_of_public_data(self, folders: Sequence[str]) -> str:
+        base = public_data_directory()
+        there = [] if base is None else [base / name for name in folders if (base / name).is_dir()]
+        return self._hashes.digest_many(there, base) if base is not None and there else ABSENT
 
     # --- building ----------------------------------------------------------------------------------------------------
     def build(self, name: str) -> Outcome:
@@ -219,8 +226,10 @@ class Pipeline:
         }
         for name in stage.optional_inputs:
             digests.setdefault(name, ABSENT)
-        settings = plain_settings(self.loaded.config, stage.settings)
-        code = code_version(stage.run.__module__, stage.modules)
+        if stage.public_data:
+            digests[PUBLIC_DATA] = self._digest_of_public_data(stage.public_data)
+        settings = plain_settings(self.loaded.config, stage.settings, self._hashes)
+        code = code_version(stage.run.__module__)
         return StageKey(digests, settings, code, self.loaded.config.seed)
 
     def _run_or_reuse(self, stage: Stage) -> Outcome:
@@ -263,8 +272,9 @@ class Pipeline:
             except StageSkipped as reason:
                 summary, skipped = {}, str(reason)
                 self._remove_outputs(stage)
-        outputs = {} if skipped else {name: self._hashes.digest(self.run_directory / name) for name in stage.outputs}
         part.save()
+        written = [] if skipped else [*stage.outputs, *part.files]
+        outputs = {name: self._hashes.digest(self.run_directory / name) for name in written}
         seconds = time.monotonic() - started
         manifest = Manifest(stage.name, key, outputs, plain(summary), context.warnings, skipped, round(seconds, 3))
         manifest.save(self._manifests)

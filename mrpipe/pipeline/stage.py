@@ -114,8 +114,8 @@ class Stage:
         Dotted names of the settings read: whole sections (`prepare`) or single ones (`simulate.excitation`).
     outputs
         Files (or directories) written, relative to the run directory; the first is the stage's artifact.
-    modules
-        Modules whose source, with all of mrpipe that they import, makes up the stage's code version.
+    public_data
+        Folders of the public measurements ($MRPIPE_DATA) that the stage reads; they count by content.
     after
         Stages (or families of stages) that `mrpipe run` and `status` list before this one, in addition to those whose
         results it reads.
@@ -132,7 +132,7 @@ class Stage:
     optional_inputs: tuple[str, ...] = ()
     settings: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
-    modules: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
     family: str = ""
+    public_data: tuple[str, ...] = ()
     check: Callable[[Any], None] | None = None

@@ -34,7 +34,6 @@ def write_response(artifact: ArtifactWriter, response: Response, drive_unit: str
     artifact.put("drive", response.drive, unit=drive_unit, dims=("time",))
     artifact.put("commands", response.commands, unit="see mrpipe.control.kernel", dims=("sample", "command"))
     artifact.put("command_time", response.command_time_s, unit="s", dims=("sample",))
-    artifact.attributes("/", seconds=response.seconds)
 
 
 def read_histories(artifact: Artifact) -> dict[str, FloatArray]:

@@ -43,11 +43,6 @@ def _motion_summary(motion: GroundMotion) -> dict[str, Any]:
     }
 
 
-def _digest(context: StageContext) -> str:
-    """Return the digest of the files that the command was given (empty where it was given none)."""
-    return str(context.settings.benchmark.inputs_digest)
-
-
 def _bingham(name: str) -> BinghamDevice:
     from mrpipe.artifacts import load_parameter_set
     from mrpipe.case_studies.run import BinghamDevice
@@ -108,7 +103,7 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
                 _write_response(artifact, f"responses/{case.law}", case.response)
         artifact.attributes("/", model=study.model.origin, source=study.model.source)
     report.describe(context.report, studies, sweep)
-    return {**summary, "motion_details": _motion_summary(motion), "inputs_digest": _digest(context)}
+    return {**summary, "motion_details": _motion_summary(motion)}
 
 
 def _base_isolated(context: StageContext) -> Mapping[str, Any]:
@@ -162,7 +157,7 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
             _write_response(artifact, f"responses/{case.law}", case.response)
         artifact.attributes("/", model=building.model.origin, source=building.model.source)
     report.describe(context.report, result)
-    return {**summary, "motion_details": _motion_summary(motion), "inputs_digest": _digest(context)}
+    return {**summary, "motion_details": _motion_summary(motion)}
 
 
 def _wind_load(context: StageContext, settings: Any) -> WindLoad:
@@ -248,7 +243,7 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
             _write_response(artifact, f"responses/{case.law}", case.response)
         artifact.attributes("/", model=tower.model.origin, source=tower.model.source)
     report.describe(context.report, result)
-    return {**summary, "inputs_digest": _digest(context)}
+    return summary
 
 
 STAGES = (
@@ -256,27 +251,30 @@ STAGES = (
         name="benchmark-ten-storey",
         summary="The ten-storey frame of paper P4 under a ground motion, one 1000 kN damper at the bottom.",
         run=_ten_storey,
-        settings=("benchmark.ten_storey", "benchmark.inputs_digest"),
+        settings=("benchmark.ten_storey",),
         after=("close-loop",),
         family="benchmark",
         outputs=("benchmark-ten-storey.h5",),
+        public_data=("ground_motions", "asce_base_isolated"),
     ),
     Stage(
         name="benchmark-base-isolated",
         summary="The base-isolated building under two-component ground motions, two 1000 kN dampers at its base.",
         run=_base_isolated,
-        settings=("benchmark.base_isolated", "benchmark.inputs_digest"),
+        settings=("benchmark.base_isolated",),
         after=("close-loop",),
         family="benchmark",
         outputs=("benchmark-base-isolated.h5",),
+        public_data=("ground_motions", "asce_base_isolated"),
     ),
     Stage(
         name="benchmark-wind",
         summary="The 76-storey tower in across-wind, dampers at the ground, on an outrigger or at a tuned mass.",
         run=_wind,
-        settings=("benchmark.wind", "benchmark.inputs_digest"),
+        settings=("benchmark.wind",),
         after=("close-loop",),
         family="benchmark",
         outputs=("benchmark-wind.h5",),
+        public_data=("tall76",),
     ),
 )

@@ -241,5 +241,4 @@ STAGE = Stage(
     inputs=("identify-frame", "identify-damper"),
     settings=("calibrate",),
     outputs=("control.h5",),
-    modules=("mrpipe.stages.calibrate",),
 )

@@ -194,7 +194,6 @@ def _retrained(
     )
     summary["inverse"] = "retrained on the damper with its effects" if again.replaced else "kept: the better of both"
     summary["inverse_nrmse"] = {"before": again.before_nrmse, "after": again.after_nrmse}
-    summary["inverse_seconds"] = again.seconds
     return again.network
 
 

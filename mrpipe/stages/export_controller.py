@@ -48,5 +48,4 @@ STAGE = Stage(
     after=("reproduce",),
     family="export",
     outputs=(f"{FOLDER}/controller.json", f"{FOLDER}/controller.c", f"{FOLDER}/controller.h", f"{FOLDER}/README.md"),
-    modules=("mrpipe.stages.export_controller",),
 )

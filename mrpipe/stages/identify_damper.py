@@ -187,11 +187,4 @@ STAGE = Stage(
     after=("train-inverse",),
     settings=("identify_damper",),
     outputs=("damper.h5",),
-    modules=(
-        "mrpipe.stages.identify_damper",
-        "mrpipe.dampers.comparison",
-        "mrpipe.dampers.forms",
-        "mrpipe.dampers.summary",
-        "mrpipe.reporting.dampers",
-    ),
 )

@@ -99,5 +99,4 @@ STAGE = Stage(
     after=("identify-damper",),
     settings=("identify_frame",),
     outputs=("frame.h5",),
-    modules=("mrpipe.stages.identify_frame",),
 )

@@ -38,5 +38,5 @@ STAGE = Stage(
     settings=("reproduce",),
     after=("benchmark",),
     outputs=("reproduce.h5", "reproduce.md"),
-    modules=("mrpipe.stages.reproduce",),
+    public_data=("ground_motions", "asce_base_isolated", "tall76"),
 )

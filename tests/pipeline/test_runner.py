@@ -14,9 +14,11 @@ import pytest
 from mrpipe.artifacts import Artifact
 from mrpipe.artifacts.plain import plain, to_json
 from mrpipe.errors import UserError
-from mrpipe.pipeline.fingerprint import code_version, digest_of_artifact
+from mrpipe.pipeline.code_version import code_version
+from mrpipe.pipeline.fingerprint import digest_of_artifact
 from mrpipe.pipeline.lock import run_lock
 from mrpipe.pipeline.manifest import Manifest
+from mrpipe.pipeline.parts import read_part
 from mrpipe.pipeline.stage import StageContext
 
 from .conftest import CALLS, STAGES, MakePipeline, with_run
@@ -76,7 +78,11 @@ def test_output_harmed_by_other_hands_is_built_again(harm: str, make_pipeline: M
     else:
         with h5py.File(path, "a") as handle:
             handle["values"][0] = 9.0
-    expected = "output first.h5 is missing" if harm == "remove" else "output first.h5 was changed by other hands"
+    expected = (
+        "output first.h5 is missing"
+        if harm == "remove"
+        else "output first.h5 was changed or damaged after it was written"
+    )
     again = make_pipeline()
     assert again.status(["first"])["first"] == [expected]
     assert again.build("first").reasons == [expected]
@@ -206,3 +212,45 @@ def test_json_is_strict() -> None:
 def test_missing_artifact_is_told(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no such artifact; run the stage that writes it"):
         Artifact(tmp_path / "none.h5")
+
+
+@pytest.mark.parametrize("harm", ["remove", "change"])
+def test_a_harmed_part_of_the_report_is_built_again(harm: str, make_pipeline: MakePipeline) -> None:
+    pipeline = make_pipeline()
+    pipeline.build("second")
+    part = pipeline.run_directory / "report-parts" / "second.json"
+    whole = part.read_text()
+    if harm == "remove":
+        part.unlink()
+    else:
+        part.write_text(whole[: len(whole) // 2])
+    assert "damaged" in str(read_part(pipeline.run_directory, "second")) or harm == "remove"
+    again = make_pipeline()
+    assert again.build("second").what == "built"
+    assert part.read_text() == whole
+    assert CALLS == ["first", "second", "second"]
+
+
+@pytest.mark.parametrize("content", ["", "null", "[]", '{"stage": 1}', '{"outputs": 5}'])
+def test_a_damaged_manifest_counts_as_none(content: str, make_pipeline: MakePipeline) -> None:
+    pipeline = make_pipeline()
+    pipeline.build("first")
+    path = pipeline.run_directory / "manifests" / "first.json"
+    if content == '{"outputs": 5}':
+        content = json.dumps({**json.loads(path.read_text()), "outputs": 5})
+    path.write_text(content)
+    again = make_pipeline()
+    assert again.status(["first"])["first"] == ["never built"]
+    assert again.build("first").what == "built"
+
+
+def test_a_damaged_artifact_is_built_again(make_pipeline: MakePipeline) -> None:
+    pipeline = make_pipeline()
+    pipeline.build("second")
+    path = pipeline.run_directory / "first.h5"
+    before, content = digest_of_artifact(path), path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    again = make_pipeline()
+    assert again.status(["second"])["first"] == ["output first.h5 was changed or damaged after it was written"]
+    assert again.build("second").what == "reused"
+    assert digest_of_artifact(path) == before

@@ -192,11 +192,6 @@ class BenchmarkSettings(Section):
         BaseIsolatedSettings(), description="The base-isolated building of section 6.2."
     )
     wind: WindSettings = Field(WindSettings(), description="The 76-storey tower of section 6.3.")
-    inputs_digest: str = Field(
-        "",
-        description="Digest of the model and motion files that the command was given; the command sets it, so that a "
-        "file that changed makes the stage stale.",
-    )
 
 
 Benchmark = Literal["ten-storey", "base-isolated", "wind"]

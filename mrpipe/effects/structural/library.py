@@ -12,6 +12,9 @@ from mrpipe.effects.library import effect_of_file, effects_in
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 
+LOADS_FROM = ("mrpipe.effects.structural",)
+"""Packages that are walked at run time: their modules belong to the code version of a stage."""
+
 
 @cache
 def all_structural_effects() -> dict[str, StructuralEffect]:
