@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from mrpipe.config.model import Config
+from mrpipe.config.model import config_model
 from mrpipe.pipeline.fingerprint import MISSING, FileHashes, digest_of_artifact, plain_settings
 from mrpipe.stages.registry import all_stages
 
@@ -110,7 +110,7 @@ _NAMED = {
 def test_the_content_of_a_file_that_a_setting_names_counts(section: str, tmp_path: Path, hashes: FileHashes) -> None:
     file = tmp_path / "own.yaml"
     file.write_text("1.0")
-    config = Config.model_validate({section: _NAMED[section](str(file))})
+    config = config_model().model_validate({section: _NAMED[section](str(file))})
     before = plain_settings(config, [section], hashes)
     assert plain_settings(config, [section], hashes) == before
     file.write_text("2.0")
@@ -123,7 +123,7 @@ def test_the_content_of_a_file_that_a_setting_names_counts(section: str, tmp_pat
 def test_a_bare_word_is_no_file(tmp_path: Path, hashes: FileHashes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "identified").write_text("a file that has the name of a value by chance")
-    assert list(plain_settings(Config(), ["simulate"], hashes)) == ["simulate"]
+    assert list(plain_settings(config_model()(), ["simulate"], hashes)) == ["simulate"]
 
 
 @pytest.mark.property
