@@ -1,0 +1,6 @@
+"""Checks whether the numbers of a campaign can be what campaign.yaml says they are."""
+
+from mrpipe.campaigns.plausibility.compare_tests import compare_tests
+from mrpipe.campaigns.plausibility.finding import Finding, TestArrays, arrays_of
+
+__all__ = ["Finding", "TestArrays", "arrays_of", "compare_tests"]

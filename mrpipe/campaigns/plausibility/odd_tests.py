@@ -1,0 +1,288 @@
+"""Tests whose force contradicts that of the other tests: sign, exchanged channels, unit, gain, delay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.plausibility.agreement import Agreement, agreement, delay, fit
+from mrpipe.campaigns.plausibility.finding import Finding, TestArrays
+from mrpipe.campaigns.plausibility.reference import ReferenceMap, Slow, slow_down
+
+GAIN_SCATTER, PHASE_SCATTER = 0.04, 0.06
+"""Standard deviations between tests of a sound rig, before any test is seen: of log(gain), and of phase [rad]."""
+
+PRIOR_TESTS = 4
+"""Number of tests that these prior figures are worth."""
+
+CHANCE = 0.02
+"""Probability with which a sound campaign would have one test called odd."""
+
+DECADES = 100.0
+"""Ratio of RMS force or drive between a test and all others from which a unit is suspected by itself."""
+
+LARGE_DRIVE = 20.0
+"""Drive [A or V] above which milliamperes or millivolts are suspected."""
+
+EXCHANGED = 1.05
+"""Mean frequency of displacement over that of force above which the two look exchanged."""
+
+FACTORS = (1000.0, 1e-3)
+
+
+def find_odd_tests(arrays: Sequence[TestArrays]) -> list[Finding]:
+    """Return the tests that contradict the others, each with the simplest mistake that explains it.
+
+    First the energy is looked at: a damper dissipates, so a test in which the force does negative work while it does
+    positive work in the others has a reversed sign or exchanged channels. The remaining tests are compared with a force
+    map that the others predict. The oddest is taken out until all that remain agree; for each odd test a wrong unit
+    is tried as explanation, else its gain is reported. Tests in which nothing moves are left out.
+    """
+    tests = [slow_down(test) for test in arrays if _moves(test)]
+    if len(tests) < 2:
+        return []
+    findings: list[Finding] = []
+    for check in (_decades, _against_the_work):
+        findings += check(tests)
+        tests = [test for test in tests if test.name not in {item.test for item in findings}]
+    return findings + (_against_the_map(tests) if len(tests) > 2 else [])
+
+
+def find_exchanged_columns(arrays: Sequence[TestArrays]) -> list[Finding]:
+    """Return a finding where displacement and force look exchanged in most tests of a campaign."""
+    tests = [slow_down(test) for test in arrays if _moves(test)]
+    ratios = [test.frequency_ratio for test in tests]
+    if not ratios or float(np.median(ratios)) <= EXCHANGED:
+        return []
+    return [
+        Finding(
+            name="channels-exchanged",
+            severity="error",
+            sentence="displacement and force look exchanged: the displacement holds higher frequencies than the force "
+            f"(mean frequency {float(np.median(ratios)):.2f} times that of the force), but a damper distorts its force",
+            remedy="exchange the columns of displacement and force in campaign.yaml",
+            numbers={"frequency_ratio": float(np.median(ratios))},
+        )
+    ]
+
+
+def _moves(test: TestArrays) -> bool:
+    return bool(test.time_s.size >= 100 and np.std(test.displacement_m) > 0.0 and np.std(test.force_n) > 0.0)
+
+
+def _against_the_work(tests: Sequence[Slow]) -> list[Finding]:
+    """Return tests in which the force does negative work, or none, while it does positive work in the others."""
+    findings = []
+    for index, test in enumerate(tests):
+        others = [other for other in tests if other is not test]
+        work = float(np.median([other.work for other in others])) if others else 0.0
+        if work < 0.2 or test.work > 0.1:
+            continue
+        told = f"correlation of force and velocity {test.work:.2f}, in the other tests {work:.2f}"
+        numbers = {"correlation_with_velocity": test.work, "correlation_of_others": work}
+        found = _why_no_work(test, index, tests)
+        if found is not None:
+            name, channel, sentence, remedy = found
+            findings.append(Finding(name, "error", f"{sentence} ({told})", remedy, test.name, channel, numbers))
+    return findings
+
+
+def _why_no_work(test: Slow, index: int, tests: Sequence[Slow]) -> tuple[str, str, str, str] | None:
+    """Return name, channel, sentence and remedy of the mistake that best explains a test without positive work."""
+    bad = {position for position, other in enumerate(tests) if other.work < 0.1} | {index}
+    if len(bad) == len(tests):
+        return None
+    reference = ReferenceMap(tests)
+    coefficients = reference.coefficients(bad)
+    plain = fit(reference.normal(test), coefficients)[1]
+    exchanged = fit(reference.normal(test.exchanged(reference.travel)), coefficients)[1]
+    if exchanged > max(-plain, 0.5):
+        sentence = f"displacement and force look exchanged: exchanged they follow the other tests ({exchanged:.2f})"
+        return "channels-exchanged", "displacement", sentence, "exchange the two columns in this test"
+    if test.work < -0.2:
+        return (
+            "sign-reversed",
+            "force",
+            "force or displacement has the opposite sign to the other tests",
+            "correct the sign with `scale: -1` on one of the two channels in this test",
+        )
+    if abs(plain) < 0.3:
+        return (
+            "force-unrelated",
+            "force",
+            "force does not follow the motion as it does in the other tests",
+            "check the sensors of this test and the columns that are named for it, or leave the test out",
+        )
+    return None
+
+
+def _against_the_map(tests: Sequence[Slow]) -> list[Finding]:
+    reference = ReferenceMap(tests)
+    odd: list[int] = []
+    while len(tests) - len(odd) > max(2, len(tests) // 2):
+        worst = _oddest(reference, odd)
+        if worst is None:
+            break
+        odd.append(worst)
+    findings = [_explain(reference, tests, index, odd) for index in sorted(odd)]
+    sound = [index for index in range(len(tests)) if index not in odd]
+    return findings + _late(reference, tests, sound)
+
+
+def limit_of(others: FloatArray, prior: float, tests: int, error: float = 0.0) -> float:
+    """Return the largest deviation from the middle of the others that chance explains.
+
+    The scatter of the others is pooled with a prior (Student's t); `error` is the standard error of the figure itself.
+    """
+    freedom = PRIOR_TESTS + others.size - 1
+    middle = float(np.median(others))
+    variance = (PRIOR_TESTS * prior**2 + float(np.sum((others - middle) ** 2))) / freedom
+    quantile = float(stats.t.ppf(1.0 - CHANCE / (2 * tests), freedom))
+    return quantile * float(np.sqrt(variance * (1.0 + 1.0 / others.size) + error**2))
+
+
+def _oddest(reference: ReferenceMap, odd: Sequence[int]) -> int | None:
+    """Return the test that agrees least with the others, None where all agree."""
+    kept = [index for index in range(len(reference.parts)) if index not in odd]
+    items = {index: agreement(reference, reference.parts[index], {*odd, index}) for index in kept}
+    scores: dict[int, float] = {}
+    for index, item in items.items():
+        related = [other for other in kept if other != index]
+        correlations = [items[other].correlation for other in related]
+        if item.highest_correlation < 0.3 and float(np.median(correlations)) > 0.8:
+            scores[index] = 100.0 * (1.0 - item.highest_correlation)
+            continue
+        gains = np.array([items[other].log_gain for other in related if items[other].correlation > 0.5])
+        if item.correlation < 0.5 or gains.size < 2:
+            continue
+        by = abs(item.log_gain - float(np.median(gains)))
+        error = item.log_gain_error
+        if gains.size < 3 or not np.isfinite(error):
+            # too little to judge a gain, but decades show in any case
+            error = 1.0
+        score = by / limit_of(gains, GAIN_SCATTER, len(kept), error)
+        if score > 1.0:
+            scores[index] = score
+    return max(scores, key=lambda index: scores[index]) if scores else None
+
+
+def _explain(reference: ReferenceMap, tests: Sequence[Slow], index: int, odd: Sequence[int]) -> Finding:
+    """Name the simplest mistake that makes an odd test agree with the sound ones."""
+    test = tests[index]
+    without = {*odd, index}
+    plain = agreement(reference, reference.parts[index], without)
+    numbers = {"gain": plain.gain, "correlation": plain.correlation}
+    if plain.correlation < 0.3:
+        return Finding(
+            name="force-unrelated",
+            severity="error",
+            test=test.name,
+            channel="force",
+            sentence="force does not follow the motion as it does in the other tests (correlation with their "
+            f"prediction {plain.correlation:.2f})",
+            remedy="check the sensors of this test and the columns that are named for it, or leave the test out",
+            numbers=numbers,
+        )
+    for channel, factor in _units(reference, test, without, plain):
+        return _unit_finding(test, channel, factor, f"force is {plain.gain:.3g} times what they predict", numbers)
+    return Finding(
+        name="gain-differs",
+        severity="warning",
+        test=test.name,
+        channel="force",
+        sentence=f"force is {plain.gain:.3g} times what the other tests give for this motion and drive",
+        remedy="check range and calibration of the load cell, the drive and the temperature in this test",
+        numbers=numbers,
+    )
+
+
+def _units(reference: ReferenceMap, test: Slow, without: set[int], plain: Agreement) -> list[tuple[str, float]]:
+    """Return channel and factor of the unit that brings a test closest to the others, if one does."""
+    found = []
+    for channel in ("force", "displacement", "drive"):
+        for factor in FACTORS:
+            changed = test.scaled(**{channel: factor})
+            item = agreement(reference, reference.normal(changed), without)
+            distance = abs(item.log_gain) + 2.0 * (1.0 - item.correlation)
+            if item.correlation > 0.7 and abs(item.log_gain) < max(np.log(2.0), 0.25 * abs(plain.log_gain)):
+                found.append((distance, channel, factor))
+    before = abs(plain.log_gain) + 2.0 * (1.0 - plain.correlation)
+    return [(channel, factor) for distance, channel, factor in sorted(found)[:1] if distance < 0.5 * before]
+
+
+def _unit_finding(test: Slow, channel: str, factor: float, evidence: str, numbers: dict[str, float]) -> Finding:
+    wrong = "small" if factor > 1.0 else "large"
+    return Finding(
+        name="unit-decades",
+        severity="error",
+        test=test.name,
+        channel=channel,
+        sentence=f"{channel} looks 1000 times too {wrong} beside the other tests ({evidence})",
+        remedy=f"correct the unit of {channel} in this test",
+        numbers={**numbers, "factor_to_correct": factor},
+    )
+
+
+def _decades(tests: Sequence[Slow]) -> list[Finding]:
+    """Return tests whose stroke, force or drive lies decades away from that of all others.
+
+    A drive can be zero in a test, so only a drive that is far larger than all others is suspected.
+    """
+    findings = []
+    for channel, decades in (("displacement", 3.0 * DECADES), ("force", DECADES), ("drive", DECADES)):
+        sizes = [float(np.sqrt(np.mean(getattr(test, channel) ** 2))) for test in tests]
+        for index, size in enumerate(sizes):
+            others = [other for position, other in enumerate(sizes) if position != index]
+            if size <= 0.0 or not max(others) > 0.0:
+                continue
+            ratio = size / max(others)
+            # of two tests, the larger one is named, because which of them is wrong cannot be known
+            small = channel != "drive" and len(tests) > 2 and min(others) > 0.0
+            ratio = ratio if ratio > 1.0 else min(size / min(others), 1.0) if small else 1.0
+            # a drive near zero is noise, so ratios alone say nothing
+            suspect = channel != "drive" or size > LARGE_DRIVE
+            if suspect and (ratio > decades or ratio < 1.0 / decades):
+                told = f"its RMS is {ratio:.3g} times that of any other test"
+                factor = 1e-3 if ratio > 1.0 else 1e3
+                findings.append(_unit_finding(tests[index], channel, factor, told, {"ratio": ratio}))
+    return findings
+
+
+def _late(reference: ReferenceMap, tests: Sequence[Slow], sound: Sequence[int]) -> list[Finding]:
+    """Return tests whose force comes earlier or later than in the other tests.
+
+    Delays are compared as phases of the mean frequency, because what the map does not know of hysteresis shifts the
+    force by a share of the period.
+    """
+    without = [index for index in range(len(tests)) if index not in sound]
+    phases: dict[int, float] = {}
+    for index in sound:
+        item = agreement(reference, reference.parts[index], {*without, index})
+        if item.correlation > 0.8 and item.log_gain_error < 0.3:
+            expected = reference.predict(tests[index], {*without, index})
+            phases[index] = 2.0 * np.pi * tests[index].frequency_hz * delay(tests[index], expected)
+    findings = []
+    for index, phase in phases.items():
+        others = np.array([value for other, value in phases.items() if other != index])
+        if others.size < 3:
+            continue
+        by = phase - float(np.median(others))
+        if abs(by) <= limit_of(others, PHASE_SCATTER, len(phases)):
+            continue
+        seconds = by / (2.0 * np.pi * tests[index].frequency_hz)
+        findings.append(
+            Finding(
+                name="delay-differs",
+                severity="warning",
+                test=tests[index].name,
+                channel="force",
+                sentence=f"force comes {1e3 * abs(seconds):.3g} ms {'later' if by > 0.0 else 'earlier'} against the "
+                "displacement than in the other tests",
+                remedy="check whether the channels of this test were recorded with one clock",
+                numbers={"delay_s": seconds},
+            )
+        )
+    return findings
