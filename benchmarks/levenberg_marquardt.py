@@ -20,8 +20,9 @@ from mrpipe.networks.assembly import History
 from mrpipe.networks.held_out import training_data
 from mrpipe.networks.levenberg_marquardt import Method, StoppingRules, fit
 from mrpipe.networks.network import FeatureSpec
+from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.problem import Problem
-from mrpipe.networks.training import TrainingOptions, train
+from mrpipe.networks.training import train
 
 RATE = 200.0
 METHODS: tuple[Method, ...] = ("mu-identity", "mu-diagonal", "least-squares")
@@ -73,7 +74,12 @@ def main() -> None:
     history = history_of(arguments.rows)
     spec = FeatureSpec(("velocity", "drive"), 3, False, RATE, "force")
     options = TrainingOptions(
-        biases=True, starts=arguments.starts, refined_starts=arguments.starts, iterations=50, held_out_share=0.0
+        architecture=(6, 6),
+        biases=True,
+        starts=arguments.starts,
+        refined_starts=arguments.starts,
+        iterations=50,
+        held_out_share=0.0,
     )
     rng = np.random.default_rng(2)
     data = training_data(history, spec, options.held_out_share, rng)

@@ -8,7 +8,8 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.networks.assembly import History
 from mrpipe.networks.network import FeatureSpec
-from mrpipe.networks.training import Trained, TrainingOptions, train
+from mrpipe.networks.options import TrainingOptions
+from mrpipe.networks.training import Trained, train
 
 KINDS = ("sine", "triangle", "step", "gaussian")
 """Displacement inputs of the training set (6.1)."""
@@ -102,7 +103,8 @@ def train_inverse(device: BinghamDevice, rng: np.random.Generator, *, hidden: in
     """
     spec = FeatureSpec(("velocity", "force"), 0, True, RATE_HZ, "drive")
     options = TrainingOptions(
-        hidden=(hidden, hidden),
+        architecture=(hidden, hidden),
+        biases=True,
         starts=4,
         refined_starts=1,
         subsample_rows=4000,

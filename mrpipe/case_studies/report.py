@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -13,19 +12,6 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.style import COLOURS, MEASURED, figure_with_axes, label
 
 _POINTS = 4000
-
-
-class Sink(Protocol):
-    """Where texts, tables and figures go, in order."""
-
-    def text(self, paragraph: str) -> None:
-        """Add a paragraph."""
-
-    def table(self, name: str, frame: pd.DataFrame, caption: str) -> None:
-        """Add a table."""
-
-    def figure(self, name: str, figure: Figure, caption: str) -> None:
-        """Add a figure."""
 
 
 def _thinned(count: int) -> slice:

@@ -8,9 +8,9 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.networks.assembly import History
-from mrpipe.networks.levenberg_marquardt import StoppingRules
 from mrpipe.networks.network import FeatureSpec, Network, lagged
-from mrpipe.networks.training import TrainingOptions, train
+from mrpipe.networks.options import TrainingOptions
+from mrpipe.networks.training import train
 
 
 @dataclass(frozen=True)
@@ -109,14 +109,14 @@ def train_reference(
         history,
         spec,
         TrainingOptions(
-            hidden=options.hidden,
+            architecture=options.hidden,
             biases=False,
             starts=options.starts,
             refined_starts=1,
-            rules=StoppingRules(iterations=options.iterations, held_out_failures=15),
+            held_out_failures=15,
             subsample_rows=options.rows,
             subsample_iterations=options.iterations,
-            iterations=20,
+            iterations=min(20, options.iterations),
             method="mu-diagonal",
         ),
         rng,

@@ -165,6 +165,13 @@ def free_run(network: Network, history: History) -> FloatArray:
     return np.concatenate([output[index, :length] for index, length in enumerate(lengths)])
 
 
+def judge_free_run(network: Network, history: History) -> ErrorFigures | None:
+    """Return the errors of :func:`free_run`, or None for a network without past outputs among its inputs."""
+    if not network.features.past_target:
+        return None
+    return error_figures(history.channels[network.features.target], free_run(network, history))
+
+
 @dataclass(frozen=True)
 class Judgement:
     """A network judged on validation tests.
@@ -187,6 +194,8 @@ class Judgement:
         Share of estimates below zero (by more than a hundredth of the largest target).
     outside_training_range
         Share of validation rows beyond the range of the training set.
+    test_varies
+        Whether the drive varies within each validation test.
     """
 
     samples: Samples
@@ -202,9 +211,26 @@ class Judgement:
     yield_travel_m: float
     negative_share: float
     outside_training_range: float
+    test_varies: tuple[bool, ...]
 
-    def rows(self, unit: str) -> list[dict[str, str | float | int]]:
-        """Return the table of errors, a row a group of samples; `unit` is that of the target."""
+    @property
+    def finding(self) -> str:
+        """What a user should know of the validation tests; empty where there is nothing to say."""
+        share = 100.0 * self.outside_training_range
+        return f"{share:.1f} % of the validation samples lie outside the training range" if share > 1.0 else ""
+
+    def rows(self, unit: str, span: float | None = None) -> list[dict[str, str | float | int]]:
+        """Return the table of errors, one row for each group of samples.
+
+        Parameters
+        ----------
+        unit
+            Of the target.
+        span
+            Range of the target. Where it is given (drive of an inverse network) errors are also shown as a share of it,
+            and relative errors are left out for groups whose target is constant within each test: the RMS of a drive
+            of 0 A says nothing about the error.
+        """
         groups = [
             ("all", self.pooled),
             ("linear model, all", self.linear),
@@ -213,21 +239,27 @@ class Judgement:
             *((name.replace("_", "-"), figures) for name, figures in self.regimes.items()),
             *((f"varying drive, {name.replace('_', '-')}", figures) for name, figures in self.varying_regimes.items()),
         ]
-        return [{"samples of": name, **_row(figures, unit)} for name, figures in groups if figures.samples]
+        return [
+            {"samples of": name, **_row(figures, unit, span, varies=name != "constant drive")}
+            for name, figures in groups
+            if figures.samples
+        ]
 
-    def test_rows(self, unit: str) -> list[dict[str, str | float | int]]:
-        """Return the table of errors of each test."""
-        return [{"test": name, **_row(figures, unit)} for name, figures in self.tests]
+    def test_rows(self, unit: str, span: float | None = None) -> list[dict[str, str | float | int]]:
+        """Return the table of errors of each test; the arguments are those of :meth:`rows`."""
+        varies = dict(zip((name for name, _ in self.tests), self.test_varies, strict=True))
+        return [{"test": name, **_row(figures, unit, span, varies=varies[name])} for name, figures in self.tests]
 
 
-def _row(figures: ErrorFigures, unit: str) -> dict[str, str | float | int]:
-    return {
-        "NRMSE": figures.nrmse,
-        "fit [%]": figures.fit_percent,
-        "R2": figures.r2,
-        f"RMS error [{unit}]": figures.rms,
-        "n": figures.samples,
-    }
+def _row(figures: ErrorFigures, unit: str, span: float | None, *, varies: bool) -> dict[str, str | float | int]:
+    nan = float("nan")
+    row: dict[str, str | float | int] = {f"RMS error [{unit}]": figures.rms}
+    if span is None:
+        row |= {"NRMSE": figures.nrmse, "fit [%]": figures.fit_percent, "R2": figures.r2}
+    else:
+        row |= {"RMS error [% of range]": 100.0 * figures.rms / span if span > 0.0 else nan}
+        row |= {"R2 (varying drive)": figures.r2 if varies else nan}
+    return {**row, "samples": figures.samples}
 
 
 def judge(network: Network, training: History, validation: History) -> Judgement:
@@ -253,4 +285,5 @@ def judge(network: Network, training: History, validation: History) -> Judgement
         yield_travel_m=travel,
         negative_share=float(np.mean(estimated < -floor)) if len(estimated) else 0.0,
         outside_training_range=network.outside_training_range(rows.features),
+        test_varies=tuple(validation.drive_varies),
     )

@@ -11,7 +11,7 @@ from mrpipe.artifacts import IntArray
 from mrpipe.networks.assembly import History, Samples, samples
 from mrpipe.networks.network import FeatureSpec
 from mrpipe.networks.problem import Problem
-from mrpipe.networks.scaling import Normalisation, Scaling, scaling_of
+from mrpipe.networks.scaling import NORMALISATION, Normalisation, Scaling, scaling_of
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def training_data(
     share: float,
     rng: np.random.Generator,
     *,
-    normalisation: Normalisation = "maximum",
+    normalisation: Normalisation = NORMALISATION,
     whitened: bool = True,
 ) -> TrainingData:
     """Hold a share of the records out, build feature rows and normalise them (see :mod:`mrpipe.networks.scaling`)."""

@@ -17,6 +17,9 @@ from mrpipe.networks.network import FeatureSpec
 
 Normalisation = Literal["maximum", "range", "standard"]
 
+NORMALISATION: Normalisation = "maximum"
+"""What is used where nothing else is asked for: zero stays zero."""
+
 _SMALLEST_EIGENVALUE = 1e-9
 
 
@@ -58,7 +61,7 @@ def scaling_of(
     features: FloatArray,
     target: FloatArray,
     spec: FeatureSpec,
-    normalisation: Normalisation = "maximum",
+    normalisation: Normalisation = NORMALISATION,
     *,
     whitened: bool = True,
 ) -> Scaling:

@@ -6,9 +6,8 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -17,9 +16,10 @@ from mrpipe.artifacts import FloatArray, IntArray, Progress, atomic_path, no_pro
 from mrpipe.networks.assembly import History, rows_at, window_starts
 from mrpipe.networks.candidates import Candidate
 from mrpipe.networks.held_out import hold_out
-from mrpipe.networks.levenberg_marquardt import Method, StoppingRules, fit
+from mrpipe.networks.levenberg_marquardt import StoppingRules, fit
+from mrpipe.networks.options import SweepOptions
 from mrpipe.networks.problem import Problem
-from mrpipe.networks.scaling import Normalisation, scaling_of
+from mrpipe.networks.scaling import NORMALISATION, Normalisation, scaling_of
 from mrpipe.networks.training import in_parallel, initial_parameters
 
 Crossings = Callable[[Mapping[Candidate, float]], list[Candidate]]
@@ -27,41 +27,6 @@ Crossings = Callable[[Mapping[Candidate, float]], list[Candidate]]
 
 _Fits = tuple[FloatArray, FloatArray]
 """Errors (starts,) and parameters (starts, P) of one candidate."""
-
-
-@dataclass(frozen=True)
-class SweepOptions:
-    """How candidates are compared.
-
-    Attributes
-    ----------
-    starts
-        Random starts of every candidate.
-    screen_rows, screen_iterations
-        Of the screening fit.
-    refined
-        How many candidates, the best of the screening, go on.
-    refine_rows, refine_iterations
-        Of the fit that continues each of their starts.
-    held_out_rows
-        Rows of the held-out records on which all are judged.
-    held_out_share, method, whitened, normalisation, initial, rules
-        As for training.
-    """
-
-    starts: int = 4
-    screen_rows: int = 3000
-    screen_iterations: int = 60
-    refined: int = 12
-    refine_rows: int = 8000
-    refine_iterations: int = 60
-    held_out_rows: int = 8000
-    held_out_share: float = 0.25
-    method: Method = "mu-identity"
-    whitened: bool = True
-    normalisation: Normalisation = "maximum"
-    initial: Literal["random", "perceptron"] = "random"
-    rules: StoppingRules = field(default_factory=StoppingRules)
 
 
 @dataclass(frozen=True)
@@ -97,6 +62,7 @@ class _Data:
     screen: IntArray
     refine: IntArray
     judged: IntArray
+    normalisation: Normalisation
 
 
 def sweep(
@@ -105,6 +71,7 @@ def sweep(
     options: SweepOptions,
     seed: int,
     *,
+    normalisation: Normalisation = NORMALISATION,
     jobs: int = 1,
     cache: Path | None = None,
     crossings: tuple[Crossings, int] | None = None,
@@ -123,6 +90,8 @@ def sweep(
         How.
     seed
         Of the split and the starts. A candidate's starts depend on the candidate and the seed alone.
+    normalisation
+        Of inputs and target, see :mod:`mrpipe.networks.scaling`.
     jobs
         Threads; no result depends on it.
     cache
@@ -135,7 +104,7 @@ def sweep(
         Told how far it is; told the predicted cost before it starts.
     """
     began = time.perf_counter()
-    data = _places(history, candidates, options, seed)
+    data = _places(history, candidates, options, seed, normalisation)
     digest = _digest_of(data, options, seed)
     further = crossings[1] if crossings else 0
     kept = [_kept_file(cache, f"screen-{digest}", item) is not None for item in candidates]
@@ -221,7 +190,9 @@ def _part(progress: Progress, first: float, last: float) -> Progress:
     return lambda fraction, text="": progress(first + (last - first) * fraction, text)
 
 
-def _places(history: History, candidates: Sequence[Candidate], options: SweepOptions, seed: int) -> _Data:
+def _places(
+    history: History, candidates: Sequence[Candidate], options: SweepOptions, seed: int, normalisation: Normalisation
+) -> _Data:
     rng = np.random.default_rng([seed, 1])
     fit_history, held = hold_out(history, options.held_out_share, rng)
     longest = max(candidate.past_values for candidate in candidates)
@@ -233,6 +204,7 @@ def _places(history: History, candidates: Sequence[Candidate], options: SweepOpt
         screen=np.sort(shuffled[: options.screen_rows]),
         refine=np.sort(shuffled[: options.refine_rows]),
         judged=np.sort(rng.permutation(judged)[: options.held_out_rows]),
+        normalisation=normalisation,
     )
 
 
@@ -242,11 +214,11 @@ def _fit_all(
     """Fit every start of a candidate; return held-out errors (starts,) and parameters (starts, P)."""
     spec = candidate.spec(data.fit.sampling_rate_hz)
     features, target = rows_at(data.fit, spec, data.screen if starts is None else data.refine)
-    scaling = scaling_of(features, target, spec, options.normalisation, whitened=options.whitened)
+    scaling = scaling_of(features, target, spec, data.normalisation, whitened=options.whitened)
     if starts is not None:
         # the parameters of the screening live in the basis of its rows
         small = rows_at(data.fit, spec, data.screen)
-        scaling = scaling_of(*small, spec, options.normalisation, whitened=options.whitened)
+        scaling = scaling_of(*small, spec, data.normalisation, whitened=options.whitened)
     held_features, held_target = rows_at(data.held, spec, data.judged)
     problem = Problem(scaling.inputs(features), scaling.target(target), candidate.layers, candidate.biases)
     held = Problem(scaling.inputs(held_features), scaling.target(held_target), candidate.layers, candidate.biases)
@@ -337,8 +309,8 @@ def _number(key: str) -> int:
 def _digest_of(data: _Data, options: SweepOptions, seed: int) -> str:
     """Return a digest of all that a fit depends on besides its candidate."""
     digest = hashlib.sha256()
-    kept = {name: value for name, value in asdict(options).items() if name != "refined"}
-    digest.update(json.dumps([kept, seed], sort_keys=True).encode())
+    fits = options.model_dump(exclude={"refined", "design", "states", "past_values", "layers", "neurons", "biases"})
+    digest.update(json.dumps([fits, data.normalisation, seed], sort_keys=True).encode())
     for history, places in ((data.fit, data.refine), (data.held, data.judged)):
         digest.update(places.tobytes())
         for name in sorted(history.channels):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.networks.assembly import History, samples
-from mrpipe.networks.evaluation import ErrorFigures, error_figures
+from mrpipe.networks.evaluation import ErrorFigures, by_regime, error_figures, regimes_of
 from mrpipe.networks.network import Network
+from mrpipe.networks.options import ViscousEmulationOptions
 
 
 @dataclass(frozen=True)
@@ -157,4 +159,77 @@ def emulate_viscous(
         fast=error_figures(tracking.desired_n[fast], tracking.force_n[fast]),
         negative_share=float(np.mean(tracking.drive_raw < -0.01 * drive_limit)),
         outside_training_range=inverse.outside_training_range(samples(motion, inverse.features).features),
+    )
+
+
+@dataclass(frozen=True)
+class TrackingJudgement:
+    """How well an inverse network serves a controller.
+
+    Attributes
+    ----------
+    pooled, regimes
+        Error of the force of the round trip on the validation tests: of all samples, and by regime.
+    viscous
+        Emulation of viscous damping.
+    """
+
+    pooled: ErrorFigures
+    regimes: dict[str, ErrorFigures]
+    viscous: ViscousEmulation
+
+    @property
+    def finding(self) -> str:
+        """What a user should know; empty where there is nothing to say."""
+        share = 100.0 * self.viscous.outside_training_range
+        if share <= 1.0:
+            return ""
+        return (
+            f"the viscous damping to be emulated lies {share:.1f} % of the time outside the training range: lower "
+            "train_inverse.viscous.amplitude_m, frequency_hz or damping_n_s_m"
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers by name."""
+        viscous = self.viscous
+        return {
+            "round_trip_nrmse": self.pooled.nrmse,
+            "round_trip_regime_nrmse": {name: item.nrmse for name, item in self.regimes.items()},
+            "viscous_nrmse": viscous.figures.nrmse,
+            "viscous_fast_nrmse": viscous.fast.nrmse,
+            "viscous_damping_n_s_m": viscous.damping_n_s_m,
+            "viscous_negative_drive_share": viscous.negative_share,
+            "viscous_outside_training_range_share": viscous.outside_training_range,
+        }
+
+
+def judge_tracking(
+    inverse: Network,
+    forward: Network,
+    training: History,
+    validation: History,
+    options: ViscousEmulationOptions,
+    yield_travel_m: float,
+) -> TrackingJudgement:
+    """Judge the round trip on the validation tests and emulate a viscous damper.
+
+    Parameters
+    ----------
+    inverse, forward
+        Networks of one sampling rate.
+    training, validation
+        Histories; the largest drive of the training tests limits the drive.
+    options
+        Motion and damping of the emulation.
+    yield_travel_m
+        Where the pre-yield regime ends [m].
+    """
+    limit = float(training.channels["drive"].max())
+    trip = round_trip(inverse, forward, validation, limit)
+    regimes = regimes_of(validation, yield_travel_m)[trip.sample]
+    viscous = emulate_viscous(
+        inverse, forward, training, limit, options.frequency_hz, options.amplitude_m, options.damping_n_s_m
+    )
+    return TrackingJudgement(
+        error_figures(trip.desired_n, trip.force_n), by_regime(trip.desired_n, trip.force_n, regimes), viscous
     )

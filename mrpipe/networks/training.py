@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,65 +15,14 @@ from threadpoolctl import threadpool_limits
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.networks.assembly import History
 from mrpipe.networks.held_out import TrainingData, training_data
-from mrpipe.networks.levenberg_marquardt import FitResult, Method, StoppingRules, fit
+from mrpipe.networks.levenberg_marquardt import FitResult, StoppingRules, fit
 from mrpipe.networks.network import FeatureSpec, Network, averaged
+from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.problem import Problem, pack, unpack
-from mrpipe.networks.scaling import Normalisation
+from mrpipe.networks.scaling import NORMALISATION, Normalisation
 
 HELD_OUT_ROWS = 10000
 """Rows of the held-out records on which early stopping looks while a subsample is fitted."""
-
-
-@dataclass(frozen=True)
-class TrainingOptions:
-    """How a network is trained.
-
-    Attributes
-    ----------
-    hidden
-        Neurons of each hidden layer.
-    biases
-        Whether biases are trained (the thesis has none).
-    starts
-        Number of random starts.
-    refined_starts
-        How many of them, the best on the held-out records, go on with all rows.
-    method, rules
-        See :mod:`mrpipe.networks.levenberg_marquardt`; `rules.iterations` is the limit of both phases together.
-    subsample_rows, subsample_iterations, iterations
-        Rows and iterations of the first phase, iterations of the second.
-    refined_rows, refine_on
-        Rows of the second phase (None: all), and whether it too is stopped by the held-out records (`fitted`) or learns
-        them (`every`): they have chosen between the starts by then, and a record left out is a condition not learned.
-    averaged
-        How many of the refined starts, the best, are averaged: one network that holds them side by side.
-    initial
-        `random` (uniform within +-0.5, thesis 2.3.3) or `perceptron` (scikit-learn's MLPRegressor with lbfgs).
-    normalisation, whitened
-        See :mod:`mrpipe.networks.scaling`.
-    held_out_share
-        Share of the training records kept for early stopping and for the choice between starts.
-    weight_decay
-        See :class:`mrpipe.networks.problem.Problem`; it does not count where starts are compared.
-    """
-
-    hidden: tuple[int, ...] = (6, 6)
-    biases: bool = True
-    starts: int = 10
-    refined_starts: int = 2
-    method: Method = "mu-identity"
-    rules: StoppingRules = field(default_factory=StoppingRules)
-    subsample_rows: int = 20000
-    subsample_iterations: int = 150
-    iterations: int = 50
-    refined_rows: int | None = None
-    refine_on: Literal["fitted", "every"] = "fitted"
-    averaged: int = 1
-    initial: Literal["random", "perceptron"] = "random"
-    normalisation: Normalisation = "maximum"
-    whitened: bool = True
-    held_out_share: float = 0.15
-    weight_decay: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -196,6 +145,7 @@ def train(
     options: TrainingOptions,
     rng: np.random.Generator,
     *,
+    normalisation: Normalisation = NORMALISATION,
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Trained:
@@ -211,6 +161,8 @@ def train(
         How to train.
     rng
         For the split and the starts; the result does not depend on `jobs`.
+    normalisation
+        Of inputs and target, see :mod:`mrpipe.networks.scaling`.
     jobs
         Threads.
     progress
@@ -218,7 +170,7 @@ def train(
     """
     began = time.perf_counter()
     data = training_data(
-        history, spec, options.held_out_share, rng, normalisation=options.normalisation, whitened=options.whitened
+        history, spec, options.held_out_share, rng, normalisation=normalisation, whitened=options.whitened
     )
     layers = data.layers(options.hidden)
     rows = np.sort(rng.permutation(len(data.fit_rows.target))[: options.subsample_rows])

@@ -11,28 +11,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     # the command line reads every stage for its help text, so nothing heavy is imported here
     import numpy as np
-    import pandas as pd
-    from matplotlib.figure import Figure
 
     from mrpipe.artifacts import Artifact, ArtifactWriter, Progress, Provenance
-
-
-class ReportSink(Protocol):
-    """Where a stage writes its own part of the report, in the order of the calls."""
-
-    def text(self, paragraph: str) -> None:
-        """Add a paragraph in plain words (Markdown inline marks allowed)."""
-
-    def table(self, name: str, frame: pd.DataFrame, caption: str) -> None:
-        """Add a table; it is also saved as tables/<stage>-<name>.csv."""
-
-    def figure(self, name: str, figure: Figure, caption: str) -> None:
-        """Add a figure; it is also saved as figures/<stage>-<name>.png."""
+    from mrpipe.reporting.sink import Sink
 
 
 @dataclass(frozen=True)
@@ -68,7 +54,7 @@ class StageContext:
     seed: int
     jobs: int
     progress: Progress
-    report: ReportSink
+    report: Sink
     log: logging.Logger
     provenance: Provenance
     warnings: list[str] = field(default_factory=list)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.networks.assembly import CHANNELS, join, write_history
     from mrpipe.networks.network import FeatureSpec
-    from mrpipe.reporting.networks import joined_history
+    from mrpipe.reporting import assemble as section
     from mrpipe.signals.prepared import read_prepared
 
     settings = context.settings.assemble
@@ -53,8 +53,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         artifact.attributes("/", normalisation=settings.normalisation)
     training = histories["training"]
     jumps = {name: training.largest_jump(name) for name in CHANNELS}
-    _report(context, histories, jumps)
-    context.report.figure("history", joined_history(training), "The joined training history (thesis Figure 2.11 b).")
+    section.describe(context.report, section.TrainingSet(training, histories["validation"], jumps))
     return {
         "training_tests": len(training.names),
         "validation_tests": len(histories["validation"].names),
@@ -89,24 +88,6 @@ def _write_rows(
                 artifact.put(f"{name}/{key}", getattr(scaling, key), unit="SI of each feature", dims=("feature",))
             for key in ("output_scale", "output_shift"):
                 artifact.put(f"{name}/{key}", getattr(scaling, key), unit=unit)
-
-
-def _report(context: StageContext, histories: Mapping[str, History], jumps: Mapping[str, float]) -> None:
-    import pandas as pd
-
-    training = histories["training"]
-    context.report.text(
-        f"{len(training.names)} training tests joined at zero crossings of displacement give {training.samples} "
-        f"samples at {training.sampling_rate_hz:g} Hz; {len(histories['validation'].names)} validation tests are "
-        "assembled the same way and kept apart. No window of past values reaches across a join."
-    )
-    table = pd.DataFrame({"channel": list(jumps), "step at joins over largest step within": list(jumps.values())})
-    context.report.table(
-        "joins",
-        table,
-        "Continuity at the joins. Displacement is continuous; the velocity of another frequency and the force of "
-        "another drive cannot be, and no network sees those steps.",
-    )
 
 
 STAGE = Stage(

@@ -6,66 +6,32 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.stages.train_forward import THESIS_HIDDEN
 
 if TYPE_CHECKING:
-    from mrpipe.networks.candidates import Grid
     from mrpipe.networks.findings import Finding
-    from mrpipe.networks.sweep import Outcome, SweepOptions, SweepRun
+    from mrpipe.networks.sweep import Outcome, SweepRun
 
 CACHE = "sweep-cache"
-
-
-def _grid(settings: Any, past_values: int) -> Grid:
-    from mrpipe.networks.candidates import Candidate, Grid
-
-    centre = Candidate(("velocity",), past_values, THESIS_HIDDEN, settings.biases[0])
-    return Grid(
-        states=tuple(tuple(states) for states in settings.states),
-        past_values=tuple(settings.past_values),
-        layers=tuple(settings.layers),
-        neurons=tuple(settings.neurons),
-        biases=tuple(settings.biases),
-        centre=centre,
-    )
-
-
-def _options(settings: Any, normalisation: Any) -> SweepOptions:
-    from mrpipe.networks.levenberg_marquardt import StoppingRules
-    from mrpipe.networks.sweep import SweepOptions
-
-    return SweepOptions(
-        starts=settings.starts,
-        screen_rows=settings.screen_rows,
-        screen_iterations=settings.screen_iterations,
-        refined=settings.refined,
-        refine_rows=settings.refine_rows,
-        refine_iterations=settings.refine_iterations,
-        held_out_rows=settings.held_out_rows,
-        held_out_share=settings.held_out_share,
-        method=settings.method,
-        whitened=settings.whitened,
-        normalisation=normalisation,
-        initial=settings.initial,
-        rules=StoppingRules(held_out_failures=settings.held_out_failures),
-    )
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.networks.assembly import read_history
     from mrpipe.networks.findings import choose, findings, score
+    from mrpipe.networks.plan import sweep_grid
     from mrpipe.networks.sweep import sweep
+    from mrpipe.reporting import sweep as section
 
     settings = context.settings.sweep
     training = context.artifact("assemble")
     history = read_history(training, "training")
-    grid = _grid(settings, int(training.json("forward/features")["past_values"]))
+    grid = sweep_grid(settings, int(training.json("forward/features")["past_values"]))
     candidates = grid.candidates(settings.design)
     run = sweep(
         history,
         candidates,
-        _options(settings, training.attributes("/")["normalisation"]),
+        settings,
         context.seed,
+        normalisation=training.attributes("/")["normalisation"],
         jobs=context.jobs,
         cache=context.run_directory / CACHE,
         crossings=(grid.crossings, grid.most_crossings) if settings.design == "star" else None,
@@ -75,7 +41,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     chosen = choose(run.outcomes)
     verdicts = findings(run.outcomes, grid.centre)
     _write(context, run, chosen, verdicts)
-    _report(context, run, chosen, verdicts, grid)
+    section.describe(context.report, section.SweepResult(run, chosen, verdicts, grid.centre))
     best = score(chosen.refined)
     return {
         "candidates": len(run.outcomes),
@@ -125,59 +91,6 @@ def _write(context: StageContext, run: SweepRun, chosen: Outcome, verdicts: list
             artifact.put(
                 f"{level}_nrmse", errors, unit="1", dims=("candidate", "start"), description="on held-out records"
             )
-
-
-def _report(context: StageContext, run: SweepRun, chosen: Outcome, verdicts: list[Finding], grid: Grid) -> None:
-    import pandas as pd
-
-    from mrpipe.networks.findings import score
-    from mrpipe.reporting import networks as figures
-
-    context.report.text(
-        f"{len(run.outcomes)} architectures, each from {len(chosen.screened)} starts, were screened on few rows; "
-        f"{sum(outcome.is_refined for outcome in run.outcomes)} were trained further. All are judged on "
-        f"{len(run.held_out)} training records that no fit has seen. The choice, the smallest network within one "
-        f"standard error of the best: {chosen.candidate.label}."
-    )
-    rows = []
-    for outcome in sorted(run.outcomes, key=lambda item: (not item.is_refined, item.candidate.parameters)):
-        level = score(outcome.refined if outcome.is_refined else outcome.screened)
-        rows.append(
-            {
-                "architecture": outcome.candidate.label,
-                "parameters": outcome.candidate.parameters,
-                "level": "refined" if outcome.is_refined else "screened",
-                "NRMSE": level.mean,
-                "standard error": level.mean * level.standard_error,
-                "best start": level.best,
-                "worst start": level.worst,
-                "screened NRMSE": score(outcome.screened).mean,
-            }
-        )
-    verdict_rows = [
-        {
-            "the thesis says": item.statement,
-            "compared": item.alternative,
-            "with": item.reference,
-            "NRMSE": item.alternative_nrmse,
-            "NRMSE of the thesis' network": item.reference_nrmse,
-            "change": item.change,
-            "two standard errors": item.uncertainty,
-            "fit": item.level,
-            "verdict": item.verdict,
-        }
-        for item in verdicts
-    ]
-    context.report.table("findings", pd.DataFrame(verdict_rows), "The findings of thesis 2.3.2, checked.")
-    context.report.table("candidates", pd.DataFrame(rows), "All candidates, error over starts on held-out records.")
-    context.report.figure(
-        "axes",
-        figures.sweep_axes(run.outcomes, grid.centre),
-        "Error over starts (points: single starts) along each axis of the sweep through the thesis' network.",
-    )
-    context.report.figure(
-        "sizes", figures.sweep_sizes(run.outcomes, chosen), "Error against number of parameters; the choice is ringed."
-    )
 
 
 STAGE = Stage(

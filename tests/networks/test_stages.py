@@ -33,7 +33,13 @@ FILES = {
     "train-forward": "forward.h5",
     "train-inverse": "inverse.h5",
 }
-QUICK_TRAINING = {"starts": 4, "refined_starts": 1, "subsample_iterations": 80, "iterations": 30}
+QUICK_TRAINING = {
+    "architecture": (6, 6),
+    "starts": 4,
+    "refined_starts": 1,
+    "subsample_iterations": 80,
+    "iterations": 30,
+}
 QUICK_SWEEP = {
     "states": (("velocity",), ("displacement",), ("velocity", "acceleration")),
     "past_values": (1, 3),
@@ -106,7 +112,7 @@ def rig_in(directory: Path, **settings: Any) -> Rig:
         "assemble": AssembleSettings(cycles=3),
         "sweep": SweepSettings(**QUICK_SWEEP),
         "train_forward": TrainForwardSettings(**QUICK_TRAINING),
-        "train_inverse": TrainInverseSettings(**QUICK_TRAINING),
+        "train_inverse": TrainInverseSettings(**{**QUICK_TRAINING, "architecture": (12, 6)}),
     }
     return Rig(directory, {**chosen, **settings})
 

@@ -10,7 +10,8 @@ import pytest
 
 from mrpipe.networks.candidates import Candidate, Grid
 from mrpipe.networks.findings import choose, findings, score
-from mrpipe.networks.sweep import Outcome, SweepOptions, predicted_costs, sweep
+from mrpipe.networks.options import SweepOptions
+from mrpipe.networks.sweep import Outcome, predicted_costs, sweep
 from tests.networks.rig import bench_history
 
 CENTRE = Candidate(("velocity",), 3, (6, 6), False)
@@ -86,9 +87,9 @@ def test_kept_fits_are_used_only_for_what_they_are(tmp_path: Path) -> None:
     candidates = GRID.candidates("star")[:2]
     sweep(history, candidates, TINY, 5, cache=tmp_path)
     before = len(list(tmp_path.iterdir()))
-    sweep(history, candidates, replace(TINY, refined=1), 5, cache=tmp_path)
+    sweep(history, candidates, TINY.changed(refined=1), 5, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) == before
-    sweep(history, candidates, replace(TINY, screen_iterations=9), 5, cache=tmp_path)
+    sweep(history, candidates, TINY.changed(screen_iterations=9), 5, cache=tmp_path)
     sweep(history, candidates, TINY, 6, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) > 2 * before
 
@@ -110,7 +111,7 @@ def test_time_left_and_cost_are_told() -> None:
 @pytest.mark.property
 def test_larger_networks_are_predicted_to_cost_more() -> None:
     candidates = [replace(CENTRE, hidden=(2,)), CENTRE, replace(CENTRE, hidden=(24, 24))]
-    screening, refining = predicted_costs(bench_history(), candidates, replace(TINY, screen_rows=2000))
+    screening, refining = predicted_costs(bench_history(), candidates, TINY.changed(screen_rows=2000))
     assert screening[0] < screening[2]
     assert refining[0] < refining[2]
 
@@ -137,7 +138,7 @@ def test_combinations_are_screened_refined_and_resumed(tmp_path: Path) -> None:
     history, star = bench_history(), GRID.candidates("star")
     crossings = (lambda scores: [replace(CENTRE, hidden=(3,), past_values=1), *list(scores)[:1]], 11)
     told: list[str] = []
-    options = replace(TINY, screen_iterations=3, refine_iterations=2, refined=len(star) + 1)
+    options = TINY.changed(screen_iterations=3, refine_iterations=2, refined=len(star) + 1)
     run = sweep(history, star, options, 5, crossings=crossings, cache=tmp_path, tell=told.append)
     assert "up to 11 combinations" in told[0]
     assert len(run.outcomes) == len(star) + 1

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,13 +9,22 @@ from mrpipe.networks.assembly import samples
 from mrpipe.networks.evaluation import judge
 from mrpipe.networks.held_out import hold_out, training_data
 from mrpipe.networks.network import FeatureSpec
+from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.scaling import channel_blocks, scaling_of
-from mrpipe.networks.training import TrainingOptions, initial_parameters, to_network, train
+from mrpipe.networks.training import initial_parameters, to_network, train
 from tests.networks.rig import bench_history, bench_test
 
 FORWARD = FeatureSpec(("velocity", "drive"), 3, False, 200.0, "force")
 INVERSE = FeatureSpec(("velocity", "force"), 3, True, 200.0, "drive")
-QUICK = TrainingOptions(starts=3, refined_starts=2, subsample_rows=2000, subsample_iterations=60, iterations=30)
+QUICK = TrainingOptions(
+    architecture=(6, 6),
+    biases=True,
+    starts=3,
+    refined_starts=2,
+    subsample_rows=2000,
+    subsample_iterations=60,
+    iterations=30,
+)
 
 
 @pytest.mark.property
@@ -77,7 +84,7 @@ def test_whitened_inputs_are_uncorrelated_and_the_basis_folds_away() -> None:
 @pytest.mark.parametrize("biases", [False, True])
 def test_forward_network_learns_the_bench(biases: bool) -> None:
     history = bench_history()
-    trained = train(history, FORWARD, replace(QUICK, biases=biases), np.random.default_rng(1), jobs=2)
+    trained = train(history, FORWARD, QUICK.changed(biases=biases), np.random.default_rng(1), jobs=2)
     judged = judge(trained.network, history, bench_history("validation", (1.2,)))
     assert trained.network.architecture == "8-6-6-1"
     assert trained.network.has_biases is biases
@@ -100,7 +107,7 @@ def test_the_result_depends_on_the_seed_and_not_on_the_jobs() -> None:
 
 @pytest.mark.property
 def test_the_best_start_on_the_held_out_records_is_kept() -> None:
-    trained = train(bench_history(), FORWARD, replace(QUICK, refined_starts=1), np.random.default_rng(4))
+    trained = train(bench_history(), FORWARD, QUICK.changed(refined_starts=1), np.random.default_rng(4))
     refined = [start for start in trained.starts if np.isfinite(start.refined_held_out_nrmse)]
     assert len(refined) == 1
     assert refined[0].held_out_nrmse == min(start.held_out_nrmse for start in trained.starts)
@@ -112,7 +119,7 @@ def test_the_best_start_on_the_held_out_records_is_kept() -> None:
 
 @pytest.mark.property
 def test_training_without_held_out_records_or_second_phase() -> None:
-    options = replace(QUICK, held_out_share=0.0, iterations=0)
+    options = QUICK.changed(held_out_share=0.0, iterations=0)
     trained = train(bench_history(), FORWARD, options, np.random.default_rng(5))
     assert trained.held_out == ()
     assert all(np.isnan(start.refined_held_out_nrmse) for start in trained.starts)
@@ -122,9 +129,9 @@ def test_training_without_held_out_records_or_second_phase() -> None:
 @pytest.mark.property
 def test_the_second_phase_can_learn_the_held_out_records_and_average_starts() -> None:
     history = bench_history()
-    options = replace(QUICK, biases=True, refine_on="every", refined_rows=1500)
+    options = QUICK.changed(biases=True, refine_on="every", refined_rows=1500)
     one = train(history, INVERSE, options, np.random.default_rng(7))
-    two = train(history, INVERSE, replace(options, averaged=2), np.random.default_rng(7))
+    two = train(history, INVERSE, options.changed(averaged=2), np.random.default_rng(7))
     # the held-out records chose between the starts all the same
     assert one.held_out and one.held_out == two.held_out
     assert [start.held_out_nrmse for start in one.starts] == [start.held_out_nrmse for start in two.starts]
@@ -136,7 +143,7 @@ def test_the_second_phase_can_learn_the_held_out_records_and_average_starts() ->
         name: float(np.sqrt(np.mean((trained.network.predict(rows.features) - rows.target) ** 2)))
         for name, trained in {
             "every": one,
-            "fitted": train(history, INVERSE, replace(QUICK, biases=True), np.random.default_rng(7)),
+            "fitted": train(history, INVERSE, QUICK.changed(biases=True), np.random.default_rng(7)),
         }.items()
     }
     assert errors["every"] < errors["fitted"]
@@ -171,7 +178,7 @@ def test_a_start_from_scikit_learn_is_its_network(biases: bool) -> None:
 @pytest.mark.property
 def test_the_training_range_is_kept_with_the_network() -> None:
     history = bench_history()
-    trained = train(history, FORWARD, replace(QUICK, starts=1, iterations=0), np.random.default_rng(6))
+    trained = train(history, FORWARD, QUICK.changed(starts=1, iterations=0), np.random.default_rng(6))
     assert trained.network.outside_training_range(samples(history, FORWARD).features) == 0.0
     from mrpipe.networks.assembly import join
 

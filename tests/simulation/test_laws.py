@@ -8,7 +8,8 @@ import pytest
 from mrpipe.control import LAWS
 from mrpipe.networks import FeatureSpec, Network
 from mrpipe.networks.assembly import join
-from mrpipe.networks.training import TrainingOptions, train
+from mrpipe.networks.options import TrainingOptions
+from mrpipe.networks.training import train
 from mrpipe.simulation import LoopOptions, SensorNoise
 from mrpipe.thesis.printed import PRINTED
 from tests.networks.rig import bench_test
@@ -126,7 +127,7 @@ def inverse_network() -> Network:
         for frequency in (0.7, 1.8, 3.5)
     ]
     spec = FeatureSpec(("velocity", "force"), 3, True, 200.0, "drive")
-    options = TrainingOptions(biases=False, starts=3, refined_starts=1, subsample_iterations=80, iterations=0)
+    options = TrainingOptions(architecture=(6, 6), starts=3, refined_starts=1, subsample_iterations=80, iterations=0)
     return train(join(tests, cycles=2, sampling_rate_hz=200.0), spec, options, np.random.default_rng(1)).network
 
 

@@ -20,6 +20,7 @@ from mrpipe.case_studies.base_isolated.study import (
 )
 from mrpipe.case_studies.model import natural_periods
 from mrpipe.case_studies.run import Response
+from mrpipe.reporting.sink import Sink
 from mrpipe.structures.records import GroundMotion
 
 
@@ -91,7 +92,7 @@ def _listed(periods_s: FloatArray) -> str:
     return ", ".join(f"{period:.3f}" for period in periods_s)
 
 
-def describe(sink: figures.Sink, result: IsolationResult) -> None:
+def describe(sink: Sink, result: IsolationResult) -> None:
     """Write the part of the report."""
     building = result.study.building
     origin, name = building.model.origin, result.motion.name
@@ -144,7 +145,7 @@ def _floor_peaks(result: IsolationResult, response: Response) -> tuple[FloatArra
     return np.asarray(np.abs(displacement).max(axis=0)), np.asarray(np.abs(acceleration).max(axis=0))
 
 
-def _histories(sink: figures.Sink, result: IsolationResult) -> None:
+def _histories(sink: Sink, result: IsolationResult) -> None:
     time = result.uncontrolled.time_s
     for axis, letter in enumerate("xy"):
         curves = {case.law: _top(result, case.response, axis) for case in result.cases}

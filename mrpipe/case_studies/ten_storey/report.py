@@ -10,6 +10,7 @@ import pandas as pd
 
 from mrpipe.case_studies import report as figures
 from mrpipe.case_studies.ten_storey.study import REASON, THESIS, VARIANTS, TenStoreyCase, TenStoreyStudy
+from mrpipe.reporting.sink import Sink
 
 Studies = Mapping[str, tuple[TenStoreyStudy, Sequence[TenStoreyCase]]]
 
@@ -76,7 +77,7 @@ def summary(studies: Studies, sweep: Mapping[float, Mapping[str, float]]) -> dic
     }
 
 
-def describe(sink: figures.Sink, studies: Studies, sweep: Mapping[float, Mapping[str, float]]) -> None:
+def describe(sink: Sink, studies: Studies, sweep: Mapping[float, Mapping[str, float]]) -> None:
     """Write the part of the report; the arguments are those of :func:`summary`."""
     study, cases = next(iter(studies.values()))
     origin, motion = study.model.origin, study.motion

@@ -12,6 +12,7 @@ import pandas as pd
 from mrpipe.case_studies import report as figures
 from mrpipe.case_studies.indices import WIND_FLOORS
 from mrpipe.case_studies.wind.study import REASON, THESIS, WindCase, WindStudy, wind_response
+from mrpipe.reporting.sink import Sink
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def summary(result: WindResult) -> dict[str, Any]:
     }
 
 
-def describe(sink: figures.Sink, result: WindResult) -> None:
+def describe(sink: Sink, result: WindResult) -> None:
     """Write the part of the report."""
     study = result.study
     origin = study.tower.model.origin

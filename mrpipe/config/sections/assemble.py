@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from mrpipe.config.section import Section
+from mrpipe.networks.scaling import NORMALISATION, Normalisation
 
 ForwardInput = Literal["displacement", "velocity", "acceleration", "drive"]
 InverseInput = Literal["displacement", "velocity", "acceleration", "force"]
@@ -34,8 +35,8 @@ class AssembleSettings(Section):
         ("velocity", "force"), min_length=1, description="Input channels of the inverse network, in order (2.9)."
     )
     inverse_absolute: bool = Field(True, description="The inverse network sees absolute values, as in (2.9).")
-    normalisation: Literal["maximum", "range", "standard"] = Field(
-        "maximum",
+    normalisation: Normalisation = Field(
+        NORMALISATION,
         description="Normalisation of inputs and target: `maximum` keeps zero at zero, `range` maps to -1 .. 1 "
         "(MATLAB's mapminmax), `standard` to zero mean and unit variance.",
     )

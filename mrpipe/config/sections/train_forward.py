@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mrpipe.config.sections._training import TrainingSettings
+from mrpipe.networks.options import TrainingOptions
 
 
-class TrainForwardSettings(TrainingSettings):
-    """How the forward network (drive to force) is trained."""
+class TrainForwardSettings(TrainingOptions):
+    """How the forward network (motion and drive to force) is trained."""

@@ -14,7 +14,8 @@ from mrpipe.dampers.plant import FORCE, Chain, build_chain, run_chain
 from mrpipe.fitting.engine import Fit
 from mrpipe.networks.assembly import History, join, samples
 from mrpipe.networks.network import Network
-from mrpipe.networks.training import TrainingOptions, train
+from mrpipe.networks.options import TrainingOptions
+from mrpipe.networks.training import train
 from mrpipe.signals.prepared import PreparedTest
 
 SPEEDS_M_S = (0.01, 0.03, 0.08, 0.2, 0.4)
@@ -246,7 +247,7 @@ def retrain_inverse(
     rate = old.features.sampling_rate_hz
     history = simulated_history(chain, training, drive_limit, rate, rng)
     options = options or TrainingOptions(
-        hidden=old.hidden_of_members,
+        architecture=old.hidden_of_members,
         biases=old.has_biases,
         starts=3,
         refined_starts=min(3, old.members),

@@ -113,12 +113,15 @@ def test_gains_make_up_for_what_the_damper_gives_beside(damper: DamperModel) -> 
 @pytest.mark.planted
 def test_an_inverse_that_was_trained_on_another_damper_is_replaced(damper: DamperModel) -> None:
     from mrpipe.networks.network import FeatureSpec
-    from mrpipe.networks.training import TrainingOptions, train
+    from mrpipe.networks.options import TrainingOptions
+    from mrpipe.networks.training import train
 
     tests, other = motions("training"), motions("validation")
     spec = FeatureSpec(("velocity", "force"), 3, True, 200.0, "drive")
     rng = np.random.default_rng(3)
-    quick = TrainingOptions(hidden=(4,), starts=1, refined_starts=1, subsample_iterations=30, iterations=5)
+    quick = TrainingOptions(
+        architecture=(4,), biases=True, starts=1, refined_starts=1, subsample_iterations=30, iterations=5
+    )
     old = train(augmented.simulated_history(damper.chain(), tests, 3.0, 200.0, rng), spec, quick, rng).network
     drag = with_effect(damper, "quadratic-drag", "square", {"drag": 4000.0})
     again = augmented.retrain_inverse(old, drag, tests, other, 3.0, rng, options=quick)
