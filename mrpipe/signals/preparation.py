@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
@@ -13,9 +12,8 @@ from mrpipe.campaigns import Campaign, Recording
 from mrpipe.errors import UserError
 from mrpipe.signals.cycles import SteadyCycles, choose_cycles, find_steady_cycles, is_sine
 from mrpipe.signals.differentiation import backward_difference, central_difference, savitzky_golay
-from mrpipe.signals.faults import KnownFaults, require_known
+from mrpipe.signals.faults import require_known
 from mrpipe.signals.filters import (
-    Phase,
     advance,
     butterworth_lowpass,
     even_clock,
@@ -23,7 +21,7 @@ from mrpipe.signals.filters import (
     samples_needed,
     usable_cutoff,
 )
-from mrpipe.signals.kalman import KalmanGains, kalman_gains, kinematic_kalman, kinematic_smoother
+from mrpipe.signals.kalman import kinematic_kalman, kinematic_smoother
 from mrpipe.signals.offsets import (
     acceleration_gain,
     balanced_extremes,
@@ -31,8 +29,9 @@ from mrpipe.signals.offsets import (
     force_intercept,
     mean_over_cycles,
 )
+from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.signals.spectra import cutoff_by_criterion, noise_level
+from mrpipe.signals.spectra import cutoff_by_criterion
 
 VELOCITY_SHARE = 0.99
 """Share of the power of a random motion's velocity that the cut-off by criterion keeps."""
@@ -43,36 +42,6 @@ CONTROLLER_RATE_HZ = 200.0
 
 LENT_OFFSET_SPREAD = 0.05
 """Largest spread between tests, over the deviation of the channel, at which an offset passes for one of the sensor."""
-
-
-@dataclass(frozen=True)
-class PreparationOptions:
-    """How tests are prepared; the fields are those of the stage's settings, see there."""
-
-    working_rate_hz: float = 0.0
-    cutoff_hz: float = 100.0
-    velocity_cutoff_hz: float = 20.0
-    order: int = 2
-    phase: Phase = "zero"
-    cutoff_choice: Literal["by-motion", "fixed", "criterion"] = "by-motion"
-    differentiation: Literal["backward", "central", "savitzky-golay", "kalman"] = "backward"
-    savitzky_golay_window_s: float = 0.03
-    kalman_displacement_noise_m: float = 20e-6
-    kalman_acceleration_noise_m_s2: float = 0.1
-    kalman_bias_drift_m_s3: float = 0.0
-    offset: Literal["test", "campaign", "off"] = "test"
-    displacement_late_s: float = 0.0
-    cycles: int = 10
-    settle_cycles: int = 1
-    faults: KnownFaults = field(default_factory=KnownFaults)
-
-    def gains(self, displacement: FloatArray, acceleration: FloatArray, rate: float) -> KalmanGains:
-        """Return the gains of the kinematic Kalman filter; noise levels of 0 are estimated from the channels."""
-        return kalman_gains(
-            self.kalman_displacement_noise_m or max(noise_level(displacement, rate), 1e-9),
-            self.kalman_acceleration_noise_m_s2 or max(noise_level(acceleration, rate), 1e-6),
-            self.kalman_bias_drift_m_s3,
-        )
 
 
 @dataclass(frozen=True)

@@ -8,46 +8,22 @@ from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
 from mrpipe.stages.close_loop_laws import closed_loop
-from mrpipe.stages.close_loop_report import report
 
 if TYPE_CHECKING:
-    from mrpipe.config.sections.close_loop import CloseLoopSettings
     from mrpipe.effects.contract import Effect
     from mrpipe.signals.prepared import PreparedTest
-    from mrpipe.tracing.bench.summary import Tracing, TracingOptions
+    from mrpipe.tracing.bench.summary import Tracing
 
 CORRECTIONS = "corrections.yaml"
 NEXT_TESTS = "next-tests.yaml"
 
 
-def tracing_options(settings: CloseLoopSettings, drive_unit: str) -> TracingOptions:
-    """Return what the settings ask of a tracing, on a bench or behind a structure."""
-    from mrpipe.tracing.bench.summary import TracingOptions
-    from mrpipe.tracing.bench.verdict import Rules
-
-    return TracingOptions(
-        model=settings.model,
-        yield_order=settings.yield_order,
-        viscosity_order=settings.viscosity_order,
-        most_effects=settings.most_effects,
-        fit_rate_hz=settings.fit_rate_hz,
-        displacement_cutoff_hz=settings.displacement_cutoff_hz,
-        refits=settings.refits,
-        folds=settings.folds,
-        bootstrap_draws=settings.bootstrap_draws,
-        rules=Rules(settings.named_share, settings.least_share, settings.lead),
-        record_gain=settings.record_gain,
-        observation_filter=settings.observation_filter,
-        model_error_share=settings.model_error_share,
-        unattributed=settings.unattributed,
-        drive_unit=drive_unit or "A",
-    )
-
-
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
     from mrpipe.effects.library import damper_effects, effects_named
+    from mrpipe.reporting import close_loop as section
     from mrpipe.signals.prepared import read_prepared
+    from mrpipe.tracing.bench.settings import tracing_options
     from mrpipe.tracing.bench.trace import trace_campaign
 
     settings = context.settings.close_loop
@@ -68,7 +44,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     summary["corrections"] = _corrections(context, traced, tests)
     summary["next_tests"] = _next_tests(context, traced, library)
     _write(context, traced, summary)
-    report(context, traced, summary)
+    section.describe(context.report, section.Traced(traced, summary, settings.named_share, settings.least_share))
     return summary
 
 

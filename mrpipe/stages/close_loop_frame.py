@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.stages.close_loop import tracing_options
 
 if TYPE_CHECKING:
     from mrpipe.config.sections.campaigns import CampaignsSettings
@@ -21,6 +20,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
     from mrpipe.effects.library import damper_effects
     from mrpipe.effects.structural.library import all_structural_effects, structural_effects
+    from mrpipe.reporting import close_loop_frame as section
+    from mrpipe.tracing.bench.settings import tracing_options
     from mrpipe.tracing.structure.verdict import trace_structure
 
     settings = context.settings.close_loop
@@ -47,7 +48,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for finding in traced.findings:
         context.warn(finding)
     _write(context, traced)
-    _report(context, traced)
+    section.describe(context.report, section.TracedStructure(traced, settings.named_share, settings.least_share))
     return traced.summary
 
 
@@ -60,35 +61,6 @@ def _write(context: StageContext, traced: StructureTracing) -> None:
         for name, history in traced.histories.items():
             artifact.put(name, history.values, unit=history.unit, dims=history.dims)
     atomic_write_text(context.run_directory / "close-loop.json", to_json(traced.summary) + "\n")
-
-
-def _report(context: StageContext, traced: StructureTracing) -> None:
-    import pandas as pd
-
-    from mrpipe.reporting import structure_tracing as figures
-    from mrpipe.reporting.bench_tracing import candidate_ranking, errors_per_test
-
-    summary, settings = traced.summary, context.settings.close_loop
-    context.report.text(figures.in_plain_words(summary))
-    if traced.maps:
-        context.report.figure("maps", figures.storey_maps(traced.maps), figures.MAPS_CAPTION)
-    if summary["candidates"]:
-        rows = [{k: v for k, v in item.items() if k not in ("forms", "at_bound")} for item in summary["candidates"]]
-        context.report.table("candidates", pd.DataFrame(rows), "Candidates with their evidence.")
-        context.report.figure(
-            "ranking",
-            candidate_ranking(summary["candidates"], settings.named_share, settings.least_share),
-            "Share of what stands out of the noise, by family.",
-        )
-    if traced.shown:
-        context.report.figure(
-            "histories", figures.histories(traced.shown), "Residual of validation tests before and after, per storey."
-        )
-    if summary["tests"]:
-        context.report.figure(
-            "errors", errors_per_test(summary["tests"], summary["noise_floor_nrmse"]), "Error of each validation test."
-        )
-        context.report.table("tests", pd.DataFrame(summary["tests"]), "Error of each validation test.")
 
 
 def _stage(*inputs: str) -> Stage:

@@ -10,7 +10,6 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
     from mrpipe.dampers.comparison import JudgedFit
-    from mrpipe.signals.prepared import PreparedTest
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
@@ -20,6 +19,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.dampers.forms import FORMS
     from mrpipe.dampers.samples import scales_of, smooth_motion
     from mrpipe.dampers.summary import findings
+    from mrpipe.reporting import identify_damper as section
     from mrpipe.signals.prepared import read_prepared
 
     settings = context.settings.identify_damper
@@ -63,7 +63,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         "velocity": max(float(np.abs(test.velocity_m_s).max()) for test in training),
     }
     _write(context, judged, chosen, summary, largest)
-    _report(context, tests, judged, chosen, summary)
+    section.describe(context.report, section.IdentifiedDamper(tests, judged, chosen, summary))
     return summary
 
 
@@ -124,59 +124,6 @@ def _write(
         artifact.put_json("thesis_parameters", summary["thesis_parameters"])
         artifact.put_json("comparison", summary["comparison"])
         artifact.put_json("tests", summary["tests"])
-
-
-def _report(
-    context: StageContext,
-    tests: Sequence[PreparedTest],
-    judged: Sequence[JudgedFit],
-    chosen: JudgedFit,
-    summary: Mapping[str, Any],
-) -> None:
-    import pandas as pd
-
-    from mrpipe.dampers.scoring import shown_loops, yield_curves
-    from mrpipe.reporting.dampers import comparison_bars, damper_loops, yield_force_curves
-
-    context.report.text(
-        f"Damper model {chosen.fit.form.name} ({chosen.fit.form.summary}): NRMSE {chosen.training.nrmse:.3f} on the "
-        f"training tests, {chosen.validation.nrmse:.3f} on the validation tests; of the forms compared "
-        f"{summary['comparison'][0]['form']} does best on them."
-    )
-    for warning in context.warnings:
-        context.report.text(f"Noticed: {warning}.")
-    tables = {
-        "parameters": (pd.DataFrame(summary["parameters"]).T.rename_axis("name").reset_index(), "Parameters (SI)."),
-        "thesis-parameters": (
-            pd.DataFrame(summary["thesis_parameters"]).T.rename_axis("name").reset_index(),
-            "The same in the notation of thesis Table 2.2, for a chosen A.",
-        ),
-        "comparison": (
-            pd.DataFrame(summary["comparison"]),
-            "Model forms by their error on the validation tests, which no fit has seen.",
-        ),
-        "tests": (pd.DataFrame(summary["tests"]), "Error of each test."),
-    }
-    for name, (frame, caption) in tables.items():
-        if len(frame):
-            context.report.table(name, frame, caption)
-    unit = chosen.fit.model.drive_unit
-    context.report.figure(
-        "loops",
-        damper_loops(shown_loops(chosen.fit.model, tests)),
-        "Measured loops and those of the model (thesis Figures 2.7 to 2.9).",
-    )
-    context.report.figure(
-        "comparison",
-        comparison_bars(
-            [(row["form"], row["training_nrmse"], row["validation_nrmse"]) for row in summary["comparison"]]
-        ),
-        "Error of the model forms.",
-    )
-    drive, curves = yield_curves([(item.fit.form.name, item.fit.model) for item in judged], tests)
-    context.report.figure(
-        "yield-force", yield_force_curves(drive, curves, unit), "Post-yield force at half the largest speed."
-    )
 
 
 STAGE = Stage(

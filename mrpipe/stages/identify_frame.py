@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.modal.identify import FrameIdentification, IdentificationOptions
+    from mrpipe.modal.identify import IdentificationOptions
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
@@ -16,6 +16,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.modal.identify import identify_frame
     from mrpipe.modal.records import frame_tests
     from mrpipe.modal.storage import summary, write_identification
+    from mrpipe.reporting import identify_frame as section
 
     campaign = load_campaign(context.inputs["campaign:frame"])
     for finding in campaign.findings:
@@ -26,7 +27,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     with context.write("frame.h5") as artifact:
         write_identification(artifact, result)
     values = summary(result)
-    _report(context, result, values)
+    segment_s = context.settings.identify_frame.segment_s
+    section.describe(context.report, section.IdentifiedFrame(result, values, segment_s))
     return {"campaign": campaign.name, **values}
 
 
@@ -52,42 +54,6 @@ def _options(context: StageContext) -> IdentificationOptions:
         orthogonal=settings.orthogonal_shapes,
         mode_matrix=shapes,
         mode_matrix_name=settings.mode_matrix,
-    )
-
-
-def _report(context: StageContext, result: FrameIdentification, values: Mapping[str, Any]) -> None:
-    import pandas as pd
-
-    from mrpipe.modal.spectra import averaged_responses
-    from mrpipe.reporting import modal as figures
-
-    floors = result.frame.floors
-    context.report.text(
-        f"{floors} floors, {floors} modes between {values['frequencies_hz'][0]:.3g} and "
-        f"{values['frequencies_hz'][-1]:.3g} Hz. Poles come from a fit of all floors together in which what a record "
-        "holds of its beginning and end is modelled; damping from free decays where there are any, and from the sweep "
-        "as the second, independent method."
-    )
-    context.report.table("modes", pd.DataFrame(figures.mode_rows(values)), "Modes with 95 % intervals.")
-    for name in ("mass", "stiffness", "damping"):
-        frame = pd.DataFrame(getattr(result.frame, name), columns=[f"floor {i + 1}" for i in range(floors)])
-        context.report.table(name, frame, {"mass": "M [kg].", "stiffness": "K [N/m].", "damping": "C [N s/m]."}[name])
-    averaged = averaged_responses(result.tests[0], context.settings.identify_frame.segment_s)
-    context.report.figure(
-        "frequency-responses",
-        figures.frequency_responses(result.in_frequency, averaged, result.band_hz),
-        "Frequency responses: measured (leakage taken out), of M, C and K, and coherence of the averaged spectra.",
-    )
-    context.report.figure(
-        "mode-shapes", figures.mode_shapes(result.mode_shapes, values["frequencies_hz"]), "Mode shapes."
-    )
-    if result.decays:
-        decays = [result.decays[mode] for mode in sorted(result.decays)]
-        context.report.figure(
-            "decays", figures.decays(decays), "Free decays, exponential fit and peak-to-peak damping."
-        )
-    context.report.figure(
-        "verification", figures.verification(result.in_time[0]), "Measured and simulated response of the sweep."
     )
 
 

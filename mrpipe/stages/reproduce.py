@@ -9,8 +9,6 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
-    import pandas as pd
-
     from mrpipe.artifacts import atomic_write_text
     from mrpipe.thesis import ClaimOptions, collect_claims, page
 
@@ -22,12 +20,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         artifact.put_json("claims", [claim.as_dict() for claim in claims])
         artifact.put("deviation", page.deviations(claims), unit="1", dims=("claim",))
     atomic_write_text(context.run_directory / "reproduce.md", page.markdown(claims))
-    context.report.text(
-        f"{len(claims)} printed figures were recomputed: {number['holds']} hold, {number['differs']} differ, "
-        f"{number['cannot-be-recomputed']} cannot be recomputed from what is printed or published."
-    )
-    context.report.table("claims", pd.DataFrame(page.rows(claims)), "Printed figures of the thesis beside ours.")
-    context.report.figure("deviations", page.deviation_figure(claims), "Deviation of each recomputed figure.")
+    page.describe(context.report, claims)
     return {"claims": [claim.as_dict() for claim in claims], "counts": number}
 
 

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
+from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, figure_with_axes, label
 from mrpipe.thesis.claim import Claim, Verdict, deviation
 
@@ -104,3 +106,14 @@ def deviation_figure(claims: Sequence[Claim]) -> Figure:
     axis.invert_yaxis()
     label(axis, "largest relative deviation (mark: tolerance)", "", "green: holds, red: differs")
     return figure
+
+
+def describe(sink: Sink, claims: Sequence[Claim]) -> None:
+    """Write the section of the report."""
+    number = counts(claims)
+    sink.text(
+        f"{len(claims)} printed figures were recomputed: {number['holds']} agree, {number['differs']} differ, "
+        f"{number['cannot-be-recomputed']} cannot be recomputed from what is printed or published."
+    )
+    sink.table("claims", pd.DataFrame(rows(claims)), "Printed figures of the thesis and the recomputed ones.")
+    sink.figure("deviations", deviation_figure(claims), "Deviation of each recomputed figure.")

@@ -11,7 +11,8 @@ from mrpipe.campaigns import load_campaign
 from mrpipe.dampers.comparison import FitOptions, compare_forms
 from mrpipe.dampers.forms import FORMS
 from mrpipe.dampers.samples import scales_of, smooth_motion
-from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
+from mrpipe.signals.options import PreparationOptions
+from mrpipe.signals.preparation import prepare_campaign
 
 
 def judged_forms(name: str, forms: tuple[str, ...]):

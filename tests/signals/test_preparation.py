@@ -12,8 +12,8 @@ import pytest
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray, Provenance, config_directory
 from mrpipe.campaigns import Campaign, Recording, load_campaign
 from mrpipe.errors import UserError
-from mrpipe.signals.faults import KnownFaults
-from mrpipe.signals.preparation import Preparation, PreparationOptions, common_rate, prepare_campaign
+from mrpipe.signals.options import PreparationOptions
+from mrpipe.signals.preparation import Preparation, common_rate, prepare_campaign
 from mrpipe.signals.prepared import read_prepared, write_prepared
 
 OMEGA = 2 * np.pi * 1.0
@@ -372,7 +372,7 @@ def test_faults_of_the_load_cell_that_are_known_are_taken_out() -> None:
     wrong = test.channels["force"] + 3.0 * late - 0.5 * late**2 + 0.4 * test.time_s + 7.0
     source = campaign(replace(test, channels={**test.channels, "force": wrong}))
     (plain,) = prepare_campaign(campaign(test), PreparationOptions()).tests
-    (mended,) = prepare_campaign(source, PreparationOptions(faults=KnownFaults(**faults))).tests  # type: ignore[arg-type]
+    (mended,) = prepare_campaign(source, PreparationOptions(corrections=faults)).tests  # type: ignore[arg-type]
     assert mended.test.force_n == pytest.approx(plain.test.force_n, abs=1e-9)
     # what was taken out is no offset that the test remembers: tracing it again finds it gone
     assert mended.test.force_offset_n == pytest.approx(plain.test.force_offset_n, abs=1e-9)
@@ -384,13 +384,13 @@ def test_a_force_recorded_late_is_brought_in_time() -> None:
     late = 0.0035
     moved = truth(test.time_s - late)["force"]
     source = campaign(replace(test, channels={**test.channels, "force": moved}))
-    (mended,) = prepare_campaign(source, PreparationOptions(faults=KnownFaults(force_late_s=late))).tests
+    (mended,) = prepare_campaign(source, PreparationOptions(corrections={"force_late_s": late})).tests
     (skewed,) = prepare_campaign(source, PreparationOptions()).tests
     assert errors(mended)["force"] < 0.3 * errors(skewed)["force"]
 
 
 def test_an_offset_for_a_test_that_is_not_there_is_refused() -> None:
-    options = PreparationOptions(faults=KnownFaults(force_offset_n={"two": 1.0}))
+    options = PreparationOptions(corrections={"force_offset_n": {"two": 1.0}})
     with pytest.raises(UserError, match=r"force_offset_n\.two: the campaign has no such test; one of one"):
         prepare_campaign(campaign(recording("one")), options)
 

@@ -19,7 +19,8 @@ from mrpipe.pipeline.parts import PartWriter, read_part
 from mrpipe.pipeline.stage import StageContext
 from mrpipe.reporting.signals import campaign_overview, loops, prepared_history, spectra_before_and_after
 from mrpipe.signals.prepared import read_prepared
-from mrpipe.stages.prepare import STAGE, summarised
+from mrpipe.signals.summary import summarised
+from mrpipe.stages.prepare import STAGE
 from tests.campaigns.builders import CHANNELS, campaign
 
 

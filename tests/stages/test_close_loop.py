@@ -20,11 +20,11 @@ from mrpipe.control.storage import write_calibration
 from mrpipe.effects.library import damper_effects
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import StageContext
+from mrpipe.reporting import close_loop as section
 from mrpipe.reporting.headlines import in_brief
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.stages import close_loop
 from mrpipe.stages.close_loop_laws import closed_loop
-from mrpipe.stages.close_loop_report import report
 from mrpipe.stages.simulate import LAWS
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
@@ -115,7 +115,7 @@ def test_every_law_runs_before_after_and_recalibrated(
     summary = {"campaign": "c", **traced.summary, "closed_loop": found}
     summary["corrections"] = close_loop._corrections(own, traced, tests)
     summary["next_tests"] = close_loop._next_tests(own, traced, {})
-    report(own, traced, summary)
+    section.describe(own.report, section.Traced(traced, summary, 0.9, 0.05))
     sink = own.report
     assert isinstance(sink, Sink)
     for name in ("where", "maps", "ranking", "candidates", "loops", "errors", "tests", "laws"):

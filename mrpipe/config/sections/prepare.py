@@ -2,87 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
-from pydantic import Field
-
-from mrpipe.config.section import Section
+from mrpipe.signals.options import PreparationOptions
 
 
-class SensorCorrections(Section):
-    """Faults of sensors and time base, taken out before all else; `close-loop` writes them to corrections.yaml."""
-
-    force_late_s: float = Field(
-        0.0, ge=-0.1, le=0.1, description="Time by which the force is recorded later than displacement and drive."
-    )
-    force_offset_n: dict[str, float] = Field(
-        default_factory=dict, description="Offset of the load cell in a test (name: N), beside the one of all tests."
-    )
-    force_per_drive_n: float = Field(0.0, description="Offset of the load cell for each A or V of drive [N].")
-    force_per_drive_squared_n: float = Field(0.0, description="The same for the square of the drive.")
-    drive_lag_s: float = Field(0.0, ge=0.0, le=1.0, description="First-order lag of the drive in these two.")
-    force_drift_n_s: float = Field(0.0, description="Drift of the load cell from the beginning of each test [N/s].")
-
-
-class PrepareSettings(Section):
+class PrepareSettings(PreparationOptions):
     """How measured tests are filtered, freed of offsets and differentiated."""
-
-    working_rate_hz: float = Field(
-        0.0,
-        ge=0.0,
-        description="Sampling rate to which all tests are brought; 0 takes the lowest of the campaign that is at least "
-        "200 Hz, so that no test is filled up with samples that it does not have.",
-    )
-    cutoff_hz: float = Field(
-        100.0,
-        gt=0.0,
-        description="Cut-off of the low-pass on displacement, acceleration, drive and force (thesis 2.3.1).",
-    )
-    velocity_cutoff_hz: float = Field(
-        20.0, gt=0.0, description="Cut-off of the second low-pass, on the differentiated velocity (thesis 2.3.1)."
-    )
-    order: int = Field(2, ge=1, le=8, description="Order of the Butterworth filters.")
-    phase: Literal["zero", "causal"] = Field(
-        "zero",
-        description="zero: forwards and backwards, no channel is late; causal: as on the rig, velocity is 11 ms late.",
-    )
-    cutoff_choice: Literal["by-motion", "fixed", "criterion"] = Field(
-        "by-motion",
-        description="fixed: the cut-offs above; criterion: for each test and channel the frequency at which it sinks "
-        "into its noise; by-motion: fixed for sines, criterion for every other motion.",
-    )
-    differentiation: Literal["backward", "central", "savitzky-golay", "kalman"] = Field(
-        "backward",
-        description="Velocity from displacement: backward difference (2.5; centred where phase is zero), central "
-        "difference, Savitzky-Golay, or the kinematic Kalman filter (5.1 to 5.3), which needs an acceleration.",
-    )
-    savitzky_golay_window_s: float = Field(0.03, gt=0.0, description="Window of the Savitzky-Golay differentiation.")
-    kalman_displacement_noise_m: float = Field(
-        20e-6,
-        ge=0.0,
-        description="Noise of the displacement sensor (standard deviation) for the Kalman filter; 0 estimates it from "
-        "the spectrum of each test.",
-    )
-    kalman_acceleration_noise_m_s2: float = Field(
-        0.1,
-        ge=0.0,
-        description="Noise of the accelerometer (standard deviation) for the Kalman filter; 0 estimates it as above.",
-    )
-    kalman_bias_drift_m_s3: float = Field(
-        0.0, ge=0.0, description="How fast the accelerometer's bias wanders; 0 leaves the bias state out."
-    )
-    offset: Literal["test", "campaign", "off"] = Field(
-        "test",
-        description="Sensor offsets taken out: of each test by itself, one for the whole campaign (median over the "
-        "tests), or none.",
-    )
-    displacement_late_s: float = Field(
-        0.0,
-        ge=-0.1,
-        le=0.1,
-        description="Time by which the displacement is recorded later than the other channels (the effect channel-skew "
-        "gives it); taken out.",
-    )
-    cycles: int = Field(10, ge=0, description="Steady cycles kept of each periodic test; 0 keeps all.")
-    settle_cycles: int = Field(1, ge=0, description="Steady cycles left out at the beginning, where there are enough.")
-    corrections: SensorCorrections = Field(SensorCorrections(), description="Faults of sensors that are known.")

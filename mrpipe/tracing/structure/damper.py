@@ -17,7 +17,8 @@ from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit, predict
 from mrpipe.fitting.recordings import enough_tests, record_tests
 from mrpipe.signals.filters import butterworth_lowpass
-from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
+from mrpipe.signals.options import PreparationOptions
+from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import base_form, fit_baseline
 from mrpipe.tracing.bench.summary import Tracing, TracingOptions

@@ -16,7 +16,8 @@ from mrpipe.laboratory.blind import write_bench
 from mrpipe.laboratory.damper import damper_from_set
 from mrpipe.laboratory.effects import Planted, find_form
 from mrpipe.laboratory.motion import BenchTest
-from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
+from mrpipe.signals.options import PreparationOptions
+from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench import extra_tests
 from mrpipe.tracing.bench.extra_tests import Range, kinds_in, wanted_tests
 from mrpipe.tracing.bench.summary import Tracing, TracingOptions

@@ -12,7 +12,8 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.effects.yielding_parts import with_yielding_parts
 from mrpipe.fitting.engine import fit, predict, start_of
 from mrpipe.fitting.recordings import record_tests
-from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
+from mrpipe.signals.options import PreparationOptions
+from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench.baseline import base_form, first_problem, with_form
 from mrpipe.tracing.bench.error_measures import measured_force, score
 from mrpipe.tracing.bench.nuisances import record_gains, session_gain

@@ -1,34 +1,66 @@
-"""What `close-loop` leaves for the report: words, maps, ranking, before and after, closed loop, next tests."""
+"""Section of the report: the residual traced to a missing effect, and the model before and after."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
-from mrpipe.pipeline.stage import StageContext
+import numpy as np
+import pandas as pd
 
-if TYPE_CHECKING:
-    from mrpipe.artifacts import FloatArray
-    from mrpipe.tracing.bench.summary import Tracing
+from mrpipe.artifacts import FloatArray
+from mrpipe.reporting.bench_tracing import (
+    MOST_BARS,
+    ShownTest,
+    candidate_ranking,
+    errors_per_test,
+    in_plain_words,
+    loops_before_and_after,
+    residual_location,
+    residual_maps,
+)
+from mrpipe.reporting.closed_loop import law_table, response_by_law
+from mrpipe.reporting.closed_loop_words import in_words
+from mrpipe.reporting.sink import Sink
+from mrpipe.tracing.bench.summary import Tracing
 
 
-def report(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
-    """Write the stage's part of the report."""
-    from mrpipe.reporting.bench_tracing import in_plain_words
+@dataclass(frozen=True)
+class Traced:
+    """What `close-loop` found on a bench campaign.
 
-    context.report.text(in_plain_words(summary))
-    _effects(context, summary)
+    Attributes
+    ----------
+    tracing
+        The tracing with its models and errors.
+    summary
+        What the stage prints.
+    named_share, least_share
+        Share of the residual above which an effect is named, and above which it is considered.
+    """
+
+    tracing: Tracing
+    summary: Mapping[str, Any]
+    named_share: float
+    least_share: float
+
+
+def describe(sink: Sink, result: Traced) -> None:
+    """Write the section."""
+    traced, summary = result.tracing, result.summary
+    sink.text(in_plain_words(summary))
+    _effects(sink, summary)
     for name, reason in summary["untestable"].items():
-        context.report.text(f"Effect {name} is {reason}.")
-    _where(context, traced, summary)
-    _candidates(context, summary)
-    _before_and_after(context, traced, summary)
-    _loop(context, summary["closed_loop"])
-    _next_steps(context, summary)
+        sink.text(f"Effect {name} is {reason}.")
+    _where(sink, traced, summary)
+    _candidates(sink, summary, result.named_share, result.least_share)
+    _before_and_after(sink, traced, summary)
+    _loop(sink, summary["closed_loop"])
+    _next_steps(sink, summary)
 
 
-def _effects(context: StageContext, summary: Mapping[str, Any]) -> None:
-    import pandas as pd
+def _effects(sink: Sink, summary: Mapping[str, Any]) -> None:
 
     rows = [
         {
@@ -44,13 +76,11 @@ def _effects(context: StageContext, summary: Mapping[str, Any]) -> None:
         for name, entry in effect["parameters"].items()
     ]
     if rows:
-        context.report.table("effects", pd.DataFrame(rows), "Parameters of the effects with their 95 % intervals.")
+        sink.table("effects", pd.DataFrame(rows), "Parameters of the effects with their 95 % intervals.")
 
 
-def _where(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
-    from mrpipe.reporting.bench_tracing import residual_location, residual_maps
-
-    context.report.figure(
+def _where(sink: Sink, traced: Tracing, summary: Mapping[str, Any]) -> None:
+    sink.figure(
         "where",
         residual_location(summary["residual"]["location"]),
         "Where the residual of the baseline lives (training tests).",
@@ -67,31 +97,25 @@ def _where(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
         _drive_map(states, drive, unit),
         ("time in test [s]", "dissipated work [J]", states["time in test"], states["work"]),
     ]
-    context.report.figure("maps", residual_maps(maps, residual), "Mean residual of the baseline over pairs of states.")
+    sink.figure("maps", residual_maps(maps, residual), "Mean residual of the baseline over pairs of states.")
 
 
 def _drive_map(states: Mapping[str, FloatArray], drive: str, unit: str) -> tuple[str, str, FloatArray, FloatArray]:
     """Return the drive and its past, or the displacement and the drive where no test's drive has a past."""
-    import numpy as np
-
     past = states["past of drive"]
     if float(np.max(past)) > 0.05 * float(np.max(np.abs(states["drive"]))):
         return drive, f"largest drive so far [{unit}]", states["drive"], past + np.abs(states["drive"])
     return "displacement [mm]", drive, 1e3 * states["displacement"], states["drive"]
 
 
-def _candidates(context: StageContext, summary: Mapping[str, Any]) -> None:
-    import pandas as pd
-
-    from mrpipe.reporting.bench_tracing import candidate_ranking
+def _candidates(sink: Sink, summary: Mapping[str, Any], named_share: float, least_share: float) -> None:
 
     candidates = summary["candidates"]
     if not candidates:
         return
-    settings = context.settings.close_loop
-    context.report.figure(
+    sink.figure(
         "ranking",
-        candidate_ranking(candidates, settings.named_share, settings.least_share),
+        candidate_ranking(candidates, named_share, least_share),
         "What each family of effects recovers when it is added alone and everything is fitted anew; NRMSE on the "
         "validation tests. A family at a bound of its strength is not named.",
     )
@@ -106,13 +130,10 @@ def _candidates(context: StageContext, summary: Mapping[str, Any]) -> None:
         }
         for item in candidates
     ]
-    context.report.table("candidates", pd.DataFrame(rows), "The same as a table, with every form that was tried.")
+    sink.table("candidates", pd.DataFrame(rows), "The same as a table, with every form that was tried.")
 
 
-def _before_and_after(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
-    import pandas as pd
-
-    from mrpipe.reporting.bench_tracing import MOST_BARS, ShownTest, errors_per_test, loops_before_and_after
+def _before_and_after(sink: Sink, traced: Tracing, summary: Mapping[str, Any]) -> None:
 
     validation, rows = traced.validation, summary["tests"]
     errors = {row["name"]: row for row in rows}
@@ -134,20 +155,20 @@ def _before_and_after(context: StageContext, traced: Tracing, summary: Mapping[s
             )
         )
     if shown:
-        context.report.figure(
+        sink.figure(
             "loops",
             loops_before_and_after(shown),
             "Validation tests: the one that gains most, one of middling error, and the one of largest error left. The "
             "models run freely, without the measured force.",
         )
     more = f"; the {MOST_BARS} with the largest errors of {len(rows)}" if len(rows) > MOST_BARS else ""
-    context.report.figure(
+    sink.figure(
         "errors",
         errors_per_test(rows, summary["noise_floor_nrmse"]),
         f"Error of the validation tests before and after{more}.",
     )
     table = pd.DataFrame(rows).rename(columns={"nrmse_before": "NRMSE before", "nrmse_after": "NRMSE after"})
-    context.report.table("tests", table, "Error of each validation test.")
+    sink.table("tests", table, "Error of each validation test.")
 
 
 def _chosen(names: Sequence[str], errors: Mapping[str, Mapping[str, Any]]) -> list[int]:
@@ -158,22 +179,17 @@ def _chosen(names: Sequence[str], errors: Mapping[str, Mapping[str, Any]]) -> li
     return list(dict.fromkeys([gains[0], left[len(left) // 2], left[-1]])) if known else []
 
 
-def _loop(context: StageContext, found: Mapping[str, Any]) -> None:
-    import pandas as pd
-
-    from mrpipe.reporting.closed_loop import law_table, response_by_law
-    from mrpipe.reporting.closed_loop_words import in_words
-
-    context.report.text(in_words(found))
+def _loop(sink: Sink, found: Mapping[str, Any]) -> None:
+    sink.text(in_words(found))
     if "laws" not in found:
         return
-    context.report.figure(
+    sink.figure(
         "laws",
         response_by_law(found),
         "Response by control law: measured; predicted by the model without and with the effect, under the controller "
         "that ran; and with the controller renewed for the effect.",
     )
-    context.report.table("laws", pd.DataFrame(law_table(found)), "The same as a table.")
+    sink.table("laws", pd.DataFrame(law_table(found)), "The same as a table.")
     rows = []
     for item in found["tests"]:
         if item["recorded"]:
@@ -181,16 +197,13 @@ def _loop(context: StageContext, found: Mapping[str, Any]) -> None:
             row |= {f"NRMSE of x top {when}": item[when].get("nrmse_x_top") for when in ("before", "after")}
             rows.append(row)
     if rows:
-        context.report.table(
-            "recordings", pd.DataFrame(rows), "Error of the top floor's history in each closed-loop recording."
-        )
+        sink.table("recordings", pd.DataFrame(rows), "Error of the top floor's history in each closed-loop recording.")
 
 
-def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
-    import pandas as pd
+def _next_steps(sink: Sink, summary: Mapping[str, Any]) -> None:
 
     if summary["corrections"]["found"]:
-        context.report.text(
+        sink.text(
             "The faults of sensors named above are taken out by `mrpipe prepare --settings "
             f"{summary['corrections']['file']}`, and for every later stage by the same option; the file stands in the "
             "run directory."
@@ -198,14 +211,12 @@ def _next_steps(context: StageContext, summary: Mapping[str, Any]) -> None:
     wanted = summary["next_tests"]
     if wanted["made_already"]:
         listed = "; ".join(item["decides"] for item in wanted["decides"])
-        context.report.text(
-            f"Still open, though the tests for it have been made: {listed}. Longer tests or repeats remain."
-        )
+        sink.text(f"Still open, though the tests for it have been made: {listed}. Longer tests or repeats remain.")
     if not wanted["tests"]:
         return
     for item in wanted["decides"]:
-        context.report.text(f"To decide {item['decides']}: {', '.join(item['tests'])}.")
-    context.report.table(
+        sink.text(f"To decide {item['decides']}: {', '.join(item['tests'])}.")
+    sink.table(
         "next-tests",
         pd.DataFrame(wanted["tests"]).drop(columns="later"),
         f"Tests that would decide what is open, as {wanted['file']} in the run directory lists them; on the virtual "

@@ -1,0 +1,77 @@
+"""Section of the report: the parametric damper model and its rivals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from mrpipe.dampers.comparison import JudgedFit
+from mrpipe.dampers.scoring import shown_loops, yield_curves
+from mrpipe.reporting.dampers import comparison_bars, damper_loops, yield_force_curves
+from mrpipe.reporting.sink import Sink
+from mrpipe.signals.prepared import PreparedTest
+
+
+@dataclass(frozen=True)
+class IdentifiedDamper:
+    """What `identify-damper` found.
+
+    Attributes
+    ----------
+    tests
+        The prepared tests.
+    judged
+        Every form that was fitted, with its errors.
+    chosen
+        The one that later stages use.
+    summary
+        What the stage prints.
+    """
+
+    tests: Sequence[PreparedTest]
+    judged: Sequence[JudgedFit]
+    chosen: JudgedFit
+    summary: Mapping[str, Any]
+
+
+def describe(sink: Sink, result: IdentifiedDamper) -> None:
+    """Write the section."""
+    tests, judged, chosen, summary = result.tests, result.judged, result.chosen, result.summary
+    sink.text(
+        f"Damper model {chosen.fit.form.name} ({chosen.fit.form.summary}): NRMSE {chosen.training.nrmse:.3f} on the "
+        f"training tests, {chosen.validation.nrmse:.3f} on the validation tests; of the forms compared "
+        f"{summary['comparison'][0]['form']} does best on them."
+    )
+    tables = {
+        "parameters": (pd.DataFrame(summary["parameters"]).T.rename_axis("name").reset_index(), "Parameters (SI)."),
+        "thesis-parameters": (
+            pd.DataFrame(summary["thesis_parameters"]).T.rename_axis("name").reset_index(),
+            "The same in the notation of thesis Table 2.2, for a chosen A.",
+        ),
+        "comparison": (
+            pd.DataFrame(summary["comparison"]),
+            "Model forms by their error on the validation tests, which no fit has seen.",
+        ),
+        "tests": (pd.DataFrame(summary["tests"]), "Error of each test."),
+    }
+    for name, (frame, caption) in tables.items():
+        if len(frame):
+            sink.table(name, frame, caption)
+    unit = chosen.fit.model.drive_unit
+    sink.figure(
+        "loops",
+        damper_loops(shown_loops(chosen.fit.model, tests)),
+        "Measured loops and those of the model (thesis Figures 2.7 to 2.9).",
+    )
+    sink.figure(
+        "comparison",
+        comparison_bars(
+            [(row["form"], row["training_nrmse"], row["validation_nrmse"]) for row in summary["comparison"]]
+        ),
+        "Error of the model forms.",
+    )
+    drive, curves = yield_curves([(item.fit.form.name, item.fit.model) for item in judged], tests)
+    sink.figure("yield-force", yield_force_curves(drive, curves, unit), "Post-yield force at half the largest speed.")

@@ -1,0 +1,60 @@
+"""Section of the report: mass, damping, stiffness and modes of the frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from mrpipe.modal.identify import FrameIdentification
+from mrpipe.modal.spectra import averaged_responses
+from mrpipe.reporting import modal as figures
+from mrpipe.reporting.sink import Sink
+
+
+@dataclass(frozen=True)
+class IdentifiedFrame:
+    """What `identify-frame` found.
+
+    Attributes
+    ----------
+    identification
+        The frame with its tests and checks.
+    summary
+        What the stage prints.
+    segment_s
+        Length of the segments of the averaged spectra [s].
+    """
+
+    identification: FrameIdentification
+    summary: Mapping[str, Any]
+    segment_s: float
+
+
+def describe(sink: Sink, result: IdentifiedFrame) -> None:
+    """Write the section."""
+    found, values = result.identification, result.summary
+    floors = found.frame.floors
+    sink.text(
+        f"{floors} floors, {floors} modes between {values['frequencies_hz'][0]:.3g} and "
+        f"{values['frequencies_hz'][-1]:.3g} Hz. Poles are fitted to all floors at once, including the "
+        "transients at both ends of each record. Damping comes from free decays where there are any, and from the "
+        "sweep as a second, independent method."
+    )
+    sink.table("modes", pd.DataFrame(figures.mode_rows(values)), "Modes with 95 % intervals.")
+    for name in ("mass", "stiffness", "damping"):
+        frame = pd.DataFrame(getattr(found.frame, name), columns=[f"floor {i + 1}" for i in range(floors)])
+        sink.table(name, frame, {"mass": "M [kg].", "stiffness": "K [N/m].", "damping": "C [N s/m]."}[name])
+    averaged = averaged_responses(found.tests[0], result.segment_s)
+    sink.figure(
+        "frequency-responses",
+        figures.frequency_responses(found.in_frequency, averaged, found.band_hz),
+        "Frequency responses: measured (leakage taken out), of M, C and K, and coherence of the averaged spectra.",
+    )
+    sink.figure("mode-shapes", figures.mode_shapes(found.mode_shapes, values["frequencies_hz"]), "Mode shapes.")
+    if found.decays:
+        decays = [found.decays[mode] for mode in sorted(found.decays)]
+        sink.figure("decays", figures.decays(decays), "Free decays, exponential fit and peak-to-peak damping.")
+    sink.figure("verification", figures.verification(found.in_time[0]), "Measured and simulated response of the sweep.")
