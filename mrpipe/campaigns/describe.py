@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.campaigns.schema import floor_of, quantity_of
 from mrpipe.units import SI_UNITS
 
+if TYPE_CHECKING:
+    from mrpipe.campaigns.plausibility import Finding
 
-def describe(campaign: Campaign) -> dict[str, Any]:
-    """Return tests, channels, ranges, rates, durations and findings of a campaign as JSON-able Python (SI)."""
+
+def describe(campaign: Campaign, judged: Sequence[Finding] = ()) -> dict[str, Any]:
+    """Return tests, channels, ranges, rates, durations and findings of a campaign as JSON-able Python (SI).
+
+    `findings` holds one line for each finding of the reader and of the plausibility checks (`judged`); `plausibility`
+    holds the latter with their numbers.
+    """
     floors = {floor_of(name) for test in campaign.recordings for name in test.channels} - {None}
     content: dict[str, Any] = {
         "campaign": campaign.name,
@@ -29,7 +37,8 @@ def describe(campaign: Campaign) -> dict[str, Any]:
         content["floor_masses_kg"] = list(campaign.floor_masses_kg)
     content["declared_effects"] = list(campaign.declared_effects)
     content["tests"] = [_describe_test(campaign, test) for test in campaign.recordings]
-    content["findings"] = list(campaign.findings)
+    content["findings"] = [*campaign.findings, *(item.line for item in judged)]
+    content["plausibility"] = [item.as_dict() for item in judged]
     return content
 
 

@@ -1,4 +1,4 @@
-"""What a campaign is, told by its campaign file alone."""
+"""What a campaign file says of its campaign, read without the data."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from mrpipe.errors import UserError
 
 @dataclass(frozen=True)
 class CampaignHeader:
-    """Name, rig and the kinds of its tests (empty on a bench)."""
+    """Path of the file, name, rig, kinds of the tests (empty on a bench), and declared effects."""
 
+    file: Path
     campaign: str
     rig: str
     kinds: frozenset[str]
+    declared_effects: tuple[str, ...] = ()
 
 
 def read_header(path: Path) -> CampaignHeader:
@@ -39,4 +41,4 @@ def read_header(path: Path) -> CampaignHeader:
         for test in entry.tests
         if isinstance(test, dict)
     }
-    return CampaignHeader(entry.campaign, entry.rig, frozenset(kinds - {""}))
+    return CampaignHeader(file, entry.campaign, entry.rig, frozenset(kinds - {""}), entry.declared_effects)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from itertools import pairwise
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -78,7 +80,21 @@ class ChannelEntry(Entry):
     @field_validator("unit", mode="before")
     @classmethod
     def _unit_is_text(cls, value: Any) -> Any:
-        return str(value) if isinstance(value, int) else value
+        return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+    @field_validator("column", mode="before")
+    @classmethod
+    def _column_is_no_truth_value(cls, value: Any) -> Any:
+        if isinstance(value, bool):
+            raise ValueError("write the name of a column in quotes, or its number")
+        return value
+
+    @field_validator("scale")
+    @classmethod
+    def _scale_keeps_the_signal(cls, value: float) -> float:
+        if value == 0.0 or not math.isfinite(value):
+            raise ValueError("a finite number other than 0 expected, because 0 removes the signal")
+        return value
 
     @model_validator(mode="after")
     def _one_source(self) -> ChannelEntry:
@@ -148,15 +164,33 @@ class TestEntry(Entry):
     @field_validator("name")
     @classmethod
     def _usable_name(cls, value: str) -> str:
-        if not value.strip() or "/" in value:
-            raise ValueError("a name without '/' expected")
+        if not value.strip(". \t\n") or "/" in value:
+            raise ValueError("a name without '/' expected, with at least one letter or digit")
+        if len(value) > 120:
+            raise ValueError("a name of at most 120 characters expected")
+        return value
+
+    @field_validator("segments_s", mode="before")
+    @classmethod
+    def _segments_are_pairs(cls, value: Any) -> Any:
+        if value is None:
+            return None
+        pairs = value if isinstance(value, list) else []
+        if not pairs or not all(isinstance(item, list | tuple) and len(item) == 2 for item in pairs):
+            raise ValueError("a list of pairs expected, such as [[2, 5]] or [[2, 5], [8, 12]]")
         return value
 
     @field_validator("segments_s")
     @classmethod
     def _ordered(cls, value: tuple[tuple[float, float], ...] | None) -> tuple[tuple[float, float], ...] | None:
-        if value is not None and (not value or any(not end > begin for begin, end in value)):
+        if value is None:
+            return None
+        if any(not end > begin for begin, end in value):
             raise ValueError("pairs [begin, end] with begin before end expected")
+        ordered = sorted(value)
+        for (_, end), (begin, _) in pairwise(ordered):
+            if begin < end:
+                raise ValueError(f"segments overlap: one ends at {end:g} s, another begins at {begin:g} s")
         return value
 
     def details(self) -> dict[str, Any]:

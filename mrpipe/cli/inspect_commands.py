@@ -1,4 +1,4 @@
-"""`show`, `check` and `init`: look at files, check a configuration, lay out a rig of one's own."""
+"""`show`, `check` and `init`: show files, check a configuration, create a project."""
 
 from __future__ import annotations
 
@@ -47,27 +47,19 @@ def check(
     ] = None,
     explain: Annotated[bool, typer.Option("--explain", help="List every setting with its meaning and value.")] = False,
 ) -> None:
-    """Check a configuration and its campaigns."""
-    from mrpipe.campaigns import load_campaign
+    """Check a configuration and its campaigns.
+
+    Prints findings on the measured data as `mrpipe show` does. The exit status is 1 where a finding is an error.
+    """
+    from mrpipe.cli import checking
     from mrpipe.cli.output import print_json
     from mrpipe.config.loader import default_config_path, load_config
     from mrpipe.config.model import options as all_options
-    from mrpipe.config.sections.campaigns import LABORATORY
-    from mrpipe.pipeline.settings_view import SettingsView, setting_named
-    from mrpipe.stages.registry import stage_named
+    from mrpipe.errors import CheckFailed
+    from mrpipe.pipeline.settings_view import setting_named
 
     loaded = load_config(config or default_config_path(), options.overrides, options.settings)
-    for name in loaded.config.stages:
-        stage = None if name == "report" else stage_named(name)
-        if stage is not None and stage.check is not None:
-            stage.check(SettingsView(loaded.config, stage.settings, name))
-    campaigns: dict[str, Any] = {}
-    for rig, source in loaded.config.campaigns.model_dump().items():
-        if source is None or source == LABORATORY:
-            campaigns[rig] = source or "none"
-            continue
-        campaign = load_campaign(Path(source))
-        campaigns[rig] = f"{campaign.name}: {len(campaign.recordings)} tests"
+    checking.check_stages(loaded)
     if explain:
         content = [
             {
@@ -84,13 +76,33 @@ def check(
                 value = "" if row["value"] is None else f" = {row['value']}"
                 print(f"{row['setting']}{value}\n    {row['meaning']}")
         return
-    result = {"config": str(loaded.path), "valid": True, "stages": list(loaded.config.stages), "campaigns": campaigns}
+    checking.check_headers(loaded)
+    without = checking.stages_without_data(loaded)
+    result = checking.check_campaigns(loaded)
+    stages = list(loaded.config.stages)
     if options.json:
-        print_json(result)
+        print_json(
+            {
+                "config": str(loaded.path),
+                "valid": result.errors == 0,
+                "stages": stages,
+                "skipped": without,
+                **result.as_dict(),
+            }
+        )
     else:
-        print(f"{loaded.path}: valid, {len(loaded.config.stages)} stages")
-        for rig, text in campaigns.items():
+        verdict = f"{result.errors} errors in the data" if result.errors else "valid"
+        print(f"{loaded.path}: {verdict}, {len(stages)} stages")
+        for rig, text in result.campaigns.items():
             print(f"  campaign {rig}: {text}")
+            for note in result.notes.get(rig, []):
+                print(f"    note: {note}")
+            for item in result.findings.get(rig, []):
+                print(f"    {item.severity}: {item.line}")
+        for stage, campaign in without.items():
+            print(f"  {stage}: will be skipped, because there is no {campaign} campaign")
+    if result.errors:
+        raise CheckFailed(f"{loaded.path}: {result.errors} errors in the measured data (listed above)")
 
 
 def _shown(value: Any) -> str | None:

@@ -30,11 +30,13 @@ def run(
     until: Annotated[str | None, typer.Option(metavar="STAGE", help="Stop after this stage.")] = None,
 ) -> None:
     """Run every stage that the configuration lists."""
+    from mrpipe.cli.checking import check_headers
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import session
 
     started = time.monotonic()
     with session(_with_config(options, config)) as pipeline:
+        check_headers(pipeline.loaded)
         names = _until(list(pipeline.loaded.config.stages), until)
         if options.force:
             pipeline.force = frozenset(pipeline.stages)

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from mrpipe.artifacts import Artifact, atomic_path
 from mrpipe.campaigns import describe, load_campaign
 from mrpipe.campaigns.describe import unit_of
+from mrpipe.campaigns.plausibility import judge
 from mrpipe.reporting.signals import campaign_overview
 from mrpipe.reporting.style import figure_with_axes, label
 
@@ -30,7 +31,8 @@ def describe_file(path: Path) -> dict[str, Any]:
         If it is neither, or cannot be read.
     """
     if _is_campaign(path):
-        return {"kind": "campaign", **describe(load_campaign(path))}
+        campaign = load_campaign(path)
+        return {"kind": "campaign", **describe(campaign, judge(campaign))}
     artifact = Artifact(path)
     root = {key: value for key, value in artifact.root.items() if key != "config"}
     return {"kind": "artifact", "file": str(path), **root, "datasets": _datasets(path)}
@@ -64,7 +66,7 @@ def print_description(description: Mapping[str, Any]) -> None:
     """Print what :func:`describe_file` returned, a line a test or dataset."""
     rows = description.get("datasets") if description["kind"] == "artifact" else description.get("tests")
     for key, value in description.items():
-        if value is not rows and key not in {"findings"}:
+        if value is not rows and key not in {"findings", "plausibility"}:
             print(f"{key}: {_plain(value)}")
     for row in rows or []:
         print("  " + _row(row))

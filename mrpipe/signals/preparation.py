@@ -168,9 +168,13 @@ def _require_rate(options: PreparationOptions) -> None:
         raise UserError("prepare", "working_rate_hz", problem, f"give {2.5 * cutoff:g} Hz at least")
 
 
+def length_needed(options: PreparationOptions, rate: float) -> int:
+    """Return the fewest samples at a working rate [Hz] that the filters of these options need."""
+    return max(samples_needed(min(options.cutoff_hz, options.velocity_cutoff_hz), rate), 20)
+
+
 def _require_length(work: _Work, options: PreparationOptions, source: str) -> None:
-    lowest = min(options.cutoff_hz, options.velocity_cutoff_hz)
-    needed = max(samples_needed(lowest, work.rate), 20)
+    needed = length_needed(options, work.rate)
     if work.time.size < needed:
         raise UserError(
             source,

@@ -10,6 +10,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.campaigns import load_campaign
+    from mrpipe.campaigns.plausibility import judge
     from mrpipe.reporting import prepare as section
     from mrpipe.signals.preparation import prepare_campaign
     from mrpipe.signals.prepared import write_prepared
@@ -17,7 +18,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
     settings = context.settings.prepare
     campaign = load_campaign(context.inputs["campaign:bench"])
-    for finding in campaign.findings:
+    for finding in (*campaign.findings, *(item.line for item in judge(campaign))):
         context.warn(finding)
     prepared = prepare_campaign(campaign, settings, context.progress)
     preparations = prepared.tests

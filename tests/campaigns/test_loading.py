@@ -126,6 +126,11 @@ def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: d
         ({"role": None}, "tests[0].role: is missing"),
         ({"rolle": "x"}, "tests[0].rolle: unknown key"),
         ({"segments_s": [[3, 2]]}, "pairs [begin, end] with begin before end expected"),
+        ({"segments_s": [2, 5]}, "a list of pairs expected, such as [[2, 5]]"),
+        ({"segments_s": [[0, 2], [1, 3]]}, "segments overlap: one ends at 2 s, another begins at 1 s"),
+        ({"name": "."}, "a name without '/' expected, with at least one letter or digit"),
+        ({"channels": {"force": {"scale": 0}}}, "a finite number other than 0 expected"),
+        ({"channels": {"force": {"column": True}}}, "write the name of a column in quotes, or its number"),
         ({"segments_s": [[30, 40]]}, "[30, 40] holds no sample; the clock of one.csv runs from 0 to 3.999 s"),
         ({"name": "two"}, "tests[1].name: 'two' stands twice"),
         ({"part": 2}, "part: is 2, the file has 1"),
@@ -220,9 +225,17 @@ def test_clipping_dropouts_and_jitter_are_reported(tmp_path: Path) -> None:
     columns["t"] = columns["t"] + 1e-4 * rng.uniform(-1, 1, 4000)
     findings = load_campaign(campaign(tmp_path, {key: value[keep] for key, value in columns.items()})).findings
     assert any(line.startswith("test one: force looks clipped") for line in findings)
-    assert any("1 dropouts of 20 samples in all, the first at 1.499 s" in line for line in findings)
+    assert any("1 gaps in the clock, 20 samples are missing; the first gap is at 1.499 s" in line for line in findings)
     assert any("clock jitter of" in line for line in findings)
     assert not any("test two" in line for line in findings)
+
+
+@pytest.mark.planted
+def test_strong_jitter_is_not_reported_as_lost_samples(tmp_path: Path) -> None:
+    columns = motion()
+    columns["t"] = columns["t"] + 4e-4 * np.random.default_rng(3).uniform(-1, 1, 4000)
+    findings = load_campaign(campaign(tmp_path, columns)).findings
+    assert [line.split(" of ")[0] for line in findings] == ["test one: clock jitter"]
 
 
 @pytest.mark.planted

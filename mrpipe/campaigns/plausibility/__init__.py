@@ -2,5 +2,6 @@
 
 from mrpipe.campaigns.plausibility.compare_tests import compare_tests
 from mrpipe.campaigns.plausibility.finding import Finding, TestArrays, arrays_of
+from mrpipe.campaigns.plausibility.library import Check, all_checks, judge
 
-__all__ = ["Finding", "TestArrays", "arrays_of", "compare_tests"]
+__all__ = ["Check", "Finding", "TestArrays", "all_checks", "arrays_of", "compare_tests", "judge"]

@@ -45,7 +45,7 @@ def agreement(reference: ReferenceMap, part: Normal, without: Collection[int]) -
     others = [index for index in range(len(reference.parts)) if index not in without]
     if len(others) < 2:
         return Agreement(gain, correlation, float("inf"), correlation)
-    trials = [fit(part, reference.coefficients({*without, index})) for index in others]
+    trials = [fit(part, coefficients) for coefficients in reference.jackknife(without)]
     gains = np.array([item[0] for item in trials])
     correlations = np.array([item[1] for item in trials])
     if gain <= 0.0 or np.any(gains <= 0.0):

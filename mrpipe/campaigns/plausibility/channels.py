@@ -79,15 +79,16 @@ def find_stuck(values: FloatArray, company: FloatArray) -> Stuck | None:
     return Stuck(first, samples, len(found))
 
 
-def find_spikes(values: FloatArray) -> IntArray:
+def find_spikes(values: FloatArray, share: float = SPIKE_SHARE) -> IntArray:
     """Return the indices of spikes: one or two samples far from the samples before and after them.
 
-    Steps and corners of a signal stay where they are under a median of five samples, so only isolated samples deviate.
+    `share` is the smallest deviation over the range that 99 % of the samples cover. Steps and corners of a signal stay
+    where they are under a median of five samples, so only isolated samples deviate.
     """
     if values.size < 20:
         return np.zeros(0, dtype=np.int64)
     deviation = np.abs(values - median_filter(values, size=5, mode="nearest"))
     noise = float(np.quantile(deviation, 0.9)) / 1.64
     low, high = np.quantile(values, [0.005, 0.995])
-    limit = max(SPIKE_NOISES * noise, SPIKE_SHARE * float(high - low), 1e-12 * float(np.abs(values).max()))
+    limit = max(SPIKE_NOISES * noise, share * float(high - low), 1e-12 * float(np.abs(values).max()))
     return np.asarray(np.flatnonzero(deviation > limit), dtype=np.int64)

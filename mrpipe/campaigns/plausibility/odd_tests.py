@@ -15,6 +15,9 @@ from mrpipe.campaigns.plausibility.reference import ReferenceMap, Slow, slow_dow
 GAIN_SCATTER, PHASE_SCATTER = 0.04, 0.06
 """Standard deviations between tests of a sound rig, before any test is seen: of log(gain), and of phase [rad]."""
 
+SMALLEST_PHASE = 0.15
+"""Phase [rad] below which hysteresis that the map does not follow is a likelier cause than the clock."""
+
 PRIOR_TESTS = 4
 """Number of tests that these prior figures are worth."""
 
@@ -76,10 +79,11 @@ def _moves(test: TestArrays) -> bool:
 def _against_the_work(tests: Sequence[Slow]) -> list[Finding]:
     """Return tests in which the force does negative work, or none, while it does positive work in the others."""
     findings = []
+    works = [test.work for test in tests]
     for index, test in enumerate(tests):
-        others = [other for other in tests if other is not test]
-        work = float(np.median([other.work for other in others])) if others else 0.0
-        if work < 0.2 or test.work > 0.1:
+        others = works[:index] + works[index + 1 :]
+        work = float(np.median(others)) if others else 0.0
+        if work < 0.2 or works[index] > 0.1:
             continue
         told = f"correlation of force and velocity {test.work:.2f}, in the other tests {work:.2f}"
         numbers = {"correlation_with_velocity": test.work, "correlation_of_others": work}
@@ -123,7 +127,7 @@ def _against_the_map(tests: Sequence[Slow]) -> list[Finding]:
     reference = ReferenceMap(tests)
     odd: list[int] = []
     while len(tests) - len(odd) > max(2, len(tests) // 2):
-        worst = _oddest(reference, odd)
+        worst = _oddest(reference, tests, odd)
         if worst is None:
             break
         odd.append(worst)
@@ -144,7 +148,7 @@ def limit_of(others: FloatArray, prior: float, tests: int, error: float = 0.0) -
     return quantile * float(np.sqrt(variance * (1.0 + 1.0 / others.size) + error**2))
 
 
-def _oddest(reference: ReferenceMap, odd: Sequence[int]) -> int | None:
+def _oddest(reference: ReferenceMap, tests: Sequence[Slow], odd: Sequence[int]) -> int | None:
     """Return the test that agrees least with the others, None where all agree."""
     kept = [index for index in range(len(reference.parts)) if index not in odd]
     items = {index: agreement(reference, reference.parts[index], {*odd, index}) for index in kept}
@@ -160,13 +164,20 @@ def _oddest(reference: ReferenceMap, odd: Sequence[int]) -> int | None:
             continue
         by = abs(item.log_gain - float(np.median(gains)))
         error = item.log_gain_error
-        if gains.size < 3 or not np.isfinite(error):
+        if gains.size < 3 or not np.isfinite(error) or not _covered(index, related, tests):
             # too little to judge a gain, but decades show in any case
             error = 1.0
         score = by / limit_of(gains, GAIN_SCATTER, len(kept), error)
         if score > 1.0:
             scores[index] = score
     return max(scores, key=lambda index: scores[index]) if scores else None
+
+
+def _covered(index: int, others: Sequence[int], tests: Sequence[Slow]) -> bool:
+    """Whether the drive of a test lies between those of the others; beyond them the map extrapolates."""
+    levels = [tests[other].drive_level for other in others]
+    slack = 0.1 * (max(levels) - min(levels)) + 0.02 * max(levels)
+    return min(levels) - slack <= tests[index].drive_level <= max(levels) + slack
 
 
 def _explain(reference: ReferenceMap, tests: Sequence[Slow], index: int, odd: Sequence[int]) -> Finding:
@@ -270,7 +281,7 @@ def _late(reference: ReferenceMap, tests: Sequence[Slow], sound: Sequence[int]) 
         if others.size < 3:
             continue
         by = phase - float(np.median(others))
-        if abs(by) <= limit_of(others, PHASE_SCATTER, len(phases)):
+        if abs(by) <= max(limit_of(others, PHASE_SCATTER, len(phases)), SMALLEST_PHASE):
             continue
         seconds = by / (2.0 * np.pi * tests[index].frequency_hz)
         findings.append(

@@ -8,7 +8,7 @@ tests out is cheap.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -144,19 +144,28 @@ class ReferenceMap:
         levels = np.unique(np.round([test.drive_level / self._drive for test in tests], 1))
         self._powers = min(2, levels.size - 1)
         self.parts = [self.normal(test) for test in tests]
-
-    def coefficients(self, without: Iterable[int]) -> FloatArray:
-        """Return the coefficients that fit all tests but those with the indices `without`, shape (p,)."""
-        left_out = set(without)
-        kept = [part for index, part in enumerate(self.parts) if index not in left_out]
         # tests count by relative error, but a test of far smaller force must not outweigh all others
-        weights = [1.0 / (part.power + (0.1 * self._force) ** 2) for part in kept]
-        matrix = np.sum([weight * part.matrix for weight, part in zip(weights, kept, strict=True)], axis=0)
-        vector = np.sum([weight * part.vector for weight, part in zip(weights, kept, strict=True)], axis=0)
-        ridge = RIDGE * np.trace(matrix) / len(matrix) * np.eye(len(matrix))
-        return np.asarray(np.linalg.solve(matrix + ridge, vector))
+        weights = [1.0 / (part.power + (0.1 * self._force) ** 2) for part in self.parts]
+        self._matrices = np.stack([weight * part.matrix for weight, part in zip(weights, self.parts, strict=True)])
+        self._vectors = np.stack([weight * part.vector for weight, part in zip(weights, self.parts, strict=True)])
 
-    def predict(self, test: Slow, without: Iterable[int]) -> FloatArray:
+    def coefficients(self, without: Collection[int]) -> FloatArray:
+        """Return the coefficients that fit all tests but those with the indices `without`, shape (p,)."""
+        kept = [index for index in range(len(self.parts)) if index not in without]
+        return self._solved(self._matrices[kept].sum(axis=0)[None], self._vectors[kept].sum(axis=0)[None])[0]
+
+    def jackknife(self, without: Collection[int]) -> FloatArray:
+        """Return the coefficients without one more test each, for all tests not in `without`, shape (m, p)."""
+        kept = [index for index in range(len(self.parts)) if index not in without]
+        matrices = self._matrices[kept].sum(axis=0) - self._matrices[kept]
+        return self._solved(matrices, self._vectors[kept].sum(axis=0) - self._vectors[kept])
+
+    def _solved(self, matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+        size = matrices.shape[-1]
+        ridge = RIDGE * np.trace(matrices, axis1=1, axis2=2)[:, None, None] / size * np.eye(size)
+        return np.asarray(np.linalg.solve(matrices + ridge, vectors[:, :, None])[:, :, 0])
+
+    def predict(self, test: Slow, without: Collection[int]) -> FloatArray:
         """Return the force [N], without its mean, that the tests but those in `without` give for `test`, shape (m,)."""
         return np.asarray(self._features(test) @ self.coefficients(without))
 

@@ -1,0 +1,202 @@
+"""What `check` looks at: settings, campaign files and data, as `run` would meet them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.errors import UserError
+
+if TYPE_CHECKING:
+    from mrpipe.campaigns import Campaign
+    from mrpipe.campaigns.header import CampaignHeader
+    from mrpipe.campaigns.plausibility import Finding
+    from mrpipe.config.loader import LoadedConfig
+
+RIGS = {"bench": "damper-bench", "frame": "shear-frame", "closed_loop": "shear-frame"}
+"""Key of `campaigns` -> rig that it takes."""
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """What a check found.
+
+    Attributes
+    ----------
+    campaigns
+        Key of `campaigns` -> the campaign in a few words.
+    notes
+        Key of `campaigns` -> lines that the reader noticed.
+    findings
+        Key of `campaigns` -> findings of the plausibility checks.
+    """
+
+    campaigns: dict[str, str] = field(default_factory=dict)
+    notes: dict[str, list[str]] = field(default_factory=dict)
+    findings: dict[str, list[Finding]] = field(default_factory=dict)
+
+    @property
+    def errors(self) -> int:
+        """Number of findings that are errors."""
+        return sum(item.severity == "error" for items in self.findings.values() for item in items)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return campaigns and findings as plain structure for JSON."""
+        notes = [
+            {"campaign": key, "name": "reader", "severity": "warning", "sentence": line}
+            for key, lines in self.notes.items()
+            for line in lines
+        ]
+        judged = [{"campaign": key, **item.as_dict()} for key, items in self.findings.items() for item in items]
+        return {"campaigns": self.campaigns, "findings": [*notes, *judged], "errors": self.errors}
+
+
+def check_stages(loaded: LoadedConfig) -> None:
+    """Check the settings of every stage of the configuration.
+
+    Raises
+    ------
+    UserError
+        If a stage is unknown or its settings do not fit together.
+    """
+    from mrpipe.pipeline.settings_view import SettingsView
+    from mrpipe.stages.registry import stage_named
+
+    for name in loaded.config.stages:
+        stage = None if name == "report" else stage_named(name)
+        if stage is not None and stage.check is not None:
+            stage.check(SettingsView(loaded.config, stage.settings, name))
+
+
+def measured_campaigns(loaded: LoadedConfig) -> dict[str, Path]:
+    """Return key of `campaigns` -> path of the measured campaigns; the virtual laboratory is left out."""
+    from mrpipe.config.sections.campaigns import LABORATORY
+
+    sources = loaded.config.campaigns.model_dump()
+    return {key: Path(source) for key, source in sources.items() if source not in (None, LABORATORY)}
+
+
+def check_headers(loaded: LoadedConfig) -> None:
+    """Check each campaign file without its data: the rig, the declared effects, and that the data files exist.
+
+    Raises
+    ------
+    UserError
+        If a campaign belongs under another key, declares an unknown effect, or lacks a file.
+    """
+    from mrpipe.campaigns import campaign_files
+    from mrpipe.campaigns.header import read_header
+    from mrpipe.pipeline.settings_view import setting_named
+
+    for key, path in measured_campaigns(loaded).items():
+        header = read_header(path)
+        if header.rig != RIGS[key]:
+            right = next(other for other, rig in RIGS.items() if rig == header.rig)
+            raise UserError(
+                loaded.path,
+                f"campaigns.{key}",
+                f"names a {header.rig} campaign ({header.file}), but takes a {RIGS[key]} campaign",
+                f"name it under campaigns.{right}",
+            )
+        require_known_effects(header, setting_named(loaded.config, "close_loop.effect_files"))
+        for file in campaign_files(path):
+            if not file.is_file():
+                remedy = "correct `file:` in the campaign file, or put the file there"
+                raise UserError(file, "", "data file not found", remedy)
+
+
+def require_known_effects(header: CampaignHeader, effect_files: tuple[Path, ...] = ()) -> None:
+    """Refuse effects that a campaign declares and nobody knows.
+
+    Raises
+    ------
+    UserError
+        Naming the nearest known effect.
+    """
+    if not header.declared_effects:
+        return
+    from mrpipe.artifacts.yaml_source import nearest, read_yaml
+
+    known = known_effects(effect_files)
+    for index, name in enumerate(header.declared_effects):
+        if name not in known:
+            source = read_yaml(header.file)
+            raise source.error(("declared_effects", index), f"unknown effect {name!r}", nearest(name, known))
+
+
+def known_effects(effect_files: tuple[Path, ...] = ()) -> set[str]:
+    """Return the names of all effects, those of the user's files included."""
+    from mrpipe.effects.library import all_effects, effect_of_file
+    from mrpipe.effects.structural.library import all_structural_effects
+
+    own = [getattr(effect_of_file(path), "name", "") for path in effect_files]
+    return {*all_effects(), *all_structural_effects(), *own}
+
+
+def check_campaigns(loaded: LoadedConfig) -> CheckResult:
+    """Read all measured campaigns and judge them.
+
+    Raises
+    ------
+    UserError
+        If a campaign cannot be read.
+    """
+    from mrpipe.campaigns import load_campaign
+    from mrpipe.campaigns.plausibility import judge
+
+    measured = measured_campaigns(loaded)
+    result = CheckResult()
+    for key, source in loaded.config.campaigns.model_dump().items():
+        if key not in measured:
+            result.campaigns[key] = source or "none"
+            continue
+        campaign = load_campaign(measured[key])
+        result.campaigns[key] = f"{campaign.name}: {len(campaign.recordings)} tests"
+        result.notes[key] = list(campaign.findings)
+        result.findings[key] = [*judge(campaign), *_too_short(loaded, campaign)]
+    return result
+
+
+def _too_short(loaded: LoadedConfig, campaign: Campaign) -> list[Finding]:
+    if campaign.rig != "damper-bench" or "prepare" not in loaded.config.stages:
+        return []
+    from mrpipe.pipeline.settings_view import setting_named
+    from mrpipe.signals.lengths import find_short_tests
+
+    return find_short_tests(campaign, setting_named(loaded.config, "prepare"))
+
+
+def stages_without_data(loaded: LoadedConfig) -> dict[str, str]:
+    """Return stage -> campaign that it needs, itself or through other stages, and the configuration does not name.
+
+    Raises
+    ------
+    UserError
+        If no stage has data.
+    """
+    from mrpipe.stages.registry import all_stages
+
+    campaigns = loaded.config.campaigns.model_dump()
+    stages = all_stages()
+    without: dict[str, str] = {}
+
+    def missing(name: str) -> str:
+        for item in stages[name].inputs:
+            key = item.partition(":")[2]
+            lacking = item if key and campaigns.get(key.replace("-", "_")) is None else "" if key else missing(item)
+            if lacking:
+                return lacking
+        return ""
+
+    for name in loaded.config.stages:
+        if name in stages and missing(name):
+            without[name] = missing(name).partition(":")[2]
+    if without and set(without) == set(loaded.config.stages) - {"report"}:
+        raise UserError(
+            loaded.path,
+            "campaigns",
+            f"no stage has data, because no {' or '.join(sorted(set(without.values())))} campaign is named",
+            "write the path of a campaign there, or `laboratory` for the virtual rig",
+        )
+    return without

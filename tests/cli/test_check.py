@@ -1,0 +1,128 @@
+"""`check` prints the findings of the data and sees what `run` would stumble over."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrpipe.campaigns import TestFile, write_campaign
+from mrpipe.cli import run
+from tests.campaigns.plausibility.rig import sound_tests
+
+CONFIG = """\
+name: own
+stages: [prepare, assemble, identify-damper]
+campaigns: {{bench: {bench}, frame: {frame}, closed_loop: null}}
+"""
+
+
+def project(
+    directory: Path, tests: list[Any] | None = None, *, bench: str = "data", frame: str = "null", **extra: Any
+) -> Path:
+    """Write a bench campaign and a configuration, and return the latter."""
+    write_campaign(
+        directory / "data",
+        campaign="own",
+        rig="damper-bench",
+        sampling_rate_hz=1000.0,
+        channels={
+            "time": ("t", "s"),
+            "displacement": ("x", "m"),
+            "drive": ("i", "A"),
+            "force": ("F", "N"),
+        },
+        tests=[
+            TestFile(
+                test.name,
+                test.role,
+                {"t": test.time_s, "x": test.displacement_m, "i": test.drive, "F": test.force_n},
+            )
+            for test in tests or sound_tests(4)
+        ],
+        extra=extra,
+    )
+    config = directory / "own.yaml"
+    config.write_text(CONFIG.format(bench=bench, frame=frame), encoding="utf-8")
+    return config
+
+
+def checked(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Return exit status, standard output and standard error of `mrpipe check`."""
+    status = run(["check", *arguments])
+    said = capsys.readouterr()
+    return status, said.out, said.err
+
+
+@pytest.mark.golden
+def test_a_sound_project_is_valid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = checked(capsys, str(project(tmp_path)))
+    assert (status, err) == (0, "") and "valid, 3 stages" in out and "campaign bench: own: 4 tests" in out
+
+
+@pytest.mark.planted
+def test_errors_in_the_data_are_listed_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tests = sound_tests(6)
+    tests[3] = replace(tests[3], force_n=-tests[3].force_n)
+    config = project(tmp_path, tests)
+    status, out, err = checked(capsys, str(config))
+    assert status == 1 and "error: test T3, force: force or displacement has the opposite sign" in out
+    assert "1 errors in the measured data" in err
+    status, out, _ = checked(capsys, str(config), "--json")
+    content = json.loads(out)
+    assert status == 1 and content["valid"] is False
+    (found,) = content["findings"]
+    assert (found["campaign"], found["name"], found["test"]) == ("bench", "sign-reversed", "T3")
+
+
+@pytest.mark.planted
+def test_findings_of_the_reader_are_printed_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tests = sound_tests(4)
+    tests[1] = replace(tests[1], force_n=np.clip(tests[1].force_n, -20.0, 20.0))
+    _, out, _ = checked(capsys, str(project(tmp_path, tests)))
+    assert "note: test T1: force looks clipped" in out
+
+
+@pytest.mark.planted
+def test_a_test_too_short_for_the_filters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tests = sound_tests(4)
+    short = {name: getattr(tests[1], name)[:50] for name in ("time_s", "displacement_m", "drive", "force_n")}
+    tests[1] = replace(tests[1], **short)
+    status, out, _ = checked(capsys, str(project(tmp_path, tests)))
+    assert status == 1 and "error: test T1: has 50 samples" in out and "need 151" in out
+
+
+@pytest.mark.golden
+def test_an_unknown_declared_effect_names_the_nearest_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = project(tmp_path, declared_effects=["backlsh"])
+    status, _, err = checked(capsys, str(config))
+    assert status == 2 and "declared_effects[0]: unknown effect 'backlsh'; did you mean backlash?" in err
+    assert run(["run", str(config), "--run", str(tmp_path / "run"), "--quiet"]) == 2
+    assert "did you mean backlash?" in capsys.readouterr().err
+
+
+@pytest.mark.golden
+def test_a_bench_campaign_given_as_a_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, _, err = checked(capsys, str(project(tmp_path, bench="null", frame="data")))
+    assert status == 2 and "campaigns.frame: names a damper-bench campaign" in err
+    assert "name it under campaigns.bench" in err
+
+
+@pytest.mark.golden
+def test_no_campaign_at_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, _, err = checked(capsys, str(project(tmp_path, bench="null")))
+    assert status == 2 and "no stage has data, because no bench campaign is named" in err
+
+
+@pytest.mark.golden
+def test_a_missing_data_file_is_one_line_in_check_and_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = project(tmp_path)
+    (tmp_path / "data" / "T2.h5").unlink()
+    for command in (["check", str(config)], ["run", str(config), "--run", str(tmp_path / "run"), "--quiet"]):
+        assert run(command) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "T2.h5: data file not found" in line
