@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from mrpipe.campaigns import Campaign
 from mrpipe.campaigns.plausibility.finding import Finding
-from mrpipe.signals.preparation import PreparationOptions, common_rate, length_needed
+from mrpipe.signals.options import PreparationOptions
+from mrpipe.signals.preparation import common_rate, length_needed
 
 
 def find_short_tests(campaign: Campaign, options: PreparationOptions) -> list[Finding]:
