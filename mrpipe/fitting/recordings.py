@@ -277,7 +277,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: floa
     edge = chosen / rate
     used = (path >= SETTLING_SHARE * np.ptp(smooth)) & (edge > 1.0 / cutoff) & (length / rate - edge > 1.0 / cutoff)
     band = min(cutoff, test.displacement_noise_band_hz or cutoff)
-    noise = test.displacement_noise_m or noise_level(test.displacement_raw_m, rate) * np.sqrt(
+    noise = test.displacement_noise_m or steady_noise(test.displacement_raw_m, rate) * np.sqrt(
         min(1.0, 2.0 * band / rate)
     )
     periods = np.diff(test.cycles)
@@ -291,7 +291,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: floa
         "dt": stride / rate,
         "displacement_noise": noise,
         "velocity_noise": noise * 2.0 * np.pi * band / np.sqrt(3.0),
-        "force_noise": force_noise(test.force_raw_n, rate),
+        "force_noise": steady_noise(test.force_raw_n, rate),
         "force_offset": test.force_offset_n,
         "period_s": float(np.median(periods)) / rate if len(periods) else 0.0,
         "cutoff_hz": cutoff,
@@ -305,14 +305,14 @@ def _acceleration_was_measured(test: PreparedTest) -> bool:
     return float(np.std(difference)) > 0.02 * float(np.std(derived))
 
 
-def force_noise(force: FloatArray, rate_hz: float) -> float:
-    """Return the standard deviation of the noise of a force [N].
+def steady_noise(values: FloatArray, rate_hz: float) -> float:
+    """Return the standard deviation of the noise of a channel, in its unit.
 
-    Corners of the force, as play and late rises leave at every reversal, reach up to the highest frequencies and look
-    like noise in a spectrum. They are few: the median of third differences does not see them.
+    Corners of a force at reversals, and jumps of a channel that was stuck for a while, reach up to the highest
+    frequencies and look like noise in a spectrum. They are few, so the median of third differences does not see them.
     """
-    spectral = noise_level(force, rate_hz)
-    typical = float(np.median(np.abs(np.diff(force, 3)))) / (0.6745 * np.sqrt(20.0))
+    spectral = noise_level(values, rate_hz)
+    typical = float(np.median(np.abs(np.diff(values, 3)))) / (0.6745 * np.sqrt(20.0))
     return min(spectral, max(typical, 0.2 * spectral))
 
 

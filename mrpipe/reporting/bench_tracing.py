@@ -196,8 +196,16 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         if flexible
         else ""
     )
-    if not summary["residual"]["structured"]:
-        return f"{start} What is left is noise: nothing is missing."
+    kind = summary.get("verdict_class", "")
+    if kind == "validation differs":
+        named = " ".join(_effect_in_words(effect) for effect in effects)
+        return f"{start} {_difference_in_words(summary['validation'])}{' ' + named if named else ''}{added}"
+    if kind == "noise" or not (kind or summary["residual"]["structured"]):
+        return f"{start} The residual is noise: nothing is missing."
+    if kind == "base form":
+        return f"{start} Another base form is needed: {summary['verdict']}. The error is then {_percent(after)}."
+    if kind and not summary["candidates"] and not effects:
+        return f"{start} {summary['verdict'][:1].upper()}{summary['verdict'][1:]}."
     if not effects:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         depends = f" It varies with {_listed(states)}." if states else ""
@@ -215,6 +223,24 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         end += f" Something is still unexplained{'; it varies with ' + _listed(states) if states else ''}."
     names = _listed([f"**{effect['name']}**" for effect in effects])
     return f"{start} The model lacks {names}. {' '.join(parts)} {end}{added}"
+
+
+def _difference_in_words(found: Mapping[str, Any]) -> str:
+    """Return how the validation tests differ from the training tests, and the error on the comparable part."""
+    differences = "; ".join(item["sentence"] for item in found["differences"])
+    text = f"The validation tests differ from the training tests: {differences}."
+    comparable = found.get("comparable") or {}
+    if comparable.get("nrmse_after") is not None:
+        text += (
+            f" On the comparable part ({_percent(comparable['share_of_samples'])} of the samples) the error is "
+            f"{_percent(comparable['nrmse_before'])} before and {_percent(comparable['nrmse_after'])} after."
+        )
+    if comparable.get("nrmse_corrected") is not None:
+        text += (
+            f" With gain, lag and offset corrected, estimated from the first part of each record and judged on the "
+            f"rest, the error is {_percent(comparable['nrmse_corrected'])}."
+        )
+    return text
 
 
 def _unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:

@@ -64,7 +64,12 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     after = (summary.get("after") or {}).get("nrmse")
     found = ", ".join(effect["name"] for effect in summary.get("effects") or [])
     unexplained = (summary.get("unexplained") or {}).get("structured")
-    verdict = found or ("no known effect explains the residual" if unexplained else "nothing is missing")
+    differs = "the validation tests differ from the training tests"
+    verdict = (
+        found
+        or (differs if summary.get("verdict_class") == "validation differs" else "")
+        or ("no known effect explains the residual" if unexplained else "nothing is missing")
+    )
     floor = _number(summary.get("noise_floor_nrmse"))
     return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {floor})"
 

@@ -51,3 +51,24 @@ def test_noise_alone_and_the_unknown_are_said_to_be_so(summary: dict[str, Any]) 
     assert "no known effect explains it. It varies with displacement." in in_plain_words(unknown)
     noise = {**unknown, "residual": {"structured": False}}
     assert in_plain_words(noise).endswith("nothing is missing.")
+
+
+def test_differences_of_the_validation_tests_are_said_first(summary: dict[str, Any]) -> None:
+    comparable = {"share_of_samples": 0.75, "nrmse_before": 0.02, "nrmse_after": 0.01, "nrmse_corrected": 0.012}
+    difference = {"sentence": "v8: the measured force is 0.001 times the simulated one"}
+    differs = {
+        **summary,
+        "verdict_class": "validation differs",
+        "validation": {"differences": [difference], "comparable": comparable},
+    }
+    text = in_plain_words(differs)
+    assert "v8: the measured force is 0.001 times the simulated one." in text
+    assert "75.0 % of the samples) the error is 2 % before and 1 % after" in text
+    assert "the error is 1.2 %." in text
+    assert "Remanence" in text
+
+
+def test_a_base_model_that_fails_is_said_to_fail(summary: dict[str, Any]) -> None:
+    sentence = "the model does not predict the validation tests (NRMSE 0.7): nothing is traced"
+    failed = {**summary, "effects": [], "candidates": [], "verdict_class": "unknown", "verdict": sentence}
+    assert in_plain_words(failed).endswith("(NRMSE 0.7): nothing is traced.")

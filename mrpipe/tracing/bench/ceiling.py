@@ -1,6 +1,8 @@
-"""How much of a residual is recoverable at all: boosted trees on lagged states, judged on tests they never saw."""
+"""How much of a residual is recoverable at all: boosted trees on lagged states, judged on samples they never saw."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingRegressor
@@ -14,6 +16,121 @@ from mrpipe.tracing.bench.residual_structure import states_of
 
 LAGS_S = (0.01, 0.03, 0.1, 0.3)
 MOST_ROWS = 15_000
+
+PIECES = 8
+"""Every validation record is cut into this many pieces; each piece is predicted by a model that has not seen it."""
+
+PARTS = 4
+"""Number of parts of the cross-fitting: pieces 0, 4, then 1, 5, ... are left out together."""
+
+DRAWS = 200
+"""Draws of the bootstrap over pieces."""
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """What a flexible model leaves that could learn every validation condition.
+
+    Attributes
+    ----------
+    error
+        Measured less predicted force [N], shape (n,), of pieces left out.
+    piece
+        Piece of each sample, shape (n,).
+    """
+
+    recordings: Recordings
+    measured: FloatArray
+    error: FloatArray
+    piece: IntArray
+
+    def nrmse(self, part: BoolArray) -> tuple[float, tuple[float, float]]:
+        """Return the NRMSE over some samples, shape (n,), and its 95 % interval by bootstrap over the pieces."""
+        part = part & self.recordings.used
+        if not part.any():
+            return 0.0, (0.0, 0.0)
+        index = np.unique(self.piece[part], return_inverse=True)[1]
+        squares = np.bincount(index, weights=self.error[part] ** 2)
+        powers = np.bincount(index, weights=self.measured[part] ** 2)
+        chosen = np.random.default_rng(0).integers(len(squares), size=(DRAWS, len(squares)))
+        draws = squares[chosen].sum(axis=1) / np.maximum(powers[chosen].sum(axis=1), 1e-300)
+        low, high = np.sqrt(np.quantile(draws, [0.025, 0.975]))
+        return float(np.sqrt(squares.sum() / max(powers.sum(), 1e-300))), (float(low), float(high))
+
+
+def cross_fitted(
+    found: Fit, training: Recordings, residual: FloatArray, validation: Recordings, measured: FloatArray,
+    simulated: FloatArray, *, seed: int = 0, iterations: int = 60,
+) -> Ceiling:  # fmt: skip
+    """Return what a flexible model leaves on pieces of the validation records that it has not seen.
+
+    It learns from the training tests and from the other pieces of the same record: first a gain, a lag and an offset
+    of that record, then trees on the simulated states. So it can learn every validation condition, which a model of
+    the training tests alone cannot.
+
+    Parameters
+    ----------
+    found
+        The fit whose simulated states the trees see.
+    residual
+        Measured less simulated force of the training tests [N], shape (n,), 0 where not compared.
+    validation, measured, simulated
+        Validation tests, their offset-free force and the simulated one [N], shape (m,).
+    """
+    piece = _pieces(validation)
+    states = np.column_stack([lagged_states(found, validation), 1.0 + validation.test])
+    known = np.column_stack([lagged_states(found, training), np.zeros(len(residual))])
+    rows_known = _rows(training.used)
+    columns = _record_columns(validation, simulated)
+    target = measured - simulated
+    plain, left = target.copy(), target.copy()
+    for part in range(PARTS):
+        out = piece % PARTS == part
+        rest = _without_record_fit(validation, columns, target, ~out)
+        rows = _rows(validation.used & ~out)
+        judged = np.flatnonzero(validation.used & out)
+        if not len(rows) or not len(judged):
+            continue
+        trees = _trees(seed, iterations)
+        with threadpool_limits(1):
+            trees.fit(
+                np.concatenate([states[rows], known[rows_known]]), np.concatenate([rest[rows], residual[rows_known]])
+            )
+        plain[judged] = rest[judged]
+        left[judged] = rest[judged] - trees.predict(states[judged])
+    for test in range(validation.tests):
+        own = validation.test == test
+        # where nothing can be learnt, a flexible model only adds to the error
+        options = (target[own], plain[own], left[own])
+        left[own] = min(options, key=lambda item: float(item @ item))
+    return Ceiling(validation, measured, left, piece)
+
+
+def _record_columns(recordings: Recordings, simulated: FloatArray) -> FloatArray:
+    """Return force, its rate and one, each of about unit size: gain, lag and offset of a record."""
+    rate = np.zeros(len(simulated))
+    for test in range(recordings.tests):
+        own = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
+        rate[own] = np.gradient(simulated[own], recordings.dt[test])
+    columns = np.column_stack([simulated, rate, np.ones(len(simulated))])
+    return np.asarray(columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-12))
+
+
+def _without_record_fit(recordings: Recordings, columns: FloatArray, target: FloatArray, seen: BoolArray) -> FloatArray:
+    """Return the target without what a linear fit on the samples seen makes of each record."""
+    rest = target.copy()
+    for test in range(recordings.tests):
+        inside = recordings.test == test
+        rows = inside & recordings.used & seen
+        if np.count_nonzero(rows) > columns.shape[1]:
+            rest[inside] -= columns[inside] @ np.linalg.lstsq(columns[rows], target[rows], rcond=1e-9)[0]
+    return rest
+
+
+def _pieces(recordings: Recordings) -> IntArray:
+    within = np.arange(len(recordings.force)) - recordings.starts[recordings.test]
+    length = np.diff(recordings.starts)[recordings.test]
+    return np.asarray(recordings.test * PIECES + within * PIECES // length, dtype=np.int64)
 
 
 def lagged_states(found: Fit, recordings: Recordings) -> FloatArray:

@@ -1,16 +1,13 @@
-"""Errors on tests, free-run: NRMSE and fit as the contract defines them, per test and pooled."""
+"""Errors of free-running simulations on tests: NRMSE and fit, per test and pooled, and the offset of the force."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.fitting.recordings import Recordings
-
-STEADY_SHARE = 0.02
-"""Offsets of the training tests that spread by less than this share of the force RMS are one of the whole campaign."""
 
 
 @dataclass(frozen=True)
@@ -22,27 +19,80 @@ class Score:
     by_test: dict[str, float]
 
 
-def measured_force(recordings: Recordings, simulated: FloatArray, offset: float | None) -> FloatArray:
-    """Return the offset-free measured force [N], shape (n,).
+@dataclass(frozen=True)
+class Judged:
+    """What is judged of validation tests.
+
+    Attributes
+    ----------
+    recordings
+        The validation tests; what offsets are estimated from is not among the samples compared.
+    measured
+        Offset-free measured force [N], shape (n,).
+    offsets
+        Offset of each test [N], shape (tests,).
+    """
+
+    recordings: Recordings
+    measured: FloatArray
+    offsets: FloatArray
+
+
+def judged_part(recordings: Recordings, simulated: FloatArray, offset: float | None, first: BoolArray) -> Judged:
+    """Return the offset-free measured force and the samples on which errors are judged.
 
     Parameters
     ----------
+    recordings
+        Validation tests.
     simulated
-        Force of the final model; where no offset of the campaign is known, a test's own is the mean of what it leaves.
+        Force of the final model [N], shape (n,).
     offset
-        Offset of the campaign [N], from the training tests; None where each test has its own.
+        Offset of the campaign [N], from the training tests. None if every test has its own: then it is the mean
+        difference over the first part of the record, and that part is not judged.
+    first
+        Samples of the first parts, shape (n,).
     """
     if offset is not None:
-        return recordings.force - offset
-    test, used = recordings.test, recordings.used
-    counts = np.maximum(np.bincount(test[used], minlength=recordings.tests), 1)
-    means = np.bincount(test[used], weights=(recordings.force - simulated)[used], minlength=recordings.tests) / counts
-    return np.asarray(recordings.force - means[test])
+        return Judged(recordings, recordings.force - offset, np.full(recordings.tests, offset))
+    test, early = recordings.test, recordings.used & first
+    counts = np.maximum(np.bincount(test[early], minlength=recordings.tests), 1)
+    sums = np.bincount(test[early], weights=(recordings.force - simulated)[early], minlength=recordings.tests)
+    offsets = np.asarray(sums / counts)
+    rest = replace(recordings, used=recordings.used & ~first)
+    return Judged(rest, recordings.force - offsets[test], offsets)
 
 
-def campaign_offset(offsets: FloatArray, force_rms: float) -> float | None:
-    """Return the offset that all training tests share [N], or None where they differ."""
-    return float(np.median(offsets)) if float(np.std(offsets)) < STEADY_SHARE * force_rms else None
+def campaign_offset(
+    recordings: Recordings, residual: FloatArray, offsets: FloatArray, first: BoolArray
+) -> float | None:
+    """Return the offset that all training tests share [N], or None if an estimate for each test is nearer.
+
+    Both are judged on the training tests: the offset of a test's later part is predicted from its first part, or from
+    all tests together.
+
+    Parameters
+    ----------
+    recordings
+        Training tests.
+    residual
+        Measured less simulated force without offsets [N], shape (n,).
+    offsets
+        Offset of each test [N].
+    first
+        Samples of the first parts, shape (n,).
+    """
+    early, late = (_means(recordings, residual, recordings.used & part) for part in (first, ~first))
+    early, late = early + offsets, late + offsets
+    shared = float(np.median(offsets))
+    by_test = float(np.mean((early - late) ** 2))
+    return shared if float(np.mean((shared - late) ** 2)) <= by_test else None
+
+
+def _means(recordings: Recordings, values: FloatArray, part: BoolArray) -> FloatArray:
+    counts = np.maximum(np.bincount(recordings.test[part], minlength=recordings.tests), 1)
+    sums = np.bincount(recordings.test[part], weights=values[part], minlength=recordings.tests)
+    return np.asarray(sums / counts)
 
 
 def score(recordings: Recordings, measured: FloatArray, simulated: FloatArray) -> Score:

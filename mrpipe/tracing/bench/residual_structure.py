@@ -97,6 +97,32 @@ def structure_p_value(residual: FloatArray, states: States) -> float:
     return float(max(min(1.0, best * count), 1e-300))
 
 
+def correlation_p_value(residual: FloatArray, recordings: Recordings, lags: int = 20) -> float:
+    """Return the probability that white noise has autocorrelations as large as this residual.
+
+    Portmanteau test of Ljung and Box (1978), each test on its own, corrected for the number of tests.
+
+    Parameters
+    ----------
+    residual
+        Shape (n,); samples that are not compared are left out.
+    """
+    best, count = 1.0, 0
+    for test in range(recordings.tests):
+        values = residual[recordings.used & (recordings.test == test)]
+        size = len(values)
+        if size < 4 * lags:
+            continue
+        centred = values - np.mean(values)
+        power = float(centred @ centred)
+        if power <= 0.0:
+            continue
+        own = [float(centred[k:] @ centred[:-k]) / power for k in range(1, lags + 1)]
+        statistic = size * (size + 2.0) * sum(r * r / (size - k) for k, r in enumerate(own, 1))
+        best, count = min(best, float(stats.chi2.sf(statistic, lags))), count + 1
+    return float(max(min(1.0, best * max(count, 1)), 1e-300))
+
+
 def dependence(residual: FloatArray, states: States) -> list[tuple[str, float]]:
     """Return (state, share of the residual's variance that it explains by itself), largest first.
 

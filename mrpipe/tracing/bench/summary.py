@@ -1,4 +1,4 @@
-"""Errors on the validation tests and all that the contract prints of a tracing."""
+"""All that is printed of a tracing, as one dictionary for JSON."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from mrpipe.fitting.engine import predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import FREE_EXPONENT, Baseline, ladder
 from mrpipe.tracing.bench.ceiling import flexible_residual
-from mrpipe.tracing.bench.error_measures import Score, campaign_offset, measured_force, score
+from mrpipe.tracing.bench.error_measures import Score, score
+from mrpipe.tracing.bench.judgement import recovered
 from mrpipe.tracing.bench.nuisances import RecordGain, mean_drives, record_gains, session_gain
 from mrpipe.tracing.bench.offsets import OffsetFinding
+from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, open_tests
 from mrpipe.tracing.bench.residual_structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.verdict import Named, Rules, ranking
-from mrpipe.tracing.bench.weights import sensor_deviation
+from mrpipe.tracing.rules import ValidationRules
 
 UNATTRIBUTED: dict[str, Any] = {
     "name": "unattributed",
@@ -56,11 +58,12 @@ class TracingOptions:
     model_error_share: float = 0.0
     unattributed: bool = False
     drive_unit: str = "A"
+    validation: ValidationRules = field(default_factory=ValidationRules)
 
 
 @dataclass(frozen=True)
 class Tracing:
-    """What was found; `summary` is the JSON of contract section 4, the rest is for files and figures."""
+    """What was found; `summary` is what `close-loop --json` prints, the rest is for files and figures."""
 
     summary: dict[str, Any]
     selection: Selection
@@ -79,14 +82,14 @@ class Tracing:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors on the validation tests and what the contract prints."""
+    """Errors on the validation tests and what is printed of a tracing."""
 
     selection: Selection
     baseline: Baseline
     training: Recordings
-    validation: Recordings
     offsets: OffsetFinding | None
-    reason: str
+    found: OnValidation
+    judgement: Judgement
 
     def build(
         self,
@@ -103,119 +106,108 @@ class Summary:
         `further` are terms that improve the model, their cause not proven; `untested` the effects that no test shows,
         and why.
         """
-        selection, training, validation = self.selection, self.training, self.validation
-        before, after = predict(selection.base, validation), predict(selection.chosen, validation)
-        shared = campaign_offset(selection.chosen.test_offsets, training.force_rms)
-        measured = measured_force(validation, after, shared)
-        gains = record_gains(validation, measured, after)
-        session = session_gain(validation, measured, after, self._training_gains(), mean_drives(training))
-        if options.record_gain:
-            values = {name: item.value for name, item in gains.items()}
-            factor = np.array([values.get(name, 1.0) for name in validation.names])[validation.test]
-            before, after = before * factor, after * factor
-        shifted = before
-        if self.offsets is not None:
-            # what one offset for all would have cost: the offsets of the tests are the effect
-            own = validation.force - measured
-            shifted = before - (own - np.median(own))
-        score_before, score_after = score(validation, measured, shifted), score(validation, measured, after)
+        selection, training, found = self.selection, self.training, self.found
         states = states_of(selection.base, training)
-        p_value = structure_p_value(selection.base.residual, states)
-        ceiling, after_ceiling, flexible = self._ceilings(measured, before, after)
-        structured = selection.structured or self.offsets is not None
-        if not named and structured and not self.baseline.repeats:
-            # without repeats coloured noise looks like an excess: it is one only where something can be learnt of it
-            blind = ceiling > score_before.nrmse * np.sqrt(1.0 - FLEXIBLE_SHARE)
-            structured = not blind or p_value < 1e-6
-        floor = self._noise_floor(measured)
-        left = max(selection.chosen.chi_square - selection.noise, 0.0)
-        excess = max(selection.base.chi_square - selection.noise, 1e-12)
-        final_states = states_of(selection.chosen, training)
-        effects_found = [item.as_json() for item in named]
-        better = selection.chosen is not selection.base
-        still = structured and left > max(0.2 * selection.noise, 0.1 * excess if better else 0.0)
-        best = min(ceiling, after_ceiling, score_after.nrmse if better else ceiling)
-        gain = score_before.nrmse**2 - best**2
-        # what the named effects recover: the flexible model, where it is asked for, comes after
-        recovered = (score_before.nrmse**2 - score_after.nrmse**2) / gain if gain > 1e-12 else 0.0
-        if options.unattributed and structured and after_ceiling < score_after.nrmse:
-            after = after + flexible
-            score_after = score(validation, measured, after)
-            effects_found.append(UNATTRIBUTED)
+        after, effects_found = found.after, [item.as_json() for item in named]
+        if options.unattributed and self.judgement.evidence.structured:
+            flexible = found.after + self._flexible()
+            if found.nrmse(flexible) < found.nrmse(found.after):
+                after = flexible
+                effects_found.append(UNATTRIBUTED)
+        score_before, score_after = found.score_before, score(found.recordings, found.measured, after)
         summary = {
             "model": options.model,
             "declared_effects": declared,
-            "noise_floor_nrmse": floor,
+            "noise_floor_nrmse": found.floor_nrmse(),
             "noise_from": f"{self.baseline.repeats} repeated pairs" if self.baseline.repeats else "sensor channels",
             "before": _score_json(score_before),
-            "residual": {
-                "structured": bool(structured),
-                "p_value": p_value,
-                "where": location(selection.base.residual, selection.base, training, states)["cycle"],
-                "location": location(selection.base.residual, selection.base, training, states),
-                "chi_square": selection.base.chi_square,
-                "chi_square_of_noise": selection.noise,
-            },
-            "base_form": self._ladder(options, measured, effects.get("rate-dependent-yield")),
-            "nuisances": {
-                "gain": {name: item.value for name, item in gains.items() if item.deviates},
-                "gain_interval": {name: list(item.interval) for name, item in gains.items() if item.deviates},
-                "session_gain": session.as_json() if session is not None else None,
-                "channel_skew_s": _value(named, "channel-skew", "skew"),
-                "observation_filter_s": window * float(np.median(training.period_s)),
-                "observation_filter_share_of_period": window,
-                "offset_n": {
-                    name: float(v) for name, v in zip(training.names, selection.chosen.test_offsets, strict=True)
-                },
-            },
+            "residual": self._residual(states),
+            "base_form": self._ladder(options, found.measured, effects.get("rate-dependent-yield")),
+            "nuisances": self._nuisances(named, window),
             "effects": effects_found,
             "further_terms": [item.as_json() for item in further],
-            "verdict": self.reason if not named else _verdict(named, selection, options.rules),
-            "candidates": ranking(selection, self._candidate_errors(measured)),
+            **self.judgement.verdict.as_json(),
+            "candidates": ranking(selection, self._candidate_errors(found.measured)),
             "untestable": dict(untested),
             "after": _score_json(score_after),
-            "ceiling": {"nrmse": best, "recovered": float(np.clip(recovered, 0.0, 1.0))},
-            "unexplained": {
-                "structured": bool(still),
-                "share_of_residual": float(min(1.0, left / excess)) if structured and self.offsets is None else 0.0,
-                "depends_on": [
-                    {"state": name, "share": share}
-                    for name, share in dependence(selection.chosen.residual, final_states)[:6]
-                    if share > 0.01
-                ]
-                if still
-                else [],
+            "ceiling": {
+                "nrmse": min(self.judgement.ceiling, score_after.nrmse),
+                "interval": list(self.judgement.ceiling_interval),
+                "recovered": recovered(score_before.nrmse, found.nrmse(found.after), self.judgement.ceiling),
             },
+            "unexplained": self._unexplained(options.validation),
             "tests": [
                 {"name": name, "nrmse_before": score_before.by_test[name], "nrmse_after": score_after.by_test[name]}
                 for name in score_before.by_test
             ],
         }
         return Tracing(
-            summary, selection, self.baseline, named, training, validation, measured, shifted, after, states,
-            score_before, score_after, options.drive_unit,
+            summary, selection, self.baseline, named, training, found.recordings, found.measured, found.before, after,
+            states, score_before, score_after, options.drive_unit,
         )  # fmt: skip
 
-    def _ceilings(self, measured: FloatArray, before: FloatArray, after: FloatArray) -> tuple[float, float, FloatArray]:
-        """Return the NRMSE of base and composite with a flexible model of the residual, and the latter's force."""
-        found = []
-        for fitted, simulated in ((self.selection.base, before), (self.selection.chosen, after)):
-            root = fitted.problem.root_weight
-            residual = np.divide(fitted.residual, root, out=np.zeros_like(root), where=root > 0.0)
-            extra = flexible_residual(fitted, self.training, residual, self.validation)
-            found.append(score(self.validation, measured, simulated + extra).nrmse)
-            if self.selection.base is self.selection.chosen:
-                break
-        return found[0], found[-1], extra
+    def _residual(self, states: States) -> dict[str, Any]:
+        base = self.selection.base
+        places = location(base.residual, base, self.training, states)
+        return {
+            "structured": self.judgement.evidence.structured,
+            "p_value": structure_p_value(base.residual, states),
+            "where": places["cycle"],
+            "location": places,
+            "chi_square": base.chi_square,
+            "chi_square_of_noise": self.selection.noise,
+        }
 
-    def _noise_floor(self, measured: FloatArray) -> float:
-        """Return the NRMSE that noise leaves on the validation tests, beyond the sensors as much as in training."""
-        fitted, used = self.selection.chosen, self.validation.used
+    def _nuisances(self, named: Sequence[Named], window: float) -> dict[str, Any]:
+        found, training = self.found, self.training
+        session = session_gain(
+            found.recordings, found.measured, found.after, self._training_gains(), mean_drives(training)
+        )
+        offsets = zip(training.names, self.selection.chosen.test_offsets, strict=True)
+        return {
+            "gain": {name: item.value for name, item in found.gains.items() if item.deviates},
+            "gain_interval": {name: list(item.interval) for name, item in found.gains.items() if item.deviates},
+            "session_gain": session.as_json() if session is not None else None,
+            "channel_skew_s": _value(named, "channel-skew", "skew"),
+            "observation_filter_s": window * float(np.median(training.period_s)),
+            "observation_filter_share_of_period": window,
+            "offset_n": {name: float(value) for name, value in offsets},
+            "offsets_of_validation_from": "the first part of each record, which is not judged"
+            if found.own_offsets
+            else "the training tests",
+        }
+
+    def _unexplained(self, rules: ValidationRules) -> dict[str, Any]:
+        """Return what remains in the training tests and in the validation tests, and what it varies with."""
+        selection, structured = self.selection, self.judgement.evidence.structured
+        left = max(selection.chosen.chi_square - selection.noise, 0.0)
+        excess = max(selection.base.chi_square - selection.noise, 1e-12)
+        better = selection.chosen is not selection.base
+        still = structured and left > max(0.2 * selection.noise, 0.1 * excess if better else 0.0)
+        remains, share, p_value = self.found.unexplained(rules)
+        kind = self.judgement.verdict.kind
+        in_training = float(min(1.0, left / excess)) if structured and self.offsets is None else 0.0
+        states = states_of(selection.chosen, self.training)
+        return {
+            "structured": bool(still or remains) and kind != "noise",
+            "share_of_residual": max(in_training, share if remains else 0.0),
+            "whiteness_p_value": p_value,
+            "tests": list(open_tests(self.judgement, rules)) if remains else [],
+            "depends_on": [
+                {"state": name, "share": part}
+                for name, part in dependence(selection.chosen.residual, states)[:6]
+                if part > 0.01
+            ]
+            if still or remains
+            else [],
+        }
+
+    def _flexible(self) -> FloatArray:
+        """Return what a flexible model of the training tests' residual predicts on the validation tests [N]."""
+        fitted = self.selection.chosen
         root = fitted.problem.root_weight
-        expected = root * sensor_deviation(fitted, self.training)
-        excess = self.baseline.noise / max(float(np.mean(expected[root > 0.0] ** 2)), 1e-12)
-        deviation = sensor_deviation(fitted, self.validation)[used] * np.sqrt(excess)
-        return float(np.sqrt(np.mean(deviation**2)) / max(np.sqrt(np.mean(measured[used] ** 2)), 1e-12))
+        residual = np.divide(fitted.residual, root, out=np.zeros_like(root), where=root > 0.0)
+        return flexible_residual(fitted, self.training, residual, self.found.recordings)
 
     def _training_gains(self) -> dict[str, RecordGain]:
         fitted, recordings = self.selection.chosen, self.training
@@ -228,7 +220,7 @@ class Summary:
         if not self.selection.rounds:
             return {}
         return {
-            item.name: score(self.validation, measured, predict(item.fit, self.validation)).nrmse
+            item.name: score(self.found.recordings, measured, predict(item.fit, self.found.recordings)).nrmse
             for item in self.selection.rounds[0]
         }
 
@@ -237,7 +229,8 @@ class Summary:
         first = self.selection.rounds[0] if self.selection.rounds else ()
         known = [item.fit for item in first if rate_forms is not None and item.name == rate_forms.name]
         fits = ladder(base, rate_forms, known[0] if known else None)
-        errors = {name: score(self.validation, measured, predict(f, self.validation)).nrmse for name, f in fits.items()}
+        judged = self.found.recordings
+        errors = {name: score(judged, measured, predict(f, judged)).nrmse for name, f in fits.items()}
         if options.model not in errors:
             errors[options.model] = errors[next(iter(fits))]
         # decided on the training tests, reported on the validation tests; a form must earn its parameters
@@ -255,11 +248,3 @@ def _value(named: Sequence[Named], effect: str, parameter: str) -> float:
         if item.effect.name == effect:
             return float(item.parameters[parameter]["value"])
     return 0.0
-
-
-def _verdict(named: Sequence[Named], selection: Selection, rules: Rules) -> str:
-    share = selection.share(selection.chosen)
-    names = " and ".join(item.effect.name for item in named)
-    if share >= rules.named_share or not selection.structured:
-        return f"{names}: explains what is missing"
-    return f"{names}: explains part of what is missing, its form is not proven"

@@ -32,8 +32,10 @@ from mrpipe.tracing.bench.baseline import (
 )
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
+from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.offsets import offset_between_tests
+from mrpipe.tracing.bench.on_validation import OnValidation
 from mrpipe.tracing.bench.pairs import rounded_drafts, with_play
 from mrpipe.tracing.bench.refine import with_richer_forms
 from mrpipe.tracing.bench.select import Selection, Thresholds, forward_selection, share_of
@@ -88,11 +90,23 @@ def trace_campaign(
     rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
     usable = spread_tests(enough_tests([t for t in tests if t.role != "validation"]))
     training = record_tests(usable, rate_hz=rate, cutoff_hz=cutoff)
-    judged = [t for t in tests if t.role == "validation"]
-    validation = record_tests(judged, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
+    unseen = [t for t in tests if t.role == "validation"]
+    validation = record_tests(unseen, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
-    baseline, selection = _select(training, able, declared, options, rng, jobs, progress)
+    first = _first_baseline(training, declared, able, options)
+    found = validated(first.fit, first.fit, first, training, validation, options)
+    refusal = ""
+    if never_yields(first.fit, options.validation):
+        refusal = "the damper does not yield within the stroke of the training tests"
+    elif not predicts(found, first, training, options, jobs):
+        error = found.nrmse(found.before)
+        refusal = f"the model {options.model} does not predict the validation tests (NRMSE {error:.3g})"
+    if refusal:
+        return _nothing_traced(
+            f"{refusal}: nothing is traced", found, first, training, reasons, declared, effects, options, jobs
+        )
+    baseline, selection = _select(first, training, able, declared, options, rng, jobs, progress)
     window = selection.base.problem.window_share
     if not baseline.model_error:
         window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
@@ -106,7 +120,6 @@ def trace_campaign(
     offsets = offset_between_tests(
         selection.chosen, effects.get("offset"), least_ratio=CLEAR_OFFSETS if reason and selection.structured else 0.0
     )
-    report = Summary(selection, baseline, training, validation, offsets, reason)
     named = _named(selection, gains, len(declared), options, rng)
     causes = [*named[: selection.proven], *([offsets.named()] if offsets is not None else [])]
     if offsets is not None and any(item.effect.name == "offset" for item in named[: selection.proven]):
@@ -114,12 +127,62 @@ def trace_campaign(
     if baseline.model_error:
         # the base form is a verdict of its own, and every real damper asks for this one: what else there is comes first
         causes.sort(key=lambda item: item.effect.name == "rate-dependent-yield")
-    return report.build(
-        options, tuple(causes), named[selection.proven :], reasons, window, [item.name for item in declared], effects
+    further = named[selection.proven :]
+    missing = structured(selection, baseline, training, options, bool(causes))
+    found = validated(selection.base, selection.chosen, baseline, training, validation, options, offsets is not None)
+    judgement = judged(found, selection, training, options, causes, missing, reason, jobs)
+    if causes and judgement.evidence.after >= judgement.evidence.before:
+        # what does not lower the error on the validation tests is not named
+        selection = replace(selection, chosen=selection.without_effects)
+        causes, further, offsets = [], (), None
+        reason = "the effects that the training tests ask for do not lower the error on the validation tests"
+        found = validated(selection.base, selection.chosen, baseline, training, validation, options)
+        judgement = judged(found, selection, training, options, causes, missing, reason, jobs)
+    causes = [held(item, judgement) for item in causes]
+    report = Summary(selection, baseline, training, offsets, found, judgement)
+    return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared], effects)
+
+
+def _first_baseline(
+    training: Recordings, declared: Sequence[Effect], effects: Mapping[str, Effect], options: TracingOptions
+) -> Baseline:
+    base = base_form(training, options.model, options.yield_order, options.viscosity_order)
+    return fit_baseline(
+        training, base, _of_the_base(declared, effects, options), model_error_share=options.model_error_share
     )
 
 
+def _of_the_base(declared: Sequence[Effect], effects: Mapping[str, Effect], options: TracingOptions) -> list[Effect]:
+    """Return the effects that belong to the base: the declared ones, and the declared base form where it is one."""
+    own = list(declared)
+    if options.model == "rate-dependent-yield":
+        own.append(effects["rate-dependent-yield"])
+    return own
+
+
+def _nothing_traced(
+    reason: str,
+    found: OnValidation,
+    baseline: Baseline,
+    training: Recordings,
+    untested: Mapping[str, str],
+    declared: Sequence[Effect],
+    effects: Mapping[str, Effect],
+    options: TracingOptions,
+    jobs: int,
+) -> Tracing:
+    """Return the tracing of a base model on which no effect can be judged."""
+    selection = Selection(baseline.fit, baseline.noise, (), baseline.fit)
+    judgement = judged(found, selection, training, options, (), True, reason, jobs)
+    if reason not in judgement.verdict.sentence:
+        words = f"{reason}; {judgement.verdict.sentence}"
+        judgement = replace(judgement, verdict=replace(judgement.verdict, sentence=words))
+    report = Summary(selection, baseline, training, None, found, judgement)
+    return report.build(options, (), (), untested, 0.0, [item.name for item in declared], effects)
+
+
 def _select(
+    first: Baseline,
     training: Recordings,
     effects: Mapping[str, Effect],
     declared: Sequence[Effect],
@@ -129,13 +192,13 @@ def _select(
     progress: Progress,
 ) -> tuple[Baseline, Selection]:
     """Fit the baseline and select effects; with weights by force RMS where no composite comes near the noise."""
-    base = base_form(training, options.model, options.yield_order, options.viscosity_order)
-    own = list(declared)
-    if options.model == "rate-dependent-yield":
-        own.append(effects["rate-dependent-yield"])
+    base = first.fit.problem.base
+    own = _of_the_base(declared, effects, options)
     floor = options.model_error_share
+    baseline = first
     while True:
-        baseline = fit_baseline(training, base, own, model_error_share=floor)
+        if floor != options.model_error_share:
+            baseline = fit_baseline(training, base, own, model_error_share=floor)
         progress(0.2, "candidates")
         if floor > 0.0:
             effects = with_yielding_parts(effects)

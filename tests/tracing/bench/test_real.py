@@ -15,8 +15,9 @@ from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench.baseline import base_form, first_problem, with_form
-from mrpipe.tracing.bench.error_measures import measured_force, score
+from mrpipe.tracing.bench.error_measures import judged_part, score
 from mrpipe.tracing.bench.nuisances import record_gains, session_gain
+from mrpipe.tracing.bench.validation import first_parts
 
 
 @pytest.mark.real
@@ -33,13 +34,16 @@ def test_a_yield_in_parts_fits_labcontrol_and_leaves_the_gain_of_its_held_out_se
     errors = {}
     for name, found in (("bouc-wen", base), ("own-dashpot", rounded)):
         simulated = predict(found, validation)
-        measured = measured_force(validation, simulated, None)
-        errors[name] = score(validation, measured, simulated).nrmse
+        judged = judged_part(validation, simulated, None, first_parts(validation, 1 / 3))
+        errors[name] = score(judged.recordings, judged.measured, simulated).nrmse
     assert errors["own-dashpot"] < 0.8 * errors["bouc-wen"]
     assert errors["own-dashpot"] < 0.11
 
-    own = measured_force(training, predict(rounded, training), None)
-    session = session_gain(validation, measured, simulated, record_gains(training, own, predict(rounded, training)))
+    trained = predict(rounded, training)
+    own = judged_part(training, trained, None, first_parts(training, 1 / 3))
+    session = session_gain(
+        judged.recordings, judged.measured, simulated, record_gains(own.recordings, own.measured, trained)
+    )
     assert session is not None
     # seven of the nine are 9 to 11 % weaker
     assert {f"ensaio.vali.{k}" for k in range(3, 10)} <= set(session.tests)

@@ -1,0 +1,96 @@
+"""Gates of the tracing: does the base predict at all, is anything missing, what do the validation tests say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mrpipe.fitting.engine import Fit, chain_of
+from mrpipe.fitting.kernel import HYSTERESIS_AT, run_recordings
+from mrpipe.fitting.recordings import Recordings
+from mrpipe.tracing.bench.baseline import FREE_EXPONENT, Baseline
+from mrpipe.tracing.bench.ceiling import flexible_chi_square
+from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, judge, on_validation
+from mrpipe.tracing.bench.residual_structure import states_of, structure_p_value
+from mrpipe.tracing.bench.select import Selection
+from mrpipe.tracing.bench.summary import FLEXIBLE_SHARE, TracingOptions
+from mrpipe.tracing.bench.validation import compare, training_agreements
+from mrpipe.tracing.bench.verdict import Named
+from mrpipe.tracing.rules import ValidationRules
+
+
+def validated(
+    base: Fit,
+    chosen: Fit,
+    baseline: Baseline,
+    training: Recordings,
+    validation: Recordings,
+    options: TracingOptions,
+    own_offsets: bool = False,
+) -> OnValidation:
+    """Return the errors on the validation tests by the options of the tracing."""
+    return on_validation(
+        base, chosen, baseline, training, validation, options.validation,
+        own_offsets=own_offsets, record_gain=options.record_gain,
+    )  # fmt: skip
+
+
+def never_yields(found: Fit, rules: ValidationRules) -> bool:
+    """Return whether the hysteresis stays elastic in all tests, so that no effect can be separated from it."""
+    wires = run_recordings(chain_of(found.problem, found.theta)[0], found.problem.recordings)
+    reached = np.abs(wires[HYSTERESIS_AT][found.problem.recordings.used])
+    return bool(np.max(reached, initial=0.0) < rules.yielded)
+
+
+def predicts(found: OnValidation, baseline: Baseline, training: Recordings, options: TracingOptions, jobs: int) -> bool:
+    """Return whether the base model predicts the comparable part of the validation tests at all."""
+    rules = options.validation
+    if found.nrmse(found.before) <= rules.failed:
+        return True
+    trained = training_agreements(baseline.fit, options.folds, rules, jobs=jobs)
+    compared = compare(found.recordings, found.measured, found.before, found.floor, training, trained, rules)
+    part = compared.comparable
+    return bool(compared.differences and part.any() and found.nrmse(found.before, part) <= rules.failed)
+
+
+def judged(
+    found: OnValidation,
+    selection: Selection,
+    training: Recordings,
+    options: TracingOptions,
+    causes: Sequence[Named],
+    missing: bool,
+    reason: str,
+    jobs: int,
+) -> Judgement:
+    """Return the verdict on the validation tests by the options of the tracing."""
+    changed = selection.ground is not None
+    return judge(
+        found, selection.base, selection.chosen, training, options.validation,
+        names=[item.effect.name for item in causes], base_taken=FREE_EXPONENT if changed else "",
+        structured=missing or bool(causes), reason=reason, folds=options.folds, jobs=jobs,
+    )  # fmt: skip
+
+
+def structured(
+    selection: Selection,
+    baseline: Baseline,
+    training: Recordings,
+    options: TracingOptions,
+    named: bool,
+) -> bool:
+    """Return whether the residual of the training tests holds more than noise."""
+    if named or not selection.structured or baseline.repeats:
+        return selection.structured
+    # without repeats coloured noise looks like an excess: it is one only where something can be learnt of it
+    base = selection.base
+    learnt = flexible_chi_square(base) < (1.0 - FLEXIBLE_SHARE) * base.chi_square
+    return learnt or structure_p_value(base.residual, states_of(base, training)) < options.validation.whiteness
+
+
+def held(item: Named, judgement: Judgement) -> Named:
+    """Return an effect with its confidence lowered by the share that it does not recover on the validation tests."""
+    share = 1.0 if judgement.verdict.kind == "explained" else judgement.evidence.share
+    return replace(item, confidence=round(item.confidence * share, 3))

@@ -1,0 +1,107 @@
+"""The class of a verdict, decided by rule from errors on the validation tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mrpipe.tracing.rules import ValidationRules
+from mrpipe.tracing.verdict import VerdictClass
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Errors on one validation test; all are NRMSE.
+
+    Attributes
+    ----------
+    name
+        Name of the test.
+    before, after
+        Of the model without and with what was found.
+    floor
+        Of noise alone.
+    ceiling, ceiling_upper
+        Of a flexible model that could learn this test, and the upper end of its 95 % interval.
+    """
+
+    name: str
+    before: float
+    after: float
+    floor: float
+    ceiling: float
+    ceiling_upper: float
+
+    def explained(self, rules: ValidationRules) -> bool:
+        """Return whether no more than noise, or than a flexible model leaves, is left on this test."""
+        if self.after <= max(rules.within_floors * self.floor, self.ceiling_upper):
+            return True
+        return recovered(self.before, self.after, self.ceiling) >= rules.ceiling_share
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What decides the class; errors are NRMSE pooled over the comparable part of the validation tests.
+
+    Attributes
+    ----------
+    before, after, floor, ceiling
+        See :class:`Condition`.
+    conditions
+        The validation tests one by one.
+    structured
+        Whether the residual of the training tests holds more than noise.
+    effects
+        Whether effects are named.
+    base_changed
+        Whether another base form than the declared one is taken.
+    """
+
+    before: float
+    after: float
+    floor: float
+    ceiling: float
+    conditions: tuple[Condition, ...]
+    structured: bool
+    effects: bool
+    base_changed: bool = False
+
+    @property
+    def share(self) -> float:
+        """Share of the recoverable squared error that is removed, 0 to 1."""
+        return recovered(self.before, self.after, self.ceiling)
+
+
+def recovered(before: float, after: float, ceiling: float) -> float:
+    """Return the share of the squared error beyond a ceiling that goes from `before` to `after`, 0 to 1."""
+    able = before**2 - min(ceiling, after) ** 2
+    return float(min(1.0, max(0.0, (before**2 - after**2) / able))) if able > 0.0 else 0.0
+
+
+def classify(evidence: Evidence, rules: ValidationRules) -> VerdictClass:
+    """Return the class of the comparable part of the validation tests."""
+    better = evidence.after < evidence.before
+    if not evidence.effects and not evidence.base_changed:
+        quiet = evidence.after <= rules.noise_floors * evidence.floor and all(
+            item.after <= rules.noise_floors * max(item.floor, evidence.floor) for item in evidence.conditions
+        )
+        return "noise" if quiet and not evidence.structured else "unknown"
+    if not better:
+        return "unknown"
+    explained = reached(evidence, rules)
+    if evidence.base_changed and not evidence.effects:
+        return "base form" if explained or evidence.share >= rules.accounts else "unknown"
+    return "explained" if explained else "partly explained"
+
+
+def reached(evidence: Evidence, rules: ValidationRules) -> bool:
+    """Return whether the error is at the noise floor, or at the ceiling on every validation test."""
+    if evidence.after <= rules.within_floors * evidence.floor:
+        return True
+    return bool(evidence.conditions) and all(item.explained(rules) for item in evidence.conditions)
+
+
+def worst(conditions: Sequence[Condition], rules: ValidationRules) -> tuple[str, ...]:
+    """Return the names of the tests on which the error is not explained, the worst first."""
+    open_ = [item for item in conditions if not item.explained(rules)]
+    return tuple(item.name for item in sorted(open_, key=lambda item: -item.after))

@@ -1,0 +1,275 @@
+"""Errors on the validation tests before and after, what of them is comparable, and the verdict that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.artifacts import BoolArray, FloatArray
+from mrpipe.fitting.engine import Fit, predict
+from mrpipe.fitting.recordings import Recordings
+from mrpipe.tracing.bench.baseline import Baseline
+from mrpipe.tracing.bench.ceiling import Ceiling, cross_fitted
+from mrpipe.tracing.bench.error_measures import Judged, Score, campaign_offset, judged_part, score
+from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, worst
+from mrpipe.tracing.bench.nuisances import RecordGain, record_gains
+from mrpipe.tracing.bench.residual_structure import correlation_p_value
+from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, training_agreements
+from mrpipe.tracing.bench.weights import sensor_deviation
+from mrpipe.tracing.rules import ValidationRules
+from mrpipe.tracing.verdict import Comparable, Verdict
+
+
+@dataclass(frozen=True)
+class OnValidation:
+    """Forces and errors on the validation tests; forces [N] have shape (n,).
+
+    Attributes
+    ----------
+    recordings
+        The validation tests; the samples compared are those that nothing was fitted to.
+    measured
+        Offset-free measured force.
+    before, after
+        Simulated force of the base and of the final model.
+    floor
+        Standard deviation of the force that noise explains.
+    own_offsets
+        Whether every test has its own offset.
+    gains
+        Gain of each test by the final model.
+    """
+
+    recordings: Recordings
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+    floor: FloatArray
+    own_offsets: bool
+    gains: dict[str, RecordGain]
+
+    @property
+    def score_before(self) -> Score:
+        """Errors of the base."""
+        return score(self.recordings, self.measured, self.before)
+
+    @property
+    def score_after(self) -> Score:
+        """Errors of the final model."""
+        return score(self.recordings, self.measured, self.after)
+
+    def nrmse(self, simulated: FloatArray, part: BoolArray | None = None) -> float:
+        """Return the NRMSE over a part of the samples compared."""
+        used = self.recordings.used if part is None else part & self.recordings.used
+        return _rms((self.measured - simulated)[used]) / max(_rms(self.measured[used]), 1e-12)
+
+    def floor_nrmse(self, part: BoolArray | None = None) -> float:
+        """Return the NRMSE that noise leaves."""
+        used = self.recordings.used if part is None else part & self.recordings.used
+        return _rms(self.floor[used]) / max(_rms(self.measured[used]), 1e-12)
+
+    def unexplained(self, rules: ValidationRules) -> tuple[bool, float, float]:
+        """Return whether more than noise remains, its share of the residual before, and the whiteness p-value."""
+        after, before, floor = self.nrmse(self.after), self.nrmse(self.before), self.floor_nrmse()
+        p_value = correlation_p_value(self.measured - self.after, self.recordings)
+        remains = after > rules.within_floors * floor and p_value < rules.whiteness
+        excess = max(before**2 - floor**2, 1e-300)
+        return remains, float(np.clip((after**2 - floor**2) / excess, 0.0, 1.0)), p_value
+
+
+def on_validation(
+    base: Fit,
+    chosen: Fit,
+    baseline: Baseline,
+    training: Recordings,
+    validation: Recordings,
+    rules: ValidationRules,
+    *,
+    own_offsets: bool = False,
+    record_gain: bool = False,
+) -> OnValidation:
+    """Simulate the validation tests by base and final model.
+
+    Parameters
+    ----------
+    own_offsets
+        Whether the offsets of the tests are a finding: the base is then judged with one offset for all.
+    record_gain
+        Whether every record gets a gain, from its first part; the errors are those of the rest.
+    """
+    before, after = predict(base, validation), predict(chosen, validation)
+    first = first_parts(validation, rules.first_part)
+    root = chosen.problem.root_weight
+    left = np.divide(chosen.residual, root, out=np.zeros_like(root), where=root > 0.0)
+    shared = campaign_offset(training, left, chosen.test_offsets, first_parts(training, rules.first_part))
+    if own_offsets:
+        shared = None
+    judged: Judged = judged_part(validation, after, shared, first)
+    recordings = judged.recordings
+    gains = record_gains(recordings, judged.measured, after)
+    if record_gain:
+        given = record_gains(validation, judged.measured, after, first)
+        factor = np.array([given[name].value if name in given else 1.0 for name in validation.names])[validation.test]
+        before, after = before * factor, after * factor
+        recordings = replace(recordings, used=recordings.used & ~first)
+    if own_offsets:
+        before = before - (judged.offsets - np.median(judged.offsets))[validation.test]
+    floor = noise_on(chosen, baseline, training, validation)
+    return OnValidation(recordings, judged.measured, before, after, floor, shared is None, gains)
+
+
+def noise_on(found: Fit, baseline: Baseline, training: Recordings, validation: Recordings) -> FloatArray:
+    """Return the deviation that noise leaves on the validation tests [N]: beyond the sensors as much as in training."""
+    root = found.problem.root_weight
+    expected = root * sensor_deviation(found, training)
+    excess = baseline.noise / max(float(np.mean(expected[root > 0.0] ** 2)), 1e-12)
+    return np.asarray(sensor_deviation(found, validation) * np.sqrt(excess))
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict with what it rests on."""
+
+    verdict: Verdict
+    evidence: Evidence
+    ceiling: float
+    ceiling_interval: tuple[float, float]
+    comparison: Comparison | None
+
+
+def judge(
+    found: OnValidation,
+    base: Fit,
+    chosen: Fit,
+    training: Recordings,
+    rules: ValidationRules,
+    *,
+    names: Sequence[str],
+    base_taken: str,
+    structured: bool,
+    reason: str,
+    folds: int,
+    jobs: int = 1,
+) -> Judgement:
+    """Return the verdict on the validation tests.
+
+    Parameters
+    ----------
+    names
+        Effects that are named.
+    base_taken
+        Name of the base form that is taken instead of the declared one; empty if it is the declared one.
+    structured
+        Whether the residual of the training tests holds more than noise.
+    reason
+        Why nothing is named, where nothing is.
+    folds
+        Of the cross-validation on training tests.
+    """
+    ceilings = ceilings_of(found, base, chosen, training)
+    whole = _evidence(found, ceilings, found.recordings.used, structured, bool(names), bool(base_taken))
+    kind = classify(whole, rules)
+    total = min((item.nrmse(found.recordings.used) for item in ceilings), key=lambda item: item[0])
+    if kind in ("noise", "explained"):
+        return Judgement(
+            Verdict(kind, _sentence(kind, whole, names, base_taken, reason), whole.share), whole, *total, None
+        )
+    trained = training_agreements(chosen, folds, rules, jobs=jobs)
+    comparison = compare(found.recordings, found.measured, found.after, found.floor, training, trained, rules)
+    if not comparison.differences or comparison.accounted < rules.accounts:
+        verdict = Verdict(kind, _sentence(kind, whole, names, base_taken, reason), whole.share)
+        return Judgement(verdict, whole, *total, comparison)
+    part = comparison.comparable
+    evidence, inner = whole, ""
+    tests: tuple[str, ...] = ()
+    if np.count_nonzero(part) > 0:
+        evidence = _evidence(found, ceilings, part, structured, bool(names), bool(base_taken))
+        tests = tuple(item.name for item in evidence.conditions)
+        inner = _sentence(classify(evidence, rules), evidence, names, base_taken, reason)
+    comparable = Comparable(
+        tests,
+        float(np.mean(part[found.recordings.used])),
+        evidence.before if tests else None,
+        evidence.after if tests else None,
+        comparison.corrected,
+    )
+    words = "; ".join(item.sentence for item in comparison.differences)
+    rest = f"; on the comparable part (NRMSE {evidence.after:.3g}): {inner}" if inner else "; no part is comparable"
+    verdict = Verdict(
+        "validation differs",
+        f"the validation tests differ from the training tests: {words}{rest}",
+        evidence.share,
+        comparison.differences,
+        comparable,
+    )
+    return Judgement(verdict, evidence, *total, comparison)
+
+
+def ceilings_of(found: OnValidation, base: Fit, chosen: Fit, training: Recordings) -> list[Ceiling]:
+    """Return what flexible models leave that start from the base and from the final model."""
+    result = []
+    for fitted, simulated in ((base, found.before), (chosen, found.after)):
+        root = fitted.problem.root_weight
+        residual = np.divide(fitted.residual, root, out=np.zeros_like(root), where=root > 0.0)
+        result.append(cross_fitted(fitted, training, residual, found.recordings, found.measured, simulated))
+        if base is chosen:
+            break
+    return result
+
+
+def _evidence(
+    found: OnValidation, ceilings: Sequence[Ceiling], part: BoolArray, structured: bool, effects: bool, changed: bool
+) -> Evidence:
+    conditions = []
+    for test, name in enumerate(found.recordings.names):
+        own = part & (found.recordings.test == test)
+        if not (own & found.recordings.used).any():
+            continue
+        ceiling, (_, upper) = min((item.nrmse(own) for item in ceilings), key=lambda item: item[0])
+        conditions.append(
+            Condition(
+                name, found.nrmse(found.before, own), found.nrmse(found.after, own), found.floor_nrmse(own), ceiling,
+                upper,
+            )
+        )  # fmt: skip
+    return Evidence(
+        found.nrmse(found.before, part),
+        found.nrmse(found.after, part),
+        found.floor_nrmse(part),
+        min(item.nrmse(part)[0] for item in ceilings),
+        tuple(conditions),
+        structured,
+        effects,
+        changed,
+    )
+
+
+def _sentence(kind: str, evidence: Evidence, names: Sequence[str], base_taken: str, reason: str) -> str:
+    listed = " and ".join(names)
+    verb = "explains" if len(names) == 1 else "explain"
+    if kind == "noise":
+        return "the residual is noise: nothing is missing"
+    if kind == "explained":
+        return f"{listed}: {verb} what is missing"
+    if kind == "partly explained":
+        return (
+            f"{listed}: {verb} part of what is missing, {100.0 * evidence.share:.0f} % of what is recoverable on the "
+            "validation tests"
+        )
+    if kind == "base form":
+        return f"the base form: {base_taken} explains what is missing, and no effect is named"
+    if reason and evidence.structured:
+        return reason
+    ratio = evidence.after / max(evidence.floor, 1e-12)
+    return f"unknown: the error on the validation tests is {ratio:.3g} times the noise floor, and no effect explains it"
+
+
+def open_tests(judgement: Judgement, rules: ValidationRules) -> tuple[str, ...]:
+    """Return the validation tests on which something remains, the worst first."""
+    return worst(judgement.evidence.conditions, rules)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0

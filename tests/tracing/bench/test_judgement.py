@@ -1,0 +1,59 @@
+"""The class of a verdict follows from errors on validation tests by rule."""
+
+from __future__ import annotations
+
+import pytest
+
+from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, recovered
+from mrpipe.tracing.rules import ValidationRules
+
+RULES = ValidationRules()
+
+
+def evidence(
+    before: float, after: float, *, structured: bool = True, effects: bool = True, changed: bool = False,
+    floor: float = 0.01, ceiling: float = 0.01, worse: float = 0.0,
+) -> Evidence:  # fmt: skip
+    conditions = tuple(
+        Condition(name, before, after + extra, floor, ceiling, 1.02 * ceiling)
+        for name, extra in (("a", 0.0), ("b", worse))
+    )
+    return Evidence(before, after, floor, ceiling, conditions, structured, effects, changed)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    ("found", "kind"),
+    [
+        (evidence(0.1, 0.012), "explained"),
+        (evidence(0.1, 0.013), "explained"),
+        # at the ceiling on every test, though the ceiling is far above the floor
+        (evidence(0.1, 0.051, ceiling=0.05), "explained"),
+        # one test is not explained: the average does not hide it
+        (evidence(0.1, 0.051, ceiling=0.05, worse=0.03), "partly explained"),
+        (evidence(0.1, 0.06), "partly explained"),
+        (evidence(0.1, 0.1), "unknown"),
+        # a larger error than before never explains anything, not even at the noise floor
+        (evidence(0.011, 0.012), "unknown"),
+        (evidence(0.011, 0.011, structured=False, effects=False), "noise"),
+        (evidence(0.019, 0.019, structured=False, effects=False), "noise"),
+        # above twice the floor nothing is noise, whatever the training tests say
+        (evidence(0.021, 0.021, structured=False, effects=False), "unknown"),
+        (evidence(0.015, 0.015, structured=False, effects=False, worse=0.01), "unknown"),
+        (evidence(0.05, 0.05, effects=False), "unknown"),
+        (evidence(0.1, 0.012, effects=False, changed=True), "base form"),
+        (evidence(0.1, 0.095, effects=False, changed=True), "unknown"),
+    ],
+)
+def test_the_class_follows_from_the_errors(found: Evidence, kind: str) -> None:
+    assert classify(found, RULES) == kind
+
+
+@pytest.mark.property
+def test_the_share_is_that_of_the_squared_error_beyond_the_ceiling() -> None:
+    assert recovered(0.1, 0.1, 0.01) == 0.0
+    assert recovered(0.1, 0.01, 0.01) == 1.0
+    assert recovered(0.05, 0.04, 0.03) == pytest.approx(9.0 / 16.0)
+    # a ceiling above the error that is reached is none
+    assert recovered(0.1, 0.01, 0.05) == 1.0
+    assert recovered(0.01, 0.02, 0.01) == 0.0

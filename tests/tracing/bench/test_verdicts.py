@@ -1,0 +1,158 @@
+"""Single harmed tests, other sessions, faster motion, dampers that never yield: each gets its true verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrpipe.effects.library import damper_effects
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.summary import TracingOptions
+from mrpipe.tracing.bench.trace import trace_campaign
+from tests.tracing.bench.rig import RATE
+from tests.tracing.bench.sines import (
+    cut,
+    dead_load_cell,
+    harmed,
+    late,
+    recorded,
+    scaled,
+    sines,
+    stuck,
+)
+
+
+def traced(tests: list[PreparedTest], names: tuple[str, ...] = ("accumulator", "saturation")) -> dict[str, Any]:
+    options = TracingOptions(refits=2, bootstrap_draws=50, yield_order=2, most_effects=1, observation_filter=False)
+    library = {name: damper_effects()[name] for name in names}
+    return trace_campaign(tests, library, [], options, rng=np.random.default_rng(1)).summary
+
+
+@pytest.mark.planted
+def test_a_sound_campaign_of_the_base_form_holds_nothing_but_noise() -> None:
+    found = traced(sines())
+    assert found["verdict_class"] == "noise"
+    assert found["effects"] == []
+    assert not found["unexplained"]["structured"]
+    assert found["before"]["nrmse"] == pytest.approx(found["noise_floor_nrmse"], rel=0.25)
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize(
+    ("harm", "kind", "value"),
+    [
+        (lambda test: scaled(test, 1e-3), "gain", 1e-3),
+        (lambda test: scaled(test, -1.0), "gain", -1.0),
+        (lambda test: scaled(test, 1.3), "gain", 1.3),
+        (lambda test: late(test, 0.02), "lag", 0.02),
+    ],
+)
+def test_one_harmed_validation_test_is_named(harm: Callable[..., PreparedTest], kind: str, value: float) -> None:
+    found = traced(harmed(sines(), (8,), harm))
+    assert found["verdict_class"] == "validation differs"
+    assert found["effects"] == []
+    assert [(item["kind"], item["tests"]) for item in found["validation"]["differences"]] == [(kind, ["8-validation"])]
+    assert found["validation"]["differences"][0]["value"] == pytest.approx(value, rel=0.02)
+    comparable = found["validation"]["comparable"]
+    assert comparable["tests"] == ["6-validation", "7-validation", "9-validation"]
+    assert comparable["nrmse_after"] < 1.25 * found["noise_floor_nrmse"]
+    assert "8-validation" in found["verdict"]
+
+
+@pytest.mark.planted
+def test_validation_from_another_session_is_named_with_its_gain_and_lag() -> None:
+    found = traced(harmed(sines(), (6, 7, 8, 9), lambda test: late(scaled(test, 0.75), 0.02)))
+    assert found["verdict_class"] == "validation differs"
+    values = {item["kind"]: item["value"] for item in found["validation"]["differences"]}
+    assert values == {"gain": pytest.approx(0.75, rel=0.02), "lag": pytest.approx(0.02, rel=0.05)}
+    assert "session" in found["verdict"]
+    assert found["effects"] == []
+    assert found["validation"]["comparable"]["nrmse_corrected"] < 1.5 * found["noise_floor_nrmse"]
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("places", [(8,), (2, 7)])
+def test_a_displacement_that_is_stuck_for_a_while_is_never_noise(places: tuple[int, ...]) -> None:
+    found = traced(harmed(sines(), places, stuck))
+    assert found["verdict_class"] != "noise"
+    assert found["effects"] == []
+    assert found["unexplained"]["structured"] or found["verdict_class"] == "validation differs"
+
+
+@pytest.mark.planted
+def test_a_piece_cut_out_of_two_tests_is_no_effect() -> None:
+    found = traced(harmed(sines(), (2, 7), cut))
+    assert found["verdict_class"] not in ("noise", "explained")
+    assert found["effects"] == []
+
+
+@pytest.mark.planted
+def test_a_dead_load_cell_stops_the_tracing() -> None:
+    found = traced(harmed(sines(), tuple(range(10)), dead_load_cell))
+    assert found["verdict_class"] == "unknown"
+    assert "nothing is traced" in found["verdict"]
+    assert found["candidates"] == []
+
+
+def at_currents(training: tuple[float, ...], validation: tuple[float, ...], faster: float = 1.0) -> list[PreparedTest]:
+    """Return tests of a rig whose yield force is quadratic in the current; validation may be faster."""
+    t = np.arange(int(3.0 * RATE)) / RATE
+    plan = [("training", 1.0 + 0.3 * (k % 3), current) for k, current in enumerate(training)]
+    plan += [("validation", faster * (1.2 + 0.2 * (k % 2)), current) for k, current in enumerate(validation)]
+    return [
+        recorded(f"{k}-{role}", role, 8e-3 * np.sin(2 * np.pi * frequency * t), current, k)
+        for k, (role, frequency, current) in enumerate(plan)
+    ]
+
+
+@pytest.mark.planted
+def test_validation_that_is_merely_faster_is_no_difference() -> None:
+    levels = (0.0, 1.0, 2.0, 3.0)
+    found = traced(at_currents(levels * 2, levels, faster=2.0))
+    assert found["verdict_class"] == "noise"
+    assert found["validation"]["differences"] == []
+
+
+@pytest.mark.planted
+def test_drives_between_those_of_the_training_are_predicted_where_the_drive_law_is_right() -> None:
+    found = traced(at_currents((0.0, 1.0, 2.0, 3.0) * 2, (0.5, 1.5, 2.5, 3.0)))
+    assert found["verdict_class"] == "noise"
+
+
+@pytest.mark.planted
+def test_drives_between_those_of_the_training_are_named_where_the_drive_law_fails() -> None:
+    tests = at_currents((0.0, 1.0, 2.0, 3.0) * 2, (0.5, 1.5, 2.0, 3.0))
+    # a driver with a dead zone: between the levels it gives another current than the polynomial expects
+    found = traced([scaled(test, 0.7) if test.drive[0] in (0.5, 1.5) else test for test in tests])
+    assert found["verdict_class"] == "validation differs"
+    assert found["validation"]["differences"][0]["tests"] == ["8-validation", "9-validation"]
+    assert found["validation"]["comparable"]["nrmse_after"] < 1.25 * found["noise_floor_nrmse"]
+
+
+@pytest.mark.planted
+def test_a_damper_that_never_yields_within_its_stroke_has_no_effect() -> None:
+    t = np.arange(int(3.0 * RATE)) / RATE
+    # the yield displacement of the rig is 0.37 mm
+    tests = [
+        recorded(f"{k}-{role}", role, 1e-3 * amplitude * np.sin(2 * np.pi * frequency * t), current, k, noise_n=0.1)
+        for k, (role, amplitude, frequency, current) in enumerate(
+            [("training", 0.1 + 0.02 * (k % 3), 1.0 + 0.4 * (k % 4), 0.5 * (k % 4)) for k in range(8)]
+            + [("validation", 0.11, 1.2 + 0.3 * k, 0.5 * k) for k in range(4)]
+        )
+    ]
+    found = traced(tests, ("accumulator", "quadratic-drag", "stribeck"))
+    assert found["effects"] == []
+    assert "does not yield" in found["verdict"]
+
+
+@pytest.mark.planted
+def test_an_effect_is_explained_only_by_its_error_on_validation_tests() -> None:
+    found = traced(sines("accumulator"))
+    assert found["verdict_class"] == "explained"
+    assert [item["name"] for item in found["effects"]] == ["accumulator"]
+    assert found["after"]["nrmse"] < 1.25 * found["noise_floor_nrmse"]
+    low, high = found["ceiling"]["interval"]
+    assert low < found["ceiling"]["nrmse"] < high
