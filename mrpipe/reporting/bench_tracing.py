@@ -196,6 +196,10 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         if flexible
         else ""
     )
+    left_out = [item for item in summary.get("findings", []) if item["left_out"]]
+    if left_out:
+        reasons = "; ".join(f"{item['test']} {item['sentence']}" for item in left_out)
+        start = f"Tests that contradict the others are left out of the fit: {reasons}. {start}"
     kind = summary.get("verdict_class", "")
     if kind == "validation differs":
         named = " ".join(_effect_in_words(effect) for effect in effects)

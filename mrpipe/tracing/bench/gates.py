@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit, chain_of
 from mrpipe.fitting.kernel import HYSTERESIS_AT, run_recordings
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import FREE_EXPONENT, Baseline
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
+from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, judge, on_validation
 from mrpipe.tracing.bench.residual_structure import states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
@@ -44,13 +46,20 @@ def never_yields(found: Fit, rules: ValidationRules) -> bool:
     return bool(np.max(reached, initial=0.0) < rules.yielded)
 
 
-def predicts(found: OnValidation, baseline: Baseline, training: Recordings, options: TracingOptions, jobs: int) -> bool:
+def predicts(
+    found: OnValidation,
+    baseline: Baseline,
+    training: Recordings,
+    options: TracingOptions,
+    faults: Mapping[str, Finding],
+    jobs: int,
+) -> bool:
     """Return whether the base model predicts the comparable part of the validation tests at all."""
     rules = options.validation
     if found.nrmse(found.before) <= rules.failed:
         return True
     trained = training_agreements(baseline.fit, options.folds, rules, jobs=jobs)
-    compared = compare(found.recordings, found.measured, found.before, found.floor, training, trained, rules)
+    compared = compare(found.recordings, found.measured, found.before, found.floor, training, trained, faults, rules)
     part = compared.comparable
     return bool(compared.differences and part.any() and found.nrmse(found.before, part) <= rules.failed)
 
@@ -63,6 +72,7 @@ def judged(
     causes: Sequence[Named],
     missing: bool,
     reason: str,
+    ordered: SortedTests,
     jobs: int,
 ) -> Judgement:
     """Return the verdict on the validation tests by the options of the tracing."""
@@ -70,7 +80,7 @@ def judged(
     return judge(
         found, selection.base, selection.chosen, training, options.validation,
         names=[item.effect.name for item in causes], base_taken=FREE_EXPONENT if changed else "",
-        structured=missing or bool(causes), reason=reason, folds=options.folds, jobs=jobs,
+        structured=missing or bool(causes), reason=reason, faults=ordered.faults, folds=options.folds, jobs=jobs,
     )  # fmt: skip
 
 

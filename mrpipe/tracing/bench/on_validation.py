@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray
+from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit, predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import Baseline
@@ -150,6 +151,7 @@ def judge(
     base_taken: str,
     structured: bool,
     reason: str,
+    faults: Mapping[str, Finding],
     folds: int,
     jobs: int = 1,
 ) -> Judgement:
@@ -165,6 +167,8 @@ def judge(
         Whether the residual of the training tests holds more than noise.
     reason
         Why nothing is named, where nothing is.
+    faults
+        Known faults of validation tests.
     folds
         Of the cross-validation on training tests.
     """
@@ -177,7 +181,7 @@ def judge(
             Verdict(kind, _sentence(kind, whole, names, base_taken, reason), whole.share), whole, *total, None
         )
     trained = training_agreements(chosen, folds, rules, jobs=jobs)
-    comparison = compare(found.recordings, found.measured, found.after, found.floor, training, trained, rules)
+    comparison = compare(found.recordings, found.measured, found.after, found.floor, training, trained, faults, rules)
     if not comparison.differences or comparison.accounted < rules.accounts:
         verdict = Verdict(kind, _sentence(kind, whole, names, base_taken, reason), whole.share)
         return Judgement(verdict, whole, *total, comparison)

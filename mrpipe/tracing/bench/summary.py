@@ -17,6 +17,7 @@ from mrpipe.tracing.bench.ceiling import flexible_residual
 from mrpipe.tracing.bench.error_measures import Score, score
 from mrpipe.tracing.bench.judgement import recovered
 from mrpipe.tracing.bench.nuisances import RecordGain, mean_drives, record_gains, session_gain
+from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.offsets import OffsetFinding
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, open_tests
 from mrpipe.tracing.bench.residual_structure import States, dependence, location, states_of, structure_p_value
@@ -90,6 +91,7 @@ class Summary:
     offsets: OffsetFinding | None
     found: OnValidation
     judgement: Judgement
+    sorted_tests: SortedTests
 
     def build(
         self,
@@ -126,7 +128,7 @@ class Summary:
             "nuisances": self._nuisances(named, window),
             "effects": effects_found,
             "further_terms": [item.as_json() for item in further],
-            **self.judgement.verdict.as_json(),
+            **self._verdict(),
             "candidates": ranking(selection, self._candidate_errors(found.measured)),
             "untestable": dict(untested),
             "after": _score_json(score_after),
@@ -145,6 +147,13 @@ class Summary:
             summary, selection, self.baseline, named, training, found.recordings, found.measured, found.before, after,
             states, score_before, score_after, options.drive_unit,
         )  # fmt: skip
+
+    def _verdict(self) -> dict[str, Any]:
+        """Return the keys of the verdict; what is wrong with single tests is said first."""
+        found, first = self.judgement.verdict.as_json(), self.sorted_tests.sentence
+        if first:
+            found["verdict"] = f"{first}; {found['verdict']}"
+        return {**found, "findings": self.sorted_tests.as_json()}
 
     def _residual(self, states: States) -> dict[str, Any]:
         base = self.selection.base

@@ -34,6 +34,7 @@ from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
+from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
 from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.on_validation import OnValidation
 from mrpipe.tracing.bench.pairs import rounded_drafts, with_play
@@ -88,9 +89,10 @@ def trace_campaign(
         Effects that the campaign declares: part of the baseline.
     """
     rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
-    usable = spread_tests(enough_tests([t for t in tests if t.role != "validation"]))
+    ordered = sort_tests(tests)
+    usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))
     training = record_tests(usable, rate_hz=rate, cutoff_hz=cutoff)
-    unseen = [t for t in tests if t.role == "validation"]
+    unseen = [t for t in ordered.tests if t.role == "validation"]
     validation = record_tests(unseen, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
@@ -99,12 +101,12 @@ def trace_campaign(
     refusal = ""
     if never_yields(first.fit, options.validation):
         refusal = "the damper does not yield within the stroke of the training tests"
-    elif not predicts(found, first, training, options, jobs):
+    elif not predicts(found, first, training, options, ordered.faults, jobs):
         error = found.nrmse(found.before)
         refusal = f"the model {options.model} does not predict the validation tests (NRMSE {error:.3g})"
     if refusal:
         return _nothing_traced(
-            f"{refusal}: nothing is traced", found, first, training, reasons, declared, effects, options, jobs
+            f"{refusal}: nothing is traced", ordered, found, first, training, reasons, declared, effects, options, jobs
         )
     baseline, selection = _select(first, training, able, declared, options, rng, jobs, progress)
     window = selection.base.problem.window_share
@@ -130,16 +132,16 @@ def trace_campaign(
     further = named[selection.proven :]
     missing = structured(selection, baseline, training, options, bool(causes))
     found = validated(selection.base, selection.chosen, baseline, training, validation, options, offsets is not None)
-    judgement = judged(found, selection, training, options, causes, missing, reason, jobs)
+    judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
     if causes and judgement.evidence.after >= judgement.evidence.before:
         # what does not lower the error on the validation tests is not named
         selection = replace(selection, chosen=selection.without_effects)
         causes, further, offsets = [], (), None
         reason = "the effects that the training tests ask for do not lower the error on the validation tests"
         found = validated(selection.base, selection.chosen, baseline, training, validation, options)
-        judgement = judged(found, selection, training, options, causes, missing, reason, jobs)
+        judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
     causes = [held(item, judgement) for item in causes]
-    report = Summary(selection, baseline, training, offsets, found, judgement)
+    report = Summary(selection, baseline, training, offsets, found, judgement, ordered)
     return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared], effects)
 
 
@@ -162,6 +164,7 @@ def _of_the_base(declared: Sequence[Effect], effects: Mapping[str, Effect], opti
 
 def _nothing_traced(
     reason: str,
+    ordered: SortedTests,
     found: OnValidation,
     baseline: Baseline,
     training: Recordings,
@@ -173,11 +176,11 @@ def _nothing_traced(
 ) -> Tracing:
     """Return the tracing of a base model on which no effect can be judged."""
     selection = Selection(baseline.fit, baseline.noise, (), baseline.fit)
-    judgement = judged(found, selection, training, options, (), True, reason, jobs)
+    judgement = judged(found, selection, training, options, (), True, reason, ordered, jobs)
     if reason not in judgement.verdict.sentence:
         words = f"{reason}; {judgement.verdict.sentence}"
         judgement = replace(judgement, verdict=replace(judgement.verdict, sentence=words))
-    report = Summary(selection, baseline, training, None, found, judgement)
+    report = Summary(selection, baseline, training, None, found, judgement, ordered)
     return report.build(options, (), (), untested, 0.0, [item.name for item in declared], effects)
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray
+from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.crossvalidation import left_out_residual
@@ -166,6 +167,7 @@ def compare(
     floor: FloatArray,
     known: Recordings,
     trained: Sequence[Agreement],
+    faults: Mapping[str, Finding],
     rules: ValidationRules,
 ) -> Comparison:
     """Compare the validation tests with the training tests.
@@ -180,12 +182,15 @@ def compare(
         The training tests.
     trained
         Agreement of the training tests with fits that have not seen them.
+    faults
+        Known faults of validation tests, by the name of the test.
     """
     typical = float(np.median([item.error for item in trained])) if trained else 0.0
     high = float(np.quantile([item.error for item in trained], 0.9)) if trained else 0.0
     used, squares = validation.used, (measured - simulated) ** 2
     comparable = used.copy()
     kinds: dict[str, list[tuple[str, float]]] = {}
+    known_faults: list[Difference] = []
     odd_squares, corrected_squares = 0.0, 0.0
     corrections = False
     whole = float(np.sum((squares - floor**2)[used]))
@@ -197,27 +202,36 @@ def compare(
             corrected_squares += float(np.sum(squares[own]))
             continue
         inside = own & covered(validation, known, rules)
+        fault = faults.get(item.name)
         causes = _causes(item, trained, expected, rules)
-        ranges = [] if causes else _ranges(validation, known, own, inside, squares, expected, rules)
+        ranges = _ranges(validation, known, own, inside, squares, expected, rules) if not (causes or fault) else []
+        if fault:
+            known_faults.append(_fault(fault, item))
         if causes:
-            comparable &= ~own
             corrections = True
             corrected_squares += item.corrected_n**2 * int(np.count_nonzero(own))
         else:
             corrected_squares += float(np.sum(squares[own]))
-        if ranges:
+        if causes or fault:
+            comparable &= ~own
+        elif ranges:
             comparable &= ~(own & ~inside)
-        if causes or ranges:
+        if causes or ranges or fault:
             odd_squares += float(np.sum((squares - floor**2)[own]))
-        for kind, value in [*causes, *ranges]:
+        for kind, value in [] if fault else [*causes, *ranges]:
             kinds.setdefault(kind, []).append((item.name, value))
     power = float(np.sum(measured[used] ** 2))
     return Comparison(
-        tuple(_difference(kind, found, validation.tests) for kind, found in kinds.items()),
+        (*known_faults, *(_difference(kind, found, validation.tests) for kind, found in kinds.items())),
         comparable,
         odd_squares / whole if whole > 0.0 else 0.0,
         float(np.sqrt(corrected_squares / max(power, 1e-300))) if corrections else None,
     )
+
+
+def _fault(finding: Finding, item: Agreement) -> Difference:
+    """Return a known fault as a difference; its value is the gain of the test."""
+    return Difference(finding.name, (item.name,), item.gain, "1", f"{item.name}: {finding.sentence}")
 
 
 def _causes(

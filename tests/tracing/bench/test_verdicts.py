@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from tests.tracing.bench.rig import RATE
 from tests.tracing.bench.sines import (
     cut,
     dead_load_cell,
+    exchanged,
     harmed,
     late,
     recorded,
@@ -44,10 +46,12 @@ def test_a_sound_campaign_of_the_base_form_holds_nothing_but_noise() -> None:
 @pytest.mark.parametrize(
     ("harm", "kind", "value"),
     [
-        (lambda test: scaled(test, 1e-3), "gain", 1e-3),
-        (lambda test: scaled(test, -1.0), "gain", -1.0),
-        (lambda test: scaled(test, 1.3), "gain", 1.3),
-        (lambda test: late(test, 0.02), "lag", 0.02),
+        (lambda test: scaled(test, 1e-3), "unit-decades", 1e-3),
+        (lambda test: scaled(test, -1.0), "sign-reversed", -1.0),
+        (lambda test: scaled(test, 1.3), "gain-differs", 1.3),
+        # too little for the comparison of tests, enough for the model
+        (lambda test: scaled(test, 1.1), "gain", 1.1),
+        (lambda test: late(test, 0.02), "delay-differs", 1.0),
     ],
 )
 def test_one_harmed_validation_test_is_named(harm: Callable[..., PreparedTest], kind: str, value: float) -> None:
@@ -60,6 +64,36 @@ def test_one_harmed_validation_test_is_named(harm: Callable[..., PreparedTest], 
     assert comparable["tests"] == ["6-validation", "7-validation", "9-validation"]
     assert comparable["nrmse_after"] < 1.25 * found["noise_floor_nrmse"]
     assert "8-validation" in found["verdict"]
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize(
+    ("harm", "finding"),
+    [
+        (lambda test: scaled(test, 1e-3), "unit-decades"),
+        (lambda test: scaled(test, -1.0), "sign-reversed"),
+        (lambda test: scaled(test, 1.3), "gain-differs"),
+        (exchanged, "channels-exchanged"),
+        (stuck, "stuck-channel"),
+    ],
+)
+def test_one_harmed_training_test_is_left_out_and_named(harm: Callable[..., PreparedTest], finding: str) -> None:
+    found = traced(harmed(sines(), (3,), harm))
+    assert [(item["name"], item["test"], item["left_out"]) for item in found["findings"]] == [
+        (finding, "3-training", True)
+    ]
+    assert found["verdict"].startswith("test 3-training is left out")
+    assert found["verdict_class"] == "noise"
+    assert found["effects"] == []
+
+
+@pytest.mark.planted
+def test_a_validation_test_that_repeats_a_training_record_is_not_judged() -> None:
+    tests = sines()
+    tests[9] = replace(tests[4], name="copy", role="validation")
+    found = traced(tests)
+    assert [(item["name"], item["left_out"]) for item in found["findings"]] == [("same-record", True)]
+    assert "copy" not in [item["name"] for item in found["tests"]]
 
 
 @pytest.mark.planted
@@ -156,3 +190,21 @@ def test_an_effect_is_explained_only_by_its_error_on_validation_tests() -> None:
     assert found["after"]["nrmse"] < 1.25 * found["noise_floor_nrmse"]
     low, high = found["ceiling"]["interval"]
     assert low < found["ceiling"]["nrmse"] < high
+
+
+def without_drive(test: PreparedTest) -> PreparedTest:
+    return replace(test, drive=np.zeros_like(test.drive))
+
+
+def with_hum(test: PreparedTest) -> PreparedTest:
+    hum = 5.0 * np.sin(2.0 * np.pi * 50.0 * test.time_s)
+    return replace(test, force_n=test.force_n + hum, force_raw_n=test.force_raw_n + hum)
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("harm", [without_drive, with_hum])
+def test_a_fault_of_the_whole_campaign_is_unknown_and_no_effect(harm: Callable[..., PreparedTest]) -> None:
+    found = traced(harmed(sines(), tuple(range(10)), harm))
+    assert found["verdict_class"] == "unknown"
+    assert found["effects"] == []
+    assert found["unexplained"]["structured"]

@@ -1,0 +1,91 @@
+"""Tests that contradict the others or hold a fault are named before anything is fitted, and left out of the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrpipe.campaigns.plausibility import Finding, TestArrays, compare_tests
+from mrpipe.signals.prepared import PreparedTest
+
+FEWEST = 2
+"""So many training tests must remain; with fewer nothing is left out, because there is nothing to compare with."""
+
+SAME_RECORD = "same-record"
+"""Finding for tests that hold the same samples: the second of them is no independent test."""
+
+
+@dataclass(frozen=True)
+class SortedTests:
+    """The tests of a campaign after the comparison of the tests with each other.
+
+    Attributes
+    ----------
+    tests
+        Tests that are used: without harmed training tests, and without validation tests that repeat another record.
+    findings
+        What the comparison has found.
+    left_out
+        Names of the tests that are not used.
+    """
+
+    tests: tuple[PreparedTest, ...]
+    findings: tuple[Finding, ...]
+    left_out: tuple[str, ...]
+
+    @property
+    def faults(self) -> dict[str, Finding]:
+        """Return the first finding of every validation test that is used in spite of it."""
+        used = {test.name for test in self.tests if test.role == "validation"}
+        found: dict[str, Finding] = {}
+        for item in self.findings:
+            if item.test in used:
+                found.setdefault(item.test, item)
+        return found
+
+    @property
+    def sentence(self) -> str:
+        """Say which tests are left out and why; empty if none is."""
+        reasons = {item.test: item.sentence for item in reversed(self.findings)}
+        return "; ".join(f"test {name} is left out: {reasons[name]}" for name in self.left_out)
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """Return the findings as JSON."""
+        return [{**item.as_dict(), "left_out": item.test in self.left_out} for item in self.findings]
+
+
+def sort_tests(tests: Sequence[PreparedTest]) -> SortedTests:
+    """Compare the tests with each other and leave harmed ones out of the fit.
+
+    A harmed validation test stays: its error is reported, and the verdict names it. A validation test that holds the
+    samples of another test is left out, because the fit may have seen it.
+    """
+    findings = compare_tests([_arrays(test) for test in tests])
+    named = {item.test: item for item in reversed(findings) if item.test}
+    out = [
+        test.name
+        for test in tests
+        if test.name in named and (test.role != "validation" or named[test.name].name == SAME_RECORD)
+    ]
+    kept = [test for test in tests if test.name not in out]
+    for validation, fewest in ((False, FEWEST), (True, 1)):
+        if sum((test.role == "validation") == validation for test in kept) < fewest:
+            out = [
+                name for name in out if any(t.name == name and (t.role == "validation") != validation for t in tests)
+            ]
+            kept = [test for test in tests if test.name not in out]
+    return SortedTests(tuple(kept), findings, tuple(out))
+
+
+def _arrays(test: PreparedTest) -> TestArrays:
+    return TestArrays(
+        name=test.name,
+        time_s=np.asarray(test.time_s),
+        displacement_m=test.displacement_raw_m + test.displacement_offset_m,
+        drive=test.drive,
+        force_n=test.force_raw_n + test.force_offset_n,
+        role=test.role,
+    )
