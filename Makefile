@@ -4,6 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 CONFIG ?= configs/thesis.yaml
 LAW ?= fdns
+SEED ?= 50000
+CASES ?= 48
 RUN_STAMP := $(VENV)/.installed
 TEST_STAMP := $(VENV)/.installed-test
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
@@ -41,8 +43,8 @@ bench: $(RUN_STAMP)  ## timings: optimiser, closed loop
 	$(BIN)/python -m benchmarks.levenberg_marquardt
 	$(BIN)/python -m benchmarks.closed_loop
 
-bench-tracing: $(RUN_STAMP)  ## how often planted effects are found, by effect, strength and noise
-	$(BIN)/python -m benchmarks.tracing --preset core conditions
+bench-tracing: $(RUN_STAMP)  ## how often planted effects are found on rigs independent of the program
+	$(BIN)/python -m benchmarks.tracing --first-seed $(SEED) --cases $(CASES)
 
 reproduce: $(RUN_STAMP)  ## every printed figure of the thesis beside ours
 	$(BIN)/mrpipe reproduce --config $(CONFIG)

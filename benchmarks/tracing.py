@@ -1,8 +1,9 @@
-"""How often planted effects are found: `make bench-tracing`, or `python -m benchmarks.tracing --preset core`.
+"""How often planted effects are found, on rigs independent of the program: `make bench-tracing`.
 
-Every campaign is drawn and recorded by the virtual laboratory and goes through prepare and the tracing as `close-loop`
-runs them; its truth is read only after the verdict. Each case is a line of a results file (JSON), so that an
-interrupted run is taken up where it ended; `benchmarks.tracing_table` makes docs/tracing-benchmark.md of it.
+`python -m benchmarks.tracing --first-seed 50000 --cases 48` draws a rig for every seed (base form x effect x noise x
+excitation, see :mod:`benchmarks.rigs`), writes its campaign directory, and runs `mrpipe close-loop --campaign` on it as
+a user would. The truth is compared with what the program prints. Each case is one line of a results file, so that an
+interrupted run continues where it ended. `python -m benchmarks.tracing_table` makes tables of the results.
 """
 
 from __future__ import annotations
@@ -11,216 +12,66 @@ import argparse
 import json
 import os
 import resource
+import subprocess
+import sys
 import tempfile
 import time
 import traceback
-import zlib
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator
+from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+from benchmarks.judging import judged, verdict_row
+from benchmarks.rigs.bases import BASES
+from benchmarks.rigs.cases import KINDS, Case, case_of
 
 RESULTS = Path(__file__).with_name("results") / "tracing.jsonl"
-NOISES = ("white", "coloured", "harmonics")
-EXCITATIONS = ("mixed", "sine", "triangle", "random", "earthquake")
 
 
-@dataclass(frozen=True)
-class Case:
-    """One campaign: what is planted (names joined by +, `none`, `unfamiliar`, `any`), how strong, recorded how."""
+def close_loop(campaign: Path, run: Path, timeout_s: float) -> dict[str, Any]:
+    """Run `mrpipe close-loop` on a campaign and return what it prints.
 
-    planted: str
-    seed: int
-    share: float = 0.05
-    noise: str = "white"
-    rate_hz: float = 1000.0
-    excitation: str = "mixed"
-
-    @property
-    def key(self) -> str:
-        """Return what tells it from all others."""
-        return f"{self.planted}-{self.seed}-{self.share:g}-{self.noise}-{self.rate_hz:g}-{self.excitation}"
-
-
-def tests_for(excitation: str, duration_s: float) -> list[Any]:
-    """Return the tests: the compact plan, or training of one kind of motion judged on the plan's mixed validation."""
-    from mrpipe.laboratory.plans import compact
-
-    tests = compact(duration_s)
-    if excitation == "mixed":
-        return tests
-    kept = []
-    for test in tests:
-        if test.role == "validation":
-            kept.append(test)
-        elif test.motion != "dwell":
-            # the command of another motion: its strokes, frequencies and drives stay
-            frequency = test.frequency_hz if excitation in ("sine", "triangle") else max(test.frequency_hz, 2.0)
-            kept.append(replace(test, motion=excitation, frequency_hz=frequency))
-    return kept
-
-
-def record(case: Case, folder: Path, duration_s: float) -> Path:
-    """Record the campaign of a case."""
-    from mrpipe.laboratory.bench import BenchRig, BenchSensors
-    from mrpipe.laboratory.blind import record_blind
-    from mrpipe.laboratory.effects import EFFECT_NAMES
-    from mrpipe.laboratory.motion import Servo
-
-    names = [part for part in case.planted.split("+") if part != "none"]
-    many = len(names)
-    chosen: tuple[str, ...] = EFFECT_NAMES if "any" in names else tuple(names)
-    servo = Servo(amplitude_error=0.02, harmonic_share=0.03) if case.noise == "harmonics" else Servo()
-    rig = BenchRig(
-        servo=servo,
-        sensors=BenchSensors(colour="coloured" if case.noise == "coloured" else "white"),
-        sampling_rate_hz=case.rate_hz,
-    )
-    return record_blind(
-        folder / case.key, case.seed, names=chosen, share=case.share, count=many,
-        tests=tests_for(case.excitation, duration_s), rig=rig,
+    Raises
+    ------
+    RuntimeError
+        If the program fails; the message holds the end of what it says.
+    """
+    command = [sys.executable, "-m", "mrpipe", "close-loop", "--campaign", str(campaign), "--run", str(run)]
+    done = subprocess.run(
+        [*command, "--jobs", "1", "--quiet", "--json"], capture_output=True, text=True, timeout=timeout_s, check=False,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
     )  # fmt: skip
+    if done.returncode != 0:
+        raise RuntimeError(f"exit status {done.returncode}: {done.stderr.strip()[-600:]}")
+    return dict(json.loads(done.stdout))
 
 
-def run_case(case: Case, *, duration_s: float = 4.0, keep: Path | None = None) -> dict[str, Any]:
-    """Record and trace one case, open its truth, and return its row."""
-    import warnings
+def run_case(case: Case, *, keep: Path | None = None, timeout_s: float = 900.0) -> dict[str, Any]:
+    """Record a case, trace it and return its row; `keep` is a directory for the campaigns whose verdict is wrong."""
+    from benchmarks.rigs.campaign import record, write
 
-    warnings.simplefilter("ignore")
+    row: dict[str, Any] = case.as_row()
     try:
         with tempfile.TemporaryDirectory() as temporary:
-            campaign = record(case, keep or Path(temporary), duration_s)
-            return {"key": case.key, **asdict(case), **trace(campaign, case.seed), "error": ""}
-    except Exception:
-        return {"key": case.key, **asdict(case), "right": False, "error": traceback.format_exc(limit=-2)}
-
-
-def trace(campaign: Path, seed: int) -> dict[str, Any]:
-    """Trace a recorded campaign and judge the verdict by its sealed truth."""
-    import numpy as np
-
-    from mrpipe.campaigns import load_campaign
-    from mrpipe.effects.library import damper_effects
-    from mrpipe.laboratory.sealing import sealed_path
-    from mrpipe.signals.options import PreparationOptions
-    from mrpipe.signals.preparation import prepare_campaign
-    from mrpipe.tracing.bench.summary import TracingOptions
-    from mrpipe.tracing.bench.trace import trace_campaign
-
-    tests = [item.test for item in prepare_campaign(load_campaign(campaign), PreparationOptions()).tests]
-    damper_effects()
-    began, used = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_utime
-    options = TracingOptions(drive_unit=tests[0].drive_unit or "A")
-    summary = trace_campaign(tests, damper_effects(), [], options, rng=np.random.default_rng(seed)).summary
-    seconds, cpu = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_utime - used
-    truth = json.loads(sealed_path(campaign).read_text(encoding="utf-8"))
-    return {**judged(summary, truth), "seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2)}
-
-
-def judged(summary: dict[str, Any], truth: dict[str, Any]) -> dict[str, Any]:
-    """Return what was planted, what was found, and whether that is right."""
-    planted = [item["name"] for item in truth["effects"]]
-    found = [item["name"] for item in summary["effects"]]
-    structured = bool(summary["residual"]["structured"])
-    if not planted:
-        right = not found
-    elif "unfamiliar" in planted:
-        right = not found and bool(summary["unexplained"]["structured"])
-    elif len(planted) == 1:
-        right = found[:1] == planted
-    else:
-        right = set(planted) <= set(found)
-    return {
-        "truth": planted,
-        "truth_forms": [item.get("form", "") for item in truth["effects"]],
-        "truth_parameters": [
-            {name: number["value"] for name, number in item["parameters"].items()} for item in truth["effects"]
-        ],
-        "found": found,
-        "verdict": "+".join(found) or ("unknown" if structured else "none"),
-        "right": right,
-        "further": [item["name"] for item in summary["further_terms"]],
-        "spurious": [name for name in found if name not in planted],
-        "effects": [
-            {
-                "name": item["name"],
-                "form": item["form"],
-                "confidence": item["confidence"],
-                "tied_with": item["tied_with"],
-                "parameters": {name: number["value"] for name, number in item["parameters"].items()},
-                "gain": item.get("cross_validated_gain"),
+            campaign = record(case)
+            row["truth"] = campaign.truth
+            directory = write(campaign, Path(temporary) / f"rig-{case.seed}")
+            began, used = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+            summary = close_loop(directory, Path(temporary) / "run", timeout_s)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            row |= {
+                "seconds": round(time.perf_counter() - began, 1),
+                "cpu_seconds": round(after.ru_utime + after.ru_stime - used.ru_utime - used.ru_stime, 1),
             }
-            for item in summary["effects"]
-        ],
-        "candidates": [[item["name"], item["form"], round(item["share"], 4)] for item in summary["candidates"][:5]],
-        "before": summary["before"]["nrmse"],
-        "after": summary["after"]["nrmse"],
-        "floor": summary["noise_floor_nrmse"],
-        "chi_square": summary["residual"]["chi_square"],
-        "chi_square_of_noise": summary["residual"]["chi_square_of_noise"],
-        "p_value": summary["residual"]["p_value"],
-        "ceiling": summary["ceiling"],
-        "left": summary["unexplained"]["share_of_residual"],
-    }
-
-
-PAIRS = (
-    "accumulator+remanence", "stribeck+backlash", "offset+migration", "heating+asymmetry", "inertia+delay",
-    "quadratic-drag+saturation", "pinching+channel-skew", "end-stop+remanence", "rate-dependent-yield+backlash",
-    "migration+accumulator", "heating+remanence", "asymmetry+delay",
-)  # fmt: skip
-
-
-def core(first: int) -> Iterator[Case]:
-    """Yield the cases of the committed table: all names at three strengths, clean rigs, unknown shapes, pairs."""
-    from mrpipe.effects.library import damper_effects
-
-    for place, name in enumerate(damper_effects()):
-        for step, share in enumerate((0.05, 0.05, 0.1, 0.2)):
-            yield Case(name, first + 4 * place + step, share)
-    for number in range(16):
-        yield Case("none", first + 100 + number)
-    for number in range(12):
-        yield Case("unfamiliar", first + 120 + number, (0.05, 0.1)[number % 2])
-    for number, pair in enumerate(PAIRS):
-        yield Case(pair, first + 140 + number, 0.08)
-
-
-def conditions(first: int) -> Iterator[Case]:
-    """Yield cases of any effect under other noise, rates and excitations, and clean rigs under the same."""
-    settings = [{"noise": noise} for noise in NOISES[1:]] + [{"rate_hz": rate} for rate in (500.0, 2000.0)]
-    settings += [{"excitation": kind} for kind in EXCITATIONS[1:]] + [{"share": 0.02}]
-    for place, changed in enumerate(settings):
-        for number in range(6):
-            yield Case("any", first + 200 + 10 * place + number, **changed)  # type: ignore[arg-type]
-        if "share" not in changed:
-            for number in range(2):
-                yield Case("none", first + 300 + 10 * place + number, **changed)  # type: ignore[arg-type]
-
-
-PRESETS = {"core": core, "conditions": conditions}
-
-
-def listed(options: argparse.Namespace) -> Iterator[Case]:
-    """Yield the cases that the command line asks for."""
-    from mrpipe.effects.library import damper_effects
-
-    if options.preset:
-        for name in options.preset:
-            yield from PRESETS[name](options.first_seed)
-        return
-    names = options.names or ["none", "unfamiliar", *damper_effects()]
-    for number in range(options.seeds):
-        for place, name in enumerate(names):
-            for share in options.shares:
-                for noise in options.noise:
-                    for rate in options.rate_hz:
-                        for excitation in options.excitation:
-                            seed = options.first_seed + number * len(names) + place
-                            yield Case(name, seed, share, noise, rate, excitation)
+            row |= verdict_row(summary)
+            row |= judged(case.kind, row["planted"], row)
+            if keep is not None and not row["alone"]:
+                write(campaign, keep / f"rig-{case.seed}")
+                (keep / f"rig-{case.seed}.truth.json").write_text(json.dumps(row, indent=1), encoding="utf-8")
+    except Exception:
+        return {**row, "right": False, "alone": False, "error": traceback.format_exc(limit=-2)[-900:]}
+    return {**row, "error": ""}
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
@@ -230,47 +81,59 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
 
 
-def run(cases: Iterable[Case], path: Path, *, jobs: int, keep: Path | None, duration_s: float) -> None:
-    """Run what the results file lacks, two cases at a time with one thread each."""
-    import joblib
+def selected(options: argparse.Namespace) -> Iterator[Case]:
+    """Yield the cases that the command line asks for, by seed."""
+    cases = (case_of(seed) for seed in count(options.first_seed))
+    wanted = (
+        case
+        for case in cases
+        if (not options.kinds or case.kind in options.kinds)
+        and (not options.bases or case.base in options.bases)
+        and (not options.effects or set(case.planted) & set(options.effects))
+    )
+    return islice(wanted, options.cases)
 
-    done = {row["key"] for row in read_rows(path)}
-    todo = [case for case in cases if case.key not in done]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    parallel = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
-    work = (joblib.delayed(run_case)(case, duration_s=duration_s, keep=keep) for case in todo)
-    for row in parallel(work):
-        with path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
-        mark = "ok " if row["right"] else "BAD"
-        print(mark, row["key"], row.get("verdict", row["error"][-200:]), row.get("truth_forms", ""), flush=True)
+
+def report_line(row: dict[str, Any]) -> str:
+    """Return one line that says what was planted and what was found."""
+    mark = "ok " if row["alone"] else "first" if row["right"] else "BAD"
+    if row["error"]:
+        return f"ERR {row['seed']} {row['error'][-200:]}"
+    planted, found = "+".join(row["planted"]) or "clean", "+".join(row["found"]) or "nothing"
+    return (
+        f"{mark:5s} {row['seed']} {row['base']}: {planted} -> {found} ({row['verdict_class'] or row['verdict']}), "
+        f"{row['before']:.4f} to {row['after']:.4f}, floor {row['floor']:.4f}, "
+        f"true model {row['truth']['true_model_nrmse']:.4f}, {row['seconds']:.0f} s"
+    )
 
 
 def main() -> None:
-    """Run the cases that the command line asks for and print how many were right."""
+    """Run the cases that the command line asks for and print their table."""
+    import joblib
+
+    from benchmarks.tracing_table import document
+
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--preset", nargs="+", choices=sorted(PRESETS), default=[])
-    parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--first-seed", type=int, default=1)
-    parser.add_argument("--shares", type=float, nargs="+", default=[0.05])
-    parser.add_argument("--noise", nargs="+", choices=NOISES, default=["white"])
-    parser.add_argument("--rate-hz", type=float, nargs="+", default=[1000.0])
-    parser.add_argument("--excitation", nargs="+", choices=EXCITATIONS, default=["mixed"])
-    parser.add_argument("--names", nargs="+", default=[], help="names joined by +, none, unfamiliar, any")
-    parser.add_argument("--duration-s", type=float, default=4.0)
+    parser.add_argument("--first-seed", type=int, default=50000)
+    parser.add_argument("--cases", type=int, default=24)
+    parser.add_argument("--kinds", nargs="+", choices=sorted(set(KINDS)), default=[])
+    parser.add_argument("--bases", nargs="+", choices=BASES, default=[])
+    parser.add_argument("--effects", nargs="+", default=[])
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--results", type=Path, default=RESULTS)
-    parser.add_argument("--keep", type=Path, default=None, help="keep the campaigns in this directory")
-    parser.add_argument("--last", type=int, default=0, help="only so many of the cases")
+    parser.add_argument("--keep", type=Path, default=None, help="directory for the campaigns whose verdict is wrong")
+    parser.add_argument("--minutes", type=float, default=1e9, help="begin no case after this time")
     options = parser.parse_args()
-    # in no order of theirs, so that a run that is cut short is a fair sample
-    cases = sorted(listed(options), key=lambda case: zlib.crc32(case.key.encode()))
-    run(
-        cases[: options.last or None], options.results, jobs=options.jobs, keep=options.keep,
-        duration_s=options.duration_s,
-    )  # fmt: skip
-    rows = read_rows(options.results)
-    print(json.dumps({"campaigns": len(rows), "right": sum(row["right"] for row in rows) / max(len(rows), 1)}))
+    done = {row["seed"] for row in read_rows(options.results)}
+    until = time.monotonic() + 60.0 * options.minutes
+    todo = (case for case in selected(options) if case.seed not in done and time.monotonic() < until)
+    options.results.parent.mkdir(parents=True, exist_ok=True)
+    parallel = joblib.Parallel(n_jobs=options.jobs, return_as="generator_unordered", pre_dispatch=options.jobs)
+    for row in parallel(joblib.delayed(run_case)(case, keep=options.keep) for case in todo):
+        with options.results.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        print(report_line(row), file=sys.stderr, flush=True)
+    print(document(read_rows(options.results)))
 
 
 if __name__ == "__main__":

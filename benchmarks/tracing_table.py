@@ -7,166 +7,210 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from statistics import median
-from typing import Any, TypeVar
 
-from benchmarks.tracing import read_rows
-
-Row = dict[str, Any]
-_Item = TypeVar("_Item")
+from benchmarks.judging import Row, parameter_errors
 
 HEAD = """# How often planted effects are found
 
-Campaigns of the virtual laboratory (44 tests of 4 s, the compact plan) with effects that campaign.yaml does not
-declare: a rig drawn from a seed, its numbers spread by a tenth, prepared and traced as `mrpipe close-loop` does, the
-sealed truth read after the verdict. The laboratory has forms of its own. Seeds are used once: what failed on earlier
-seeds was mended, these were drawn afterwards.
+Bench campaigns of rigs that share neither code nor formulas with the program (`benchmarks/rigs`): 16 base forms from
+the literature, integrated at 20 kHz; planted effects in functional forms that differ from the library's wherever the
+physics allows it; forces from 100 N to 1 MN; white, coloured, 50 Hz or quantised noise; 500, 1000 or 2000 samples a
+second; validation tests like or unlike the training tests. Each case is one campaign directory, on which
+`mrpipe close-loop --campaign` runs as a user would run it. Each seed is one case, in a fixed layout: a third of the
+cases are clean rigs.
 
-    python -m benchmarks.tracing --preset core conditions --first-seed {first} --results RESULTS.jsonl
-    python -m benchmarks.tracing_table RESULTS.jsonl
+    python -m benchmarks.tracing --first-seed {first} --cases {count}
+    python -m benchmarks.tracing_table benchmarks/results/tracing.jsonl
 
-The cases are run in random order; this table holds the {count} that were run of those that the presets list.
+This table holds {count} cases, seeds {first} to {last}.
 """
 
-
-def kind_of(row: Row) -> str:
-    """Return `clean`, `outside`, `pair` or `single`."""
-    if row["planted"] == "none":
-        return "clean"
-    if row["planted"] == "unfamiliar":
-        return "outside"
-    return "pair" if "+" in row["planted"] else "single"
+Test = Callable[[Row], bool]
 
 
-def percent(rows: Iterable[_Item], test: Callable[[_Item], bool]) -> str:
+def percent(rows: Iterable[Row], test: Test) -> str:
     """Return `hits of all (percent)`."""
-    found = [test(row) for row in rows]
-    return f"{sum(found)} of {len(found)} ({100 * sum(found) / len(found):.0f} %)" if found else "none run"
+    found = [bool(test(row)) for row in rows]
+    return f"{sum(found)} of {len(found)} ({100 * sum(found) / len(found):.0f} %)" if found else "-"
 
 
-def rates(rows: list[Row]) -> list[str]:
-    """Return the lines of the table of rates."""
-    groups = {name: [row for row in rows if kind_of(row) == name] for name in ("single", "clean", "outside", "pair")}
-    single = groups["single"]
-    named = [row for row in single if row["right"]]
-    lines = [
-        "| what | rate | aim |",
-        "| --- | --- | --- |",
-        f"| one effect, 5 to 20 % of force RMS: named first | {percent(single, lambda r: r['right'])} | 95 % |",
-        f"| ... and nothing else named | {percent(single, lambda r: r['right'] and not r['spurious'])} | |",
-        f"| ... and tied with no other | "
-        f"{percent(single, lambda r: r['right'] and not r['effects'][0]['tied_with'])} | |",
-        f"| clean rig: nothing named | {percent(groups['clean'], lambda r: r['right'])} | 98 % |",
-        f"| shape of no family: unknown | {percent(groups['outside'], lambda r: r['right'])} | 80 % |",
-        f"| pair of effects, 8 % each: both named | {percent(groups['pair'], lambda r: r['right'])} | 70 % |",
-        f"| pair: at least one, and none that is not there | "
-        f"{percent(groups['pair'], lambda r: bool(r['found']) and not r['spurious'])} | |",
-        f"| held-out error after at most 1.25 noise floors (one effect) | "
-        f"{percent(named, lambda r: r['after'] <= 1.25 * r['floor'])} | all |",
-        f"| ... at most 2 noise floors | {percent(named, lambda r: r['after'] <= 2.0 * r['floor'])} | |",
+def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a Markdown table."""
+    lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header)]
+    return "\n".join(lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows])
+
+
+def of_kind(rows: Sequence[Row], kind: str) -> list[Row]:
+    """Return the rows of one kind."""
+    return [row for row in rows if row["kind"] == kind]
+
+
+def confidences(rows: Sequence[Row]) -> list[tuple[float, bool]]:
+    """Return (confidence, whether the effect is really there) of every effect that was named with a confidence."""
+    return [
+        (float(item["confidence"]), item["name"] in row["planted"])
+        for row in rows
+        for item in row["effects"]
+        if item["confidence"] is not None
     ]
+
+
+def at_floor(row: Row) -> bool:
+    """Return whether the error after is at most 1.25 noise floors."""
+    return bool(row["after"] <= 1.25 * row["floor"])
+
+
+def floor_is_right(row: Row) -> bool:
+    """Return whether the program's noise floor lies within 25 % of the true model's error."""
+    return bool(0.75 <= row["floor"] / row["truth"]["true_model_nrmse"] <= 1.25)
+
+
+def rates(rows: Sequence[Row]) -> str:
+    """Return the table of acceptance figures."""
+    clean, single, pair, outside = (of_kind(rows, kind) for kind in ("clean", "single", "pair", "outside"))
+    sure = [there for confidence, there in confidences(rows) if confidence >= 0.9]
+    wrong = f"{sum(not there for there in sure)} of {len(sure)}" if sure else "-"
+    if sure:
+        wrong += f" ({100 * sum(not there for there in sure) / len(sure):.0f} %)"
+    errors = [abs(error) for row in single for _, _, error in parameter_errors(row)]
+    within = f"{sum(e <= 0.15 for e in errors)} of {len(errors)}" if errors else "-"
+    if errors:
+        within += f" ({100 * sum(e <= 0.15 for e in errors) / len(errors):.0f} %)"
+    first = [row for row in single if row["right"]]
+    lines: list[tuple[str, str, str]] = [
+        ("clean rig: no effect named", percent(clean, lambda r: r["right"]), "98 %"),
+        ("one effect: named first", percent(single, lambda r: r["right"]), "95 %"),
+        ("one effect: named alone", percent(single, lambda r: r["alone"]), "90 %"),
+        ("pair: both named", percent(pair, lambda r: r["right"]), "70 %"),
+        ("pair: no name that is not there", percent(pair, lambda r: not r["spurious"]), ""),
+        ("shape outside the library: unknown", percent(outside, lambda r: r["right"]), "80 %"),
+        ("effects named with confidence 0.9 or more that are wrong", wrong, "at most 5 %"),
+        ("clean rig: error after at most 1.25 noise floors", percent(clean, at_floor), "90 %"),
+        ("effect named first: error after at most 1.25 noise floors", percent(first, at_floor), "90 %"),
+        ("clean rig: error after at most 1.25 times the true model's error",
+         percent(clean, lambda r: r["after"] <= 1.25 * r["truth"]["true_model_nrmse"]), ""),
+        ("clean rig: noise floor within 25 % of the true model's error", percent(clean, floor_is_right), "100 %"),
+        ("one effect: parameters that can be compared within 15 %", within, "90 %"),
+    ]  # fmt: skip
     if rows:
-        lines.append(f"| processor time of a tracing, median | {median(r['cpu_seconds'] for r in rows):.0f} s | |")
-        lines.append(f"| ... largest | {max(r['cpu_seconds'] for r in rows):.0f} s | |")
-    return lines
+        lines.append(("time of a case, median", f"{median(r['seconds'] for r in rows):.0f} s", ""))
+        lines.append(("time of a case, largest", f"{max(r['seconds'] for r in rows):.0f} s", ""))
+    return table(("what", "rate", "aim"), lines)
 
 
-def by_effect(rows: list[Row]) -> list[str]:
-    """Return the lines of the table by effect."""
-    lines = [
-        "| planted | share of force RMS | planted form | verdict | form named | before | after | noise floor |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    for row in sorted(rows, key=lambda r: (kind_of(r) != "single", kind_of(r), r["truth"], r["share"], r["seed"])):
-        verdict = row["verdict"] if row["right"] else f"**{row['verdict']}**"
-        forms = ", ".join(item["form"] for item in row["effects"])
-        share = "" if row["planted"] == "none" else f"{row['share']:g}"
+def reliability(rows: Sequence[Row]) -> str:
+    """Return the reliability diagram as a table, and the Brier score."""
+    pairs = confidences(rows)
+    if not pairs:
+        return "No effect was named."
+    bins = ((0.0, 0.5), (0.5, 0.7), (0.7, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 1.01))
+    lines = []
+    for low, high in bins:
+        inside = [(confidence, there) for confidence, there in pairs if low <= confidence < high]
+        if inside:
+            mean = sum(confidence for confidence, _ in inside) / len(inside)
+            really = sum(there for _, there in inside) / len(inside)
+            lines.append((f"{low:g} to {min(high, 1.0):g}", len(inside), f"{mean:.2f}", f"{really:.2f}"))
+    brier = sum((confidence - there) ** 2 for confidence, there in pairs) / len(pairs)
+    diagram = table(("confidence", "effects named", "mean confidence", "share really there"), lines)
+    return f"{diagram}\n\nBrier score: {brier:.3f} ({len(pairs)} effects named)."
+
+
+def by_group(rows: Sequence[Row], group: Callable[[Row], str], header: str) -> str:
+    """Return the table of rates by a property of the case."""
+    lines = []
+    for name in sorted({group(row) for row in rows}):
+        some = [row for row in rows if group(row) == name]
+        clean, single = of_kind(some, "clean"), of_kind(some, "single")
         lines.append(
-            f"| {'+'.join(row['truth']) or 'none'} | {share} | {', '.join(row['truth_forms'])} | {verdict} | {forms} "
-            f"| {row['before']:.4f} | {row['after']:.4f} | {row['floor']:.4f} |"
-        )
-    return lines
+            (name, percent(clean, lambda r: r["right"]), percent(single, lambda r: r["right"]),
+             percent(single, lambda r: r["alone"]), percent(of_kind(some, "pair"), lambda r: r["right"]),
+             percent(of_kind(some, "outside"), lambda r: r["right"]), percent(clean, floor_is_right))
+        )  # fmt: skip
+    columns = (header, "clean: none", "single: first", "single: alone", "pair: both", "outside: unknown",
+               "floor right (clean)")  # fmt: skip
+    return table(columns, lines)
 
 
-def conditions_of(rows: list[Row]) -> list[str]:
-    """Return the lines of the table by noise, rate, excitation and strength."""
-    plain = {"noise": "white", "rate_hz": 1000.0, "excitation": "mixed"}
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        other = [f"{key}: {row[key]}" for key, usual in plain.items() if row[key] != usual]
-        name = ", ".join(other) or f"as usual, {row['share']:g} of force RMS"
-        groups.setdefault(name, []).append(row)
-    lines = ["| condition | one effect named first | clean rig: nothing named |", "| --- | --- | --- |"]
-    for name, group in sorted(groups.items()):
-        single = [row for row in group if kind_of(row) == "single"]
-        clean = [row for row in group if kind_of(row) == "clean"]
-        if single:
-            lines.append(
-                f"| {name} | {percent(single, lambda r: r['right'])} | {percent(clean, lambda r: r['right'])} |"
-            )
-    return lines
+def by_effect(rows: Sequence[Row]) -> str:
+    """Return the table of single effects and outside shapes by name."""
+    some = [row for row in rows if row["kind"] in ("single", "outside")]
+    lines = []
+    for name in sorted({row["planted"][0] for row in some}):
+        cases = [row for row in some if row["planted"][0] == name]
+        others = Counter("+".join(row["found"]) or "none" for row in cases if not row["alone"])
+        instead = ", ".join(f"{verdict} ({times})" for verdict, times in others.most_common(5))
+        lines.append((name, percent(cases, lambda r: r["right"]), percent(cases, lambda r: r["alone"]), instead))
+    return table(("planted", "right", "right and nothing else", "named otherwise"), lines)
 
 
-SAME_MEANING = {
-    ("accumulator", "gas-spring", "gas"): ("stiffness", "stiffness"),
-    ("backlash", "free", "free"): ("gap", "gap"),
-    ("backlash", "held", "held"): ("gap", "gap"),
-    ("channel-skew", "constant", "late-force"): ("time", "skew"),
-    ("delay", "dead-time", "dead-time"): ("time", "delay"),
-    ("end-stop", "hertz", "contact"): ("clearance", "free_travel"),
-    ("inertia", "lagged", "mass"): ("mass", "mass"),
-    ("migration", "slip", "rational"): ("slip", "slip_length"),
-    ("pinching", "quartic", "flat"): ("width", "width"),
-    ("stribeck", "rational", "rational"): ("speed", "velocity_scale"),
-}
-"""(effect, planted form, form found) -> a number of the planted form, and the parameter that means the same."""
-
-
-def parameter_errors(rows: list[Row]) -> list[str]:
-    """Return the lines of the table of parameters where the form found says the same as the one planted."""
-    errors: dict[tuple[str, ...], list[float]] = {}
-    for row in rows:
-        for found in row["effects"]:
-            for name, form, values in zip(
-                row["truth"], row["truth_forms"], row.get("truth_parameters", ()), strict=False
-            ):
-                same = SAME_MEANING.get((found["name"], form, found["form"]))
-                if same and name == found["name"]:
-                    off = found["parameters"][same[1]] / values[same[0]] - 1.0
-                    errors.setdefault((found["name"], found["form"], same[1]), []).append(100.0 * off)
-    every = [abs(off) for offs in errors.values() for off in offs]
-    lines = [f"Within 15 %: {percent(every, lambda off: off <= 15.0)}.", ""] if every else ["None to compare."]
-    if every:
-        lines += ["| effect | form found | parameter | errors [%] |", "| --- | --- | --- | --- |"]
-    return lines + [
-        f"| {effect} | {form} | {name} | {', '.join(f'{off:+.0f}' for off in sorted(offs))} |"
-        for (effect, form, name), offs in sorted(errors.items())
-    ]
-
-
-def confusions(rows: list[Row]) -> list[str]:
-    """Return the lines that say what was taken for what."""
-    wrong = Counter(
-        ("+".join(row["truth"]) or "none", row["verdict"]) for row in rows if not row["right"] or row["spurious"]
+def parameters(rows: Sequence[Row]) -> str:
+    """Return the table of parameter errors."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for row in of_kind(rows, "single"):
+        for name, key, error in parameter_errors(row):
+            found.setdefault((name, key), []).append(100.0 * error)
+    if not found:
+        return "None to compare."
+    return table(
+        ("effect", "parameter", "errors [%]"),
+        [(*key, ", ".join(f"{error:+.0f}" for error in sorted(errors))) for key, errors in sorted(found.items())],
     )
-    if not wrong:
-        return ["None."]
-    return ["| planted | verdict | times |", "| --- | --- | --- |"] + [
-        f"| {planted} | {verdict} | {count} |" for (planted, verdict), count in sorted(wrong.items())
+
+
+def every_case(rows: Sequence[Row]) -> str:
+    """Return one line for each case."""
+    order = {"clean": 0, "single": 1, "pair": 2, "outside": 3}
+    lines = []
+    for row in sorted(rows, key=lambda r: (order[r["kind"]], r["planted"], r["base"], r["seed"])):
+        named = ", ".join(f"{i['name']} {i['confidence'] or 0:.2f}" for i in row["effects"]) or "none"
+        shares = ", ".join(f"{share:.2f}" for share in row["truth"]["shares"])
+        lines.append(
+            (row["seed"], "+".join(row["planted"]) or "none", shares, row["base"],
+             f"{row['noise']}, {row['rate_hz']:g} Hz, {row['training']}, {row['validation']}",
+             named if row["alone"] else f"**{named}**", row["verdict_class"] or "", row["base_taken"] or "",
+             *(f"{row[key]:.4f}" for key in ("before", "after", "floor")), f"{row['truth']['true_model_nrmse']:.4f}")
+        )  # fmt: skip
+    header = ("seed", "planted", "share of force", "base form", "conditions", "named, confidence", "class",
+              "base taken", "before", "after", "noise floor", "true model")  # fmt: skip
+    return table(header, lines)
+
+
+def document(all_rows: Sequence[Row]) -> str:
+    """Return the whole document."""
+    rows = [row for row in all_rows if not row["error"]]
+    failed = [row for row in all_rows if row["error"]]
+    if not rows:
+        return f"No case was run ({len(failed)} failed)."
+    seeds = [row["seed"] for row in all_rows]
+    sections = [
+        ("Rates", rates(rows)),
+        ("Reliability of the confidence", reliability(rows)),
+        ("By base form", by_group(rows, lambda r: r["base"], "base form")),
+        ("By effect", by_effect(rows)),
+        ("By noise", by_group(rows, lambda r: r["noise"], "noise")),
+        ("By sampling rate", by_group(rows, lambda r: f"{r['rate_hz']:g} Hz", "rate")),
+        ("By excitation", by_group(rows, lambda r: f"{r['training']} / {r['validation']}", "training / validation")),
+        ("By strength", by_group(rows, lambda r: f"{r['share']:g} of force RMS", "strength asked for")),
+        ("Parameters", parameters(rows)),
+        ("Every case", every_case(rows)),
     ]
+    if failed:
+        lines = [(row["seed"], "+".join(row["planted"]) or "none", row["base"], row["error"].split("\n")[-1][-200:])
+                 for row in failed]  # fmt: skip
+        sections.insert(1, ("Cases in which the program failed", table(("seed", "planted", "base", "error"), lines)))
+    head = HEAD.format(first=min(seeds), last=max(seeds), count=len(all_rows))
+    return "\n\n".join([head.strip(), *(f"## {title}\n\n{text}" for title, text in sections)]) + "\n"
 
 
 def main() -> None:
     """Print the document."""
-    rows = [row for path in sys.argv[1:] for row in read_rows(Path(path)) if not row["error"]]
-    first = min(row["seed"] for row in rows) // 1000 * 1000
-    parts = [HEAD.format(first=first, count=len(rows)), "## Rates", "\n".join(rates(rows))]
-    parts += ["## What was taken for what", "\n".join(confusions(rows))]
-    parts += ["## Parameters", "\n".join(parameter_errors(rows))]
-    parts += ["## By condition", "\n".join(conditions_of(rows)), "## Every case", "\n".join(by_effect(rows))]
-    print("\n\n".join(part.strip() for part in parts))
+    from benchmarks.tracing import read_rows
+
+    print(document([row for path in sys.argv[1:] for row in read_rows(Path(path))]), end="")
 
 
 if __name__ == "__main__":
