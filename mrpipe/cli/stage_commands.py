@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
+from mrpipe.control.laws import law_names
 from mrpipe.errors import UserError
 
 _RIGS = ("bench", "frame", "closed-loop")
@@ -78,17 +79,14 @@ def record(
 @with_common_options()
 def simulate(
     options: CommonOptions,
-    law: Annotated[
-        str, typer.Option(metavar="LAW", help="vd, vdps, vdns, fdns, nnc, lqg, passive-off, passive-on; or all.")
-    ],
+    law: Annotated[str, typer.Option(metavar="LAW", help=f"{', '.join(law_names())}; or all.")],
 ) -> None:
     """Run the closed loop under a control law."""
     from mrpipe.artifacts.yaml_source import nearest
-    from mrpipe.stages.registry import all_stages
 
-    known = [name.removeprefix("simulate-") for name in all_stages() if name.startswith("simulate-")]
+    known = law_names()
     if law != "all" and law not in known:
-        raise UserError("--law", law, "is no control law", nearest(law, [*known, "all"]))
+        raise UserError("--law", law, "is not a control law", nearest(law, [*known, "all"]))
     build_and_print([f"simulate-{item}" for item in (known if law == "all" else [law])], options)
 
 

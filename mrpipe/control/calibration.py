@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control import exact, limits
-from mrpipe.control.controller import Gains
-from mrpipe.control.linearisation import clipped_linear_stiffness, friction_stiffness
+from mrpipe.control.gains import Gains
+from mrpipe.control.law import Law, Plant
+from mrpipe.control.laws import all_laws, law_named
 from mrpipe.control.lqg import Weights, regulator_gain
-from mrpipe.errors import UserError
-from mrpipe.structures import Frame, state_space
+from mrpipe.structures import Frame
 
 Source = Literal["thesis", "closed-form", "exact"]
 
@@ -75,12 +75,15 @@ class Calibration:
         Law -> its calibration.
     regulator_gain
         k of law lqg, shape (2n,).
+    position
+        Connectivity vector w of the damper, shape (n,).
     """
 
     modes: limits.LimitingModes
     static_stiffness_n_m: float
     laws: Mapping[str, LawCalibration]
     regulator_gain: FloatArray
+    position: FloatArray
 
 
 @dataclass(frozen=True)
@@ -109,120 +112,70 @@ class CalibrationOptions:
     weights: Weights = field(default_factory=Weights)
 
 
-def calibrate(frame: Frame, position: FloatArray, options: CalibrationOptions) -> Calibration:
+def calibrate(
+    frame: Frame, position: FloatArray, options: CalibrationOptions, laws: Sequence[Law] | None = None
+) -> Calibration:
     """Calibrate every law on a frame with a damper along `position`, shape (n,).
+
+    Parameters
+    ----------
+    frame, position, options
+        What is calibrated.
+    laws
+        All laws if left out.
 
     Raises
     ------
     UserError
         If the frame or the position allows no calibration, or a given gain has the wrong sign.
     """
-    modes = limits.limiting_modes(frame, position, options.mode)
-    bare = exact.undamped(frame)
-    laws: dict[str, LawCalibration] = {}
-    for law in ("vd", "vdps", "vdns", "fdns", "nnc"):
-        candidates = candidate_gains(bare, position, modes, law, options)
-        gains = options.overrides.get(law, candidates[options.source])
-        _check_signs(law, gains)
-        laws[law] = assess(frame, position, modes, law, gains, candidates)
-    regulator = regulator_gain(frame, position, options.weights)
-    laws["lqg"] = _assess_regulator(frame, bare, position, modes, regulator)
-    return Calibration(modes, limits.static_stiffness(frame, position), laws, regulator)
-
-
-def candidate_gains(
-    bare: Frame, position: FloatArray, modes: limits.LimitingModes, law: str, options: CalibrationOptions
-) -> dict[str, Gains]:
-    """Return the gains of a law by source; `bare` is the frame without its own damping."""
-    found = {"thesis": THESIS_GAINS[law]}
-    if law in {"fdns", "nnc"}:
-        found["closed-form"] = Gains(alpha_n_m=limits.optimal_friction(modes))
-        best = exact.best_gain(lambda alpha: _ratio(exact.exact_friction(bare, position, modes, alpha)), 2.0 / modes.nu)
-        found["exact"] = Gains(alpha_n_m=best.gain)
-        return found
-    k = {"vd": 0.0, "vdps": options.positive_stiffness_n_m, "vdns": options.negative_stiffness_n_m}[law]
-    found["closed-form"] = Gains(limits.optimal_viscosity(modes, k), k)
-    found["closed-form-thesis"] = Gains(limits.optimal_viscosity_thesis(modes, k), k)
-    largest = 4.0 * limits.optimal_viscosity(modes)
-
-    def ratio(c: float) -> float:
-        if k < 0.0:
-            # without clipping negative stiffness can make the structure fold, so the clipped law is what is tuned
-            H = clipped_linear_stiffness(c, k, modes.omega_0)
-            return _ratio(exact.exact_equivalent(bare, position, modes, H))
-        return _ratio(exact.exact_damping(bare, position, modes, c, k))
-
-    found["exact"] = Gains(exact.best_gain(ratio, largest).gain, k)
-    return found
-
-
-def _ratio(answer: exact.ExactDamping) -> float:
-    return answer.damping_ratio if answer.stable else -1.0
-
-
-def _check_signs(law: str, gains: Gains) -> None:
-    where = f"calibrate.gains_{law}"
-    if gains.c_n_s_m < 0.0 or gains.alpha_n_m < 0.0:
-        raise UserError(where, "c_n_s_m or alpha_n_m", "is negative", "a damper takes energy out: give a positive gain")
-    if law == "vdps" and gains.k_n_m < 0.0:
-        raise UserError(where, "k_n_m", f"is {gains.k_n_m:g}", "positive stiffness is meant; vdns has the negative one")
-    if law == "vdns" and gains.k_n_m > 0.0:
-        raise UserError(where, "k_n_m", f"is {gains.k_n_m:g}", "negative stiffness is meant; vdps has the positive one")
-
-
-def assess(
-    frame: Frame,
-    position: FloatArray,
-    modes: limits.LimitingModes,
-    law: str,
-    gains: Gains,
-    candidates: Mapping[str, Gains],
-) -> LawCalibration:
-    """Return estimate and exact damping of a linear or friction law at its gains."""
-    bare = exact.undamped(frame)
-    clipped = float("nan")
-    if law in {"fdns", "nnc"}:
-        H = friction_stiffness(gains.alpha_n_m)
-        without, with_frame = (exact.exact_equivalent(item, position, modes, H) for item in (bare, frame))
-    else:
-        H = complex(gains.k_n_m, gains.c_n_s_m * modes.omega_0)
-        without, with_frame = (
-            exact.exact_damping(item, position, modes, gains.c_n_s_m, gains.k_n_m) for item in (bare, frame)
-        )
-        if gains.k_n_m:
-            equivalent = clipped_linear_stiffness(gains.c_n_s_m, gains.k_n_m, modes.omega_0)
-            clipped = exact.exact_equivalent(bare, position, modes, equivalent).damping_ratio
-    return LawCalibration(
-        law=law,
-        gains=gains,
-        candidates=candidates,
-        damping_ratio_estimate=limits.damping_estimate(modes, H.real, H.imag),
-        damping_ratio_exact=without.damping_ratio,
-        damping_ratio_with_frame=with_frame.damping_ratio,
-        damping_ratio_clipped=clipped,
-        unstable_pole_1_s=with_frame.unstable_pole,
+    plant = plant_of(frame, position, options)
+    found = {}
+    for law in all_laws().values() if laws is None else laws:
+        if law.calibrated:
+            found[law.name] = calibrate_law(plant, law, options)
+    return Calibration(
+        plant.modes,
+        plant.static_stiffness_n_m,
+        found,
+        regulator_gain(frame, position, options.weights),
+        position,
     )
 
 
-def _assess_regulator(
-    frame: Frame, bare: Frame, position: FloatArray, modes: limits.LimitingModes, gain: FloatArray
-) -> LawCalibration:
-    """Follow the target's pole while the unclipped regulator is faded in."""
-    answers = []
-    for item in (bare, frame):
-        space = state_space(item, position)
-        pole = complex(0.0, modes.omega_0)
-        poles = np.zeros(0, dtype=np.complex128)
-        for share in np.linspace(0.0, 1.0, exact.CONTINUATION_STEPS + 1):
-            poles = np.asarray(np.linalg.eigvals(space.A - share * np.outer(space.B[:, 1], gain)))
-            upper = poles[poles.imag >= -1e-9]
-            pole = complex(upper[np.argmin(np.abs(upper - pole))])
-        answers.append(exact.ExactDamping(pole, float(np.max(poles.real))))
-    without, with_frame = answers
-    nan = float("nan")
-    return LawCalibration(
-        "lqg", Gains(), {}, nan, without.damping_ratio, with_frame.damping_ratio, nan, with_frame.unstable_pole
+def plant_of(frame: Frame, position: FloatArray, options: CalibrationOptions) -> Plant:
+    """Return what the laws are calibrated for.
+
+    Raises
+    ------
+    UserError
+        If the frame or the position allows no calibration.
+    """
+    return Plant(
+        frame=frame,
+        bare=exact.undamped(frame),
+        position=position,
+        modes=limits.limiting_modes(frame, position, options.mode),
+        static_stiffness_n_m=limits.static_stiffness(frame, position),
+        stiffness_n_m={"vdps": options.positive_stiffness_n_m, "vdns": options.negative_stiffness_n_m},
+        weights=options.weights,
     )
+
+
+def calibrate_law(plant: Plant, law: Law, options: CalibrationOptions) -> LawCalibration:
+    """Return the gains of a law from every source, those to run with, and the damping that they give.
+
+    Raises
+    ------
+    UserError
+        If a given gain is unknown or has the wrong sign.
+    """
+    candidates = dict(law.candidates(plant))
+    if law.name in THESIS_GAINS:
+        candidates = {"thesis": THESIS_GAINS[law.name], **candidates}
+    gains = options.overrides.get(law.name, candidates.get(options.source, Gains()))
+    law.check(gains)
+    return LawCalibration(law.name, gains, candidates, **vars(law.assess(plant, gains)))
 
 
 def validity_warnings(
@@ -247,8 +200,7 @@ def validity_warnings(
     limit = calibration.static_stiffness_n_m
     omega = calibration.modes.omega_0
     for law, item in calibration.laws.items():
-        k, alpha = item.gains.k_n_m, item.gains.alpha_n_m
-        negative = max(-k, alpha)
+        negative = max(-item.gains.k_n_m, item.gains.alpha_n_m)
         if negative > limit:
             said.append(
                 f"{law}: negative stiffness of {-negative:.0f} N/m is beyond the static limit of {-limit:.0f} N/m at "
@@ -258,7 +210,7 @@ def validity_warnings(
             said.append(
                 f"{law}: negative stiffness is at {negative / limit:.0%} of the static limit of {-limit:.0f} N/m"
             )
-        needed = needed_force(item.gains, amplitude_m, omega)
+        needed = needed_force(law_named(law), item.gains, amplitude_m, omega)
         if needed <= 0.0:
             continue
         if needed > largest_force_n:
@@ -271,23 +223,10 @@ def validity_warnings(
     return said
 
 
-def needed_force(gains: Gains, amplitude_m: float, omega: float) -> float:
-    """Return the largest force [N] that a law asks for in harmonic motion of the damper, after clipping."""
-    if gains.alpha_n_m:
-        return 2.0 * gains.alpha_n_m * amplitude_m
-    # c v + k x has its largest value where it is still dissipative, or at an extremum
-    return float(amplitude_m * np.hypot(gains.c_n_s_m * omega, gains.k_n_m))
-
-
-def gains_to_json(law: str, gains: Gains) -> dict[str, Any]:
-    """Return the gains that a law has, keys with units."""
-    if law in {"fdns", "nnc"}:
-        return {"alpha_n_m": gains.alpha_n_m}
-    entry = {"c_n_s_m": gains.c_n_s_m}
-    return entry if law == "vd" else {**entry, "k_n_m": gains.k_n_m}
-
-
-def with_gains(calibration: Calibration, law: str, gains: Gains) -> Calibration:
-    """Return the calibration with other gains of one law (not assessed anew)."""
-    changed = replace(calibration.laws[law], gains=gains)
-    return replace(calibration, laws={**calibration.laws, law: changed})
+def needed_force(law: Law, gains: Gains, amplitude_m: float, omega: float) -> float:
+    """Return the largest force [N] that a law demands in harmonic motion of the damper; 0 for laws without such."""
+    if law.harmonic_force is None:
+        return 0.0
+    phase = np.linspace(0.0, 2.0 * np.pi, 1441)
+    x, v = amplitude_m * np.sin(phase), amplitude_m * omega * np.cos(phase)
+    return float(np.max(np.abs(law.harmonic_force(gains, x, v, amplitude_m))))

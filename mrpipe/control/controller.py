@@ -17,42 +17,21 @@ from scipy.signal import butter
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control import kernel
+from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import InverseTable
 from mrpipe.control.kalman import kalman_gains
+from mrpipe.control.law import Law
+from mrpipe.control.laws import law_named
 from mrpipe.control.lqg import Observer
 from mrpipe.errors import UserError
 from mrpipe.networks.network import Network
 
-LAWS = ("vd", "vdps", "vdns", "fdns", "nnc", "lqg", "passive-off", "passive-on")
-"""Every control law, in the order of tables."""
-
-PASSIVE = ("passive-off", "passive-on")
-
-_LAW_CODES = {
-    "vd": kernel.LAW_LINEAR,
-    "vdps": kernel.LAW_LINEAR,
-    "vdns": kernel.LAW_LINEAR,
-    "fdns": kernel.LAW_FRICTION,
-    "nnc": kernel.LAW_NETWORK,
-    "lqg": kernel.LAW_OBSERVER,
-    "passive-off": kernel.LAW_CONSTANT,
-    "passive-on": kernel.LAW_CONSTANT,
-}
 _SOURCES = {
     "kalman": kernel.VELOCITY_KALMAN,
     "measured": kernel.VELOCITY_MEASURED,
     "difference": kernel.VELOCITY_DIFFERENCE,
 }
 _CHANNELS = {"displacement": 0, "velocity": 1, "acceleration": 2, "force": 3}
-
-
-@dataclass(frozen=True)
-class Gains:
-    """Gains of a law: f = c v + k x (4.14), or f = sign(v) alpha X - alpha x (4.18) with (4.20)."""
-
-    c_n_s_m: float = 0.0
-    k_n_m: float = 0.0
-    alpha_n_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -113,20 +92,23 @@ class Controller:
     Attributes
     ----------
     law
-        One of :data:`LAWS`.
+        Name of its law.
+    force
+        Compiled force of the law.
     numbers, layout
         Arrays for :func:`~mrpipe.control.kernel.controller_step`.
     gains, options
         What it was built from.
     floors
-        Floors whose accelerometers it reads (lqg), else 0.
+        Floors whose accelerometers it reads, else 0.
     networks
-        `inverse` and `law`, where there are such, in the form in which they are asked.
+        `inverse` and `law`, where there are such, in the form in which they are evaluated.
     details
         More about how it was built, for tables and JSON.
     """
 
     law: str
+    force: Any
     numbers: FloatArray
     layout: IntArray
     gains: Gains
@@ -134,6 +116,11 @@ class Controller:
     floors: int = 0
     networks: Mapping[str, Network] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def arguments(self) -> tuple[Any, FloatArray, IntArray]:
+        """Return (force, numbers, layout), the first arguments of :func:`~mrpipe.control.kernel.controller_step`."""
+        return self.force, self.numbers, self.layout
 
     @property
     def sample_time_s(self) -> float:
@@ -156,46 +143,43 @@ class Controller:
 
 
 def build_controller(
-    law: str,
+    law: str | Law,
     gains: Gains,
     options: ControllerOptions,
     *,
     inverse: Network | InverseTable | None = None,
     reference: Network | None = None,
     observer: Observer | None = None,
+    position: FloatArray | None = None,
 ) -> Controller:
     """Pack a controller.
 
     Parameters
     ----------
     law
-        One of :data:`LAWS`.
+        A law or its name.
     gains
-        Of the law; not read for nnc, lqg and the passive ones.
+        Of the law.
     options
         How it runs.
     inverse
         From desired force to drive: a network as P2 (23) or a table; None for a damper that tracks perfectly.
     reference
-        Network of law nnc: displacement and velocity to force (4.3.4).
+        For a law that needs a network: from displacement and velocity to force (4.3.4).
     observer
-        Of law lqg.
+        For a law that needs an observer.
+    position
+        Connectivity vector w of the damper, shape (n,), for a law that reads the accelerometers of the floors.
 
     Raises
     ------
     UserError
         If the law is unknown or lacks its gains, network or observer, or the low-pass lies above half the rate.
     """
-    if law not in _LAW_CODES:
-        raise UserError("control law", law, "is no control law", f"one of {', '.join(LAWS)}")
-    if law == "nnc" and reference is None:
-        raise UserError("control law", law, "has no trained network", "calibrate it first")
-    if law == "lqg" and observer is None:
-        raise UserError("control law", law, "has no observer", "calibrate it first")
-    if _LAW_CODES[law] in (kernel.LAW_LINEAR, kernel.LAW_FRICTION) and gains == Gains():
-        raise UserError("control law", law, "has no gains", "calibrate it first or give them")
+    entry = law_named(law) if isinstance(law, str) else law
+    _check_parts(entry, gains, reference, observer, position)
     pack = _Pack(options)
-    pack.layout[kernel.LAW] = _LAW_CODES[law]
+    pack.layout[kernel.OUTPUT] = kernel.OUTPUT_DRIVE if entry.output == "drive" else kernel.OUTPUT_FORCE
     pack.numbers[0][kernel.GAIN_C : kernel.GAIN_ALPHA + 1] = [gains.c_n_s_m, gains.k_n_m, gains.alpha_n_m]
     limit = options.drive_limit
     history = 2
@@ -209,21 +193,36 @@ def build_controller(
         asked = inverse if plain else inverse.steady()
         history = max(history, pack.network(asked, kernel.NETWORK_INVERSE, kernel.INVERSE_SPACING))
         pack.layout[kernel.INVERSE] = kernel.INVERSE_NETWORK
-        if law not in PASSIVE:
+        if entry.output == "force":
             networks["inverse"] = asked
-    if reference is not None and law == "nnc":
+    if reference is not None and "network" in entry.needs:
         networks["law"] = reference
         history = max(history, pack.network(reference, kernel.NETWORK_LAW, kernel.LAW_SPACING))
     floors = 0
-    if observer is not None and law == "lqg":
+    if observer is not None and "observer" in entry.needs:
         floors = pack.observer(observer)
-    head = pack.numbers[0]
-    head[kernel.DRIVE_LIMIT] = 1e300 if limit is None else limit
-    if law == "passive-on":
-        if limit is None:
-            raise UserError("control law", law, "has no drive limit", "give the largest drive of the damper")
-        head[kernel.CONSTANT_DRIVE] = limit
-    return pack.finish(law, gains, history, floors, networks)
+    elif position is not None and "floor-accelerations" in entry.needs:
+        floors = len(position)
+    pack.numbers[0][kernel.DRIVE_LIMIT] = 1e300 if limit is None else limit
+    if limit is None and "drive-limit" in entry.needs:
+        raise UserError("control law", entry.name, "has no drive limit", "give the largest drive of the damper")
+    pack.layout[kernel.AT_LAW] = pack.at
+    pack.numbers.append(entry.numbers(gains, position, 1.0 / options.rate_hz))
+    return pack.finish(entry, gains, history, floors, networks)
+
+
+def _check_parts(
+    law: Law, gains: Gains, reference: Network | None, observer: Observer | None, position: FloatArray | None
+) -> None:
+    if "network" in law.needs and reference is None:
+        raise UserError("control law", law.name, "has no trained network", "calibrate it first")
+    if "observer" in law.needs and observer is None:
+        raise UserError("control law", law.name, "has no observer", "calibrate it first")
+    if "floor-accelerations" in law.needs and observer is None and position is None:
+        raise UserError("control law", law.name, "does not know where the damper is", "give its position")
+    required = [gain.name for gain in law.gains if not gain.optional]
+    if required and "network" not in law.needs and not any(gains.get(name, 0.0) for name in required):
+        raise UserError("control law", law.name, "has no gains", "calibrate it first or give them")
 
 
 class _Pack:
@@ -296,22 +295,25 @@ class _Pack:
     def observer(self, observer: Observer) -> int:
         """Add an observer; return the number of floors it reads."""
         if abs(observer.sample_time_s * self.options.rate_hz - 1.0) > 1e-9:
-            raise UserError("control law", "lqg", "the observer was made for another rate", "calibrate at this rate")
+            raise UserError("control law", "observer", "was made for another rate", "calibrate at this rate")
         self.layout[kernel.AT_OBSERVER] = self.at
         self.layout[kernel.FLOORS] = observer.floors
         for part in (observer.transition, observer.force_input, observer.innovation, observer.gain):
             self.numbers.append(np.ravel(part))
         return observer.floors
 
-    def finish(self, law: str, gains: Gains, history: int, floors: int, networks: Mapping[str, Network]) -> Controller:
+    def finish(self, law: Law, gains: Gains, history: int, floors: int, networks: Mapping[str, Network]) -> Controller:
         """Return the controller."""
+        observed = 2 * floors if "observer" in law.needs else 0
         layout = self.layout
         layout[kernel.STATE_HISTORY] = kernel.S_HEAD
         layout[kernel.HISTORY] = history
         layout[kernel.STATE_OBSERVER] = kernel.S_HEAD + 4 * history
-        layout[kernel.STATE_SIZE] = kernel.S_HEAD + 4 * history + 2 * floors
+        layout[kernel.STATE_LAW] = kernel.S_HEAD + 4 * history + observed
+        layout[kernel.STATE_SIZE] = kernel.S_HEAD + 4 * history + observed + law.memory
         return Controller(
-            law=law,
+            law=law.name,
+            force=law.force,
             numbers=np.ascontiguousarray(np.concatenate(self.numbers), dtype=np.float64),
             layout=np.concatenate([layout, *self.networks]).astype(np.int64),
             gains=gains,

@@ -1,7 +1,7 @@
 /* Controller of law @LAW@, written by mrpipe; see controller.h and README.md.
  *
  * Figure 5.3: kinematic Kalman filter, control law, clipping (P2 22), inverse damper (P2 23), switch (P2 24), low-pass,
- * limits. Everything it knows is in `numbers` and `layout`.
+ * limits. All constants are in `numbers` and `layout`.
  */
 #include "controller.h"
 
@@ -142,48 +142,15 @@ static double look_up(double speed, double force)
     return numbers[TABLE_DRIVE];
 }
 
-static double observe(double *state, const double *measured)
+@LAW_HELPERS@static double law(double *state, const double *measured)
 {
-    const int floors = layout[FLOORS], n = 2 * floors, outputs = floors + 2;
-    const double *f = numbers + layout[AT_OBSERVER], *g = f + n * n, *h = g + n, *k = h + n * outputs;
-    double *z = state + layout[STATE_OBSERVER];
-    double fresh[WIDEST] = {0.0}, force = 0.0;
-    for (int row = 0; row < n; ++row) {
-        double total = g[row] * state[S_FORCE] + h[row * outputs] * measured[MEASURED_DISPLACEMENT];
-        for (int column = 0; column < n; ++column) total += f[row * n + column] * z[column];
-        for (int column = 0; column <= floors; ++column)
-            total += h[row * outputs + 1 + column] * measured[MEASURED_GROUND + column];
-        fresh[row] = total;
-    }
-    for (int row = 0; row < n; ++row) {
-        z[row] = fresh[row];
-        force -= k[row] * fresh[row];
-    }
-    return force;
-}
-
-static double law(double *state, const double *measured)
-{
-    switch (layout[LAW]) {
-    case LAW_LINEAR:
-        return numbers[GAIN_C] * state[S_V] + numbers[GAIN_K] * state[S_X];
-    case LAW_FRICTION: {
-        const double amplitude = larger(state[S_AMPLITUDE], fabs(state[S_X]));
-        const double side = numbers[ROUNDING] > 0.0 ? tanh(state[S_V] / numbers[ROUNDING]) : state[S_DIRECTION];
-        return numbers[GAIN_ALPHA] * (side * amplitude - state[S_X]);
-    }
-    case LAW_NETWORK:
-        return evaluate(state, layout[NETWORK_LAW], numbers[LAW_SPACING]);
-    case LAW_OBSERVER:
-        return observe(state, measured);
-    default:
-        return 0.0;
-    }
-}
+    (void)state;
+    (void)measured;
+@LAW_BODY@}
 
 static double inverse(const double *state, double force)
 {
-    if (layout[LAW] == LAW_CONSTANT) return numbers[CONSTANT_DRIVE];
+    if (layout[OUTPUT] == OUTPUT_DRIVE) return state[S_REQUEST];
     if (layout[INVERSE] == INVERSE_TABLE) return look_up(fabs(state[S_V]), fabs(force));
     if (layout[INVERSE] == INVERSE_NETWORK) return evaluate(state, layout[NETWORK_INVERSE], numbers[INVERSE_SPACING]);
     return 0.0;
@@ -202,16 +169,17 @@ void @PREFIX@_controller_step(double state[@UPPER@_STATE_SIZE],
     follow_motion(state);
     remember(state, state[S_X], state[S_V], measured[MEASURED_ACCELERATION], 0.0);
     const double wanted = law(state, measured);
-    const int clipped = wanted * state[S_DIRECTION] < 0.0;
+    const int direct = layout[OUTPUT] == OUTPUT_DRIVE;
+    const int clipped = !direct && wanted * state[S_DIRECTION] < 0.0;
     const double force = clipped ? 0.0 : wanted;
     double *forces = state + layout[STATE_HISTORY] + 3 * layout[HISTORY];
     forces[0] = force;
     if (state[S_STARTED] < 0.5)
         for (int index = 0; index < layout[HISTORY]; ++index) forces[index] = force;
     const double asked = inverse(state, force);
-    const int switched = layout[LAW] != LAW_CONSTANT && fabs(force) < numbers[RESIDUAL_FORCE];
+    const int switched = !direct && fabs(force) < numbers[RESIDUAL_FORCE];
     const double drive = switched ? 0.0 : asked;
-    if (state[S_STARTED] < 0.5 && layout[LAW] == LAW_CONSTANT) {
+    if (state[S_STARTED] < 0.5 && direct) {
         state[S_FILTER] = drive * (1.0 - numbers[LOW_PASS]);
         state[S_FILTER + 1] = drive * (numbers[LOW_PASS + 2] - numbers[LOW_PASS + 4]);
     }

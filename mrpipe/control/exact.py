@@ -108,6 +108,11 @@ def exact_friction(frame: Frame, position: FloatArray, modes: LimitingModes, alp
     return exact_equivalent(frame, position, modes, alpha * complex(-1.0, FRICTION_RATIO))
 
 
+def stable_ratio(answer: ExactDamping) -> float:
+    """Return the damping ratio; -1 where a pole grows, so that a search for the best gain avoids it."""
+    return answer.damping_ratio if answer.stable else -1.0
+
+
 def undamped(frame: Frame) -> Frame:
     """Return the frame without its own damping: what the closed forms and the printed figures are about."""
     return Frame(frame.mass, np.zeros_like(frame.damping), frame.stiffness, frame.name)

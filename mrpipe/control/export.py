@@ -11,6 +11,8 @@ import numpy as np
 
 from mrpipe.control import kernel
 from mrpipe.control.controller import Controller
+from mrpipe.control.law import Law
+from mrpipe.control.laws import law_named
 
 LOADS_FROM = ("mrpipe/control/controller_template.c",)
 """Files of the program that are read at run time: they belong to the code version of a stage."""
@@ -21,6 +23,7 @@ _MACROS = (
     "MEASURED_ACCELERATION",
     "MEASURED_VELOCITY",
     "MEASURED_GROUND",
+    "MEASURED_FORCE",
     "MEASURED_FLOORS",
     "COMMAND_DRIVE",
     "COMMAND_FORCE",
@@ -48,11 +51,12 @@ def controller_files(controller: Controller, prefix: str, details: dict[str, Any
     prefix
         Of the C names.
     details
-        What else controller.json should say (where gains come from, units).
+        Further entries of controller.json (where gains come from, units).
     """
+    law = law_named(controller.law)
     return {
         "controller.h": _header(controller, prefix),
-        "controller.c": _source(controller, prefix),
+        "controller.c": _source(controller, law, prefix),
         "controller.json": json.dumps(_description(controller, prefix, details), indent=2) + "\n",
         "README.md": _readme(controller, prefix),
     }
@@ -85,7 +89,7 @@ def _header(controller: Controller, prefix: str) -> str:
     return "\n".join(lines)
 
 
-def _source(controller: Controller, prefix: str) -> str:
+def _source(controller: Controller, law: Law, prefix: str) -> str:
     upper = prefix.upper()
     numbers = ",\n".join(
         "    " + ", ".join(_literal(value) for value in controller.numbers[start : start + 4])
@@ -101,6 +105,8 @@ def _source(controller: Controller, prefix: str) -> str:
         "@NUMBERS@": numbers,
         "@LAYOUT@": layout,
         "@LAW@": controller.law,
+        "@LAW_HELPERS@": f"{law.c_helpers}\n" if law.c_helpers else "",
+        "@LAW_BODY@": law.c_body,
     }.items():
         text = text.replace(key, value)
     return text
@@ -115,17 +121,22 @@ def _description(controller: Controller, prefix: str, details: dict[str, Any]) -
     return {
         "law": controller.law,
         "prefix": prefix,
-        "gains": asdict(controller.gains),
+        "gains": dict(controller.gains),
         "options": asdict(controller.options),
         "sample_time_s": controller.sample_time_s,
-        "measured": {name.removeprefix("MEASURED_").lower(): getattr(kernel, name) for name in _MACROS[:5]},
+        "measured": _places("MEASURED_"),
         "measured_size": controller.measured_size,
-        "command": {name.removeprefix("COMMAND_").lower(): getattr(kernel, name) for name in _MACROS[5:14]},
+        "command": _places("COMMAND_"),
         "state_size": controller.state_size,
         "numbers": [float(value) for value in controller.numbers],
         "layout": [int(value) for value in np.asarray(controller.layout)],
         **details,
     }
+
+
+def _places(prefix: str) -> dict[str, int]:
+    names = (name for name in _MACROS if name.startswith(prefix) and not name.endswith("_SIZE"))
+    return {name.removeprefix(prefix).lower(): getattr(kernel, name) for name in names}
 
 
 def _readme(controller: Controller, prefix: str) -> str:

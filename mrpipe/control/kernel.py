@@ -1,44 +1,47 @@
-"""The controller of Figure 5.3 as one compiled function, called once a controller sample.
+"""The controller of Figure 5.3 as one compiled function, called once per controller sample.
 
-Everything a controller knows is in two arrays, `numbers` (float) and `layout` (integers), its memory in a third, so
-that the same function runs in any plant integrator, and translates to C line by line (:mod:`mrpipe.control.export`).
+A controller consists of its law (a compiled function), the arrays `numbers` (float) and `layout` (integers), and an
+array for its memory. The same function runs in every plant integrator and translates to C line by line
+(:mod:`mrpipe.control.export`).
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numba import float64, int64, njit, void
+from numba import float64, int64, njit, types, void
 
 from mrpipe.artifacts import FloatArray, IntArray
 
-# --- measured: what the sensors say at this instant ---
+# --- measured: the readings of the sensors at this instant ---
 MEASURED_DISPLACEMENT = 0  # of the damper [m]
 MEASURED_ACCELERATION = 1  # of the damper: floor less ground, both as accelerometers give them [m/s^2]
 MEASURED_VELOCITY = 2  # m/s; read only where the controller was built with velocity="measured"
-MEASURED_GROUND = 3  # ground acceleration [m/s^2]; read by lqg only
-MEASURED_FLOORS = 4  # from here: absolute acceleration of each floor [m/s^2]; read by lqg only
+MEASURED_GROUND = 3  # ground acceleration [m/s^2]; read only by laws that need the accelerometers
+MEASURED_FORCE = 4  # damper force, positive where it resists [N]; read only by laws that need it
+MEASURED_FLOORS = 5  # from here: absolute acceleration of each floor [m/s^2]; as the ground acceleration
 
-# --- command: what the controller says ---
+# --- command: the outputs of the controller ---
 COMMAND_DRIVE = 0  # coil current [A] (or voltage [V]) to be held until the next sample
 COMMAND_FORCE = 1  # desired force after clipping (P2 (22)) [N]
 COMMAND_UNCLIPPED = 2  # desired force of the law [N]
 COMMAND_DISPLACEMENT = 3  # estimated damper displacement [m]
 COMMAND_VELOCITY = 4  # estimated damper velocity [m/s]
 COMMAND_AMPLITUDE = 5  # X of (4.18) [m]
-COMMAND_CLIPPED = 6  # 1 where clipping took the force away
-COMMAND_SWITCHED = 7  # 1 where the switch P2 (24) took the drive away
+COMMAND_CLIPPED = 6  # 1 where clipping set the force to zero
+COMMAND_SWITCHED = 7  # 1 where the switch P2 (24) set the drive to zero
 COMMAND_INVERSE = 8  # drive of the inverse before switch, low-pass and limits [A]
 COMMAND_SIZE = 12
 
 # --- layout ---
-LAW = 0
+OUTPUT = 0  # whether the law gives a force, or the drive itself
 INVERSE = 1
 VELOCITY_SOURCE = 2
 FLOORS = 3
 NETWORK_INVERSE = 4  # where in `layout` the inverse network is described
-NETWORK_LAW = 5  # where in `layout` the network of law nnc is described
+NETWORK_LAW = 5  # where in `layout` the network of the law is described
 TABLE_SPEEDS = 6  # points of the inverse table in speed
 TABLE_DRIVES = 7  # points of the inverse table in drive
 AT_TABLE = 8  # where in `numbers` the table is
@@ -47,7 +50,9 @@ STATE_HISTORY = 10  # where in `state` the histories are: displacement, velocity
 HISTORY = 11  # length of each
 STATE_OBSERVER = 12  # where in `state` the observer is
 STATE_SIZE = 13
-LAYOUT_SIZE = 16
+AT_LAW = 14  # where in `numbers` further numbers of the law are
+STATE_LAW = 15  # where in `state` the memory of the law is
+LAYOUT_SIZE = 24
 # a network in `layout`: layers, then neurons of each (input included), channels, past values, absolute, channel codes
 NET_AT = 0  # where in `numbers`
 NET_LAYERS = 1
@@ -58,7 +63,7 @@ NET_CODES = 5  # four codes
 NET_NEURONS = 9  # neurons of each layer, input first
 NET_SIZE = 16
 
-LAW_CONSTANT, LAW_LINEAR, LAW_FRICTION, LAW_NETWORK, LAW_OBSERVER = 0, 1, 2, 3, 4
+OUTPUT_FORCE, OUTPUT_DRIVE = 0, 1
 INVERSE_NONE, INVERSE_TABLE, INVERSE_NETWORK = 0, 1, 2
 VELOCITY_KALMAN, VELOCITY_MEASURED, VELOCITY_DIFFERENCE = 0, 1, 2
 
@@ -68,15 +73,14 @@ GAIN_C = 1
 GAIN_K = 2
 GAIN_ALPHA = 3
 RESIDUAL_FORCE = 4
-DRIVE_LIMIT = 5
-CONSTANT_DRIVE = 6
+DRIVE_LIMIT = 5  # largest drive; 1e300 where there is none
 KALMAN = 7  # three gains: displacement, velocity, bias
 DEAD_BAND = 10
 EXTREMUM_STEP = 11
 EXTREMUM_SHARE = 12
 LOW_PASS = 13  # b0, b1, b2, a1, a2
 INVERSE_SPACING = 18  # samples between past values of the inverse network
-LAW_SPACING = 19  # the same for the network of nnc
+LAW_SPACING = 19  # the same for the network of the law
 TABLE_SPEED = 20  # largest speed of the inverse table [m/s]
 TABLE_DRIVE = 21  # largest drive of the inverse table
 ROUNDING = 22  # speed over which the friction of fdns changes its sign [m/s]; 0: a jump
@@ -98,9 +102,16 @@ S_FILTER = 9  # two
 S_FORCE = 11  # last desired force
 S_DISPLACEMENT = 12  # last measured displacement
 S_AGE = 13  # time since the last extremum
-S_HEAD = 16
+S_REQUEST = 14  # drive that a law commands itself
+S_HEAD = 24
 
 WIDEST = 256  # neurons of a layer, several networks side by side included
+
+LAW_SIGNATURE = float64(float64[::1], int64[::1], float64[::1], float64[::1])
+"""Of the compiled force of a law: numbers, layout, state, measured -> desired force before clipping [N]."""
+
+LAW_FUNCTION = types.FunctionType(LAW_SIGNATURE)
+"""The compiled type of such a function, for the signatures of kernels that call it."""
 
 
 @njit(void(float64[::1], float64[::1], float64[::1], int64), cache=True)
@@ -176,7 +187,7 @@ def _remember(layout: IntArray, state: FloatArray, x: float, v: float, a: float,
 
 
 @njit(float64(float64[::1], int64[::1], float64[::1], int64, float64), cache=True)
-def _evaluate(numbers: FloatArray, layout: IntArray, state: FloatArray, where: int, spacing: float) -> float:
+def evaluate(numbers: FloatArray, layout: IntArray, state: FloatArray, where: int, spacing: float) -> float:
     """Return the output of a network on the histories; past values lie `spacing` samples apart."""
     signal = np.empty(WIDEST)
     result = np.empty(WIDEST)
@@ -235,69 +246,21 @@ def _look_up(numbers: FloatArray, layout: IntArray, speed: float, force: float) 
     return numbers[TABLE_DRIVE]
 
 
-@njit(float64(float64[::1], int64[::1], float64[::1], float64[::1]), cache=True)
-def _observe(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Advance the observer of law lqg and return its desired force: z+ = F z + g f + H y, f = -k z.
-
-    `y` is the damper displacement, the ground acceleration and the absolute acceleration of each floor.
-    """
-    floors = layout[FLOORS]
-    n = 2 * floors
-    outputs = floors + 2
-    at_f, at_g = layout[AT_OBSERVER], layout[AT_OBSERVER] + n * n
-    at_h = at_g + n
-    at_k = at_h + n * outputs
-    at = layout[STATE_OBSERVER]
-    new = np.zeros(WIDEST)
-    for row in range(n):
-        total = numbers[at_g + row] * state[S_FORCE] + numbers[at_h + row * outputs] * measured[MEASURED_DISPLACEMENT]
-        for column in range(n):
-            total += numbers[at_f + row * n + column] * state[at + column]
-        for column in range(floors + 1):
-            total += numbers[at_h + row * outputs + 1 + column] * measured[MEASURED_GROUND + column]
-        new[row] = total
-    force = 0.0
-    for row in range(n):
-        state[at + row] = new[row]
-        force -= numbers[at_k + row] * new[row]
-    return force
-
-
-@njit(float64(float64[::1], int64[::1], float64[::1], float64[::1]), cache=True)
-def _law(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Return the desired force of the law before clipping: (4.11), (4.14), (4.18), 4.3.4 or LQG."""
-    law = layout[LAW]
-    if law == LAW_LINEAR:
-        return numbers[GAIN_C] * state[S_V] + numbers[GAIN_K] * state[S_X]
-    if law == LAW_FRICTION:
-        # the pending extremum counts where it already exceeds the last one, so that a growing motion stays dissipative
-        amplitude = max(state[S_AMPLITUDE], abs(state[S_X]))
-        side = state[S_DIRECTION]
-        if numbers[ROUNDING] > 0.0:
-            side = math.tanh(state[S_V] / numbers[ROUNDING])
-        return numbers[GAIN_ALPHA] * (side * amplitude - state[S_X])
-    if law == LAW_NETWORK:
-        return _evaluate(numbers, layout, state, layout[NETWORK_LAW], numbers[LAW_SPACING])
-    if law == LAW_OBSERVER:
-        return _observe(numbers, layout, state, measured)
-    return 0.0
-
-
 @njit(float64(float64[::1], int64[::1], float64[::1], float64), cache=True)
 def _drive(numbers: FloatArray, layout: IntArray, state: FloatArray, force: float) -> float:
-    """Return the drive that the inverse asks for, before switch, low-pass and limits."""
-    if layout[LAW] == LAW_CONSTANT:
-        return numbers[CONSTANT_DRIVE]
+    """Return the drive of the inverse, before switch, low-pass and limits."""
+    if layout[OUTPUT] == OUTPUT_DRIVE:
+        return state[S_REQUEST]
     if layout[INVERSE] == INVERSE_TABLE:
         return _look_up(numbers, layout, abs(state[S_V]), abs(force))
     if layout[INVERSE] == INVERSE_NETWORK:
-        return _evaluate(numbers, layout, state, layout[NETWORK_INVERSE], numbers[INVERSE_SPACING])
+        return evaluate(numbers, layout, state, layout[NETWORK_INVERSE], numbers[INVERSE_SPACING])
     return 0.0
 
 
-@njit(void(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1]), cache=True)
+@njit(void(LAW_FUNCTION, float64[::1], int64[::1], float64[::1], float64[::1], float64[::1]), cache=True)
 def controller_step(
-    numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray, command: FloatArray
+    law: Any, numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray, command: FloatArray
 ) -> None:
     """Run the controller for one of its samples.
 
@@ -309,18 +272,19 @@ def controller_step(
         measured = np.zeros(controller.measured_size)
         command = np.zeros(COMMAND_SIZE)
         ...
-        controller_step(controller.numbers, controller.layout, state, measured, command)
+        controller_step(*controller.arguments, state, measured, command)
 
     Parameters
     ----------
-    numbers, layout
-        Arrays of the :class:`~mrpipe.control.controller.Controller`.
+    law, numbers, layout
+        Law and arrays of the :class:`~mrpipe.control.controller.Controller`.
     state
         Its memory: zeros before the first call (:meth:`Controller.new_state`).
     measured
-        Shape (4 + floors,), filled by the caller; indices MEASURED_...: damper displacement [m], damper acceleration
+        Shape (5 + floors,), filled by the caller; indices MEASURED_...: damper displacement [m], damper acceleration
         (absolute floor acceleration less ground acceleration) [m/s^2], damper velocity [m/s] (only for
-        velocity="measured"), ground acceleration [m/s^2] and absolute floor accelerations [m/s^2] (only for lqg).
+        velocity="measured"), and for laws that need them: ground acceleration [m/s^2], damper force [N], absolute
+        accelerations of the floors [m/s^2].
     command
         Shape (COMMAND_SIZE,), filled here; indices COMMAND_...
 
@@ -328,11 +292,12 @@ def controller_step(
     """
     _estimate(numbers, state, measured, layout[VELOCITY_SOURCE])
     _follow_motion(numbers, state)
-    # the histories of motion are needed by nnc before the force of this instant is known
+    # a law with a network needs the histories of motion before the force of this instant is known
     _remember(layout, state, state[S_X], state[S_V], measured[MEASURED_ACCELERATION], 0.0)
-    wanted = _law(numbers, layout, state, measured)
+    wanted = law(numbers, layout, state, measured)
     force = wanted
-    clipped = wanted * state[S_DIRECTION] < 0.0
+    direct = layout[OUTPUT] == OUTPUT_DRIVE
+    clipped = not direct and wanted * state[S_DIRECTION] < 0.0
     if clipped:
         force = 0.0
     at = layout[STATE_HISTORY] + 3 * layout[HISTORY]
@@ -342,11 +307,11 @@ def controller_step(
             state[at + index] = force
     asked = _drive(numbers, layout, state, force)
     drive = asked
-    switched = layout[LAW] != LAW_CONSTANT and abs(force) < numbers[RESIDUAL_FORCE]
+    switched = not direct and abs(force) < numbers[RESIDUAL_FORCE]
     if switched:
         drive = 0.0
-    if state[S_STARTED] < 0.5 and layout[LAW] == LAW_CONSTANT:
-        # a passive damper has been at its drive for long: the low-pass starts in equilibrium
+    if state[S_STARTED] < 0.5 and direct:
+        # a passive damper was at its drive before the start: the low-pass starts in equilibrium
         state[S_FILTER] = drive * (1.0 - numbers[LOW_PASS])
         state[S_FILTER + 1] = drive * (numbers[LOW_PASS + 2] - numbers[LOW_PASS + 4])
     filtered = numbers[LOW_PASS] * drive + state[S_FILTER]

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
-from mrpipe.control.calibration import Calibration, gains_to_json
-from mrpipe.control.controller import Gains
+from mrpipe.control.calibration import Calibration
+from mrpipe.control.gains import NAMES, Gains
+from mrpipe.control.laws import law_named
 from mrpipe.control.limits import attainable_damping, attainable_damping_friction, optimal_force_ratio
 from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceNetwork
@@ -28,15 +27,16 @@ def calibration_to_json(calibration: Calibration) -> dict[str, Any]:
     """Return what `--json` prints: limiting frequencies and every law."""
     modes = calibration.modes
     laws: dict[str, Any] = {}
-    for law, item in calibration.laws.items():
-        laws[law] = {
-            **({} if law == "lqg" else gains_to_json(law, item.gains)),
+    for name, item in calibration.laws.items():
+        law = law_named(name)
+        laws[name] = {
+            **law.gains_as_json(item.gains),
             "damping_ratio_estimate": finite(item.damping_ratio_estimate),
             "damping_ratio_exact": finite(item.damping_ratio_exact),
             "damping_ratio_exact_with_frame": finite(item.damping_ratio_with_frame),
             "damping_ratio_clipped": finite(item.damping_ratio_clipped),
             "fastest_pole_1_s": finite(item.unstable_pole_1_s),
-            "candidates": {source: gains_to_json(law, gains) for source, gains in item.candidates.items()},
+            "candidates": {source: law.gains_as_json(gains) for source, gains in item.candidates.items()},
         }
     return {
         "target_mode": modes.mode,
@@ -61,10 +61,10 @@ def write_calibration(
     calibration: Calibration,
     position: FloatArray,
     weights: Weights,
-    reference: ReferenceNetwork,
+    reference: ReferenceNetwork | None,
     friction_rounding_m_s: float,
 ) -> None:
-    """Write modes, gains, regulator, the network of nnc, and the speed over which friction changes its sign [m/s]."""
+    """Write modes, gains, regulator, reference network, and the speed over which friction changes its sign."""
     modes = calibration.modes
     for name, unit in (("omega_0", "rad/s"), ("omega_inf", "rad/s"), ("nu", "m/N"), ("u_0", "kg^-1/2"), ("kappa", "1")):
         artifact.put(name, getattr(modes, name), unit=unit)
@@ -76,11 +76,13 @@ def write_calibration(
     artifact.put("lqg/regulator_gain", calibration.regulator_gain, unit="N/m and N*s/m", dims=("state",))
     artifact.put_json("lqg/weights", asdict(weights))
     for law, item in calibration.laws.items():
-        for key, unit in (("c_n_s_m", "N*s/m"), ("k_n_m", "N/m"), ("alpha_n_m", "N/m")):
-            artifact.put(f"laws/{law}/{key}", getattr(item.gains, key), unit=unit)
+        for key, unit in zip(NAMES, ("N*s/m", "N/m", "N/m"), strict=True):
+            artifact.put(f"laws/{law}/{key}", item.gains[key], unit=unit)
+        artifact.put_json(f"laws/{law}/gains", dict(item.gains))
         for key in ("damping_ratio_estimate", "damping_ratio_exact", "damping_ratio_with_frame"):
             artifact.put(f"laws/{law}/{key}", getattr(item, key), unit="1")
-    write_network(artifact, "nnc/network", reference.network)
+    if reference is not None:
+        write_network(artifact, "nnc/network", reference.network)
 
 
 def read_gains(artifact: Artifact, law: str) -> Gains:
@@ -94,24 +96,64 @@ def read_gains(artifact: Artifact, law: str) -> Gains:
     if law not in artifact.members("laws"):
         known = ", ".join(artifact.members("laws")) or "none"
         raise UserError(artifact.path, f"laws/{law}", "this law is not calibrated", f"calibrated: {known}")
-    return Gains(**{key: artifact.scalar(f"laws/{law}/{key}") for key in ("c_n_s_m", "k_n_m", "alpha_n_m")})
+    return Gains(**artifact.json(f"laws/{law}/gains"))
 
 
-def read_reference(artifact: Artifact) -> Network:
-    """Return the network of law nnc."""
-    return read_network(artifact, "nnc/network")
+@dataclass(frozen=True)
+class Calibrated:
+    """What control.h5 holds for those who build controllers.
+
+    Attributes
+    ----------
+    position
+        Connectivity vector w of the damper, shape (n,).
+    omega_0
+        Free frequency of the target mode [rad/s].
+    friction_rounding_m_s
+        Speed over which friction changes its sign.
+    weights
+        Of laws that are designed by an optimum.
+    gains
+        Law -> its calibrated gains.
+    reference
+        Network of laws that need one; None where it was not trained.
+    path
+        Of the file, for messages.
+    """
+
+    position: FloatArray
+    omega_0: float
+    friction_rounding_m_s: float
+    weights: Weights
+    gains: Mapping[str, Gains]
+    reference: Network | None
+    path: str = "control.h5"
+
+    def gains_of(self, law: str) -> Gains:
+        """Return the gains of a law; none for a law that has nothing to calibrate.
+
+        Raises
+        ------
+        UserError
+            If the law needs a calibration and has none.
+        """
+        if law in self.gains:
+            return self.gains[law]
+        if law_named(law).calibrated:
+            known = ", ".join(self.gains) or "none"
+            raise UserError(self.path, f"laws/{law}", "this law is not calibrated", f"calibrated: {known}")
+        return Gains()
 
 
-def read_weights(artifact: Artifact) -> Weights:
-    """Return the weights of law lqg."""
-    return Weights(**artifact.json("lqg/weights"))
-
-
-def map_rows(axes: Mapping[str, FloatArray], values: FloatArray) -> list[dict[str, float | None]]:
-    """Return a map as rows for a table: each axis, then `damping_ratio`."""
-    names = list(axes)
-    grids = np.meshgrid(*axes.values(), indexing="ij")
-    return [
-        {**{name: float(grid[place]) for name, grid in zip(names, grids, strict=True)}, "damping_ratio": finite(value)}
-        for place, value in np.ndenumerate(values)
-    ]
+def read_calibrated(artifact: Artifact) -> Calibrated:
+    """Read what is needed to build controllers."""
+    trained = "nnc" in artifact.members()
+    return Calibrated(
+        position=artifact.array("position"),
+        omega_0=artifact.scalar("omega_0"),
+        friction_rounding_m_s=artifact.scalar("friction_rounding"),
+        weights=Weights(**artifact.json("lqg/weights")),
+        gains={law: read_gains(artifact, law) for law in artifact.members("laws")},
+        reference=read_network(artifact, "nnc/network") if trained else None,
+        path=str(artifact.path),
+    )

@@ -136,7 +136,7 @@ def run_loop(
             assembled.A, assembled.B, assembled.Ad, assembled.B0, assembled.B1, assembled.w, assembled.drift_rows,
             floors, ground, rig.step_s, rig.fine_steps, assembled.storey_codes, assembled.storey_values,
             True, damper.base, codes, values, every, delay,
-            controller.numbers, controller.layout, controller.new_state(), noise,
+            *controller.arguments, controller.new_state(), noise,
         )  # fmt: skip
     if not np.all(np.isfinite(displacement)) or float(np.abs(displacement).max()) > 10.0:
         raise DivergedError(f"the rig's motion grew without bound under law {controller.law}: check its gains")
@@ -154,9 +154,7 @@ def run_loop(
 
 def gains_of(controller: Controller) -> dict[str, float]:
     """Return the gains that campaign.yaml tells of a test; those that are nought are left out."""
-    gains = controller.gains
-    named = {"c_n_s_m": gains.c_n_s_m, "k_n_m": gains.k_n_m, "alpha_n_m": gains.alpha_n_m}
-    return {key: float(value) for key, value in named.items() if value != 0.0}
+    return {key: value for key, value in controller.gains.items() if value != 0.0}
 
 
 def record_closed_loop(

@@ -11,6 +11,7 @@ from scipy import signal
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.campaigns import TestFile
+from mrpipe.control.laws.passive_off import no_drive
 from mrpipe.errors import UserError
 from mrpipe.laboratory.damper import solve_strength
 from mrpipe.laboratory.effects import Planted
@@ -102,8 +103,8 @@ def shake(assembled: Assembled, ground: FloatArray, rig: FrameRig) -> tuple[Floa
     displacement, acceleration, _ = run_structure(
         assembled.A, assembled.B, assembled.Ad, assembled.B0, assembled.B1, assembled.w, assembled.drift_rows,
         assembled.floors, ground, rig.step_s, rig.fine_steps, assembled.storey_codes, assembled.storey_values,
-        False, np.zeros(11), np.zeros(0, dtype=np.int64), np.zeros((0, PARAMETERS)), 0, 0, nothing,
-        np.zeros(1, dtype=np.int64), nothing, np.zeros((0, 4)),
+        False, np.zeros(11), np.zeros(0, dtype=np.int64), np.zeros((0, PARAMETERS)), 0, 0,
+        no_drive, nothing, np.zeros(1, dtype=np.int64), nothing, np.zeros((0, 4)),
     )  # fmt: skip
     return displacement[:, : assembled.floors], acceleration
 

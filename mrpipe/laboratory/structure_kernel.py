@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import boolean, float64, int64, njit, types
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.kernel import (
     COMMAND_DRIVE,
     COMMAND_FORCE,
     COMMAND_SIZE,
+    LAW_FUNCTION,
     MEASURED_ACCELERATION,
     MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
+    MEASURED_FORCE,
     MEASURED_GROUND,
     MEASURED_VELOCITY,
     controller_step,
@@ -95,7 +98,18 @@ def _advance(
         out[i] = total
 
 
-@njit(cache=True)
+_ROWS = float64[:, ::1]
+_ROW = float64[::1]
+
+
+# the signature is written out, so that a law is passed as a pointer and not compiled into a version of its own
+@njit(
+    types.Tuple((_ROWS, _ROWS, _ROWS))(
+        _ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _ROW, _ROWS, int64, _ROW, float64, int64, int64[::1], _ROWS, boolean,
+        _ROW, int64[::1], _ROWS, int64, int64, LAW_FUNCTION, _ROW, int64[::1], _ROW, _ROWS,
+    ),
+    cache=True,
+)  # fmt: skip
 def run_structure(
     A: FloatArray,
     B: FloatArray,
@@ -116,6 +130,7 @@ def run_structure(
     values: FloatArray,
     control_every: int,
     delay_steps: int,
+    law: Any,
     numbers: FloatArray,
     layout: IntArray,
     memory_of_controller: FloatArray,
@@ -140,7 +155,7 @@ def run_structure(
         Whether there is a damper, and which (see :mod:`mrpipe.laboratory.kernel`).
     control_every, delay_steps
         Fine steps a controller sample (0: none, the drive is 0), and by how many its command is late.
-    numbers, layout, memory_of_controller
+    law, numbers, layout, memory_of_controller
         Of :class:`~mrpipe.control.controller.Controller`.
     sensor_noise
         What the controller's sensors add, shape (ticks, 4 + floors), in the order of its measurements.
@@ -165,7 +180,7 @@ def run_structure(
     sliding = np.zeros((max(storey_codes.shape[0], 1), floors))
     sliding_kept = sliding.copy()
     waiting = np.zeros(delay_steps + 1)
-    measured, command = np.zeros(_SENSED + floors), np.zeros(COMMAND_SIZE)
+    measured, command = np.zeros(MEASURED_FLOORS + floors), np.zeros(COMMAND_SIZE)
     drive, force, speed, rod_acceleration = 0.0, 0.0, 0.0, 0.0
     absolute = np.zeros(floors)
     for k in range(steps):
@@ -215,9 +230,10 @@ def run_structure(
             measured[MEASURED_DISPLACEMENT] = z[0] + sensor_noise[tick, 0]
             measured[MEASURED_ACCELERATION] = absolute[0] - u0[0] + sensor_noise[tick, 1]
             measured[MEASURED_GROUND] = u0[0] + sensor_noise[tick, 3]
+            measured[MEASURED_FORCE] = force
             for i in range(floors):
                 measured[MEASURED_FLOORS + i] = absolute[i] + sensor_noise[tick, _SENSED + i]
-            controller_step(numbers, layout, memory_of_controller, measured, command)
+            controller_step(law, numbers, layout, memory_of_controller, measured, command)
         waiting[k % (delay_steps + 1)] = command[COMMAND_DRIVE]
         drive = waiting[(k + 1) % (delay_steps + 1)]
         if k % every == 0:

@@ -1,7 +1,16 @@
-"""The closed loop: frame, damper, sensors and controller (thesis chapter 5)."""
+"""The closed loop: frame, damper, sensors and controller (thesis chapter 5).
 
-from mrpipe.simulation.excitation import Excitation, amplitude_for, at_rest, harmonic, recorded, sweep
-from mrpipe.simulation.loop import LoopOptions, Response, SensorNoise, simulate_law
+The names below are imported at first use, because the configuration needs the settings of this package without numba.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mrpipe.simulation.excitation import Excitation, amplitude_for, at_rest, harmonic, recorded, sweep
+    from mrpipe.simulation.loop import LoopOptions, Response, SensorNoise, simulate_law
 
 __all__ = [
     "Excitation",
@@ -15,3 +24,12 @@ __all__ = [
     "simulate_law",
     "sweep",
 ]
+
+_IN_LOOP = ("LoopOptions", "Response", "SensorNoise", "simulate_law")
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    home = "loop" if name in _IN_LOOP else "excitation"
+    return getattr(importlib.import_module(f"{__name__}.{home}"), name)

@@ -17,6 +17,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.kernel import (
     COMMAND_DRIVE,
     COMMAND_FORCE,
+    LAW_FUNCTION,
     MEASURED_ACCELERATION,
     MEASURED_FLOORS,
     controller_step,
@@ -103,7 +104,7 @@ def _damper_force(
         int64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1],
         float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1],
         CHAIN_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1],
-        float64[::1], int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1],
+        LAW_FUNCTION, float64[::1], int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1],
     ),
     cache=True,
 )  # fmt: skip
@@ -111,7 +112,7 @@ def run_loop(
     counts: IntArray, run: FloatArray, step_matrix: FloatArray, at_end: FloatArray, lower: FloatArray,
     gain: FloatArray, M: FloatArray, C: FloatArray, K: FloatArray, w: FloatArray, ground: FloatArray, z: FloatArray,
     functions: Any, parameters: FloatArray, parameter_offsets: IntArray, state_offsets: IntArray, damper: FloatArray,
-    numbers: FloatArray, layout: IntArray, memory: FloatArray, noise: FloatArray, commands: FloatArray,
+    law: Any, numbers: FloatArray, layout: IntArray, memory: FloatArray, noise: FloatArray, commands: FloatArray,
     record: FloatArray,
 ) -> None:  # fmt: skip
     """Run the loop.
@@ -136,10 +137,10 @@ def run_loop(
         Initial state, shape (2n,); holds the final one in the end.
     functions, parameters, parameter_offsets, state_offsets, damper
         Chain and its state.
-    numbers, layout, memory
+    law, numbers, layout, memory
         Controller and its state.
     noise
-        Sensor noise a controller sample, shape (samples, 4 + n).
+        Sensor noise of each controller sample, shape (samples, 5 + n).
     commands
         Filled, shape (samples, COMMAND_SIZE).
     record
@@ -188,7 +189,7 @@ def run_loop(
             sample += 1
             to_sample = per_sample
             sense(lower, gain, w, state, force, ground[step], noise[sample], measured)
-            controller_step(numbers, layout, memory, measured, commands[sample])
+            controller_step(law, numbers, layout, memory, measured, commands[sample])
         to_sample -= 1
         if step >= counts[I_DELAY]:
             if to_output == 0:

@@ -18,6 +18,7 @@ from mrpipe.control.kernel import (
     MEASURED_FLOORS,
     MEASURED_GROUND,
 )
+from mrpipe.control.laws import law_named
 from mrpipe.dampers.drive import command_place, lag_step, polynomial_step
 from mrpipe.dampers.hysteresis import hysteresis_step
 from mrpipe.dampers.plant import Chain, build_chain, new_state, sum_step
@@ -27,8 +28,6 @@ from mrpipe.simulation.excitation import Excitation
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
 Tracking = Literal["damper", "ideal", "continuous"]
-
-_WITHOUT_MEMORY = ("vd", "vdps", "vdns")
 
 
 @dataclass(frozen=True)
@@ -222,7 +221,7 @@ def simulate_law(
     began = time.perf_counter()
     kernel.run_loop(
         counts, run, *plant, *matrices, ground, z, *chain.arguments, new_state(chain),
-        controller.numbers, controller.layout, memory, noise, commands, record,
+        *controller.arguments, memory, noise, commands, record,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     if not np.all(np.isfinite(record)):
@@ -273,7 +272,7 @@ def _run_numbers(
     if options.tracking == "ideal":
         track = parts.TRACK_SAMPLED
     elif options.tracking == "continuous":
-        if controller.law not in _WITHOUT_MEMORY:
+        if not law_named(controller.law).linear:
             raise UserError(
                 "simulate", "tracking", f"law {controller.law} cannot run in continuous time", "give ideal or damper"
             )
@@ -291,13 +290,14 @@ def _run_numbers(
 
 
 def _noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generator | None) -> FloatArray:
-    """Return sensor noise, shape (samples, 4 + n); the damper's acceleration is a difference of two sensors."""
+    """Return sensor noise, shape (samples, 5 + n); the damper's acceleration is a difference of two sensors."""
     result = np.zeros((samples, MEASURED_FLOORS + floors))
     if noise.displacement_m > 0.0 or noise.acceleration_m_s2 > 0.0:
         if rng is None:
             raise ValueError("sensor noise needs a generator")
         result[:, MEASURED_DISPLACEMENT] = noise.displacement_m * rng.standard_normal(samples)
-        result[:, MEASURED_GROUND:] = noise.acceleration_m_s2 * rng.standard_normal((samples, 1 + floors))
+        accelerations = noise.acceleration_m_s2 * rng.standard_normal((samples, 1 + floors))
+        result[:, MEASURED_GROUND], result[:, MEASURED_FLOORS:] = accelerations[:, 0], accelerations[:, 1:]
         result[:, MEASURED_ACCELERATION] = noise.acceleration_m_s2 * rng.standard_normal(samples)
     result[:, MEASURED_ACCELERATION] += noise.acceleration_bias_m_s2
     return result

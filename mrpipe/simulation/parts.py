@@ -9,6 +9,7 @@ from mrpipe.control.kernel import (
     MEASURED_ACCELERATION,
     MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
+    MEASURED_FORCE,
     MEASURED_GROUND,
     MEASURED_VELOCITY,
 )
@@ -91,7 +92,7 @@ def sense(
     lower: FloatArray, gain: FloatArray, w: FloatArray, z: FloatArray, force: float, ground: float,
     noise: FloatArray, measured: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill what the sensors say; `lower` is the transposed lower half of A, `gain` what a newton accelerates."""
+    """Fill the readings of the sensors; `lower` is the transposed lower half of A, `gain` the accelerations of 1 N."""
     n = w.shape[0]
     floors = measured[MEASURED_FLOORS:]
     multiply(lower, z, floors)
@@ -106,6 +107,7 @@ def sense(
     measured[MEASURED_GROUND] = ground + noise[MEASURED_GROUND]
     measured[MEASURED_DISPLACEMENT] = x + noise[MEASURED_DISPLACEMENT]
     measured[MEASURED_VELOCITY] = v
+    measured[MEASURED_FORCE] = force + noise[MEASURED_FORCE]
     measured[MEASURED_ACCELERATION] = a + noise[MEASURED_ACCELERATION]
 
 

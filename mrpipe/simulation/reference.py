@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.control.controller import ControllerOptions, Gains
+from mrpipe.control.controller import ControllerOptions
+from mrpipe.control.gains import Gains
 from mrpipe.control.kalman import kalman_gains
 from mrpipe.dampers.model import DamperModel
 from mrpipe.networks.network import Network

@@ -6,7 +6,7 @@ found from what it noted at each of its samples, in the form in which its kernel
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from mrpipe.control.controller import Controller
 from mrpipe.control.kernel import COMMAND_DISPLACEMENT, COMMAND_FORCE, COMMAND_SWITCHED, COMMAND_VELOCITY
 from mrpipe.networks.network import Network
 from mrpipe.simulation.loop import Response
+from mrpipe.simulation.rig import Rig
 
 MARGIN = 0.02
 """How far beyond the range counts as within, as a share of the range: noise at the edge is no extrapolation."""
@@ -138,6 +139,30 @@ def requests(response: Response, acceleration: FloatArray) -> Requests:
             "force": commands[:, COMMAND_FORCE],
         }
     )
+
+
+def check_ranges(rig: Rig, controller: Controller, response: Response, tested: Mapping[str, float]) -> list[RangeCheck]:
+    """Compare the inputs of networks and damper model in a run with what training and bench tests covered.
+
+    Parameters
+    ----------
+    rig, controller, response
+        What ran.
+    tested
+        Largest |displacement| [m] and |velocity| [m/s] of the bench tests; empty where they are not known.
+    """
+    with_damper = rig.options.tracking == "damper"
+    relative = np.einsum("tf,f->t", response.acceleration, rig.position)
+    acceleration = np.interp(response.command_time_s, response.time_s, relative)
+    checks = check_networks(controller, response, acceleration, drive_counts=with_damper)
+    if with_damper and tested:
+        checks.append(check_damper(response, tested))
+    return checks
+
+
+def ranges_as_json(checks: Sequence[RangeCheck]) -> dict[str, Any]:
+    """Return the checks as plain values, by the network or model that they are of."""
+    return {check.what.replace(" ", "_"): check.as_json() for check in checks}
 
 
 def check_networks(

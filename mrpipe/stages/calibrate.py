@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.artifacts import FloatArray
     from mrpipe.control.calibration import Calibration, CalibrationOptions
     from mrpipe.control.lqg import Weights
     from mrpipe.control.neural import ReferenceNetwork
@@ -29,6 +28,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.calibration import calibrate, validity_warnings
     from mrpipe.control.storage import calibration_to_json, write_calibration
     from mrpipe.dampers.model import read_damper
+    from mrpipe.reporting import calibrate as report
     from mrpipe.structures import floor_position, read_frame, storey_position
 
     settings = context.settings.calibrate
@@ -54,7 +54,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     summary = calibration_to_json(calibration)
     summary["laws"]["nnc"] |= _neural_summary(calibration, reference, amplitude)
     summary |= {"residual_force_n": float(forces[0]), "largest_force_n": float(forces[1])}
-    _report(context, frame, position, calibration, summary)
+    report.describe(context.report, frame, calibration, summary, context.warnings, amplitude, settings.map_points)
     return summary
 
 
@@ -69,17 +69,16 @@ def _check_floor(floor: int, frame: Frame) -> None:
 
 def _options(settings: Any) -> CalibrationOptions:
     from mrpipe.control.calibration import THESIS_GAINS, CalibrationOptions
-    from mrpipe.control.controller import Gains
+    from mrpipe.control.gains import Gains
+    from mrpipe.control.laws import law_names
 
     overrides = {}
-    for law in ("vd", "vdps", "vdns", "fdns"):
-        given = {key: value for key, value in getattr(settings, law).model_dump().items() if value is not None}
+    for law in law_names():
+        given = settings.given(law)
         if given:
-            known = THESIS_GAINS[law]
-            base = {key: getattr(known, key) for key in ("c_n_s_m", "k_n_m", "alpha_n_m")}
-            overrides[law] = Gains(**{**base, **given})
+            overrides[law] = Gains(**{**THESIS_GAINS.get(law, {}), **given})
     if "fdns" in overrides:
-        overrides["nnc"] = overrides["fdns"]
+        overrides.setdefault("nnc", overrides["fdns"])
     return CalibrationOptions(
         mode=settings.target_mode,
         source=settings.gains,
@@ -148,90 +147,6 @@ def _neural_summary(calibration: Calibration, reference: ReferenceNetwork, ampli
         "equivalent_loss_n_m": H.imag,
         "equivalent_error": abs(H - wanted) / abs(wanted),
     }
-
-
-def _report(
-    context: StageContext, frame: Frame, position: FloatArray, calibration: Calibration, summary: Mapping[str, Any]
-) -> None:
-    import pandas as pd
-
-    modes = calibration.modes
-    context.report.text(
-        f"Mode {modes.mode}: {modes.omega_0:.3f} rad/s free, {modes.omega_inf:.3f} rad/s with the damper locked, modal "
-        f"flexibility {modes.nu:.4g} m/N, static stiffness at the damper {calibration.static_stiffness_n_m:.0f} N/m."
-    )
-    rows = [
-        {"law": law, **{key: value for key, value in entry.items() if isinstance(value, float | int)}}
-        for law, entry in summary["laws"].items()
-    ]
-    context.report.table("laws", pd.DataFrame(rows), "Gains and damping of every law; friction by its equivalent.")
-    sources = [
-        {"law": law, "source": source, **gains}
-        for law, entry in summary["laws"].items()
-        for source, gains in entry["candidates"].items()
-    ]
-    context.report.table(
-        "candidates",
-        pd.DataFrame(sources),
-        "Gains as the thesis ran them, by closed form, and of best exact damping.",
-    )
-    for warning in context.warnings:
-        context.report.text(f"Warning: {warning}.")
-    _maps(context, frame, position, calibration)
-
-
-def _maps(context: StageContext, frame: Frame, position: FloatArray, calibration: Calibration) -> None:
-    import numpy as np
-
-    from mrpipe.control import exact, limits
-    from mrpipe.control.linearisation import clipped_force, friction_stiffness
-    from mrpipe.reporting import control as figures
-
-    points = context.settings.calibrate.map_points
-    modes, bare = calibration.modes, exact.undamped(frame)
-    optimum = limits.optimal_viscosity(modes)
-    c = np.linspace(optimum / points, 2.0 * optimum, points)
-    k = np.linspace(-1.1 * calibration.static_stiffness_n_m, calibration.static_stiffness_n_m, points)
-    laws = calibration.laws
-    over_c = np.array([exact.exact_damping(bare, position, modes, float(value), 0.0).damping_ratio for value in c])
-    estimate = np.array([limits.damping_estimate(modes, 0.0, value * modes.omega_0) for value in c])
-    marks = {"vd as run": (laws["vd"].gains.c_n_s_m, laws["vd"].damping_ratio_exact)}
-    context.report.figure(
-        "viscosity", figures.damping_over_gain(c, over_c, estimate, marks, "c [N s/m]"), "Viscous damping."
-    )
-    alpha = np.linspace(1.5 / modes.nu / points, 1.5 / modes.nu, points)
-    H = [friction_stiffness(float(value)) for value in alpha]
-    context.report.figure(
-        "friction",
-        figures.damping_over_gain(
-            alpha,
-            exact.friction_map(bare, position, modes, alpha),
-            np.array([limits.damping_estimate(modes, item.real, item.imag) for item in H]),
-            {"fdns as run": (laws["fdns"].gains.alpha_n_m, laws["fdns"].damping_ratio_exact)},
-            "alpha [N/m]",
-        ),
-        "Friction with negative stiffness, by its equivalent.",
-    )
-    context.progress(0.95, "maps")
-    context.report.figure(
-        "map",
-        figures.damping_over_gains(
-            c,
-            k,
-            exact.damping_map(bare, position, modes, c, k),
-            {law: (laws[law].gains.c_n_s_m, laws[law].gains.k_n_m) for law in ("vd", "vdps", "vdns")},
-            calibration.static_stiffness_n_m,
-        ),
-        "Exact damping over viscosity and stiffness of an unclipped device; white: the structure folds.",
-    )
-    amplitude = context.settings.calibrate.expected_amplitude_m
-    phase = np.linspace(0.0, 2.0 * np.pi, 721)
-    x, v = amplitude * np.sin(phase), amplitude * modes.omega_0 * np.cos(phase)
-    loops = {
-        law: (x, clipped_force(laws[law].gains.c_n_s_m, laws[law].gains.k_n_m, x, v)) for law in ("vd", "vdps", "vdns")
-    }
-    loops["fdns"] = (x, laws["fdns"].gains.alpha_n_m * (np.sign(v) * amplitude - x))
-    context.report.figure("loops", figures.law_loops(loops), "Desired force (thesis Figure 5.5).")
 
 
 STAGE = Stage(

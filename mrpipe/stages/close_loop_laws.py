@@ -7,13 +7,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import StageContext
-from mrpipe.stages.simulate import LAWS, Rig, controller, excitation_of, loop_options
 
 if TYPE_CHECKING:
-    from mrpipe.control.controller import Controller, Gains
+    from mrpipe.control.controller import Controller
+    from mrpipe.control.gains import Gains
     from mrpipe.control.inverse import InverseTable
     from mrpipe.networks.network import Network
     from mrpipe.signals.prepared import PreparedTest
+    from mrpipe.simulation.rig import Rig
     from mrpipe.tracing.bench.summary import Tracing
     from mrpipe.tracing.loop.augmented import ForceInUse
     from mrpipe.tracing.loop.comparison import LoopRun
@@ -30,7 +31,10 @@ _LACKING = {
 
 def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
     """Return the part `closed_loop` of the JSON: each law measured, before, after and recalibrated."""
+    from mrpipe.control.assembly import ControllerFactory, inverse_network
+    from mrpipe.control.storage import read_calibrated
     from mrpipe.reporting.closed_loop_words import in_words
+    from mrpipe.simulation.rig import Rig, loop_options
     from mrpipe.structures import read_frame
     from mrpipe.tracing.loop.augmented import damper_of, plant_chain
     from mrpipe.tracing.loop.comparison import Arrangement, Bench, best_ways, compare_laws
@@ -43,23 +47,29 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
         return {"status": f"skipped: there is no {' and no '.join(lacking)}"}
     context.progress(0.92, "closed loop")
     frame = read_frame(context.artifact("identify-frame"))
-    position = context.artifact("calibrate").array("position")
     damper = damper_of(traced.selection.base, traced.drive_unit)
-    rig = Rig(frame, damper, position, replace(loop_options(context), tracking="damper"))
+    settings = context.settings.simulate
+    controllers = ControllerFactory(
+        frame,
+        damper,
+        read_calibrated(context.artifact("calibrate")),
+        settings.controller,
+        inverse_network(settings.controller, lambda: context.artifact("train-inverse")),
+    )
+    position = controllers.calibrated.position
+    rig = Rig(frame, damper, controllers, replace(loop_options(settings), tracking="damper"))
     bench = Bench(frame, position, rig.options, context.seed, traced.selection.base.problem.scales.stroke)
     runs, status = _runs(context, rig)
     base, chosen = plant_chain(traced.selection.base), plant_chain(traced.selection.chosen)
     ways = {
-        "before": Arrangement(base, lambda run: _as_it_ran(context, rig, run)),
-        "after": Arrangement(chosen, lambda run: _as_it_ran(context, rig, run)),
+        "before": Arrangement(base, lambda run: _as_it_ran(rig, run)),
+        "after": Arrangement(chosen, lambda run: _as_it_ran(rig, run)),
     }
     found: dict[str, Any] = {"status": status, "plant": _plant_words(traced)}
     if found["plant"]["effects"]:
         renewed = _renewed(context, traced, rig, tests)
         offered = {
-            ", ".join(parts) or "nothing": Arrangement(
-                chosen, partial(_renewed_controller, context, rig, renewed, parts)
-            )
+            ", ".join(parts) or "nothing": Arrangement(chosen, partial(_renewed_controller, rig, renewed, parts))
             for parts in ((), ("inverse",), ("inverse", "switch"), ("inverse", "switch", "gain"))
         }
         taken = best_ways(runs, offered, bench)
@@ -72,21 +82,23 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
 def _runs(context: StageContext, rig: Rig) -> tuple[list[LoopRun], str]:
     """Return the recordings and every other law under their motion; without recordings all laws as simulate has it."""
     from mrpipe.campaigns import load_campaign
+    from mrpipe.simulation.rig import excitation_of
     from mrpipe.tracing.loop.comparison import measured_runs, simulated_runs, with_unrecorded
 
+    laws = rig.controllers.available()
     recorded = []
     if "campaign:closed-loop" in context.inputs:
         recorded = measured_runs(load_campaign(context.inputs["campaign:closed-loop"]))
         if not recorded:
             context.warn("no closed-loop recording names its law and has ground motion and floor displacements")
     if recorded:
-        runs = with_unrecorded(recorded, LAWS)
-        others = [law for law in LAWS if law not in {run.law for run in recorded}]
+        runs = with_unrecorded(recorded, laws)
+        others = [law for law in laws if law not in {run.law for run in recorded}]
         more = f"; {', '.join(others)} predicted alone" if others else ""
         return runs, f"{len(recorded)} recordings replayed with their measured ground motion{more}"
-    excitation, _ = excitation_of(context, rig)
+    excitation, _ = excitation_of(rig, context.settings.simulate.excitation)
     kind = excitation.details.get("kind", "given")
-    return simulated_runs(excitation, LAWS), f"predicted alone under {kind} excitation: no closed-loop recordings"
+    return simulated_runs(excitation, laws), f"predicted alone under {kind} excitation: no closed-loop recordings"
 
 
 def _plant_words(traced: Tracing) -> dict[str, Any]:
@@ -104,13 +116,13 @@ def _plant_words(traced: Tracing) -> dict[str, Any]:
 
 
 def _given_gains(run: LoopRun) -> Gains | None:
-    from mrpipe.control.controller import Gains
+    from mrpipe.control.gains import Gains
 
     return Gains(**run.gains) if run.gains else None
 
 
-def _as_it_ran(context: StageContext, rig: Rig, run: LoopRun) -> Controller:
-    return controller(context, run.law, rig.frame, rig.damper, _given_gains(run))
+def _as_it_ran(rig: Rig, run: LoopRun) -> Controller:
+    return rig.controllers.build(run.law, _given_gains(run))
 
 
 @dataclass(frozen=True)
@@ -162,7 +174,7 @@ def _renewed(context: StageContext, traced: Tracing, rig: Rig, tests: list[Prepa
         summary["inverse"] = "rebuilt from the damper with its effects"
     else:
         inverse = _retrained(context, traced, tests, limit, summary)
-    factors = _factors(context, before, after, omega, amplitude)
+    factors = _factors(rig, before, after, omega, amplitude)
     summary["gain_factors"] = factors
     return Renewed(inverse, threshold, factors, summary)
 
@@ -197,40 +209,28 @@ def _retrained(
     return again.network
 
 
-def _factors(
-    context: StageContext, before: ForceInUse, after: ForceInUse, omega: float, amplitude: float
-) -> dict[str, float]:
+def _factors(rig: Rig, before: ForceInUse, after: ForceInUse, omega: float, amplitude: float) -> dict[str, float]:
     """Return by what the gain of each law moves, from the calibrated gains."""
-    from mrpipe.control.storage import read_gains
-    from mrpipe.tracing.loop.recalibration import LAWS_WITH_GAINS, gain_factor
+    from mrpipe.control.laws import law_named
+    from mrpipe.tracing.loop.recalibration import gain_factor
 
-    calibrated = context.artifact("calibrate")
-    return {
-        law: gain_factor(law, read_gains(calibrated, law), before, after, omega, amplitude)
-        for law in LAWS_WITH_GAINS
-        if law in calibrated.members("laws")
-    }
+    found = {}
+    for name, gains in rig.controllers.calibrated.gains.items():
+        law = law_named(name)
+        if law.tuned_gain and law.harmonic_force is not None:
+            found[name] = gain_factor(law, gains, before, after, omega, amplitude)
+    return found
 
 
-def _renewed_controller(
-    context: StageContext, rig: Rig, renewed: Renewed, parts: tuple[str, ...], run: LoopRun
-) -> Controller:
+def _renewed_controller(rig: Rig, renewed: Renewed, parts: tuple[str, ...], run: LoopRun) -> Controller:
     """Return the controller of a run with some of its parts (`inverse`, `switch`, `gain`) renewed."""
-    from mrpipe.control.controller import PASSIVE, Gains
-    from mrpipe.control.storage import read_gains
-    from mrpipe.tracing.loop.recalibration import scaled
+    from mrpipe.control.laws import law_named
 
     factor = renewed.factors.get(run.law, 1.0) if "gain" in parts else 1.0
-    gains = _given_gains(run)
-    if gains is None:
-        gains = Gains() if run.law in PASSIVE else read_gains(context.artifact("calibrate"), run.law)
-    return controller(
-        context,
+    gains = _given_gains(run) or rig.controllers.calibrated.gains_of(run.law)
+    return rig.controllers.build(
         run.law,
-        rig.frame,
-        rig.damper,
-        scaled(run.law, gains, factor),
+        law_named(run.law).scaled(gains, factor),
         inverse=renewed.inverse if "inverse" in parts else None,
         residual_force_n=renewed.threshold_n if "switch" in parts else None,
-        reference_factor=factor,
     )

@@ -12,15 +12,24 @@ FOLDER = "controller"
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.artifacts import atomic_write_text
+    from mrpipe.control.assembly import ControllerFactory, inverse_network
     from mrpipe.control.export import controller_files
+    from mrpipe.control.storage import read_calibrated
     from mrpipe.dampers.model import read_damper
-    from mrpipe.stages.simulate import controller
     from mrpipe.structures import read_frame
 
     settings = context.settings.export
     frame = read_frame(context.artifact("identify-frame"))
     damper = read_damper(context.artifact("identify-damper"))
-    built = controller(context, settings.law, frame, damper)
+    chosen = context.settings.simulate.controller
+    factory = ControllerFactory(
+        frame,
+        damper,
+        read_calibrated(context.artifact("calibrate")),
+        chosen,
+        inverse_network(chosen, lambda: context.artifact("train-inverse")),
+    )
+    built = factory.build(settings.law)
     details = {"drive_unit": damper.drive_unit, "inverse": context.settings.simulate.controller.inverse}
     folder = context.run_directory / FOLDER
     files = controller_files(built, settings.prefix, details)

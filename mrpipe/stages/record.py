@@ -122,17 +122,26 @@ def _record_frame(context: StageContext) -> Mapping[str, Any]:
 
 
 def _record_closed_loop(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.control.assembly import ControllerFactory, inverse_network
+    from mrpipe.control.storage import read_calibrated
     from mrpipe.dampers.model import read_damper
     from mrpipe.laboratory.bench import calibrated_on
     from mrpipe.laboratory.closed_loop import LoopRig, record_closed_loop
-    from mrpipe.stages.simulate import controller
     from mrpipe.structures import read_frame
 
     settings = context.settings.laboratory.closed_loop
     rig = LoopRig(**settings.model_dump(exclude={"laws"}))
     damper, structure = calibrated_on(_true_damper(context), *_bench_order(context)), _true_structure(context)
     frame, model = read_frame(context.artifact("identify-frame")), read_damper(context.artifact("identify-damper"))
-    controllers = {law: controller(context, law, frame, model) for law in settings.laws}
+    chosen = context.settings.simulate.controller
+    factory = ControllerFactory(
+        frame,
+        model,
+        read_calibrated(context.artifact("calibrate")),
+        chosen,
+        inverse_network(chosen, lambda: context.artifact("train-inverse")),
+    )
+    controllers = {law: factory.build(law) for law in settings.laws}
     record = record_closed_loop(damper, structure, controllers, rig, context.rng, context.progress)
     effects = (*damper.effects, *structure.effects)
     summary = _write_table(context, "closed-loop", record, structure, effects, rig.sampling_rate_hz)

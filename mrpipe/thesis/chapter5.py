@@ -9,7 +9,8 @@ import numpy as np
 
 from mrpipe.artifacts import Progress, load_parameter_set
 from mrpipe.control.calibration import THESIS_GAINS
-from mrpipe.control.controller import Controller, ControllerOptions, Gains, build_controller
+from mrpipe.control.controller import Controller, ControllerOptions, build_controller
+from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
 from mrpipe.dampers.model import DamperModel, damper_from_parameter_set
 from mrpipe.simulation import Excitation, LoopOptions, amplitude_for, harmonic, simulate_law

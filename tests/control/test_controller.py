@@ -38,7 +38,7 @@ def run(controller, displacement, acceleration, velocity=None):
     for index, command in enumerate(commands):
         measured[0], measured[1] = displacement[index], acceleration[index]
         measured[2] = 0.0 if velocity is None else velocity[index]
-        controller_step(controller.numbers, controller.layout, state, measured, command)
+        controller_step(*controller.arguments, state, measured, command)
     return commands
 
 

@@ -50,7 +50,7 @@ def in_python(controller: Controller, signal: np.ndarray) -> np.ndarray:
     state = controller.new_state()
     commands = np.zeros((len(signal), COMMAND_SIZE))
     for row, command in zip(signal, commands, strict=True):
-        controller_step(controller.numbers, controller.layout, state, np.ascontiguousarray(row), command)
+        controller_step(*controller.arguments, state, np.ascontiguousarray(row), command)
     return commands
 
 

@@ -8,12 +8,12 @@ import pytest
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration import (
     CalibrationOptions,
-    Gains,
     calibrate,
-    gains_to_json,
     needed_force,
     validity_warnings,
 )
+from mrpipe.control.gains import Gains
+from mrpipe.control.laws import law_named
 from mrpipe.control.linearisation import (
     clipped_force,
     clipped_linear_stiffness,
@@ -99,7 +99,7 @@ def test_negative_stiffness_beyond_the_static_limit_folds(bare, thesis_frame, fl
 @pytest.mark.literature
 def test_residual_force_is_the_limit_and_not_saturation(thesis_frame, floor_one):
     calibration = calibrate(thesis_frame, floor_one, CalibrationOptions())
-    assert needed_force(Gains(650.0), 0.0093, 8.0) == pytest.approx(48.0, abs=0.5)
+    assert needed_force(law_named("vd"), Gains(650.0), 0.0093, 8.0) == pytest.approx(48.0, abs=0.5)
     said = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0)
     assert any(line.startswith("vd: the residual force of 22 N") for line in said)
     weak = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=1.0, largest_force_n=40.0)
@@ -151,11 +151,11 @@ def test_bad_input_is_told_in_one_line(thesis_frame, floor_one):
         ),
         (
             lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vdns": Gains(250.0, 4000.0)})),
-            "negative stiffness is meant",
+            "law vdns needs a negative k_n_m",
         ),
         (
             lambda: calibrate(thesis_frame, floor_one, CalibrationOptions(overrides={"vd": Gains(-1.0)})),
-            "is negative",
+            "law vd needs a positive c_n_s_m",
         ),
     ]
     for call, words in cases:
@@ -169,4 +169,5 @@ def test_sources_of_gains(thesis_frame, floor_one):
     for source, c in (("thesis", 650.0), ("closed-form", 811.5), ("exact", 537.9)):
         calibration = calibrate(thesis_frame, floor_one, CalibrationOptions(source=source))
         assert calibration.laws["vd"].gains.c_n_s_m == pytest.approx(c, rel=1e-3)
-    assert gains_to_json("fdns", calibration.laws["fdns"].gains) == {"alpha_n_m": pytest.approx(3127.6, rel=1e-3)}
+    gains = calibration.laws["fdns"].gains
+    assert law_named("fdns").gains_as_json(gains) == {"alpha_n_m": pytest.approx(3127.6, rel=1e-3)}

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from mrpipe.artifacts import load_parameter_set
-from mrpipe.control.controller import Controller, ControllerOptions, Gains, build_controller
+from mrpipe.control.controller import Controller, ControllerOptions, build_controller
+from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError

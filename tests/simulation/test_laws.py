@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrpipe.control import LAWS
+from mrpipe.control.laws import law_names
 from mrpipe.networks import FeatureSpec, Network
 from mrpipe.networks.assembly import join
 from mrpipe.networks.options import TrainingOptions
@@ -21,7 +21,7 @@ SENSORS = SensorNoise(2e-5, 0.1)
 
 @pytest.fixture(scope="module")
 def with_damper(rig):
-    return {law: rig.run(law, WITH_DAMPER)[1] for law in LAWS}
+    return {law: rig.run(law, WITH_DAMPER)[1] for law in law_names()}
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def changes(first, second):
 
 
 @pytest.mark.property
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", law_names())
 @pytest.mark.parametrize("noise", [SensorNoise(), SENSORS], ids=["quiet", "noisy"])
 def test_halving_the_step_changes_no_index(rig, law, noise):
     """Noise is drawn for a controller sample, so that both runs see the same."""
@@ -153,7 +153,7 @@ def test_halving_the_step_changes_no_index_of_the_perfect_damper(rig, law):
 
 
 @pytest.mark.property
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", law_names())
 def test_energy_balance_closes(rig, law):
     response, values = rig.run(law, LoopOptions(noise=SENSORS))
     assert values["energy_balance_error"] < 5e-3

@@ -203,7 +203,7 @@ def test_bad_input_is_told_in_one_line(rig):
         (lambda: simulate_law(rig.frame, nothing(), viscous, rest, LoopOptions(delay_s=-1.0)), "is negative"),
         (lambda: simulate_law(rig.frame, None, rig.controller("fdns"), rest, LoopOptions(tracking="continuous")),
             "law fdns cannot run in continuous time"),
-        (lambda: build_controller("vdx", Gains(), ControllerOptions()), "is no control law"),
+        (lambda: build_controller("vdx", Gains(), ControllerOptions()), "is not a control law"),
         (lambda: build_controller("fdns", Gains(), ControllerOptions()), "fdns: has no gains; calibrate it first"),
         (lambda: build_controller("nnc", Gains(), ControllerOptions()), "nnc: has no trained network"),
         (lambda: build_controller("lqg", Gains(), ControllerOptions()), "lqg: has no observer"),

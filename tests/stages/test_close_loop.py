@@ -14,6 +14,7 @@ from mrpipe.artifacts import ArtifactWriter, Provenance
 from mrpipe.config.loader import load_config
 from mrpipe.config.model import config_model
 from mrpipe.control.calibration import CalibrationOptions, calibrate
+from mrpipe.control.laws import law_names
 from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceOptions, train_reference
 from mrpipe.control.storage import write_calibration
@@ -25,7 +26,6 @@ from mrpipe.reporting.headlines import in_brief
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.stages import close_loop
 from mrpipe.stages.close_loop_laws import closed_loop
-from mrpipe.stages.simulate import LAWS
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
 from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing, TracingOptions
@@ -103,7 +103,7 @@ def test_every_law_runs_before_after_and_recalibrated(
     own = context(tmp_path, inputs)
     found = closed_loop(own, traced, tests)
     assert found["status"] == "predicted alone under harmonic excitation: no closed-loop recordings"
-    assert [row["law"] for row in found["laws"]] == list(LAWS)
+    assert [row["law"] for row in found["laws"]] == list(law_names())
     assert found["plant"] == {"effects": ["accumulator"], "left_out": {}}
     assert found["controller"]["inverse"] == "rebuilt from the damper with its effects"
     assert set(found["ranking"]) == {"before", "after", "recalibrated"}
@@ -111,7 +111,7 @@ def test_every_law_runs_before_after_and_recalibrated(
         assert 0.001 < row["after"]["rms_x_top_m"] < 0.5
         # what is renewed is taken where it helps
         assert row["recalibrated"]["rms_x_top_m"] < 1.001 * row["after"]["rms_x_top_m"]
-    assert set(found["controller"]["renewed"]) == set(LAWS)
+    assert set(found["controller"]["renewed"]) == set(law_names())
     summary = {"campaign": "c", **traced.summary, "closed_loop": found}
     summary["corrections"] = close_loop._corrections(own, traced, tests)
     summary["next_tests"] = close_loop._next_tests(own, traced, {})

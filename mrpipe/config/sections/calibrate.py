@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from mrpipe.config.section import Section
-
-
-class GivenGains(Section):
-    """Gains of the user's own for one law: f = c v + k x, or f = sign(v) alpha X - alpha x."""
-
-    c_n_s_m: float | None = Field(None, description="Viscous gain c; not given: calibrated.")
-    k_n_m: float | None = Field(None, description="Stiffness gain k; not given: calibrated.")
-    alpha_n_m: float | None = Field(None, description="Friction gain alpha of fdns and nnc; not given: calibrated.")
+from mrpipe.control.laws import law_names
 
 
 class NeuralReferenceSettings(Section):
@@ -46,8 +39,8 @@ class RegulatorSettings(Section):
     )
 
 
-class CalibrateSettings(Section):
-    """For which mode and damper the laws are calibrated, and whose gains they run with."""
+class _Fixed(Section):
+    """For which mode and damper the laws are calibrated, and the gains they run with."""
 
     target_mode: int = Field(1, ge=1, description="Mode to be damped.")
     damper_floor: int = Field(1, ge=1, description="Floor that the damper acts on.")
@@ -59,10 +52,6 @@ class CalibrateSettings(Section):
     )
     positive_stiffness_n_m: float = Field(2500.0, gt=0.0, description="k for which vdps is calibrated.")
     negative_stiffness_n_m: float = Field(-4500.0, lt=0.0, description="k for which vdns is calibrated.")
-    vd: GivenGains = Field(GivenGains(), description="Gains of your own for vd.")
-    vdps: GivenGains = Field(GivenGains(), description="Gains of your own for vdps.")
-    vdns: GivenGains = Field(GivenGains(), description="Gains of your own for vdns.")
-    fdns: GivenGains = Field(GivenGains(), description="Gains of your own for fdns, and for nnc which imitates it.")
     expected_amplitude_m: float = Field(
         0.0093, gt=0.0, description="Damper amplitude at which forces are judged and around which nnc learns."
     )
@@ -75,3 +64,28 @@ class CalibrateSettings(Section):
     map_points: int = Field(25, ge=5, le=200, description="Points along each axis of the damping maps.")
     neural: NeuralReferenceSettings = Field(NeuralReferenceSettings(), description="The neural reference controller.")
     regulator: RegulatorSettings = Field(RegulatorSettings(), description="Clipped LQG.")
+
+    def given(self, law: str) -> dict[str, float]:
+        """Return the gains that the user gives for a law, by name."""
+        return dict(getattr(self, law.replace("-", "_"), {}))
+
+
+if TYPE_CHECKING:
+
+    class CalibrateSettings(_Fixed):
+        """For which mode and damper the laws are calibrated, and the gains they run with."""
+
+else:
+    CalibrateSettings = create_model(
+        "CalibrateSettings",
+        __base__=_Fixed,
+        __doc__=_Fixed.__doc__,
+        **{
+            name.replace("-", "_"): (
+                dict[str, float],
+                Field({}, description=f"Your own gains for {name}, by name; gains that are left out are calibrated."),
+            )
+            for name in law_names()
+            if not name.startswith("passive-")
+        },
+    )

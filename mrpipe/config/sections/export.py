@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from mrpipe.config.section import Section
+from mrpipe.control.laws import known_law, law_names
 
 
 class ExportSettings(Section):
     """The controller as C; how it runs is what simulate.controller says."""
 
-    law: Literal["vd", "vdps", "vdns", "fdns", "nnc", "lqg", "passive-off", "passive-on"] = Field(
-        "fdns", description="Control law to be exported."
-    )
+    law: str = Field("fdns", description=f"Control law to be exported: {', '.join(law_names())}.")
     prefix: str = Field("mrpipe", pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", description="Prefix of the C function names.")
+
+    @field_validator("law")
+    @classmethod
+    def _known(cls, law: str) -> str:
+        return known_law(law)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from mrpipe.config.section import Section
+from mrpipe.control.laws import known_law
 
 
 class PlantedEffect(Section):
@@ -134,6 +135,12 @@ class ClosedLoopSettings(Section):
     laws: tuple[str, ...] = Field(
         ("vd", "vdps", "vdns", "fdns", "passive-off", "passive-on"), min_length=1, description="Control laws recorded."
     )
+
+    @field_validator("laws")
+    @classmethod
+    def _known(cls, laws: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(known_law(law) for law in laws)
+
     frequency_rad_s: float = Field(8.0, gt=0.0, description="Frequency of the base [rad/s].")
     base_amplitude_m_s2: float = Field(
         0.788, gt=0.0, description="Amplitude of the base's acceleration [m/s2]; 0.788 gives vd about 24 mm on top."

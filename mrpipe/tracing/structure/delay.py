@@ -14,6 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.control.laws import is_linear
 
 FILTER_S = 0.004
 """Lag that a low-pass on the command is granted: a second-order one at 60 Hz (thesis section 5.2)."""
@@ -137,7 +138,7 @@ def law_lag(tests: Sequence[LoopSignals], laws: Mapping[str, str], *, longest_s:
     laws
         Test -> law; those of vd, vdps and vdns are linear in velocity and displacement where they are not clipped.
     """
-    linear = [item for item in tests if laws.get(item.name) in ("vd", "vdps", "vdns") and np.std(item.desired) > 0.0]
+    linear = [item for item in tests if is_linear(laws.get(item.name, "")) and np.std(item.desired) > 0.0]
     validation = [item for item in linear if item.role == "validation"] or linear
     if not linear:
         return None

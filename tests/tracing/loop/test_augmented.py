@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from mrpipe.artifacts import load_parameter_set
-from mrpipe.control.controller import Gains
+from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
+from mrpipe.control.laws import law_named
 from mrpipe.dampers.model import DamperModel, damper_from_parameter_set
 from mrpipe.dampers.plant import Chain, build_chain
 from mrpipe.effects.library import damper_effects
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.loop import augmented
 from mrpipe.tracing.loop.augmented import ForceInUse, changed_share, force_in_use
-from mrpipe.tracing.loop.recalibration import equivalent_loss, gain_factor, scaled, switch_threshold
+from mrpipe.tracing.loop.recalibration import equivalent_loss, gain_factor, switch_threshold
 
 OMEGA, STROKE, LIMIT = 8.0, 0.010, 4.0
 MEMORY = {"gain": 0.5, "slip_length": 0.05, "relaxation_time": 1.0}
@@ -99,15 +100,16 @@ def test_how_much_an_effect_changes(damper: DamperModel) -> None:
 def test_gains_make_up_for_what_the_damper_gives_beside(damper: DamperModel) -> None:
     before = in_use(damper.chain())
     after = replace(before, force_n=before.force_n + 5.0, from_above_n=before.from_above_n + 5.0)
-    for law, gains in (("vd", Gains(650.0)), ("fdns", Gains(alpha_n_m=3000.0))):
+    for name, gains in (("vd", Gains(650.0)), ("fdns", Gains(alpha_n_m=3000.0))):
+        law = law_named(name)
         assert gain_factor(law, gains, before, before, OMEGA, 0.0093) == pytest.approx(1.0, abs=1e-3)
         factor = gain_factor(law, gains, before, after, OMEGA, 0.0093)
         assert 0.5 < factor < 0.99
         wanted = equivalent_loss(law, gains, before, OMEGA, 0.0093)
-        assert equivalent_loss(law, scaled(law, gains, factor), after, OMEGA, 0.0093) == pytest.approx(wanted, rel=1e-3)
+        assert equivalent_loss(law, law.scaled(gains, factor), after, OMEGA, 0.0093) == pytest.approx(wanted, rel=1e-3)
     # 20 N of viscous force are less than the residual force: no gain makes up for that
-    assert gain_factor("vdns", Gains(250.0, -4500.0), before, after, OMEGA, 0.0093) == 1.0
-    assert scaled("vdns", Gains(250.0, -4500.0), 2.0) == Gains(500.0, -4500.0)
+    assert gain_factor(law_named("vdns"), Gains(250.0, -4500.0), before, after, OMEGA, 0.0093) == 1.0
+    assert law_named("vdns").scaled(Gains(250.0, -4500.0), 2.0) == Gains(500.0, -4500.0)
 
 
 @pytest.mark.planted

@@ -1,0 +1,195 @@
+"""Controllers from settings, structure, damper and calibration: the one place where they are put together.
+
+Simulation, export, the virtual laboratory, the tracing and the design of laws use it::
+
+    factory = ControllerFactory(frame, damper, calibrated, ControllerSettings(inverse="model"))
+    controller = factory.build("vdns", Gains(c_n_s_m=250.0, k_n_m=-4500.0))
+    response = simulate_law(frame, damper.chain(), controller, excitation, LoopOptions(), position=calibrated.position)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from mrpipe.artifacts import Artifact
+from mrpipe.control.calibration import Calibration
+from mrpipe.control.controller import Controller, ControllerOptions, build_controller
+from mrpipe.control.gains import Gains
+from mrpipe.control.inverse import InverseTable, inverse_table
+from mrpipe.control.law import Law
+from mrpipe.control.laws import all_laws, law_named
+from mrpipe.control.lqg import Weights
+from mrpipe.control.settings import ControllerSettings
+from mrpipe.control.storage import Calibrated
+from mrpipe.dampers.model import DamperModel
+from mrpipe.errors import UserError
+from mrpipe.networks.network import Network, read_network
+from mrpipe.structures import Frame
+
+RATES_HZ = (200.0, 500.0)
+"""The two sampling rates that the thesis prints: with the damper, and for a perfect one."""
+
+PERFECT_ROUNDING = 1.5
+"""Rounding of friction for a perfect damper over that with a damper, because no yielding rounds its force."""
+
+
+@dataclass(frozen=True)
+class ControllerFactory:
+    """Builds the controller of any law for one structure and one damper.
+
+    Attributes
+    ----------
+    frame, damper
+        What is controlled; the damper is the model that the controller knows.
+    calibrated
+        Position of the damper, gains and weights.
+    settings
+        How the controllers run.
+    inverse
+        Inverse network of the damper; None: a table of the model's post-yield force.
+    ideal_rounding_m_s
+        Speed over which friction changes its sign with a perfect damper; None: from the calibrated one.
+
+    Raises
+    ------
+    UserError
+        If the calibration is for another number of floors.
+    """
+
+    frame: Frame
+    damper: DamperModel
+    calibrated: Calibrated
+    settings: ControllerSettings
+    inverse: Network | None = None
+    ideal_rounding_m_s: float | None = None
+
+    def __post_init__(self) -> None:
+        floors = len(self.calibrated.position)
+        if floors != self.frame.floors:
+            raise UserError(
+                "simulate.frame", self.frame.name, f"has {self.frame.floors} floors", f"calibrated for {floors}"
+            )
+
+    def build(
+        self,
+        law: str | Law,
+        gains: Gains | None = None,
+        *,
+        perfect: bool = False,
+        inverse: Network | InverseTable | None = None,
+        residual_force_n: float | None = None,
+    ) -> Controller:
+        """Return the controller of a law.
+
+        Parameters
+        ----------
+        law
+            A law or its name.
+        gains
+            In place of the calibrated gains.
+        perfect
+            For a perfect damper and perfect sensors: the controller reads the velocity, and runs at 500 Hz where the
+            rate is not given.
+        inverse, residual_force_n
+            In place of the inverse, and of the force below which the drive is 0 [N].
+
+        Raises
+        ------
+        UserError
+            If the law is unknown or lacks what it needs.
+        """
+        entry = law_named(law) if isinstance(law, str) else law
+        known = self.calibrated
+        options = self.options(perfect=perfect, residual_force_n=residual_force_n)
+        if inverse is None:
+            inverse = self.inverse or inverse_table(self.damper, drive_limit=self.settings.drive_limit)
+        chosen = known.gains_of(entry.name) if gains is None else gains
+        observer = None
+        if entry.observer is not None:
+            observer = entry.observer(self.frame, known.position, known.weights, 1.0 / options.rate_hz)
+        return build_controller(
+            entry,
+            chosen,
+            options,
+            inverse=inverse,
+            reference=self._reference(entry, chosen),
+            observer=observer,
+            position=known.position,
+        )
+
+    def available(self) -> list[str]:
+        """Return the laws for which everything is there that they need."""
+        known = self.calibrated
+        return [
+            name
+            for name, law in all_laws().items()
+            if (name in known.gains or not law.calibrated)
+            and ("network" not in law.needs or known.reference is not None)
+        ]
+
+    def options(self, *, perfect: bool = False, residual_force_n: float | None = None) -> ControllerOptions:
+        """Return the options of the controllers; arguments as in :meth:`build`."""
+        settings = self.settings
+        rounding = settings.friction_rounding_m_s
+        if rounding is None:
+            rounding = self.calibrated.friction_rounding_m_s
+        if perfect:
+            given = self.ideal_rounding_m_s
+            rounding = PERFECT_ROUNDING * rounding if given is None else given
+        return ControllerOptions(
+            rate_hz=settings.rate_hz or RATES_HZ[perfect],
+            velocity="measured" if perfect else settings.velocity,
+            displacement_noise_m=settings.kalman_displacement_noise_m,
+            acceleration_noise_m_s2=settings.kalman_acceleration_noise_m_s2,
+            bias_drift_m_s2=settings.kalman_bias_drift_m_s2,
+            inverse_request=settings.inverse_request,
+            residual_force_n=settings.residual_force_n if residual_force_n is None else residual_force_n,
+            low_pass_hz=settings.low_pass_hz,
+            drive_limit=settings.drive_limit or self.damper.drive_limit,
+            dead_band_m_s=settings.dead_band_m_s,
+            extremum_step_m=settings.extremum_step_m,
+            friction_rounding_m_s=rounding,
+            extremum_share=settings.extremum_share,
+            extremum_memory_s=settings.extremum_memory_periods * 2.0 * math.pi / self.calibrated.omega_0,
+        )
+
+    def _reference(self, law: Law, gains: Gains) -> Network | None:
+        """Return the reference network for these gains: its force is proportional to the tuned gain of the law."""
+        known = self.calibrated
+        if "network" not in law.needs or known.reference is None:
+            return None
+        trained = known.gains.get(law.name, gains).get(law.tuned_gain, 0.0)
+        factor = gains.get(law.tuned_gain, 0.0) / trained if trained else 1.0
+        if factor == 1.0:
+            return known.reference
+        network = known.reference
+        return replace(network, output_scale=factor * network.output_scale, output_shift=factor * network.output_shift)
+
+
+def inverse_network(settings: ControllerSettings, trained: Callable[[], Artifact]) -> Network | None:
+    """Return the trained inverse network where the settings ask for it, else None.
+
+    Parameters
+    ----------
+    settings
+        Of the controller.
+    trained
+        Opens the artifact of `train-inverse`; not called where no network is needed.
+    """
+    return read_network(trained(), "network") if settings.inverse == "network" else None
+
+
+def calibrated_from(
+    calibration: Calibration, weights: Weights, friction_rounding_m_s: float, reference: Network | None = None
+) -> Calibrated:
+    """Return a calibration in the form that the factory takes, without a file."""
+    return Calibrated(
+        position=calibration.position,
+        omega_0=calibration.modes.omega_0,
+        friction_rounding_m_s=friction_rounding_m_s,
+        weights=weights,
+        gains={law: item.gains for law, item in calibration.laws.items()},
+        reference=reference,
+    )

@@ -1,0 +1,54 @@
+"""Settings of the controller: a section of the configuration, and the options of :mod:`mrpipe.control.assembly`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from mrpipe.options import Section
+
+
+class ControllerSettings(Section):
+    """The real-time controller of Figure 5.3."""
+
+    rate_hz: float | None = Field(
+        None,
+        gt=0.0,
+        description="Sampling rate; null: as printed, 200 Hz, and 500 Hz for a perfect damper.",
+    )
+    delay_s: float = Field(0.0, ge=0.0, description="From sampling to output.")
+    velocity: Literal["kalman", "difference", "measured"] = Field(
+        "kalman", description="Kinematic Kalman filter, backward difference, or a perfect velocity sensor."
+    )
+    kalman_displacement_noise_m: float = Field(20e-6, gt=0.0, description="Displacement noise the filter reckons with.")
+    kalman_acceleration_noise_m_s2: float = Field(0.1, gt=0.0, description="Acceleration noise it reckons with.")
+    kalman_bias_drift_m_s2: float = Field(
+        0.0,
+        ge=0.0,
+        description="Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.",
+    )
+    inverse: Literal["network", "model"] = Field(
+        "network", description="Inverse of the damper: the trained network, or the identified model's post-yield force."
+    )
+    inverse_request: Literal["steady", "history"] = Field(
+        "steady",
+        description="Past values for an inverse network: `steady`, the present ones; `history`, as (2.9) has it, what "
+        "was desired before: at a reversal a history that no measured force has, and the network answers with spikes.",
+    )
+    residual_force_n: float = Field(
+        18.0, ge=0.0, description="Switch: below this desired force the drive is 0 (P2 24)."
+    )
+    low_pass_hz: float | None = Field(60.0, gt=0.0, description="Butterworth low-pass on the drive; null: none.")
+    drive_limit: float | None = Field(None, gt=0.0, description="Largest drive; null: that of the damper.")
+    dead_band_m_s: float = Field(0.0, ge=0.0, description="Speed below which the direction of motion is kept.")
+    friction_rounding_m_s: float | None = Field(
+        None,
+        ge=0.0,
+        description="Speed over which friction of fdns changes its sign; 0: the jump of (4.18); null: as calibrated.",
+    )
+    extremum_memory_periods: float = Field(
+        0.75, gt=0.0, description="Free periods after which a pending extremum counts though nothing came back from it."
+    )
+    extremum_step_m: float = Field(1e-4, gt=0.0, description="Way back that makes an extremum count (X of fdns).")
+    extremum_share: float = Field(0.1, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")

@@ -1,0 +1,167 @@
+"""The loop as the settings describe it: structure, damper, options of the run, and what shakes the base."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control.assembly import ControllerFactory
+from mrpipe.control.controller import Controller
+from mrpipe.control.gains import Gains
+from mrpipe.control.law import Law
+from mrpipe.dampers.model import DamperModel
+from mrpipe.dampers.plant import Chain
+from mrpipe.simulation import excitation as kinds
+from mrpipe.simulation.adjustment import adjusted_amplitude
+from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.ground_record import read_ground_record
+from mrpipe.simulation.loop import LoopOptions, Response, SensorNoise, simulate_law
+from mrpipe.simulation.settings import ExcitationSettings, SimulateSettings
+from mrpipe.structures import Frame, natural_modes
+
+RECORD_RATE_HZ = 1000.0
+"""Rate of the histories where the settings give none; with a perfect damper, whose force jumps, every plant step."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Structure, damper and controllers of one loop.
+
+    Attributes
+    ----------
+    frame, damper
+        What is simulated.
+    controllers
+        Builds the controller of any law for it.
+    options
+        How the loop is run.
+    """
+
+    frame: Frame
+    damper: DamperModel
+    controllers: ControllerFactory
+    options: LoopOptions
+
+    @property
+    def position(self) -> FloatArray:
+        """Connectivity vector w of the damper, shape (n,)."""
+        return self.controllers.calibrated.position
+
+    @property
+    def perfect(self) -> bool:
+        """Whether the damper gives any force that is desired, and the sensors are perfect."""
+        return self.options.tracking == "ideal"
+
+    def controller(self, law: str | Law, gains: Gains | None = None) -> Controller:
+        """Return the controller of a law, with its calibrated gains or others."""
+        return self.controllers.build(law, gains, perfect=self.perfect)
+
+    def run(
+        self,
+        controller: Controller,
+        excitation: Excitation,
+        *,
+        chain: Chain | None = None,
+        rng: np.random.Generator | None = None,
+        initial_state: FloatArray | None = None,
+    ) -> Response:
+        """Run the loop under a controller; `chain` in place of the damper's own.
+
+        Raises
+        ------
+        DivergedError
+            If the response grows without bound.
+        """
+        return simulate_law(
+            self.frame,
+            self.damper.chain() if chain is None else chain,
+            controller,
+            excitation,
+            self.options,
+            position=self.position,
+            rng=rng,
+            initial_state=initial_state,
+        )
+
+
+def loop_options(settings: SimulateSettings) -> LoopOptions:
+    """Return how the loop is run."""
+    sensors = settings.sensors
+    perfect = settings.tracking != "damper"
+    noise = SensorNoise(sensors.displacement_noise_m, sensors.acceleration_noise_m_s2, sensors.acceleration_bias_m_s2)
+    return LoopOptions(
+        plant_rate_hz=settings.plant_rate_hz,
+        tracking=settings.tracking,
+        delay_s=settings.controller.delay_s,
+        driver_time_constant_s=settings.driver_time_constant_s,
+        noise=SensorNoise() if perfect else noise,
+        record_rate_hz=settings.record_rate_hz or (settings.plant_rate_hz if perfect else RECORD_RATE_HZ),
+    )
+
+
+def excitation_of(rig: Rig, settings: ExcitationSettings) -> tuple[Excitation, Response | None]:
+    """Return the excitation and, where its amplitude was adjusted, the response of vd to it.
+
+    Raises
+    ------
+    UserError
+        If a recorded motion cannot be read, or no amplitude gives the wanted response.
+    """
+    factor = settings.factor
+    if settings.kind == "recorded":
+        time_s, acceleration = read_ground_record(Path(settings.file), settings.file_unit)
+        return kinds.recorded(time_s, acceleration, scale=factor), None
+    if settings.kind == "free-decay":
+        return kinds.at_rest(settings.decay_s), None
+    omega = settings.frequency_rad_s or rig.controllers.calibrated.omega_0
+
+    def harmonic(amplitude: float) -> Excitation:
+        return kinds.harmonic(
+            amplitude,
+            omega,
+            cycles=settings.cycles,
+            settling_cycles=min(settings.settling_cycles, settings.cycles - 1),
+            ramp_cycles=settings.ramp_cycles,
+            decay_s=settings.decay_s,
+        )
+
+    amplitude, viscous = settings.base_amplitude_m_s2, None
+    if amplitude is None:
+        amplitude, viscous = _adjusted(rig, settings, harmonic)
+        viscous = viscous if factor == 1.0 and settings.kind == "harmonic" else None
+    if settings.kind == "sweep":
+        return kinds.sweep(factor * amplitude, settings.sweep_first_hz, settings.sweep_last_hz, settings.sweep_s), None
+    return harmonic(factor * amplitude), viscous
+
+
+def _adjusted(
+    rig: Rig, settings: ExcitationSettings, harmonic: Callable[[float], Excitation]
+) -> tuple[float, Response | None]:
+    tracking = rig.options.tracking
+    if settings.adjust_with == "ideal" and tracking == "damper":
+        tracking = "ideal"
+    options = replace(rig.options, noise=SensorNoise(), tracking=tracking)
+    gains = Gains(c_n_s_m=settings.reference_c_n_s_m)
+    viscous = rig.controllers.build("vd", gains, perfect=tracking == "ideal")
+    amplitude, response = adjusted_amplitude(
+        rig.frame,
+        rig.damper.chain(),
+        viscous,
+        harmonic,
+        options,
+        position=rig.position,
+        rms_top_m=settings.reference_rms_top_m,
+    )
+    return amplitude, response if options.tracking == rig.options.tracking else None
+
+
+def release_state(rig: Rig, settings: ExcitationSettings) -> FloatArray | None:
+    """Return the initial state of a free decay: the first mode with the given top displacement, at rest."""
+    if settings.kind != "free-decay":
+        return None
+    shape = natural_modes(rig.frame).mode_shapes[:, 0]
+    return np.concatenate([settings.release_top_m * shape / shape[-1], np.zeros(rig.frame.floors)])

@@ -1,0 +1,81 @@
+"""Settings of the closed loop: a section of the configuration, and the options of :mod:`mrpipe.simulation.rig`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from mrpipe.control.settings import ControllerSettings
+from mrpipe.options import Section
+
+
+class ExcitationSettings(Section):
+    """What shakes the base."""
+
+    kind: Literal["harmonic", "sweep", "recorded", "free-decay"] = Field(
+        "harmonic", description="Harmonic with a free decay after its stop, sweep, recorded, or release from a shape."
+    )
+    frequency_rad_s: float | None = Field(
+        8.0, gt=0.0, description="Of the harmonic; null: the free frequency of the calibrated mode."
+    )
+    base_amplitude_m_s2: float | None = Field(
+        None, gt=0.0, description="Of harmonic or sweep; null: adjusted so that vd gives `reference_rms_top_m`."
+    )
+    adjust_with: Literal["damper", "ideal"] = Field(
+        "damper", description="Whether the amplitude is adjusted with the damper in the loop or with perfect tracking."
+    )
+    reference_rms_top_m: float = Field(0.0243, gt=0.0, description="RMS top displacement of vd (thesis Table 5.1).")
+    reference_c_n_s_m: float = Field(650.0, gt=0.0, description="Viscous gain of vd in the adjustment.")
+    factor: float = Field(1.0, gt=0.0, description="Factor on the base acceleration, whatever its kind.")
+    cycles: int = Field(40, ge=2, description="Cycles of the harmonic.")
+    settling_cycles: int = Field(20, ge=1, description="Cycles left out of the indices.")
+    ramp_cycles: float = Field(2.0, ge=0.0, description="Cycles over which the harmonic is eased in.")
+    decay_s: float = Field(8.0, ge=0.0, description="Free decay after the harmonic stops.")
+    release_top_m: float = Field(0.035, gt=0.0, description="Top displacement from which kind free-decay is released.")
+    sweep_first_hz: float = Field(0.5, gt=0.0, description="First frequency of the sweep.")
+    sweep_last_hz: float = Field(3.0, gt=0.0, description="Last frequency of the sweep.")
+    sweep_s: float = Field(60.0, gt=0.0, description="Length of the sweep.")
+    file: str = Field(
+        "", description="Recorded base acceleration: text or CSV of two columns, time [s] and acceleration."
+    )
+    file_unit: str = Field("m/s^2", description="Unit of the recorded acceleration, such as g or cm/s^2.")
+
+
+class SensorSettings(Section):
+    """Noise of the sensors in the loop."""
+
+    displacement_noise_m: float = Field(20e-6, ge=0.0, description="RMS noise of the damper displacement.")
+    acceleration_noise_m_s2: float = Field(0.1, ge=0.0, description="RMS noise of each acceleration.")
+    acceleration_bias_m_s2: float = Field(0.0, description="Constant bias of the damper's acceleration.")
+
+
+class SimulateSettings(Section):
+    """The closed loop."""
+
+    frame: str = Field("identified", description="Frame: `identified`, or a set of configs/frames or its YAML file.")
+    damper: str = Field("identified", description="Damper: `identified`, or a set of configs/dampers or its YAML file.")
+    tracking: Literal["damper", "ideal", "continuous"] = Field(
+        "damper",
+        description="The damper gives the force; `ideal`: the controller has perfect sensors and its clipped force is "
+        "held from sample to sample (errata section B); `continuous`: vd, vdps, vdns at every instant, never active.",
+    )
+    plant_rate_hz: float = Field(2000.0, ge=100.0, description="Steps of the plant a second.")
+    record_rate_hz: float | None = Field(
+        None, gt=0.0, description="Rate of the histories; null: 1000 Hz, and every plant step with a perfect damper."
+    )
+    ideal_rounding_m_s: float | None = Field(
+        None,
+        ge=0.0,
+        description="Speed over which the friction of a perfect damper changes its sign; 0: a jump; null: half as much "
+        "again as calibrated, since no yielding rounds it besides.",
+    )
+    driver_time_constant_s: float = Field(
+        0.0, ge=0.0, description="Lag of the current driver besides the damper's own."
+    )
+    accelerations: Literal["relative", "absolute"] = Field(
+        "relative", description="Which accelerations rms_a1 and the like are of; errata section B gives relative ones."
+    )
+    excitation: ExcitationSettings = Field(ExcitationSettings(), description="What shakes the base.")
+    controller: ControllerSettings = Field(ControllerSettings(), description="The real-time controller.")
+    sensors: SensorSettings = Field(SensorSettings(), description="Noise of the sensors.")
