@@ -93,3 +93,8 @@ def to_si(values: ArrayLike, unit: str, *, where: str = "", quantity: str | None
 def same_dimension(unit: str, quantity: str) -> bool:
     """Return whether `unit` measures `quantity`."""
     return bool(_parse(unit, "").dimensionality == _registry().parse_units(SI_UNITS[quantity]).dimensionality)
+
+
+def same_unit_dimension(unit: str, other: str, *, where: str = "") -> bool:
+    """Return whether two units measure the same kind of quantity, such as kN/m and N/m."""
+    return bool(_parse(unit, where).dimensionality == _parse(other, where).dimensionality)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ class ExactDamping:
 
 def _poles(frame: Frame, position: FloatArray, c: float, k: float) -> NDArray[np.complex128]:
     device = np.outer(position, position)
-    changed = Frame(frame.mass, frame.damping + c * device, frame.stiffness + k * device)
+    changed = replace(frame, damping=frame.damping + c * device, stiffness=frame.stiffness + k * device)
     return np.asarray(np.linalg.eigvals(state_space(changed).A), dtype=np.complex128)
 
 
@@ -115,7 +115,7 @@ def stable_ratio(answer: ExactDamping) -> float:
 
 def undamped(frame: Frame) -> Frame:
     """Return the frame without its own damping: what the closed forms and the printed figures are about."""
-    return Frame(frame.mass, np.zeros_like(frame.damping), frame.stiffness, frame.name)
+    return replace(frame, damping=np.zeros_like(frame.damping))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -121,6 +121,6 @@ def amplitude_for(frame: Frame, position: FloatArray, c: float, omega: float, rm
     This is how the thesis chose its excitation: VD with c = 650 N s/m and 24.3 mm.
     """
     device = c * np.outer(position, position)
-    damped = Frame(frame.mass, frame.damping + device, frame.stiffness)
+    damped = replace(frame, damping=frame.damping + device)
     gain = frequency_response(damped, [omega], absolute_acceleration=False)[0, -1]
     return float(math.sqrt(2.0) * rms_top_m / abs(gain))

@@ -226,7 +226,7 @@ def simulate_law(
     seconds = time.perf_counter() - began
     if not np.all(np.isfinite(record)):
         raise DivergedError(f"law {controller.law}: the response grows without bound; lower the negative stiffness")
-    return _response(record, commands, w, dt * every, dt * per_sample, seconds)
+    return _response(record, commands, w, frame.ground_influence, dt * every, dt * per_sample, seconds)
 
 
 def _plant(frame: Frame, w: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -241,7 +241,7 @@ def _plant(frame: Frame, w: FloatArray, dt: float) -> tuple[FloatArray, FloatArr
     outputs[2 * n, :n] = w
     outputs[2 * n + 1, n:] = w
     outputs[2 * n + 2] = relative
-    outputs[2 * n + 3, :n] = frame.mass.sum(axis=0)
+    outputs[2 * n + 3, :n] = frame.mass.T @ frame.ground_influence
     step_matrix = outputs @ np.column_stack([Ad, B0[:, 0], B1[:, 0], B0[:, 1]])
     step_matrix[2 * n + 2, 2 * n + 1] += w @ space.B[n:, 0]
     at_end = outputs @ B1[:, 1]
@@ -304,7 +304,13 @@ def _noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generat
 
 
 def _response(
-    record: FloatArray, commands: FloatArray, w: FloatArray, dt: float, command_dt: float, seconds: float
+    record: FloatArray,
+    commands: FloatArray,
+    w: FloatArray,
+    influence: FloatArray,
+    dt: float,
+    command_dt: float,
+    seconds: float,
 ) -> Response:
     n = len(w)
     tail = record[:, 3 * n :]
@@ -314,7 +320,7 @@ def _response(
         time_s=dt * np.arange(len(record), dtype=np.float64),
         displacement=record[:, :n],
         velocity=record[:, n : 2 * n],
-        acceleration=absolute - ground[:, None],
+        acceleration=absolute - np.outer(ground, influence),
         absolute_acceleration=absolute,
         # not by BLAS, whose second thread spins on after a product of this length
         damper_displacement=np.einsum("tf,f->t", record[:, :n], w),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,7 +82,7 @@ class StateSpace:
     def absolute_acceleration(self) -> tuple[FloatArray, FloatArray]:
         """Return C (n, 2n) and D (n, 1 + k) of the absolute accelerations x'' + x_g'' = C z + D u.
 
-        The ground's part cancels: M (x'' + x_g'') = f - C x' - K x.
+        The ground's part cancels: M (x'' + r x_g'') = f - C x' - K x.
         """
         n = self.floors
         D = self.B[n:].copy()
@@ -141,7 +141,7 @@ def state_space(frame: Frame, force_positions: ArrayLike | None = None) -> State
     A[:n, n:] = np.eye(n)
     A[n:, :n] = -inverse @ frame.stiffness
     A[n:, n:] = -inverse @ frame.damping
-    columns = [-np.ones((n, 1))]
+    columns = [-frame.ground_influence[:, None]]
     if force_positions is not None:
         columns.append(inverse @ np.asarray(force_positions, dtype=np.float64).reshape(n, -1))
     B = np.vstack([np.zeros((n, sum(c.shape[1] for c in columns))), np.hstack(columns)])
@@ -164,7 +164,9 @@ def complex_modes(
     """
     w = floor_position(frame.floors) if position is None else np.asarray(position, dtype=np.float64)
     device = np.outer(w, w)
-    with_device = Frame(frame.mass, frame.damping + damping * device, frame.stiffness + stiffness * device)
+    with_device = replace(
+        frame, damping=frame.damping + damping * device, stiffness=frame.stiffness + stiffness * device
+    )
     poles, vectors = np.linalg.eig(state_space(with_device).A)
     keep = poles.imag >= -1e-12 * np.abs(poles)
     poles, shapes = poles[keep], vectors[: frame.floors, keep]
@@ -214,12 +216,12 @@ def frequency_response(
     """
     w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
     n = frame.floors
-    load = -frame.mass @ np.ones(n) if shaker_floor == 0 else floor_position(n, shaker_floor)
+    load = -frame.mass @ frame.ground_influence if shaker_floor == 0 else floor_position(n, shaker_floor)
     dynamic = frame.stiffness + 1j * w[:, None, None] * frame.damping - w[:, None, None] ** 2 * frame.mass
     relative = np.linalg.solve(dynamic, np.broadcast_to(load.astype(np.complex128)[:, None], (w.size, n, 1)))[..., 0]
     if not absolute_acceleration:
         return np.asarray(relative)
-    ground = 1.0 if shaker_floor == 0 else 0.0
+    ground = frame.ground_influence if shaker_floor == 0 else np.zeros(n)
     return np.asarray(ground - w[:, None] ** 2 * relative)
 
 

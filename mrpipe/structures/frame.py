@@ -1,48 +1,76 @@
-"""A structure with lumped masses: what identification finds and the closed loop shakes."""
+"""A linear structure: what identification finds, or a file gives, and the closed loop shakes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+import numpy as np
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 
 
 @dataclass(frozen=True)
 class Frame:
-    """M x'' + C x' + K x = -w f - M 1 x_g'' (4.1); floor 1 first.
+    """M x'' + C x' + K x = -w f - M r x_g'' (4.1), with the displacements x relative to the ground.
+
+    For a shear frame the degrees of freedom are the floors, floor 1 first, and r is a column of ones.
 
     Attributes
     ----------
     mass, damping, stiffness
-        Shape (n, n); kg, N s/m, N/m.
+        Shape (n, n); kg, N s/m, N/m for displacements. Rotations have kg m^2 and so on.
     name
         For tables.
+    influence
+        Displacement of each degree of freedom when the ground moves by 1 m, r, shape (n,) [1]; None: ones.
+    degrees_of_freedom
+        Names of the degrees of freedom, length n; empty: `floor 1` and so on.
     """
 
     mass: FloatArray
     damping: FloatArray
     stiffness: FloatArray
     name: str = "frame"
+    influence: FloatArray | None = None
+    degrees_of_freedom: tuple[str, ...] = ()
 
     @property
     def floors(self) -> int:
-        """Number of floors n."""
+        """Number of degrees of freedom n."""
         return int(self.mass.shape[0])
+
+    @property
+    def ground_influence(self) -> FloatArray:
+        """Influence vector r of the ground motion, shape (n,)."""
+        return np.ones(self.floors) if self.influence is None else self.influence
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom."""
+        return self.degrees_of_freedom or tuple(f"floor {k + 1}" for k in range(self.floors))
 
 
 _MATRICES = {"mass": "kg", "damping": "N*s/m", "stiffness": "N/m"}
 
 
 def write_frame(artifact: ArtifactWriter, frame: Frame, group: str = "frame") -> None:
-    """Write the matrices of a frame."""
+    """Write the matrices of a frame, and influence vector and names where it has its own."""
     for name, unit in _MATRICES.items():
         artifact.put(f"{group}/{name}", getattr(frame, name), unit=unit, dims=("floor", "floor_of_cause"))
+    if frame.influence is not None:
+        artifact.put(f"{group}/influence", frame.influence, unit="1", dims=("floor",))
+    if frame.degrees_of_freedom:
+        artifact.put_json(f"{group}/degrees_of_freedom", list(frame.degrees_of_freedom))
     artifact.attributes(group, name=frame.name)
 
 
 def read_frame(artifact: Artifact, group: str = "frame") -> Frame:
     """Read what :func:`write_frame` wrote."""
+    members = set(artifact.members(group))
+    names = artifact.json(f"{group}/degrees_of_freedom") if "degrees_of_freedom" in members else []
     return Frame(
         **{name: artifact.array(f"{group}/{name}") for name in _MATRICES},
         name=str(artifact.attributes(group)["name"]),
+        influence=artifact.array(f"{group}/influence") if "influence" in members else None,
+        degrees_of_freedom=tuple(str(name) for name in names),
     )

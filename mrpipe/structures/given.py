@@ -1,0 +1,222 @@
+"""A structure from matrices in a file, a storey table, or modes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import UserError
+from mrpipe.structures.frame import Frame
+from mrpipe.structures.options import MatrixEntry, StructureSettings
+from mrpipe.structures.shear_frame import frame_from_modes, modal_damping_matrix, shear_frame
+from mrpipe.units import conversion, same_unit_dimension
+
+Reader = Callable[[Path, str], Any]
+"""From a file and the name of a variable in it (empty: the only table) to its content."""
+
+SYMMETRY = 1e-8
+"""Largest relative asymmetry of M and K that is taken for rounding."""
+
+
+def structure_from_settings(settings: StructureSettings, read: Reader, name: str = "structure") -> Frame:
+    """Return the structure that the settings describe.
+
+    Parameters
+    ----------
+    settings
+        Exactly one of matrices, storey table and modes.
+    read
+        Reads a variable of a data file.
+    name
+        Of the structure.
+
+    Raises
+    ------
+    UserError
+        If several descriptions are given, sizes disagree, or a matrix is not what it must be.
+    """
+    ways = {
+        "file": bool(settings.file or settings.mass.file),
+        "storeys": bool(settings.storeys),
+        "mode_shapes": bool(settings.mode_shapes),
+    }
+    given = [way for way, there in ways.items() if there]
+    if len(given) != 1:
+        problem = "describes no structure" if not given else f"describes it {len(given)} times: {', '.join(given)}"
+        raise UserError("structure", "", problem, "give matrices (file), or storeys, or mode_shapes")
+    if given == ["storeys"]:
+        frame = _from_storeys(settings, name)
+    elif given == ["mode_shapes"]:
+        frame = _from_modes(settings, name)
+    else:
+        frame = _from_matrices(settings, read, name)
+    return Frame(
+        frame.mass,
+        frame.damping,
+        frame.stiffness,
+        name,
+        _influence(settings, frame.floors),
+        _names(settings, frame.floors),
+    )
+
+
+def _from_storeys(settings: StructureSettings, name: str) -> Frame:
+    rows = [row for row in settings.storeys for _ in range(row.repeat)]
+    ratios = _ratios(settings, len(rows))
+    return shear_frame(
+        [row.mass_kg for row in rows], [row.stiffness_n_m for row in rows], ratios, name=name, source="structure"
+    )
+
+
+def _from_modes(settings: StructureSettings, name: str) -> Frame:
+    shapes = np.array(settings.mode_shapes, dtype=np.float64)
+    n = shapes.shape[0]
+    if shapes.shape != (n, n) or len(settings.frequencies_hz) != n or len(settings.masses_kg) != n:
+        raise UserError(
+            "structure",
+            "mode_shapes",
+            f"{shapes.shape[0]} rows, {shapes.shape[-1]} columns, {len(settings.frequencies_hz)} frequencies, "
+            f"{len(settings.masses_kg)} masses",
+            "give as many modes, frequencies and masses as degrees of freedom",
+        )
+    omega = 2.0 * math.pi * np.array(settings.frequencies_hz)
+    return frame_from_modes(
+        shapes, omega, _ratios(settings, n), np.array(settings.masses_kg), name=name, source="structure"
+    )
+
+
+def _from_matrices(settings: StructureSettings, read: Reader, name: str) -> Frame:
+    mass = _matrix("mass", settings.mass, settings, read, "kg")
+    stiffness = _matrix("stiffness", settings.stiffness, settings, read, "N/m")
+    n = mass.shape[0]
+    if stiffness.shape != (n, n):
+        raise UserError(
+            "structure", "stiffness", f"is {_size(stiffness)}, the mass is {_size(mass)}", "give matrices of one size"
+        )
+    mass, stiffness = _symmetric("mass", mass), _symmetric("stiffness", stiffness)
+    if np.min(np.linalg.eigvalsh(mass)) <= 0.0:
+        raise UserError(
+            "structure",
+            "mass",
+            "is not positive definite",
+            "remove degrees of freedom without mass by static condensation before, or give them a small mass",
+        )
+    if settings.damping.name or settings.damping.file:
+        damping = _matrix("damping", settings.damping, settings, read, "N*s/m")
+        if damping.shape != (n, n):
+            raise UserError("structure", "damping", f"is {_size(damping)}", f"give a matrix of {n} x {n}")
+    else:
+        damping = modal_damping_matrix(mass, stiffness, _ratios(settings, n))
+    return Frame(mass, damping, stiffness, name)
+
+
+def _matrix(key: str, entry: MatrixEntry, settings: StructureSettings, read: Reader, si: str) -> FloatArray:
+    file = entry.file or settings.file
+    if not file:
+        raise UserError("structure", f"{key}.file", "is not given", "name the file of the matrix, or structure.file")
+    content = read(Path(file), entry.name)
+    try:
+        values = np.asarray(content.toarray() if hasattr(content, "toarray") else content, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise UserError(file, entry.name or key, "is not a matrix of numbers", "name another variable") from error
+    if values.ndim == 1 or 1 in values.shape:
+        # lumped masses are often stored as a column
+        values = np.diag(values.ravel()) if key == "mass" and values.size > 1 else np.atleast_2d(values)
+    if values.ndim != 2 or values.shape[0] != values.shape[1]:
+        raise UserError(file, entry.name or key, f"has the shape {values.shape}", "give a square matrix")
+    if not np.all(np.isfinite(values)):
+        row, column = np.argwhere(~np.isfinite(values))[0] + 1
+        raise UserError(file, f"{entry.name or key}[{row}, {column}]", "is not finite", "give a finite number")
+    return values * _factor(entry.unit or si, si, f"structure.{key}.unit")
+
+
+def _factor(unit: str, si: str, where: str) -> float:
+    """Return the factor from a unit to SI; the unit must have the dimension of the SI one."""
+    if not same_unit_dimension(unit, si, where=where):
+        raise UserError(where, unit, f"is not a unit of {si}", f"give {si} or a multiple of it")
+    return conversion(unit, where=where) / conversion(si, where=where)
+
+
+def _symmetric(key: str, matrix: FloatArray) -> FloatArray:
+    scale = float(np.max(np.abs(matrix)))
+    difference = float(np.max(np.abs(matrix - matrix.T)))
+    if difference > SYMMETRY * scale:
+        row, column = np.unravel_index(int(np.argmax(np.abs(matrix - matrix.T))), matrix.shape)
+        raise UserError(
+            "structure",
+            f"{key}[{row + 1}, {column + 1}]",
+            f"differs from its mirror image by {difference / scale:.1e} of the largest entry",
+            "a mass or stiffness matrix is symmetric; check the export",
+        )
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def _size(matrix: FloatArray) -> str:
+    return f"{matrix.shape[0]} x {matrix.shape[1]}"
+
+
+def _ratios(settings: StructureSettings, count: int) -> FloatArray:
+    given = list(settings.damping_ratio)[:count]
+    return np.array(given + [given[-1]] * (count - len(given)))
+
+
+def _influence(settings: StructureSettings, count: int) -> FloatArray | None:
+    if not settings.influence:
+        return None
+    return np.array(_as_many("influence", settings.influence, count))
+
+
+def _names(settings: StructureSettings, count: int) -> tuple[str, ...]:
+    names = (
+        tuple(_as_many("degrees_of_freedom", settings.degrees_of_freedom, count)) if settings.degrees_of_freedom else ()
+    )
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise UserError("structure", "degrees_of_freedom", f"{twice} occurs more than once", "give different names")
+    return names
+
+
+def _as_many(key: str, values: Sequence[Any], count: int) -> Sequence[Any]:
+    if len(values) != count:
+        raise UserError("structure", key, f"has {len(values)} entries", f"the structure has {count} degrees of freedom")
+    return values
+
+
+def degree_of_freedom(frame: Frame, name: str | int, where: str = "structure") -> int:
+    """Return the index (from 0) of a degree of freedom given by its name or its number (from 1).
+
+    Raises
+    ------
+    UserError
+        If there is none.
+    """
+    names = frame.names
+    if str(name) in names:
+        return names.index(str(name))
+    text = str(name)
+    if text.isdigit() and 1 <= int(text) <= frame.floors:
+        return int(text) - 1
+    raise UserError(where, text, "is no degree of freedom", f"1 to {frame.floors}, or one of {', '.join(names[:12])}")
+
+
+def device_position(
+    frame: Frame, first: str | int, second: str | int = "ground", where: str = "structure"
+) -> FloatArray:
+    """Return the connectivity vector w, shape (n,), of a device between two degrees of freedom, or one and ground.
+
+    The device's displacement is w'x = x_first - x_second.
+    """
+    w = np.zeros(frame.floors)
+    w[degree_of_freedom(frame, first, where)] = 1.0
+    if str(second) not in ("ground", "0"):
+        w[degree_of_freedom(frame, second, where)] -= 1.0
+    if not np.any(w):
+        raise UserError(
+            where, f"{first} to {second}", "connects a degree of freedom to itself", "give two different ones"
+        )
+    return w

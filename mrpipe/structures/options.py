@@ -1,0 +1,77 @@
+"""Settings of a structure that is given by matrices, a storey table or modes instead of being identified."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class GivenSection(BaseModel):
+    """Base of the settings of this module: unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+class Storey(GivenSection):
+    """One row of a storey table, lowest storey first."""
+
+    mass_kg: float = Field(..., gt=0.0, description="Mass of the floor above the storey.")
+    stiffness_n_m: float = Field(..., gt=0.0, description="Lateral stiffness of the storey.")
+    height_m: float | None = Field(None, gt=0.0, description="Height of the storey; only for drawings and P-delta.")
+    repeat: int = Field(1, ge=1, description="How many storeys in a row are like this one.")
+
+
+class MatrixEntry(GivenSection):
+    """Where a matrix is, and its unit."""
+
+    file: str = Field("", description="File of the matrix (.mat, .csv, .h5, .json); empty: `structure.file`.")
+    name: str = Field("", description="Variable in the file, such as M or model.K; empty for a CSV file of its own.")
+    unit: str = Field("", description="Unit of the entries, such as kg, t, kN/m; empty: SI.")
+
+
+class ReductionSettings(GivenSection):
+    """Reduction of a large structure to few degrees of freedom."""
+
+    method: Literal["none", "guyan", "craig-bampton", "modal", "balanced"] = Field(
+        "none",
+        description="Static condensation, fixed-interface modes, lowest modes, or balanced truncation. The physical "
+        "degrees of freedom in `keep` stay in the first two and in the modal one.",
+    )
+    keep: tuple[str, ...] = Field((), description="Degrees of freedom that stay, by name or number from 1.")
+    modes: int = Field(10, ge=1, description="Modes that stay (craig-bampton: fixed-interface modes; balanced: pairs).")
+    band_high_hz: float | None = Field(
+        None, gt=0.0, description="Highest frequency at which the error is stated; null: that of the last mode kept."
+    )
+
+
+class StructureSettings(GivenSection):
+    """A linear structure from a file, a storey table or modes; without any of them the frame is identified."""
+
+    file: str = Field("", description="File that holds the matrices (.mat, .csv, .h5, .json).")
+    mass: MatrixEntry = Field(MatrixEntry(name="M", unit="kg"), description="Mass matrix.")
+    stiffness: MatrixEntry = Field(MatrixEntry(name="K", unit="N/m"), description="Stiffness matrix.")
+    damping: MatrixEntry = Field(
+        MatrixEntry(), description="Damping matrix; without a name and a file: modal damping by `damping_ratio`."
+    )
+    damping_ratio: tuple[float, ...] = Field(
+        (0.01,), min_length=1, description="Damping ratio of the modes; the last one holds for all further modes."
+    )
+    storeys: tuple[Storey, ...] = Field((), description="Storey table of a shear frame, lowest storey first.")
+    frequencies_hz: tuple[float, ...] = Field((), description="Natural frequencies, with `mode_shapes` and masses.")
+    mode_shapes: tuple[tuple[float, ...], ...] = Field(
+        (), description="A row per degree of freedom, a column per mode; as many modes as degrees of freedom."
+    )
+    masses_kg: tuple[float, ...] = Field((), description="Masses of the degrees of freedom, with `mode_shapes`.")
+    degrees_of_freedom: tuple[str, ...] = Field((), description="Their names; empty: floor 1, floor 2, ...")
+    influence: tuple[float, ...] = Field(
+        (),
+        description="Displacement of each degree of freedom when the ground moves by 1 m; empty: 1 for all. A rotation "
+        "or a direction across the motion has 0.",
+    )
+    reduction: ReductionSettings = Field(ReductionSettings(), description="Reduction of a large structure.")
+
+    @property
+    def given(self) -> bool:
+        """Whether a structure is given at all."""
+        return bool(self.file or self.storeys or self.mode_shapes or self.mass.file)

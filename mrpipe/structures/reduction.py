@@ -1,0 +1,223 @@
+"""Reduction of a large structure: static condensation, Craig-Bampton, modal and balanced truncation.
+
+All but balanced truncation return a structure again, with M, C, K and an influence vector. The error of a reduction is
+the largest deviation of the frequency response to ground motion, at the degrees of freedom that stay, over the largest
+response.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, eigh, solve_continuous_lyapunov, svd
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import UserError
+from mrpipe.structures.dynamics import StateSpace, natural_modes, state_space
+from mrpipe.structures.frame import Frame
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A smaller structure.
+
+    Attributes
+    ----------
+    frame
+        The reduced structure, coordinates q.
+    basis
+        From reduced to full coordinates, x = T q, shape (n, m).
+    kept
+        Indices of the physical degrees of freedom that stay, in the order of the first coordinates; empty: none.
+    error
+        Largest relative error of the frequency response over the band [1].
+    band_high_hz
+        Highest frequency of the band.
+    """
+
+    frame: Frame
+    basis: FloatArray
+    kept: tuple[int, ...]
+    error: float
+    band_high_hz: float
+
+
+def guyan(frame: Frame, kept: Sequence[int], band_high_hz: float | None = None) -> Reduced:
+    """Condense a structure statically onto some of its degrees of freedom (Guyan 1965).
+
+    Parameters
+    ----------
+    frame
+        Structure.
+    kept
+        Indices of the degrees of freedom that stay, from 0.
+    band_high_hz
+        Up to where the error is stated; None: twice the lowest natural frequency.
+    """
+    kept, others = _partition(frame, kept)
+    basis = np.zeros((frame.floors, len(kept)))
+    basis[kept] = np.eye(len(kept))
+    basis[others] = -np.linalg.solve(frame.stiffness[np.ix_(others, others)], frame.stiffness[np.ix_(others, kept)])
+    return _projected(frame, basis, kept, band_high_hz)
+
+
+def craig_bampton(frame: Frame, kept: Sequence[int], modes: int, band_high_hz: float | None = None) -> Reduced:
+    """Reduce a structure to interface degrees of freedom and fixed-interface modes (Craig and Bampton 1968).
+
+    Parameters
+    ----------
+    frame
+        Structure.
+    kept
+        Indices of the interface degrees of freedom, from 0.
+    modes
+        Number of fixed-interface modes.
+    band_high_hz
+        Up to where the error is stated; None: the frequency of the last mode of the reduced structure, halved.
+    """
+    kept, others = _partition(frame, kept)
+    modes = min(modes, len(others))
+    static = guyan(frame, kept, 1.0).basis
+    _, shapes = eigh(frame.stiffness[np.ix_(others, others)], frame.mass[np.ix_(others, others)])
+    basis = np.zeros((frame.floors, len(kept) + modes))
+    basis[:, : len(kept)] = static
+    basis[np.ix_(others, range(len(kept), len(kept) + modes))] = shapes[:, :modes]
+    return _projected(frame, basis, kept, band_high_hz)
+
+
+def modal(frame: Frame, modes: int, kept: Sequence[int] = (), band_high_hz: float | None = None) -> Reduced:
+    """Keep the lowest modes; with as many `kept` degrees of freedom as modes, in physical coordinates.
+
+    Parameters
+    ----------
+    frame
+        Structure.
+    modes
+        Number of modes.
+    kept
+        Degrees of freedom that become the coordinates (SEREP, O'Callahan 1989); empty: modal coordinates.
+    band_high_hz
+        Up to where the error is stated; None: the frequency of the last mode kept.
+    """
+    found = natural_modes(frame)
+    modes = min(modes, frame.floors)
+    shapes = found.mode_shapes[:, :modes]
+    if band_high_hz is None:
+        band_high_hz = float(found.angular_frequencies[modes - 1]) / (2.0 * math.pi)
+    if not kept:
+        return _projected(frame, shapes, [], band_high_hz)
+    if len(kept) != modes:
+        raise UserError(
+            "structure.reduction", "keep", f"has {len(kept)} entries", f"give as many as modes, which are {modes}"
+        )
+    basis = shapes @ np.linalg.inv(shapes[list(kept)])
+    return _projected(frame, basis, list(kept), band_high_hz)
+
+
+def balanced(space: StateSpace, outputs: FloatArray, order: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return the balanced truncation of a stable system with x' = A x + B u, y = C x (Moore 1981).
+
+    Parameters
+    ----------
+    space
+        The system; A must be stable.
+    outputs
+        C, shape (p, 2n).
+    order
+        States that stay.
+
+    Returns
+    -------
+    A, B, C of the reduced system, and the bound of the error: twice the sum of the Hankel singular values left out,
+    over the largest one.
+
+    Raises
+    ------
+    UserError
+        If the system is not stable.
+    """
+    poles = np.linalg.eigvals(space.A)
+    if np.max(poles.real) >= -1e-9 * np.max(np.abs(poles)):
+        raise UserError(
+            "structure.reduction",
+            "method",
+            "balanced truncation needs a stable structure with damping",
+            "give a positive damping ratio, or use craig-bampton",
+        )
+    controllable = solve_continuous_lyapunov(space.A, -space.B @ space.B.T)
+    observable = solve_continuous_lyapunov(space.A.T, -outputs.T @ outputs)
+    left, right = _root(controllable), _root(observable)
+    U, hankel, Vt = svd(right.T @ left)
+    order = min(order, int(np.sum(hankel > 1e-12 * hankel[0])))
+    scale = 1.0 / np.sqrt(hankel[:order])
+    into = left @ Vt[:order].T * scale
+    back = (right @ U[:, :order] * scale).T
+    bound = 2.0 * float(np.sum(hankel[order:])) / float(hankel[0])
+    return back @ space.A @ into, back @ space.B, outputs @ into, bound
+
+
+def frequency_error(frame: Frame, reduced: Frame, basis: FloatArray, places: Sequence[int], high_hz: float) -> float:
+    """Return the largest error of the response to ground motion over the largest response, from 0 to `high_hz`.
+
+    The lines lie at the natural frequencies and between them, because a resonance is narrow.
+    """
+    omega = natural_modes(frame).angular_frequencies
+    omega = omega[(omega > 0.0) & (omega <= 2.0 * math.pi * high_hz)]
+    between = np.linspace(0.0, 2.0 * math.pi * high_hz, 200)[1:]
+    lines = np.unique(np.concatenate([omega, between]))
+    rows = list(places) if len(places) else list(range(frame.floors))
+    full = _response(frame, lines)[:, rows]
+    small = (_response(reduced, lines) @ basis.T)[:, rows]
+    return float(np.max(np.abs(full - small)) / np.max(np.abs(full)))
+
+
+def _response(frame: Frame, omega: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
+    load = (frame.mass @ frame.ground_influence).astype(np.complex128)
+    return np.array([
+        np.linalg.solve(frame.stiffness + 1j * w * frame.damping - w**2 * frame.mass, -load) for w in omega
+    ])  # fmt: skip
+
+
+def _partition(frame: Frame, kept: Sequence[int]) -> tuple[list[int], list[int]]:
+    if not 0 < len(set(kept)) < frame.floors or len(set(kept)) != len(kept):
+        raise UserError(
+            "structure.reduction",
+            "keep",
+            f"{len(kept)} of {frame.floors} degrees of freedom, each once",
+            "keep at least one and not all, each once",
+        )
+    return list(kept), [k for k in range(frame.floors) if k not in set(kept)]
+
+
+def _projected(frame: Frame, basis: FloatArray, kept: Sequence[int], band_high_hz: float | None) -> Reduced:
+    mass, stiffness = (basis.T @ matrix @ basis for matrix in (frame.mass, frame.stiffness))
+    mass, stiffness = 0.5 * (mass + mass.T), 0.5 * (stiffness + stiffness.T)
+    damping = basis.T @ frame.damping @ basis
+    # the load of the ground motion is projected; with the reduced mass it defines the influence vector
+    load = basis.T @ frame.mass @ frame.ground_influence
+    influence = np.asarray(np.linalg.solve(mass, load), dtype=np.float64)
+    names = tuple(frame.names[k] for k in kept)
+    names += tuple(f"mode {k + 1}" for k in range(basis.shape[1] - len(kept)))
+    reduced = Frame(mass, damping, stiffness, f"{frame.name}, reduced", influence, names)
+    if band_high_hz is None:
+        band_high_hz = float(natural_modes(reduced).angular_frequencies[-1]) / (4.0 * math.pi)
+    error = frequency_error(frame, reduced, basis, kept, band_high_hz)
+    return Reduced(reduced, basis, tuple(kept), error, band_high_hz)
+
+
+def _root(gramian: FloatArray) -> FloatArray:
+    """Return L with L L' = gramian, also where rounding makes the gramian slightly indefinite."""
+    symmetric = 0.5 * (gramian + gramian.T)
+    try:
+        return np.asarray(cholesky(symmetric, lower=True))
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(symmetric)
+        return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def balanced_frame(frame: Frame, outputs: FloatArray, order: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return the balanced truncation of a structure under ground motion; see :func:`balanced`."""
+    return balanced(state_space(frame), outputs, order)

@@ -1,0 +1,80 @@
+"""Reduced structures: exact where the theory says so, and with the stated error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mrpipe.errors import UserError
+from mrpipe.structures import natural_modes, shear_frame, state_space
+from mrpipe.structures.reduction import balanced, craig_bampton, guyan, modal
+
+FRAME = shear_frame(np.full(12, 100.0), np.linspace(9e5, 4e5, 12), 0.02)
+KEPT = (2, 5, 8, 11)
+
+
+@pytest.mark.property
+def test_static_condensation_is_exact_at_rest() -> None:
+    reduced = guyan(FRAME, KEPT)
+    load = np.zeros(12)
+    load[list(KEPT)] = [1.0, -2.0, 3.0, 0.5]
+    full = np.linalg.solve(FRAME.stiffness, load)
+    small = np.linalg.solve(reduced.frame.stiffness, load[list(KEPT)])
+    np.testing.assert_allclose(small, full[list(KEPT)], rtol=1e-10)
+    assert reduced.frame.names == tuple(f"floor {k + 1}" for k in KEPT)
+
+
+@pytest.mark.property
+def test_frequencies_come_from_above_and_converge() -> None:
+    exact = natural_modes(FRAME).angular_frequencies
+    last = np.inf
+    for modes in (1, 3, 6, 8):
+        reduced = craig_bampton(FRAME, KEPT, modes, band_high_hz=8.0)
+        omega = natural_modes(reduced.frame).angular_frequencies
+        assert np.all(omega[:4] >= exact[:4] - 1e-9)
+        assert reduced.error <= last + 1e-9
+        last = reduced.error
+    assert last < 1e-8  # eight fixed-interface modes are all there are
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("kept", [(), KEPT])
+def test_modal_reduction_keeps_its_modes(kept: tuple[int, ...]) -> None:
+    reduced = modal(FRAME, 4, kept)
+    np.testing.assert_allclose(
+        natural_modes(reduced.frame).angular_frequencies, natural_modes(FRAME).angular_frequencies[:4], rtol=1e-9
+    )
+
+
+@pytest.mark.property
+def test_the_stated_error_is_that_of_the_response() -> None:
+    coarse, fine = guyan(FRAME, KEPT, 4.0), craig_bampton(FRAME, KEPT, 3, 4.0)
+    assert 1e-4 < coarse.error < 0.5
+    assert fine.error < 0.1 * coarse.error
+
+
+@pytest.mark.oracle
+def test_balanced_truncation_keeps_its_bound() -> None:
+    space = state_space(FRAME)
+    outputs = np.hstack([np.eye(12), np.zeros((12, 12))])[[11]]
+    A, B, C, bound = balanced(space, outputs, 8)
+    assert np.max(np.linalg.eigvals(A).real) < 0.0
+    omega = np.linspace(1.0, 200.0, 400)
+
+    def gain(a, b, c):  # type: ignore[no-untyped-def]
+        return np.array([(c @ np.linalg.solve(1j * w * np.eye(len(a)) - a, b))[0, 0] for w in omega])
+
+    full, small = gain(space.A, space.B[:, :1], outputs), gain(A, B[:, :1], C)
+    hankel_largest = 0.5 * np.max(np.abs(full))
+    assert np.max(np.abs(full - small)) < 3.0 * bound * hankel_largest
+    assert np.max(np.abs(full - small)) < 0.05 * np.max(np.abs(full))
+
+
+@pytest.mark.property
+def test_mistakes() -> None:
+    for kept in ((), tuple(range(12)), (1, 1)):
+        with pytest.raises(UserError):
+            guyan(FRAME, kept)
+    undamped = shear_frame([1.0, 1.0], [10.0, 10.0], 0.0)
+    with pytest.raises(UserError, match="stable"):
+        balanced(state_space(undamped), np.eye(4), 2)
