@@ -1,10 +1,13 @@
 """Units are converted here, at the border, and nowhere else; inside, everything is SI.
 
-The arithmetic of units is pint's; this module adds the words the field uses and one-line errors.
+The arithmetic of units is pint's; this module adds the words the field uses and one-line errors. A unit comes from a
+user's file, so only words with small powers are passed on to pint; an expression of numbers is never evaluated.
 """
 
 from __future__ import annotations
 
+import difflib
+import re
 from functools import cache
 from typing import Any
 
@@ -33,7 +36,19 @@ _WORDS = {
     "g": "standard_gravity",
     "gal": "cm/s^2",
     "Gal": "cm/s^2",
+    '"': "inch",
+    "t": "metric_ton",
 }
+
+_USUAL = ("mm", "cm", "m", "um", "in", "N", "kN", "MN", "lbf", "kip", "kgf", "A", "mA", "V", "mV", "s", "ms", "us", "g")
+_USUAL_RATES = ("m/s", "mm/s", "cm/s", "m/s^2", "mm/s^2", "cm/s^2", "in/s", "kg", "Hz")
+
+_WORD = r"(?:[A-Za-zµμ°Ω%_]{1,40}|1)"
+_POWER = r"(?:\s*(?:\^|\*\*)\s*(?:[-+]?\d(?:\.\d{1,3})?|\([-+]?\d(?:\.\d{1,3})?\))|[²³]|[-+]?[23](?![0-9A-Za-z]))?"
+_TERM = rf"\(*{_WORD}{_POWER}(?:\){_POWER})*"
+_UNIT = re.compile(rf"^{_TERM}(?:(?:\s*(?:\*|/|·|⋅)\s*|\s+){_TERM}){{0,9}}$")
+_PLAIN_POWER = re.compile(r"(?<=[A-Za-zµμΩ])([-+]?[23])(?![0-9A-Za-z])")
+_LONGEST = 80
 
 
 @cache
@@ -46,15 +61,28 @@ def _registry() -> Any:
     return registry
 
 
+def _nearest(unit: str) -> str:
+    """Return a remedy that names the usual unit that was probably meant, where there is one."""
+    usual = (*_USUAL, *_USUAL_RATES)
+    folded = {item.casefold(): item for item in usual}
+    close = difflib.get_close_matches(unit, usual, n=1, cutoff=0.6)
+    meant = folded.get(unit.casefold()) or (close[0] if close else "")
+    return f"did you mean {meant}?" if meant and meant != unit else ""
+
+
 def _parse(unit: str, where: str) -> Any:
     registry = _registry()
     text = str(unit).strip()
+    word = _WORDS.get(text, text)
+    word = word.lower() if word.isalpha() and word.istitle() and len(word) > 3 else word  # Newton, Volt
     try:
-        return registry.parse_units(_WORDS.get(text, text))
+        if len(word) > _LONGEST or not _UNIT.match(word):
+            raise ValueError("no unit words")
+        return registry.parse_units(_PLAIN_POWER.sub(r"^\1", word.replace("·", "*").replace("⋅", "*")))
     except Exception as error:
-        raise UserError(
-            where or "unit", f"unit {unit!r}", "is not a unit", "write one such as mm, m/s^2, kN, A, V"
-        ) from error
+        remedy = _nearest(text) or "write one such as mm, m/s^2, kN, A, V"
+        shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+        raise UserError(where or "unit", f"unit {shown!r}", "is not a unit", remedy) from error
 
 
 def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> float:
@@ -63,7 +91,7 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
     Parameters
     ----------
     unit
-        As a person writes it: `mm`, `cm/s^2`, `g` (gravity, for accelerations), `kN`.
+        As a person writes it: `mm`, `cm/s^2`, `m/s2`, `g` (gravity, for accelerations), `kN`.
     where
         File and key, for the message.
     quantity
@@ -72,17 +100,19 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
     Raises
     ------
     UserError
-        If the unit is unknown or of another quantity.
+        If the unit is unknown, of another quantity, or has no factor (temperatures).
     """
     parsed = _parse(unit, where)
     registry = _registry()
     if quantity is not None:
         wanted = SI_UNITS[quantity]
         if parsed.dimensionality != registry.parse_units(wanted).dimensionality:
-            raise UserError(
-                where or "unit", f"unit {unit!r}", f"is no unit of {quantity}", f"write one such as {wanted}"
-            )
-    return float((1.0 * parsed).to_base_units().magnitude)
+            remedy = _nearest(str(unit).strip()) or f"write one such as {wanted}"
+            raise UserError(where or "unit", f"unit {unit!r}", f"is no unit of {quantity}", remedy)
+    try:
+        return float((1.0 * parsed).to_base_units().magnitude)
+    except Exception as error:
+        raise UserError(where or "unit", f"unit {unit!r}", "has no factor to SI", "use another unit") from error
 
 
 def to_si(values: ArrayLike, unit: str, *, where: str = "", quantity: str | None = None) -> NDArray[np.float64]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from mrpipe.errors import UserError
@@ -40,3 +42,42 @@ def test_unit_of_another_quantity_is_refused() -> None:
 def test_current_and_voltage_are_told_apart() -> None:
     assert same_dimension("mA", "current")
     assert not same_dimension("V", "current")
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    "unit", ["9**9**9**9 N", "9^9", "1e9 N", "N**99", "x" * 79, "x" * 5000, "mm " * 26, "__import__('os')", "(" * 40]
+)
+def test_a_unit_is_never_evaluated_as_an_expression(unit: str) -> None:
+    begun = time.monotonic()
+    with pytest.raises(UserError, match="is not a unit"):
+        conversion(unit, quantity="force")
+    assert time.monotonic() - begun < 2.0
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [
+        ("m/s2", 1.0),
+        ("mm/s²", 1e-3),
+        ("m s^-2", 1.0),
+        ("kN*s/m/V", 1e3),
+        ("N/m/A^3", 1.0),
+        ("t*m^2", 1e3),
+        ("N·m", 1.0),
+        ("N/(m/s)", 1.0),
+        ("1/m^2", 1.0),
+        ("Newton", 1.0),
+        ("µm", 1e-6),
+    ],
+)
+def test_compound_units_as_people_write_them(unit: str, factor: float) -> None:
+    assert conversion(unit) == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(("unit", "meant"), [("kn", "kN"), ("KN", "kN"), ("mn", "MN")])
+def test_a_unit_in_the_wrong_case_names_the_right_one(unit: str, meant: str) -> None:
+    with pytest.raises(UserError, match=f"did you mean {meant}"):
+        conversion(unit, quantity="force")

@@ -1,4 +1,8 @@
-"""YAML with line numbers, and messages that name the line and the nearest known key."""
+"""YAML with line numbers, and messages that name the line and the nearest known key.
+
+A file is read by the safe loader only, and what a hostile or damaged file can do is bounded: aliases may not multiply
+without limit, nesting is limited, and dates stay text, so that `2026-30-01` is a name and not an error.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +20,34 @@ from mrpipe.errors import UserError
 Place = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
+MOST_NODES = 300_000
+"""Largest number of keys and values of a file, aliases written out."""
+
+DEEPEST = 60
+"""Deepest nesting."""
+
+LARGEST_BYTES = 20_000_000
+"""Largest file."""
+
+_LONGEST_SHOWN = 80
+
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return a remedy that names the known words, the likeliest first."""
     words = sorted(known)
+    # the case of a unit matters, but its misspelling often is the case alone
+    folded = {item.casefold(): item for item in words}
     close = difflib.get_close_matches(str(word), words, n=1, cutoff=0.5)
-    if close:
-        return f"did you mean {close[0]}?"
+    same = folded.get(str(word).casefold())
+    if same or close:
+        return f"did you mean {same or close[0]}?"
     return f"known: {', '.join(words)}" if words else "there are none"
+
+
+def shown(value: Any) -> str:
+    """Return a value of a user as it may stand in a message: shortened where it is long."""
+    text = repr(value) if not isinstance(value, int) or abs(value) < 10**30 else "a number of more than 30 digits"
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 4]} ..."
 
 
 @dataclass(frozen=True)
@@ -49,7 +73,7 @@ class YamlSource:
         return UserError(self.path, self.where(place), problem, remedy)
 
     def build(self, model: type[Model], content: Any, place: Place) -> Model:
-        """Validate `content` as `model`; the first fault is told with its line.
+        """Validate `content` as `model`; the first fault is reported with its line.
 
         Raises
         ------
@@ -57,9 +81,9 @@ class YamlSource:
             If a key is unknown (with the nearest known one), missing, or its value does not fit.
         """
         if not isinstance(content, Mapping):
-            raise self.error(place, f"is {content!r}", "a mapping of keys to values expected")
+            raise self.error(place, f"is {shown(content)}", "a mapping of keys to values expected")
         try:
-            return model.model_validate(dict(content))
+            return model.model_validate({str(key): value for key, value in content.items()})
         except ValidationError as error:
             first = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")[0]
             key = (*place, *first["loc"])
@@ -67,7 +91,43 @@ class YamlSource:
                 raise self.error(key, "unknown key", nearest(str(first["loc"][-1]), model.model_fields)) from None
             if first["type"] == "missing":
                 raise self.error(key, "is missing", f"write {first['loc'][-1]}: ... here") from None
-            raise self.error(key, f"is {first['input']!r}", first["msg"].removeprefix("Value error, ")) from None
+            raise self.error(key, f"is {shown(first['input'])}", expected(first)) from None
+
+
+def expected(fault: Mapping[str, Any]) -> str:
+    """Return in plain words what one fault that pydantic found should have been."""
+    kind, context = fault["type"], fault.get("ctx", {})
+    if kind == "literal_error":
+        words = [word.strip(" '") for word in str(context["expected"]).replace(" or ", ", ").split(",")]
+        close = difflib.get_close_matches(str(fault["input"]), words, n=1, cutoff=0.5)
+        hint = f"did you mean {close[0]}? " if close else ""
+        return f"{hint}{context['expected']} expected"
+    plain = {
+        "finite_number": "a finite number expected",
+        "float_parsing": "a number expected",
+        "float_type": "a number expected",
+        "int_parsing": "a whole number expected",
+        "int_type": "a whole number expected",
+        "int_from_float": "a whole number expected",
+        "string_type": "a text expected; put it in quotes",
+        "bool_parsing": "true or false expected",
+        "bool_type": "true or false expected",
+        "dict_type": "a mapping of keys to values expected",
+        "model_type": "a mapping of keys to values expected",
+        "list_type": "a list expected, as in [a, b]",
+        "tuple_type": "a list expected, as in [a, b]",
+    }
+    return plain.get(kind, str(fault["msg"]).removeprefix("Value error, "))
+
+
+class _Loader(yaml.SafeLoader):
+    """The safe loader without dates."""
+
+
+_Loader.yaml_implicit_resolvers = {
+    letter: [(tag, pattern) for tag, pattern in resolvers if tag != "tag:yaml.org,2002:timestamp"]
+    for letter, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
 
 
 def read_yaml(path: Path) -> YamlSource:
@@ -76,27 +136,82 @@ def read_yaml(path: Path) -> YamlSource:
     Raises
     ------
     UserError
-        If the file is missing, not YAML, no mapping, or holds a key twice.
+        If the file is missing, not YAML, no mapping, holds a key twice, or is nested or multiplied without measure.
     """
+    path = Path(path)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
+        if path.stat().st_size > LARGEST_BYTES:
+            raise UserError(path, "", f"is larger than {LARGEST_BYTES // 1_000_000} MB", "name a YAML file")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise UserError(path, "", "cannot be read", "name a YAML file that is there") from error
     except UnicodeDecodeError as error:
         raise UserError(path, "", "is not UTF-8 text", "save it as UTF-8") from error
-    try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"line {mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or str(error)
-        raise UserError(path, where, f"not valid YAML ({problem})", "mend the syntax") from error
+    node, content = parse(text, path)
     if not isinstance(content, dict):
         raise UserError(path, "line 1", "is no mapping", "write `key: value` lines")
     lines: dict[Place, int] = {}
-    _collect_lines(node, (), lines, Path(path))
-    return YamlSource(Path(path), content, lines)
+    _collect_lines(node, (), lines, path)
+    return YamlSource(path, content, lines)
+
+
+def parse(text: str, source: str | Path) -> tuple[Any, Any]:
+    """Return the tree of nodes of a YAML text and its content as plain Python.
+
+    Raises
+    ------
+    UserError
+        If the text is not valid YAML, or is nested or multiplied without measure; `source` names it.
+    """
+    try:
+        node = yaml.compose(text, Loader=_Loader)
+        if node is not None:
+            _require_measure(node, source)
+        # construction changes the tree where it merges mappings, so it gets a tree of its own
+        content = yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"line {mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        raise UserError(source, where, f"not valid YAML ({problem})", "correct the syntax") from error
+    except RecursionError:
+        raise UserError(source, "", "is nested too deeply", f"nest at most {DEEPEST} levels") from None
+    except (ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
+        problem = str(error).splitlines()[0] if str(error) else type(error).__name__
+        remedy = "write plain values without tags such as !!int"
+        raise UserError(source, "", f"a value cannot be read ({problem[:120]})", remedy) from error
+    return node, content
+
+
+def _require_measure(root: Any, source: str | Path) -> None:
+    """Refuse trees that contain themselves, are nested too deeply, or grow beyond measure when aliases are written out.
+
+    The size of each node is counted once, however often aliases refer to it.
+    """
+    sizes: dict[int, int] = {}
+    open_nodes: set[int] = set()
+
+    def size_of(node: Any, depth: int) -> int:
+        if isinstance(node, yaml.ScalarNode):
+            return 1
+        line = f"line {node.start_mark.line + 1}"
+        if id(node) in open_nodes:
+            raise UserError(source, line, "an alias refers to a mapping that contains it", "write the values out")
+        if depth > DEEPEST:
+            raise UserError(source, line, "is nested too deeply", f"nest at most {DEEPEST} levels")
+        if id(node) not in sizes:
+            open_nodes.add(id(node))
+            inner = (
+                node.value if isinstance(node, yaml.SequenceNode) else [item for pair in node.value for item in pair]
+            )
+            sizes[id(node)] = 1 + sum(size_of(item, depth + 1) for item in inner)
+            open_nodes.discard(id(node))
+        if sizes[id(node)] > MOST_NODES:
+            remedy = f"write at most {MOST_NODES} keys and values, aliases written out"
+            raise UserError(source, line, "holds too many values", remedy)
+        return sizes[id(node)]
+
+    size_of(root, 0)
 
 
 def _collect_lines(node: Any, place: Place, lines: dict[Place, int], path: Path) -> None:
@@ -106,7 +221,7 @@ def _collect_lines(node: Any, place: Place, lines: dict[Place, int], path: Path)
             line = key.start_mark.line + 1
             if inner in lines:
                 dotted = ".".join(str(part) for part in inner)
-                problem = f"stands already in line {lines[inner]}"
+                problem = f"appears already in line {lines[inner]}"
                 raise UserError(path, f"line {line}, {dotted}", problem, "keep one of the two")
             lines[inner] = line
             _collect_lines(value, inner, lines, path)

@@ -60,7 +60,7 @@ def floor_of(channel: str) -> int | None:
 class Entry(BaseModel):
     """Base of all entries: unknown keys refused, frozen."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class ChannelEntry(Entry):
@@ -168,6 +168,15 @@ class TestEntry(Entry):
             raise ValueError("a name without '/' expected, with at least one letter or digit")
         if len(value) > 120:
             raise ValueError("a name of at most 120 characters expected")
+        return value
+
+    @field_validator("file")
+    @classmethod
+    def _usable_file(cls, value: str) -> str:
+        if not value.strip() or "\0" in value or any(len(part.encode()) > 255 for part in value.split("/")):
+            raise ValueError("a file name expected, at most 255 bytes long")
+        if len(value) > 4000:
+            raise ValueError("a path of at most 4000 characters expected")
         return value
 
     @field_validator("segments_s", mode="before")

@@ -11,7 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from mrpipe.artifacts import config_directory
-from mrpipe.artifacts.yaml_source import YamlSource, nearest, read_yaml
+from mrpipe.artifacts.yaml_source import YamlSource, nearest, parse, read_yaml
 from mrpipe.config.errors import explain, section_of
 from mrpipe.config.model import RunSettings, config_model
 from mrpipe.config.sections.campaigns import LABORATORY, CampaignsSettings
@@ -131,9 +131,9 @@ def _apply(content: dict[str, Any], override: str) -> None:
                 nearest(str(key), list(section.model_fields)),
             )
     try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise UserError("--set", override, "value is not valid YAML", "quote it") from error
+        _, value = parse(text, "--set")
+    except UserError as error:
+        raise UserError("--set", override[:120], f"value: {error.problem}", "put it in quotes") from error
     target = content
     for key in path[:-1]:
         inner = target.setdefault(str(key), {})

@@ -122,7 +122,7 @@ def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: d
     ("change", "expected"),
     [
         ({"file": "three.csv"}, "three.csv: no such file; mend `file`"),
-        ({"role": "test"}, "tests[0].role: is 'test'; Input should be 'training', 'validation' or 'repeat'"),
+        ({"role": "test"}, "tests[0].role: is 'test'; 'training', 'validation' or 'repeat' expected"),
         ({"role": None}, "tests[0].role: is missing"),
         ({"rolle": "x"}, "tests[0].rolle: unknown key"),
         ({"segments_s": [[3, 2]]}, "pairs [begin, end] with begin before end expected"),
@@ -190,7 +190,7 @@ def test_yaml_faults_are_told_with_their_line(tmp_path: Path) -> None:
     directory = campaign(tmp_path)
     text = (directory / "campaign.yaml").read_text()
     (directory / "campaign.yaml").write_text(text + "rig: shear-frame\n")
-    assert "rig: stands already in line 2; keep one" in told(directory)
+    assert "rig: appears already in line 2; keep one" in told(directory)
     (directory / "campaign.yaml").write_text("campaign: [1, 2\nrig: x\n")
     assert "campaign.yaml: line 2" in told(directory)
     (directory / "campaign.yaml").write_text("just words\n")

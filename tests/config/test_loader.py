@@ -22,7 +22,7 @@ FAULTS = {
         "execution:\n  jobs: -2\n",
         "line 2, execution.jobs: is -2; input should be greater than or equal to 0",
     ),
-    "key twice": ("seed: 1\nname: x\nseed: 2\n", "line 3, seed: stands already in line 1; keep one of the two"),
+    "key twice": ("seed: 1\nname: x\nseed: 2\n", "line 3, seed: appears already in line 1; keep one of the two"),
     "no YAML": ("seed: [1\n", "not valid YAML"),
     "no mapping": ("- a\n- b\n", "line 1: is no mapping; write `key: value` lines"),
     "section is a number": ("prepare: 3\n", "line 1, prepare: is 3; input should be a valid dictionary"),
@@ -56,7 +56,7 @@ OVERRIDES = {
     "identify_damper.form=bouc-wenn": "identify_damper.form: is 'bouc-wenn'; input should be 'bouc-wen', ",
     "sweep.neurons=[0]": "--set: sweep.neurons.0: is 0; input should be greater than 0",
     "sweep.layers=[]": "--set: sweep.layers: is []; tuple should have at least 1 item",
-    "seed=[1": "--set: seed=[1: value is not valid YAML; quote it",
+    "seed=[1": "--set: seed=[1: value: not valid YAML",
 }
 
 

@@ -1,0 +1,55 @@
+"""YAML of a stranger: dates, aliases, nesting, tags and large numbers each end in one line."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from mrpipe.artifacts.yaml_source import parse, read_yaml
+from mrpipe.errors import UserError
+
+BILLION_LAUGHS = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{index}: &a{index} [{', '.join([f'*a{index - 1}'] * 10)}]\n" for index in range(1, 12)
+)
+
+HOSTILE = {
+    "billion laughs": (BILLION_LAUGHS, "holds too many values"),
+    "alias within itself": ("about: &a {me: *a}\n", "an alias refers to a mapping that contains it"),
+    "3000 brackets": ("a: " + "[" * 3000 + "]" * 3000, "is nested too deeply"),
+    "100 brackets": ("a: " + "[" * 100 + "]" * 100, "is nested too deeply"),
+    "no integer": ("a: !!int abc\n", "a value cannot be read"),
+    "no truth value": ("a: !!bool maybe\n", "a value cannot be read"),
+    "no float": ("a: !!float x\n", "a value cannot be read"),
+    "5000 digits": (f"a: {'9' * 5000}\n", "a value cannot be read"),
+    "no date": ("a: !!timestamp 2026-30-01\n", "a value cannot be read"),
+    "foreign tag": ("a: !!python/object/apply:os.system [ls]\n", "not valid YAML"),
+    "unhashable key": ("? [1, 2]\n: 3\n", ""),
+    "key twice": ("a: 1\na: 2\n", "line 2, a: appears already in line 1"),
+}
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("case", HOSTILE)
+def test_hostile_yaml_is_one_line_and_fast(tmp_path: Path, case: str) -> None:
+    text, expected = HOSTILE[case]
+    (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
+    begun = time.monotonic()
+    with pytest.raises(UserError) as caught:
+        read_yaml(tmp_path / "a.yaml")
+    assert expected in str(caught.value) and "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500 and time.monotonic() - begun < 5.0
+
+
+@pytest.mark.golden
+def test_dates_stay_text(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("campaign: 2026-30-01\nother: 2026-03-01\n", encoding="utf-8")
+    assert read_yaml(tmp_path / "a.yaml").content == {"campaign": "2026-30-01", "other": "2026-03-01"}
+    assert parse("2026-30-01", "--set")[1] == "2026-30-01"
+
+
+@pytest.mark.golden
+def test_merged_mappings_are_no_repeated_keys(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("base: &b {x: 1, y: 2}\nown: {<<: *b, x: 3}\n", encoding="utf-8")
+    assert read_yaml(tmp_path / "a.yaml").content["own"] == {"x": 3, "y": 2}

@@ -1,0 +1,116 @@
+"""200 mutated campaign files and configurations: each is read, or refused in one line, and soon."""
+
+from __future__ import annotations
+
+import copy
+import random
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from mrpipe.campaigns import load_campaign
+from mrpipe.campaigns.plausibility import judge
+from mrpipe.config.loader import load_config
+from mrpipe.errors import UserError
+from tests.campaigns.builders import campaign, content
+
+NASTY: list[Any] = [
+    None,
+    True,
+    0,
+    -1,
+    10**400,
+    1e308,
+    float("inf"),
+    float("nan"),
+    "",
+    ".",
+    "..",
+    "/",
+    "\0",
+    "x" * 3000,
+    "9**9**9**9 N",
+    "2026-30-01",
+    "*.csv",
+    [],
+    {},
+    [[1, 0], [0, 5]],
+    [[0, 2], [1, 3]],
+    ["backlsh"],
+    {"value": float("nan"), "unit": "N"},
+    {"column": True, "unit": "N"},
+    {"column": [1], "unit": ["N"]},
+    {1: 2},
+]
+
+CONFIG: dict[str, Any] = {
+    "name": "x",
+    "seed": 1,
+    "stages": ["prepare", "report"],
+    "campaigns": {"bench": "data", "frame": None, "closed_loop": None},
+    "prepare": {"working_rate_hz": 0, "cutoff_hz": 100, "phase": "zero", "corrections": {"force_offset_n": {"a": 1}}},
+    "report": {"formats": ["html"], "title": "x"},
+    "close_loop": {"candidates": ["backlash"], "effect_files": []},
+}
+
+
+def _places(value: Any, place: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    found = [place] if place else []
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        found += _places(inner, (*place, key))
+    return found
+
+
+def _mutated(base: dict[str, Any], seed: int) -> dict[str, Any]:
+    rng = random.Random(seed)
+    changed = copy.deepcopy(base)
+    for _ in range(rng.randint(1, 2)):
+        *way, last = rng.choice(_places(changed))
+        target = changed
+        for key in way:
+            target = target[key]
+        if rng.random() < 0.2:
+            del target[last]
+        elif rng.random() < 0.2 and isinstance(target, dict):
+            target[f"{last}x"] = target.pop(last)
+        else:
+            target[last] = copy.deepcopy(rng.choice(NASTY))
+        if not changed:
+            break
+    return changed
+
+
+def _told_or_read(read: Any, *arguments: Any) -> None:
+    begun = time.monotonic()
+    try:
+        read(*arguments)
+    except UserError as error:
+        assert "\n" not in str(error) and len(str(error)) < 6000
+    assert time.monotonic() - begun < 10.0
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("block", range(6))
+def test_mutated_campaign_files(tmp_path: Path, block: int) -> None:
+    folder = campaign(tmp_path)
+
+    def read() -> None:
+        judge(load_campaign(folder))
+
+    for seed in range(20 * block, 20 * block + 20):
+        text = yaml.safe_dump(_mutated(content(), seed), sort_keys=False)
+        (folder / "campaign.yaml").write_text(text, encoding="utf-8")
+        _told_or_read(read)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("block", range(4))
+def test_mutated_configurations(tmp_path: Path, block: int) -> None:
+    path = tmp_path / "x.yaml"
+    for seed in range(20 * block, 20 * block + 20):
+        path.write_text(yaml.safe_dump(_mutated(CONFIG, seed), sort_keys=False), encoding="utf-8")
+        _told_or_read(load_config, path)
