@@ -102,34 +102,10 @@ def _print_run(pipeline: Pipeline, content: dict[str, Any]) -> None:
 
 
 def _write_report(pipeline: Pipeline) -> list[Path]:
-    from mrpipe.pipeline.manifest import Manifest
-    from mrpipe.pipeline.parts import read_part
-    from mrpipe.reporting.page import ReportStage, write_report
+    from mrpipe.pipeline.report import run_facts
+    from mrpipe.reporting.page import write_report
 
-    directory = pipeline.run_directory
-    parts = []
-    for name, stage in pipeline.stages.items():
-        manifest = Manifest.load(directory / "manifests", name)
-        if manifest is None:
-            continue
-        items = read_part(directory, name)
-        parts.append(
-            ReportStage(
-                name, stage.summary, items, manifest.summary, manifest.warnings, manifest.skipped, manifest.seconds
-            )
-        )
-    config = pipeline.loaded.config
-    if not parts:
-        raise UserError(
-            directory, "", "no stage has run here", "run `mrpipe run` first, or name the directory with --run"
-        )
-    return write_report(
-        directory,
-        title=config.report.title or config.name,
-        description=config.description,
-        stages=parts,
-        formats=config.report.formats,
-    )
+    return write_report(run_facts(pipeline), pipeline.loaded.config.report.formats)
 
 
 @with_common_options("campaign", "jobs", "seed", "force")
@@ -138,6 +114,7 @@ def report(
     directory: Annotated[
         Path | None, typer.Argument(metavar="RUN", help="Run directory. Default: runs/<name of the config>.")
     ] = None,
+    summary: Annotated[bool, typer.Option("--summary", help="Also print the first screen of the report.")] = False,
 ) -> None:
     """Write the report of a run (HTML and Markdown)."""
     from dataclasses import replace
@@ -151,10 +128,16 @@ def report(
     loaded = load(options)
     if not run_directory(options, loaded).is_dir():
         raise UserError(run_directory(options, loaded), "", "no such run directory", "run `mrpipe run` first")
-    paths = _write_report(pipeline_of(options, loaded))
+    pipeline = pipeline_of(options, loaded)
+    paths = _write_report(pipeline)
     if options.json:
         print_json({"report": [str(path) for path in paths]})
     else:
+        if summary:
+            from mrpipe.pipeline.report import run_facts
+            from mrpipe.reporting.page import first_screen
+
+            print("\n".join(first_screen(run_facts(pipeline))), end="\n\n")
         for path in paths:
             print(f"report: {path}")
 

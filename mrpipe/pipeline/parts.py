@@ -36,11 +36,11 @@ class PartWriter:
         self.items.append({"kind": "table", "file": file, "caption": caption})
 
     def figure(self, name: str, figure: Figure, caption: str) -> None:
-        """Add a figure and save it as PNG."""
-        file = f"figures/{self.stage}-{name}.png"
-        with atomic_path(self.run_directory / file) as temporary:
-            # no time stamp or version inside, so that the same figure is the same file
-            figure.savefig(temporary, format="png", dpi=120, metadata={"Software": None})
+        """Add a figure and save it as SVG."""
+        from mrpipe.reporting.style import as_svg
+
+        file = f"figures/{self.stage}-{name}.svg"
+        atomic_write_text(self.run_directory / file, f'<?xml version="1.0" encoding="utf-8"?>\n{as_svg(figure)}')
         self.items.append({"kind": "figure", "file": file, "caption": caption})
 
     @property

@@ -1,4 +1,7 @@
-"""The report: one HTML file that opens offline, and the same in Markdown."""
+"""The report: one HTML file that opens offline, and the same in Markdown.
+
+It answers first (:mod:`mrpipe.reporting.front`); what each stage did follows in an appendix.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,6 @@ import base64
 import html
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,32 +17,42 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup
 
 from mrpipe.artifacts import atomic_write_text
+from mrpipe.reporting.facts import ReportStage, RunFacts
+from mrpipe.reporting.front.sections import sections
+from mrpipe.reporting.front.statements import statements
+from mrpipe.reporting.words import number
+from mrpipe.reporting.writer import Section
+
+__all__ = ["ReportStage", "RunFacts", "first_screen", "write_report"]
 
 _ROWS_SHOWN = 15
 
 
-@dataclass(frozen=True)
-class ReportStage:
-    """One stage's part: what it left, its summary, its warnings, or why it was skipped."""
-
-    name: str
-    about: str
-    items: Sequence[Mapping[str, Any]]
-    summary: Mapping[str, Any]
-    warnings: Sequence[str]
-    skipped: str
-    seconds: float
+def first_screen(facts: RunFacts) -> list[str]:
+    """Return the first screen as lines for a terminal."""
+    head = [facts.title, _source_line(facts), ""]
+    width = 11
+    return head + [f"{item.topic:{width}}{item.text.replace('**', '')}" for item in statements(facts)]
 
 
-def write_report(
-    directory: Path, *, title: str, description: str, stages: Sequence[ReportStage], formats: Sequence[str]
-) -> list[Path]:
+def _source_line(facts: RunFacts) -> str:
+    from mrpipe import __version__
+
+    parts = [
+        f"campaign {' and '.join(facts.campaigns)}" if facts.campaigns else "",
+        facts.date,
+        f"mrpipe {__version__}",
+    ]
+    return " - ".join(part for part in parts if part)
+
+
+def write_report(facts: RunFacts, formats: Sequence[str]) -> list[Path]:
     """Write report.html and report.md of a run directory.
 
     Parameters
     ----------
-    directory
-        Run directory; figures and tables are read from it.
+    facts
+        The run.
     formats
         `html`, `markdown` or both.
 
@@ -48,7 +60,6 @@ def write_report(
     -------
     The files written.
     """
-    from mrpipe import __version__
     from mrpipe.reporting.headlines import headline
 
     environment = Environment(
@@ -57,36 +68,65 @@ def write_report(
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    front = sections(facts)
     content = {
-        "title": title,
-        "description": description,
-        "version": __version__,
+        "title": facts.title,
+        "source": _source_line(facts),
+        "description": facts.description,
+        "sections": front,
         "stages": [
             {"part": stage, "headline": stage.skipped or headline(stage.name, stage.summary), "anchor": stage.name}
-            for stage in stages
+            for stage in facts.stages
         ],
     }
     written = []
     if "html" in formats:
-        environment.filters["item"] = lambda item: _item_html(directory, item)
-        atomic_write_text(directory / "report.html", environment.get_template("report.html").render(content))
-        written.append(directory / "report.html")
+        environment.filters["item"] = lambda item: _item_html(facts.directory, item)
+        text = environment.get_template("report.html").render(content)
+        atomic_write_text(facts.directory / "report.html", text)
+        written.append(facts.directory / "report.html")
     if "markdown" in formats:
-        environment.filters["item"] = lambda item: _item_markdown(directory, item)
+        _save_figures(facts.directory, front)
+        environment.filters["item"] = lambda item: _item_markdown(facts.directory, item)
         text = environment.get_template("report.md").render(content)
-        atomic_write_text(directory / "report.md", re.sub(r"\n{3,}", "\n\n", text))
-        written.append(directory / "report.md")
+        atomic_write_text(facts.directory / "report.md", re.sub(r"\n{3,}", "\n\n", text))
+        written.append(facts.directory / "report.md")
     return written
 
 
+def _save_figures(directory: Path, front: Sequence[Section]) -> None:
+    """Save the figures of the sections, to which the Markdown report links."""
+    for section in front:
+        for item in section.items:
+            if item["kind"] == "figure":
+                item["file"] = f"figures/{section.anchor}-{item['name']}.svg"
+                atomic_write_text(directory / item["file"], _standalone(item["svg"]))
+
+
+def _standalone(svg: str) -> str:
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg}'
+
+
+# --- HTML ------------------------------------------------------------------------------------------------------------
 def _item_html(directory: Path, item: Mapping[str, Any]) -> Markup:
-    if item["kind"] == "text":
+    kind = item["kind"]
+    if kind == "text":
         return Markup(f"<p>{_inline(str(item['text']))}</p>")
+    if "lines" in item:
+        rows = "".join(f"<li>{_inline(line)}</li>" for line in item["lines"])
+        return Markup(f"<ul class='{kind}'>{rows}</ul>")
     caption = _inline(str(item["caption"]))
+    if "svg" in item:
+        return _figure_html(str(item["svg"]), str(item["caption"]))
+    if "frame" in item:
+        table = _table_html(item["frame"])
+        return Markup(f"<div class='table'><p class='caption'>{caption}</p><div class='scroll'>{table}</div></div>")
     path = directory / str(item["file"])
     if not path.is_file():
-        return Markup(f"<p class='missing'>{html.escape(str(item['file']))} is gone: build the stage again.</p>")
-    if item["kind"] == "figure":
+        return Markup(f"<p class='missing'>{html.escape(str(item['file']))} is missing: build the stage again.</p>")
+    if kind == "figure":
+        if path.suffix == ".svg":
+            return _figure_html(path.read_text(encoding="utf-8"), str(item["caption"]))
         data = base64.b64encode(path.read_bytes()).decode("ascii")
         alt = html.escape(str(item["caption"]), quote=True)
         return Markup(
@@ -94,40 +134,71 @@ def _item_html(directory: Path, item: Mapping[str, Any]) -> Markup:
         )
     frame = _table(path)
     more = f" ({len(frame)} rows, the first {_ROWS_SHOWN} shown)" if len(frame) > _ROWS_SHOWN else ""
-    link = html.escape(str(item["file"]), quote=True)
-    table = frame.head(_ROWS_SHOWN).to_html(index=False, border=0, na_rep="-", justify="left", float_format=_number)
+    name = html.escape(str(item["file"]))
     return Markup(
-        f"<div class='table'><p class='caption'>{caption}{more} <a href='{link}'>{link}</a></p>"
-        f"<div class='scroll'>{table}</div></div>"
+        f"<div class='table'><p class='caption'>{caption}{more} <code>{name}</code></p>"
+        f"<div class='scroll'>{_table_html(frame.head(_ROWS_SHOWN))}</div></div>"
     )
 
 
+def _table_html(frame: pd.DataFrame) -> str:
+    """Return a table whose numbers, and texts that are numbers, are aligned to the right."""
+    table = frame.to_html(index=False, border=0, na_rep="-", justify="left", float_format=_four_digits)
+    return re.sub(r"<td>(-|[-+]?[\d.]+(?:e[-+]?\d+)?)</td>", r"<td class='number'>\1</td>", table)
+
+
+def _figure_html(svg: str, caption: str) -> Markup:
+    svg = svg[svg.index("<svg") :]
+    # the width is that of the page; the height follows from the view box
+    start = svg.index(">")
+    svg = re.sub(r'\s(?:width|height)="[\d.]+pt"', "", svg[:start]) + svg[start:]
+    box = re.search(r'viewBox="[\d.]+ [\d.]+ ([\d.]+) ', svg)
+    width = round(float(box.group(1)) * 96.0 / 72.0) if box else 640
+    alt = html.escape(caption, quote=True)
+    return Markup(
+        f"<figure><div class='scroll'><div class='drawing' role='img' aria-label='{alt}' style='max-width:{width}px'>"
+        f"{svg}</div></div><figcaption>{_inline(caption)}</figcaption></figure>"
+    )
+
+
+# --- Markdown --------------------------------------------------------------------------------------------------------
 def _item_markdown(directory: Path, item: Mapping[str, Any]) -> str:
-    if item["kind"] == "text":
+    kind = item["kind"]
+    if kind == "text":
         return f"{item['text']}\n"
-    path = directory / str(item["file"])
-    if item["kind"] == "figure":
+    if "lines" in item:
+        return "\n".join(f"- {line}" for line in item["lines"]) + "\n"
+    if kind == "figure":
         return f"![{item['caption']}]({item['file']})\n\n*{item['caption']}*\n"
+    if "frame" in item:
+        return f"*{item['caption']}*\n\n{_markdown_table(item['frame'])}\n"
+    path = directory / str(item["file"])
     if not path.is_file():
-        return f"{item['file']} is gone: build the stage again.\n"
-    frame = _table(path).head(_ROWS_SHOWN)
+        return f"{item['file']} is missing: build the stage again.\n"
+    return (
+        f"*{item['caption']}* ([{item['file']}]({item['file']}))\n\n{_markdown_table(_table(path).head(_ROWS_SHOWN))}\n"
+    )
+
+
+def _markdown_table(frame: pd.DataFrame) -> str:
     rows = ["| " + " | ".join(str(name) for name in frame.columns) + " |", "|" + " --- |" * len(frame.columns)]
     for values in frame.itertuples(index=False):
         rows.append("| " + " | ".join(_cell(value) for value in values) + " |")
-    return f"*{item['caption']}* ([{item['file']}]({item['file']}))\n\n" + "\n".join(rows) + "\n"
+    return "\n".join(rows)
 
 
 def _table(path: Path) -> pd.DataFrame:
-    return pd.read_csv(path, keep_default_na=True)
+    # only an empty cell is missing: the unit N/A (newton per ampere) and the text "None" are not
+    return pd.read_csv(path, keep_default_na=False, na_values=[""])
 
 
-def _number(value: float) -> str:
-    return f"{value:.4g}"
+def _four_digits(value: float) -> str:
+    return number(value, 4)
 
 
 def _cell(value: Any) -> str:
     if isinstance(value, float):
-        return "-" if value != value else _number(value)
+        return _four_digits(value)
     return str(value).replace("|", "\\|")
 
 

@@ -1,18 +1,28 @@
-"""The look that all figures share."""
+"""The look that all figures share: one colour scheme that colour-blind readers can tell apart, and vector graphics.
+
+The colours are those of Okabe and Ito, "Color Universal Design" (2008).
+"""
 
 from __future__ import annotations
 
+import io
+import re
 from typing import Any
 
+import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-MEASURED = "#444444"
+MEASURED = "#333333"
 """Colour of what was measured."""
-MODEL = "#c1432e"
-"""Colour of what the model says."""
-COLOURS = ("#1f5a99", "#c1432e", "#3f8f4f", "#8a5aa8", "#c98a1b", "#4f9da6", "#7a4b2a", "#9a9a9a")
-"""Colours of several curves, in order; told apart by people who do not see red and green."""
+MODEL = "#d55e00"
+"""Colour of a model, and of the model before an effect is added."""
+AFTER = "#0072b2"
+"""Colour of the model after the effects are added."""
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
+"""Colours of several curves, in order."""
+
+_SVG = {"svg.fonttype": "none", "svg.hashsalt": "mrpipe", "path.simplify_threshold": 0.5}
 
 
 def figure_with_axes(rows: int = 1, columns: int = 1, *, width: float = 9.0, height: float = 3.4) -> tuple[Figure, Any]:
@@ -39,3 +49,18 @@ def label(axis: Axes, x: str, y: str, title: str = "") -> None:
     axis.set_ylabel(y, fontsize=8)
     if title:
         axis.set_title(title, fontsize=9)
+
+
+def as_svg(figure: Figure) -> str:
+    """Return a figure as an SVG element without time stamp, so that the same figure is the same text.
+
+    Texts stay texts (searchable, small); coordinates are rounded to a hundredth of a point.
+    """
+    buffer = io.StringIO()
+    with matplotlib.rc_context(_SVG):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r"(\d+\.\d{2})\d+", r"\1", text)
+    return re.sub(r"\n\s*", "\n", text)

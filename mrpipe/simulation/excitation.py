@@ -77,7 +77,12 @@ def harmonic(
         (settling_cycles * period, stop),
         stop if decay_s > 0.0 else math.nan,
         omega,
-        {"kind": "harmonic", "base_amplitude_m_s2": amplitude_m_s2, "frequency_rad_s": omega},
+        {
+            "kind": "harmonic",
+            "base_amplitude_m_s2": amplitude_m_s2,
+            "frequency_rad_s": omega,
+            "steady_s": [settling_cycles * period, stop],
+        },
     )
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from mrpipe.pipeline.parts import PartWriter, read_part
-from mrpipe.reporting.page import ReportStage, write_report
+from mrpipe.reporting.page import ReportStage, RunFacts, write_report
 from mrpipe.reporting.style import figure_with_axes
 
 
@@ -30,9 +30,9 @@ def stages(tmp_path: Path) -> list[ReportStage]:
 
 
 def test_html_is_one_offline_file(tmp_path: Path, stages: list[ReportStage]) -> None:
-    (path,) = write_report(tmp_path, title="T & x", description="", stages=stages, formats=["html"])
+    (path,) = write_report(RunFacts(tmp_path, "T & x", "", stages), ["html"])
     text = path.read_text(encoding="utf-8")
-    assert "data:image/png;base64," in text
+    assert "<svg" in text and "<metadata" not in text
     assert re.findall(r"(?:src|href)=['\"]https?:", text) == []
     assert "<script" not in text
     assert "<code>100 Hz</code>" in text
@@ -43,9 +43,9 @@ def test_html_is_one_offline_file(tmp_path: Path, stages: list[ReportStage]) -> 
 
 
 def test_markdown_shows_tables_and_figures(tmp_path: Path, stages: list[ReportStage]) -> None:
-    (path,) = write_report(tmp_path, title="T", description="d", stages=stages, formats=["markdown"])
+    (path,) = write_report(RunFacts(tmp_path, "T", "d", stages), ["markdown"])
     text = path.read_text(encoding="utf-8")
-    assert "![A loop & more](figures/prepare-loop.png)" in text
+    assert "![A loop & more](figures/prepare-loop.svg)" in text
     assert "| 1a\\|x | 12.35 |" in text
     assert "Skipped: there is no frame campaign" in text
 
@@ -56,11 +56,11 @@ def test_same_figure_is_the_same_file(tmp_path: Path) -> None:
         figure, axes = figure_with_axes()
         axes[0, 0].plot([0, 1], [0, 1])
         PartWriter(name, tmp_path).figure("f", figure, "")
-        contents.append((tmp_path / "figures" / f"{name}-f.png").read_bytes())
+        contents.append((tmp_path / "figures" / f"{name}-f.svg").read_bytes())
     assert contents[0] == contents[1]
 
 
 def test_missing_figure_is_said(tmp_path: Path, stages: list[ReportStage]) -> None:
-    (tmp_path / "figures" / "prepare-loop.png").unlink()
-    (path,) = write_report(tmp_path, title="T", description="", stages=stages, formats=["html"])
-    assert "is gone: build the stage again" in path.read_text(encoding="utf-8")
+    (tmp_path / "figures" / "prepare-loop.svg").unlink()
+    (path,) = write_report(RunFacts(tmp_path, "T", "", stages), ["html"])
+    assert "is missing: build the stage again" in path.read_text(encoding="utf-8")

@@ -1,0 +1,385 @@
+"""The six sections before the appendix, made from the summaries and artifacts of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mrpipe.artifacts import Artifact
+from mrpipe.reporting.facts import RunFacts
+from mrpipe.reporting.front import figures, statements
+from mrpipe.reporting.front import laws as law_facts
+from mrpipe.reporting.front.figures import TestRun
+from mrpipe.reporting.words import number, percent, plain, quantity, readable_unit
+from mrpipe.reporting.writer import Section
+
+_POINTS_OF_A_LOOP = 700
+_POINTS_OF_A_CURVE = 1500
+
+
+def sections(facts: RunFacts) -> list[Section]:
+    """Return the sections that have something to say."""
+    made = [make(facts) for make in (result, trust, damper, structure, control, next_steps)]
+    return [section for section in made if section.items]
+
+
+def result(facts: RunFacts) -> Section:
+    """Return the first screen: answers in sentences, and two or three figures."""
+    section = Section("result", "Result")
+    section.points([f"**{item.topic}.** {item.text}" for item in statements.statements(facts)], kind="answers")
+    rows = statements.model_errors(facts)
+    if len(rows) > 1:
+        section.figure("errors", figures.model_errors(rows), "Error of the models on tests that no fit has seen.")
+    shown = _shown_tests(facts)
+    if shown:
+        section.figure(
+            "loop", figures.loop(shown[0]), f"Validation test {shown[0].name}: measured, model before and after."
+        )
+    runs = law_facts.comparison(facts)
+    if runs:
+        section.figure("laws", figures.law_bars(runs), "Response of the structure by control law.")
+    return section
+
+
+def trust(facts: RunFacts) -> Section:
+    """Return what speaks for and against the models."""
+    section = Section("trust", "Trust")
+    section.points(statements.doubts(facts), kind="warnings")
+    rows = [
+        {"model": name, "error on unseen tests [%]": number(100.0 * value)}
+        for name, value, _ in statements.model_errors(facts)
+    ]
+    section.table("errors", pd.DataFrame(rows), "RMS error over RMS force on the validation tests.")
+    loop = facts.summary("close-loop")
+    if "before" in loop:
+        ceiling = loop.get("ceiling") or {}
+        recovered = ceiling.get("recovered")
+        text = f"Noise alone causes an error of {percent(loop['noise_floor_nrmse'])} "
+        text += f"(estimated from {loop.get('noise_from', 'the sensors')})."
+        if statements.proper_effects(loop) and recovered is not None:
+            text += f" The named effects recover {percent(recovered)} of what a flexible model of the residual can."
+        section.text(text)
+        section.table("rivals", _rivals(loop), "Effects that were tried, each alone with all parameters fitted again.")
+        section.table("forms", _forms(loop), "Base forms that were tried, error on the validation tests.")
+    inverse = facts.summary("train-inverse")
+    if inverse.get("round_trip_nrmse") is not None:
+        section.text(
+            f"Inverse and forward network in series (force to drive to force) miss the desired force by "
+            f"{percent(inverse['round_trip_nrmse'])}."
+        )
+    if loop.get("tests"):
+        section.figure(
+            "tests",
+            _errors_per_test(loop),
+            "Error of the validation tests before and after; the largest errors where there are many tests.",
+        )
+    return section
+
+
+def _errors_per_test(loop: Mapping[str, Any]) -> Any:
+    from mrpipe.reporting.bench_tracing import errors_per_test
+
+    return errors_per_test(loop["tests"], loop["noise_floor_nrmse"])
+
+
+def _rivals(loop: Mapping[str, Any]) -> pd.DataFrame:
+    return pd.DataFrame(
+        [
+            {
+                "effect": item["name"],
+                "form": item.get("form", ""),
+                "recovers [%]": f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
+                "error then [%]": number(100.0 * item["nrmse"]) if item.get("nrmse") is not None else "-",
+            }
+            for item in loop.get("candidates", [])[:8]
+        ]
+    )
+
+
+def _forms(loop: Mapping[str, Any]) -> pd.DataFrame:
+    errors = (loop.get("base_form") or {}).get("nrmse") or {}
+    rows = [
+        {"base form": name, "error [%]": number(100.0 * value)}
+        for name, value in sorted(errors.items(), key=lambda item: item[1] if item[1] is not None else np.inf)
+        if value is not None
+    ]
+    return pd.DataFrame(rows if len(rows) > 1 else [])
+
+
+def damper(facts: RunFacts) -> Section:
+    """Return the damper model: parameters, effects, loops, and the residual over what explains it."""
+    section = Section("damper", "Damper")
+    summary, loop = facts.summary("identify-damper"), facts.summary("close-loop")
+    if "parameters" in summary:
+        section.text(
+            f"Model {summary['form']}: error {percent(summary['validation_nrmse'])} on the validation tests, "
+            f"{percent(summary['training_nrmse'])} on the training tests; drive up to "
+            f"{quantity(summary['drive_limit'], summary['drive_unit'])}."
+        )
+        section.table("parameters", _parameters(summary["parameters"]), "Parameters with standard errors (SI).")
+    effects = statements.proper_effects(loop)
+    for effect in effects:
+        section.text(f"**{effect['name']}** ({effect.get('form', '')}). {effect.get('physics', '')}")
+    section.table("effects", _effects(effects), "Effects that the model lacks, with 95 % intervals.")
+    if loop.get("candidates"):
+        section.figure(
+            "candidates",
+            figures.candidate_shares(loop["candidates"], [effect["name"] for effect in effects]),
+            "Share of the recoverable residual that each effect recovers alone; named effects in blue.",
+        )
+    shown = _shown_tests(facts)
+    if shown:
+        section.figure(
+            "loops",
+            figures.loops(shown),
+            "Validation tests: the one that gains most, one with a middling error, and the one with the largest error "
+            "after. The models run freely, without the measured force.",
+        )
+    artifact = facts.artifact("close-loop.h5")
+    if artifact is not None and "validation" in artifact.members("/"):
+        variables, before, after = _residual(artifact, str(summary.get("drive_unit") or "A"))
+        section.figure(
+            "residual",
+            figures.residual_over(variables, before, after),
+            "Residual of the validation tests over the variables that may explain it: mean and middle 80 %.",
+        )
+    return section
+
+
+def _parameters(parameters: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    rows = []
+    for name, entry in parameters.items():
+        error = entry.get("standard_error")
+        rows.append(
+            {
+                "parameter": plain(name),
+                "value": number(entry["value"], 4),
+                "±": number(error, 2) if error is not None else "fixed",
+                "unit": readable_unit(entry["unit"]),
+                "note": "at its bound" if entry.get("at_bound") else "",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _effects(effects: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    rows = []
+    for effect in effects:
+        for name, entry in effect["parameters"].items():
+            if entry.get("value") is None:
+                continue
+            low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
+            rows.append(
+                {
+                    "effect": effect["name"] + (f" at {effect['place']}" if effect.get("place") else ""),
+                    "parameter": plain(name),
+                    "value": number(entry["value"], 3),
+                    "from": number(low, 3),
+                    "to": number(high, 3),
+                    "unit": readable_unit(entry["unit"]),
+                    "confidence": number(effect["confidence"], 2),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def _residual(artifact: Artifact, drive_unit: str) -> tuple[list[tuple[str, Any]], Any, Any]:
+    """Return the variables, and the residual before and after, of the validation tests."""
+    measured = artifact.array("validation/measured")
+    drive = artifact.array("validation/drive")
+    variables = [
+        ("displacement [mm]", 1e3 * artifact.array("validation/displacement")),
+        ("velocity [mm/s]", 1e3 * artifact.array("validation/velocity")),
+    ]
+    if float(np.ptp(drive)) > 0.0:
+        variables.append((f"drive [{drive_unit}]", drive))
+    variables.append(("time in test [s]", artifact.array("validation/time")))
+    return variables, measured - artifact.array("validation/before"), measured - artifact.array("validation/after")
+
+
+def _shown_tests(facts: RunFacts) -> list[TestRun]:
+    """Return the validation tests to draw: gains most, middling error, largest error after; about two cycles each."""
+    artifact, loop = facts.artifact("close-loop.h5"), facts.summary("close-loop")
+    if artifact is None or not loop.get("tests") or "validation" not in artifact.members("/"):
+        return []
+    names, starts = artifact.json("validation/names"), artifact.array("validation/starts").astype(int)
+    rows = {row["name"]: row for row in loop["tests"] if row["name"] in names}
+    if not rows:
+        return []
+    gains = sorted(rows, key=lambda name: rows[name]["nrmse_after"] - rows[name]["nrmse_before"])
+    left = sorted(rows, key=lambda name: rows[name]["nrmse_after"])
+    chosen = list(dict.fromkeys([gains[0], left[len(left) // 2], left[-1]]))
+    return [_test_run(artifact, name, names.index(name), starts) for name in chosen]
+
+
+def _test_run(artifact: Artifact, name: str, index: int, starts: Any) -> TestRun:
+    piece = slice(int(starts[index]), int(starts[index + 1]))
+    displacement = artifact.array("validation/displacement")[piece]
+    centred = displacement - np.mean(displacement)
+    ups = np.flatnonzero((centred[:-1] <= 0.0) & (centred[1:] > 0.0))
+    middle = len(ups) // 2
+    first, last = (int(ups[middle - 1]), int(ups[middle + 1])) if 0 < middle < len(ups) - 1 else (0, len(displacement))
+    rows = np.arange(first, last)[:: max(1, (last - first) // _POINTS_OF_A_LOOP)]
+    channels = {
+        key: artifact.array(f"validation/{key}")[piece][rows]
+        for key in ("displacement", "velocity", "drive", "time", "measured", "before", "after")
+    }
+    return TestRun(name, **channels)
+
+
+def structure(facts: RunFacts) -> Section:
+    """Return the structure: modes, mode shapes on the frame, frequency response, storey stiffnesses."""
+    section = Section("structure", "Structure")
+    summary = facts.summary("identify-frame")
+    if "frequencies_hz" not in summary:
+        return section
+    section.text(statements.structure(facts))
+    rows = []
+    for mode, frequency in enumerate(summary["frequencies_hz"]):
+        low, high = summary["frequency_intervals_hz"][mode]
+        damped = summary["damping_ratio_intervals"][mode]
+        rows.append(
+            {
+                "mode": mode + 1,
+                "frequency [Hz]": number(frequency, 4),
+                "± [Hz]": number(0.5 * (high - low), 2),
+                "damping ratio [%]": number(100.0 * summary["damping_ratios"][mode]),
+                "from [%]": number(100.0 * damped[0]),
+                "to [%]": number(100.0 * damped[1]),
+                "MAC of the model": number(summary["mac"][mode], 4),
+            }
+        )
+    section.table("modes", pd.DataFrame(rows), "Modes with 95 % intervals.")
+    shapes = np.asarray(summary["mode_shapes"], dtype=np.float64)
+    section.figure(
+        "shapes",
+        figures.shapes_on_frame(shapes, summary["frequencies_hz"], summary["damping_ratios"]),
+        "Mode shapes drawn on the frame.",
+    )
+    stiffness, intervals = summary.get("storey_stiffnesses_n_m"), summary.get("storey_stiffness_intervals_n_m")
+    if stiffness:
+        storeys = [
+            {
+                "storey": storey + 1,
+                "stiffness [kN/m]": number(1e-3 * value, 4),
+                "± [kN/m]": number(0.5e-3 * (intervals[storey][1] - intervals[storey][0]), 2) if intervals else "-",
+            }
+            for storey, value in enumerate(stiffness)
+        ]
+        section.table("storeys", pd.DataFrame(storeys), "Stiffness of each storey with its 95 % interval.")
+    artifact = facts.artifact("frame.h5")
+    if artifact is not None and "responses" in artifact.members("/"):
+        frequency = artifact.array("responses/frequency")
+        step = slice(None, None, max(1, len(frequency) // _POINTS_OF_A_CURVE))
+        curves = [
+            artifact.array(f"responses/{kind}_real")[step, -1]
+            + 1j * artifact.array(f"responses/{kind}_imaginary")[step, -1]
+            for kind in ("measured", "synthesised")
+        ]
+        section.figure(
+            "response",
+            figures.frequency_response(frequency[step], curves[0], curves[1], shapes.shape[0]),
+            "Frequency response of the top floor.",
+        )
+    return section
+
+
+def control(facts: RunFacts) -> Section:
+    """Return one comparison of all laws, their last cycles, and prediction against measurement."""
+    section = Section("control", "Control")
+    runs = law_facts.comparison(facts)
+    loop = facts.summary("close-loop").get("closed_loop") or {}
+    if runs:
+        section.text(law_facts.answer(facts))
+        section.table("laws", _laws(facts, runs), "All laws under the same base motion; accelerations are absolute.")
+        histories: dict[str, law_facts.History] = {}
+        for run in runs:
+            artifact = facts.artifact(f"response-{run.law}.h5")
+            if artifact is not None and len(histories) < 6:
+                histories[run.law] = law_facts.last_cycles(artifact, facts.laws[run.law])
+        section.figure("cycles", figures.last_cycles(histories), "The last three cycles under each law.")
+    measured = [item for item in loop.get("laws", []) if item.get("measured")]
+    if measured:
+        error = loop.get("rms_x_top_error") or {}
+        section.text(
+            f"Against the recordings of the closed loop, the model misses the RMS top displacement by "
+            f"{percent(error.get('before'))} before and {percent(error.get('after'))} after the effect is added."
+        )
+        section.figure(
+            "measured",
+            figures.measured_and_predicted(loop),
+            "Closed loop: recorded, and predicted before and after.",
+        )
+    return section
+
+
+def _laws(facts: RunFacts, runs: Sequence[law_facts.LawRun]) -> pd.DataFrame:
+    bare = next((run for run in runs if run.law == law_facts.UNCONTROLLED), None)
+    gains = facts.summary("calibrate").get("laws") or {}
+    rows = []
+    for run in runs:
+        entry = gains.get(run.law) or {}
+        shown = [
+            f"{name} = {quantity(entry[key], unit)}"
+            for name, key, unit in (("c", "c_n_s_m", "N s/m"), ("k", "k_n_m", "N/m"), ("α", "alpha_n_m", "N/m"))
+            if entry.get(key)
+        ]
+        change = 100.0 * (run.rms_top_m / bare.rms_top_m - 1.0) if bare and run is not bare else float("nan")
+        rows.append(
+            {
+                "law": run.law,
+                "gains": ", ".join(shown),
+                "RMS top [mm]": number(1e3 * run.rms_top_m),
+                "change [%]": number(change),
+                "RMS floor 1 [mm]": number(1e3 * run.rms_first_m),
+                "RMS a top [m/s²]": number(run.rms_a_top_m_s2),
+                "RMS a floor 1 [m/s²]": number(run.rms_a_first_m_s2),
+                "peak force [N]": number(run.peak_force_n),
+                "damping ratio [%]": number(100.0 * run.damping_ratio, 2),
+                "extrapolated [% of time]": number(100.0 * run.outside_share, 2),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def next_steps(facts: RunFacts) -> Section:
+    """Return what to test and to repair next, and which files to use."""
+    section = Section("next", "Next steps")
+    loop = facts.summary("close-loop")
+    text = statements.next_tests(facts)
+    if text:
+        section.text(text)
+    wanted = loop.get("next_tests") or {}
+    if wanted.get("tests"):
+        frame = pd.DataFrame(wanted["tests"])
+        frame = frame.drop(columns=[name for name in ("later",) if name in frame])
+        section.table("tests", frame, f"Tests that would decide what is open ({wanted['file']}).")
+    remedies = [
+        f"{effect['name']}: {effect['remedy']}" for effect in statements.proper_effects(loop) if effect.get("remedy")
+    ]
+    if remedies:
+        section.text("On the rig:")
+        section.points(remedies)
+    if (loop.get("corrections") or {}).get("found"):
+        section.text(
+            f"Faults of sensors were found. `mrpipe run --settings {loop['corrections']['file']}` removes them from "
+            "the recordings and repeats the analysis."
+        )
+    files = [(file, use) for file, use in _FILES if (facts.directory / file).exists()]
+    section.points([f"`{file}`: {use}" for file, use in files])
+    return section
+
+
+_FILES: tuple[tuple[str, str], ...] = (
+    ("damper-traced.h5", "damper model with the traced effects"),
+    ("damper.h5", "damper model, parameters with covariance"),
+    ("forward.h5", "forward network: motion and drive to force"),
+    ("inverse.h5", "inverse network: motion and force to drive"),
+    ("frame.h5", "mass, damping, stiffness and modes"),
+    ("control.h5", "gains of every law"),
+    ("close-loop.json", "the verdict, for programs"),
+    ("controller", "controller as C code"),
+)

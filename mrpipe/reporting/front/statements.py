@@ -1,0 +1,230 @@
+"""The first screen in plain sentences: what was measured, how good the models are, what is missing, which law is best.
+
+Everything comes from the summaries of the stages, so that `mrpipe report --summary` prints it without drawing anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mrpipe.reporting.facts import RunFacts
+from mrpipe.reporting.front import laws as law_facts
+from mrpipe.reporting.words import duration, listed, number, percent, plain, with_interval
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One answer of the first screen.
+
+    Attributes
+    ----------
+    topic
+        The question it answers, in one or two words.
+    text
+        The answer in one to four sentences.
+    """
+
+    topic: str
+    text: str
+
+
+def statements(facts: RunFacts) -> list[Statement]:
+    """Return the answers that the stages of a run allow, in the order of a reader's questions."""
+    found = [
+        Statement("Measured", measured(facts)),
+        Statement("Missing", missing(facts)),
+        Statement("Models", models(facts)),
+        Statement("Structure", structure(facts)),
+        Statement("Control", law_facts.answer(facts)),
+        Statement("Test next", next_tests(facts)),
+        Statement("Distrust", " ".join(doubts(facts)[:4])),
+    ]
+    return [item for item in found if item.text]
+
+
+def measured(facts: RunFacts) -> str:
+    """Return what was measured: tests, time, motion and drive of the damper; floors and tests of the structure."""
+    parts = []
+    prepared = facts.summary("prepare")
+    if prepared.get("tests"):
+        tests = prepared["tests"]
+        unseen = sum(test["role"] == "validation" for test in tests)
+        seconds = sum(test["duration_s"] for test in tests)
+        stroke = max(test["amplitude_m"] for test in tests)
+        speed = max(test["velocity_peak_m_s"] for test in tests)
+        force = max(test["force_peak_n"] for test in tests)
+        motion = f"up to {number(1e3 * stroke)} mm, " if stroke > 0.0 else ""
+        parts.append(
+            f"Damper: {len(tests)} tests of campaign {prepared['campaign']}, {duration(seconds)}, {motion}"
+            f"{number(speed)} m/s and {number(force)} N. {unseen} of them are validation tests, which no fit has seen."
+        )
+    frame = facts.summary("identify-frame")
+    if "frequencies_hz" in frame:
+        parts.append(f"Structure: {len(frame['frequencies_hz'])} floors, campaign {frame['campaign']}.")
+    loop = facts.summary("close-loop").get("closed_loop") or {}
+    recorded = sum(bool(item.get("recorded")) for item in loop.get("tests", []))
+    if recorded:
+        parts.append(f"Closed loop: {recorded} recordings.")
+    return " ".join(parts)
+
+
+def missing(facts: RunFacts) -> str:
+    """Return what the model lacks, with value, interval and confidence, and the error before and after."""
+    summary = facts.summary("close-loop")
+    if "before" not in summary:
+        return ""
+    before, after = summary["before"]["nrmse"], summary["after"]["nrmse"]
+    floor = summary["noise_floor_nrmse"]
+    errors = f"Error on unseen tests: {percent(before)} before, {percent(after)} after (noise alone: {percent(floor)})."
+    kind = verdict_class(summary)
+    subject = f"The {summary.get('model') or 'linear'} model"
+    effects = proper_effects(summary)
+    if kind == "validation differs":
+        differences = "; ".join(item["sentence"] for item in summary["validation"]["differences"][:3])
+        return (
+            f"The validation tests differ from the training tests: {differences}. The error of {percent(after)} on "
+            "them therefore does not judge the model."
+        )
+    if kind == "noise":
+        return (
+            f"{subject} lacks nothing that these tests could show: its error on unseen tests, {percent(before)}, is "
+            f"that of the noise ({percent(floor)})."
+        )
+    if kind == "base form":
+        return f"{subject} is not the right base form: {summary['verdict']}. {errors}"
+    if not effects:
+        states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
+        varies = f" It varies with {listed(states)}." if states else ""
+        return f"{subject} lacks something that no effect of the library explains.{varies} {errors}"
+    named = listed([f"**{effect['name']}**{_value_of(effect)}" for effect in effects])
+    sure = listed([_confidence(effect["confidence"]) for effect in effects])
+    text = f"{subject} lacks {named}. Confidence: {sure}. {errors}"
+    ceiling = (summary.get("ceiling") or {}).get("nrmse")
+    if ceiling is not None:
+        text += f" The best any model reached is {percent(ceiling)}."
+    if kind == "partly explained" or summary["unexplained"]["structured"]:
+        share = summary["unexplained"]["share_of_residual"]
+        text += f" A part stays unexplained ({percent(share)} of the squared residual)."
+    return text
+
+
+def verdict_class(summary: Mapping[str, Any]) -> str:
+    """Return the class of a verdict; runs of older versions do not name it."""
+    if summary.get("verdict_class"):
+        return str(summary["verdict_class"])
+    if not summary["residual"]["structured"]:
+        return "noise"
+    if not proper_effects(summary):
+        return "unknown"
+    return "partly explained" if summary["unexplained"]["structured"] else "explained"
+
+
+def proper_effects(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the named effects, without the flexible model that stands for no physics."""
+    return [effect for effect in summary.get("effects", []) if effect["name"] != "unattributed"]
+
+
+def _value_of(effect: Mapping[str, Any]) -> str:
+    """Return the leading parameter of an effect with its interval; the first of the effect's own list leads."""
+    place = f" at {effect['place']}" if effect.get("place") else ""
+    for name, entry in effect["parameters"].items():
+        if entry.get("value") is None:
+            continue
+        low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
+        return f"{place} ({plain(name)} {with_interval(entry['value'], low, high, entry['unit'])})"
+    return place
+
+
+def _confidence(value: float) -> str:
+    word = "high" if value >= 0.9 else "medium" if value >= 0.6 else "low"
+    return f"{word} ({value:.2f})"
+
+
+def models(facts: RunFacts) -> str:
+    """Return the error of every model on unseen tests, with noise floor and linear baseline."""
+    rows = [f"{name} {percent(value)}" for name, value, _ in model_errors(facts)]
+    inverse = facts.summary("train-inverse")
+    text = f"RMS error over RMS force on unseen tests: {', '.join(rows)}." if rows else ""
+    if "error_over_range" in inverse:
+        text += f" The inverse network misses the drive by {percent(inverse['error_over_range'])} of its range"
+        linear = inverse.get("linear_baseline_error_over_range")
+        text += f" (linear model {percent(linear)})." if linear is not None else "."
+    return text.strip()
+
+
+def model_errors(facts: RunFacts) -> list[tuple[str, float, str]]:
+    """Return (name, NRMSE on the validation tests, kind) of the force models, best first; kind as in the figure."""
+    found: list[tuple[str, float | None, str]] = []
+    loop, damper, network = (facts.summary(name) for name in ("close-loop", "identify-damper", "train-forward"))
+    if loop.get("noise_floor_nrmse"):
+        found.append(("noise alone", loop["noise_floor_nrmse"], "noise"))
+    if proper_effects(loop):
+        found.append(("damper model with the effect", loop["after"]["nrmse"], "after"))
+    if "validation_nrmse" in damper:
+        found.append((f"damper model {damper['form']}", damper["validation_nrmse"], "before"))
+    elif "before" in loop and loop.get("model"):
+        found.append((f"damper model {loop['model']}", loop["before"]["nrmse"], "before"))
+    if "validation_nrmse" in network:
+        found.append((f"forward network {network['architecture']}", network["validation_nrmse"], "network"))
+        found.append(("linear model", network.get("linear_baseline_nrmse"), "linear"))
+    return sorted(
+        ((name, float(value), kind) for name, value, kind in found if value is not None), key=lambda item: item[1]
+    )
+
+
+def structure(facts: RunFacts) -> str:
+    """Return the modes of the structure."""
+    frame = facts.summary("identify-frame")
+    if "frequencies_hz" not in frame:
+        return ""
+    frequencies = listed([number(value) for value in frame["frequencies_hz"]])
+    ratios = [100.0 * value for value in frame["damping_ratios"]]
+    span = f"{number(min(ratios), 2)} to {number(max(ratios), 2)} %" if len(ratios) > 1 else f"{number(ratios[0], 2)} %"
+    return f"Modes at {frequencies} Hz with damping ratios of {span}."
+
+
+def next_tests(facts: RunFacts) -> str:
+    """Return which tests would decide what is open, and which would replace an extrapolation."""
+    parts = []
+    wanted = facts.summary("close-loop").get("next_tests") or {}
+    if wanted.get("tests"):
+        questions = "; ".join(item["decides"] for item in wanted["decides"][:3])
+        parts.append(f"{len(wanted['tests'])} tests, listed in {wanted['file']}, would decide {questions}.")
+    elif wanted.get("made_already"):
+        questions = "; ".join(item["decides"] for item in wanted["decides"][:3])
+        parts.append(f"Still open although tests for it were made: {questions}. Longer tests or repeats may decide.")
+    beyond = law_facts.beyond_tests(facts)
+    if beyond:
+        parts.append(f"Bench tests up to {beyond}: the closed loop moves the damper that far, and no bench test does.")
+    if not parts and proper_effects(facts.summary("close-loop")):
+        parts.append("No further test is needed to decide which effect is missing.")
+    return " ".join(parts)
+
+
+def doubts(facts: RunFacts) -> list[str]:
+    """Return what to distrust, the weightiest first, one sentence each."""
+    found = []
+    loop = facts.summary("close-loop")
+    for effect in proper_effects(loop):
+        if effect.get("tied_with"):
+            found.append(f"These tests do not separate {effect['name']} from {listed(list(effect['tied_with']))}.")
+    if "before" in loop and loop["before"]["nrmse"] > 0.3 and verdict_class(loop) != "validation differs":
+        found.append(
+            f"The base model misses the force on unseen tests by {percent(loop['before']['nrmse'])}: what is traced in "
+            "its residual depends on that model."
+        )
+    found += law_facts.doubts(facts)
+    outside = facts.summary("train-forward").get("outside_training_range_share", 0.0)
+    if outside > 0.01:
+        found.append(f"{percent(outside)} of the validation samples lie outside the range of the training tests.")
+    found += _sentences(facts.warnings("identify-damper", "prepare", "identify-frame"))
+    untestable = loop.get("untestable") or {}
+    if untestable:
+        found.append(f"These tests cannot show {listed([plain(name) for name in untestable])}.")
+    return found
+
+
+def _sentences(lines: Sequence[str]) -> list[str]:
+    return [f"{line[:1].upper()}{line[1:].rstrip('.')}." for line in lines]

@@ -1,0 +1,88 @@
+"""Sections before the appendix, and the page at phone, laptop and print width."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from mrpipe.reporting.front.sections import sections
+from mrpipe.reporting.page import first_screen, write_report
+from tests.reporting.front.run import run_in
+
+pytestmark = pytest.mark.property
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+def test_sections_answer_in_order(tmp_path: Path) -> None:
+    found = {section.anchor: section for section in sections(run_in(tmp_path))}
+    assert list(found) == ["result", "trust", "damper", "structure", "control", "next"]
+    figures = {
+        anchor: [item["name"] for item in section.items if item["kind"] == "figure"]
+        for anchor, section in found.items()
+    }
+    assert figures["result"] == ["errors", "loop", "laws"]
+    assert "residual" in figures["damper"]
+    assert figures["structure"] == ["shapes"]
+    assert figures["control"] == ["cycles"]
+
+
+def test_unit_newton_per_ampere_is_not_read_as_missing(tmp_path: Path) -> None:
+    (path,) = write_report(run_in(tmp_path), ["html"])
+    assert "<td>N per A</td>" in path.read_text(encoding="utf-8")
+
+
+def test_report_of_a_bench_alone_has_no_empty_sections(tmp_path: Path) -> None:
+    facts = run_in(tmp_path)
+    bench = [stage for stage in facts.stages if stage.name in ("prepare", "identify-damper", "close-loop")]
+    for path in tmp_path.glob("response-*.h5"):
+        path.unlink()
+    alone = type(facts)(tmp_path, "bench", "", bench)
+    assert [section.anchor for section in sections(alone)] == ["result", "trust", "damper", "next"]
+
+
+def test_first_screen_in_the_terminal_has_no_marks(tmp_path: Path) -> None:
+    lines = first_screen(run_in(tmp_path))
+    assert lines[0] == "my-rig"
+    assert "mrpipe" in lines[1]
+    assert any(line.startswith("Missing") and "accumulator" in line for line in lines)
+    assert not any("**" in line for line in lines)
+
+
+def test_html_is_small_and_offline(tmp_path: Path) -> None:
+    (path,) = write_report(run_in(tmp_path), ["html"])
+    text = path.read_text(encoding="utf-8")
+    assert len(text) < 2e6
+    assert re.findall(r"(?:src|href)=['\"]https?:", text) == []
+    assert text.count("<svg") == text.count("</svg>") >= 8
+    assert "@media print" in text
+
+
+@pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
+@pytest.mark.parametrize("width", [390, 1440])
+def test_page_does_not_scroll_sideways(tmp_path: Path, width: int) -> None:
+    (path,) = write_report(run_in(tmp_path), ["html"])
+    probe = "<script>document.title = 'W' + document.documentElement.scrollWidth + 'V' + innerWidth</script></body>"
+    path.write_text(path.read_text(encoding="utf-8").replace("</body>", probe), encoding="utf-8")
+    done = _browse(path, f"--window-size={width},900", "--dump-dom")
+    found = re.search(r"<title>W(\d+)V(\d+)</title>", done.stdout)
+    assert found is not None
+    assert int(found[1]) <= int(found[2])
+
+
+@pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
+def test_print_has_at_most_twelve_pages_before_the_appendix(tmp_path: Path) -> None:
+    (path,) = write_report(run_in(tmp_path), ["html"])
+    _browse(path, "--no-pdf-header-footer", f"--print-to-pdf={tmp_path / 'report.pdf'}")
+    pages = len(re.findall(rb"/Type\s*/Page[^s]", (tmp_path / "report.pdf").read_bytes()))
+    assert 1 <= pages <= 12
+
+
+def _browse(path: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    assert BROWSER is not None
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", *options, path.as_uri()]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)

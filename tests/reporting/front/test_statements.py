@@ -1,0 +1,92 @@
+"""The first screen answers a reader's questions from the summaries alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mrpipe.reporting.front import laws
+from mrpipe.reporting.front.statements import statements
+from tests.reporting.front.run import EFFECT, run_in, tracing
+
+pytestmark = pytest.mark.property
+
+UNKNOWN = {"structured": True, "share_of_residual": 1.0, "depends_on": [{"state": "drive"}]}
+
+
+def answers(directory: Path, **changes: object) -> dict[str, str]:
+    facts = run_in(directory, tracing(**changes))
+    return {item.topic: item.text for item in statements(facts)}
+
+
+def test_finding_has_value_interval_confidence_and_errors(tmp_path: Path) -> None:
+    text = answers(tmp_path)["Missing"]
+    assert "**accumulator** (stiffness 9.10 kN/m (9.04 to 9.16))" in text
+    assert "high (0.97)" in text
+    assert "7.9 % before, 1.5 % after (noise alone: 0.40 %)" in text
+    assert "best any model reached is 1.3 %" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"residual": {"structured": False}, "effects": []}, "lacks nothing that these tests could show"),
+        (
+            {"effects": [], "unexplained": UNKNOWN},
+            "no effect of the library explains. It varies with drive.",
+        ),
+        (
+            {
+                "verdict_class": "validation differs",
+                "validation": {"differences": [{"sentence": "the force of test b is 6.5 % lower"}]},
+            },
+            "The validation tests differ from the training tests: the force of test b is 6.5 % lower",
+        ),
+        ({"verdict_class": "base form", "verdict": "dahl fits better", "effects": []}, "is not the right base form"),
+        (
+            {"verdict_class": "partly explained", "unexplained": {**UNKNOWN, "share_of_residual": 0.3}},
+            "A part stays unexplained (30 % of the squared residual)",
+        ),
+    ],
+)  # fmt: skip
+def test_every_class_of_verdict_has_its_sentence(tmp_path: Path, changes: dict[str, object], expected: str) -> None:
+    assert expected in answers(tmp_path, **changes)["Missing"]
+
+
+def test_best_law_is_one_that_damps_and_is_compared_with_no_damper(tmp_path: Path) -> None:
+    """passive-on moves least at this one frequency, because it shifts the resonance: it is not called the best."""
+    text = answers(tmp_path)["Control"]
+    assert "**vd** is best under harmonic base motion" in text
+    assert "without a damper (-" in text
+    assert "with the damper switched off (-65 %)" in text
+    assert "passive-on moves less (16.0 mm) but damps free vibration by 0.25 % only" in text
+
+
+def test_uncontrolled_structure_is_the_linear_one(tmp_path: Path) -> None:
+    runs = laws.comparison(run_in(tmp_path))
+    assert [run.law for run in runs] == ["passive-on", "vd", "passive-off", laws.UNCONTROLLED]
+    assert runs[-1].rms_top_m > 0.05  # at resonance with half a percent of damping
+
+
+def test_doubts_name_rivals_and_extrapolation(tmp_path: Path) -> None:
+    text = answers(tmp_path)["Distrust"]
+    assert "do not separate accumulator from end-stop" in text
+    assert "extrapolated beyond its bench tests under passive-off (40 % of the time)" in text
+
+
+def test_a_law_that_was_designed_is_the_answer(tmp_path: Path) -> None:
+    facts = run_in(tmp_path)
+    design = {
+        "best": "fdns",
+        "objective": "peak RMS top displacement",
+        "laws": {"fdns": {"peak_rms_x_top_m": 0.02, "probability_best": 0.93}, "vd": {"peak_rms_x_top_m": 0.03}},
+    }
+    facts.summaries["design"] = design
+    assert "**fdns** is the best law" in laws.answer(facts)
+    assert "(others: vd 30.0 mm)" in laws.answer(facts)
+
+
+def test_tied_effect_is_not_called_sure(tmp_path: Path) -> None:
+    weak = {**EFFECT, "confidence": 0.5}
+    assert "Confidence: low (0.50)" in answers(tmp_path, effects=[weak])["Missing"]
