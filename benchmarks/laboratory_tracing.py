@@ -106,7 +106,8 @@ def trace(campaign: Path, seed: int) -> dict[str, Any]:
     from mrpipe.campaigns import load_campaign
     from mrpipe.effects.library import damper_effects
     from mrpipe.laboratory.sealing import sealed_path
-    from mrpipe.signals.preparation import PreparationOptions, prepare_campaign
+    from mrpipe.signals.options import PreparationOptions
+    from mrpipe.signals.preparation import prepare_campaign
     from mrpipe.tracing.bench.summary import TracingOptions
     from mrpipe.tracing.bench.trace import trace_campaign
 
