@@ -16,7 +16,7 @@ from benchmarks.rigs.motion import Motion, motion_of, plan
 from benchmarks.rigs.sensors import Sensors, draw_sensors, measured
 from benchmarks.rigs.types import Array, Table
 
-TEST_S = 4.0
+TEST_S = 3.0
 FINE_HZ = 20_000.0
 EDGE_S = 0.2
 CUTOFFS_HZ = (10.0, 20.0, 40.0, 80.0, 160.0)

@@ -60,7 +60,7 @@ def draw_rig(base: str, names: Sequence[str], rng: np.random.Generator, test_s: 
     """Draw a rig: force from 100 N to 1 MN, stroke from 4 to 60 mm, drive from 1 to 5 A."""
     force = float(np.exp(rng.uniform(np.log(100.0), np.log(1e6))))
     stroke = float(np.exp(rng.uniform(np.log(0.004), np.log(0.06))))
-    frequency = float(rng.uniform(0.8, 1.8))
+    frequency = float(rng.uniform(1.0, 2.0))
     speed = 2.0 * np.pi * 1.8 * frequency * stroke
     drive = float(rng.uniform(1.0, 5.0))
     idle = force * rng.uniform(0.08, 0.25)
@@ -175,7 +175,7 @@ def scaled(rig: Rig, place: int, share: float, motions: Sequence[Motion], draws:
         return replace(rig, planted=(*rig.planted[:place], item.with_strength(strength), *rig.planted[place + 1 :]))
 
     low, high, strength = 0.0, item.strongest, min(float(item.numbers[0]), item.strongest)
-    for _ in range(14):
+    for attempt in range(20):
         reached = _share(at(strength), reference, motions, draws)
         if abs(reached / share - 1.0) < 0.02 or low > 0.995 * item.strongest:
             break
@@ -184,5 +184,6 @@ def scaled(rig: Rig, place: int, share: float, motions: Sequence[Motion], draws:
         else:
             high = strength
         guess = strength * float(np.clip(share / max(reached, 1e-9), 0.1, 10.0))
-        strength = guess if low < guess < high else 0.5 * (low + high)
+        # in proportion first, because most shares are; then by halves
+        strength = guess if low < guess < high and attempt < 6 else 0.5 * (low + high)
     return at(min(strength, item.strongest))
