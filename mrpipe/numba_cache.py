@@ -156,10 +156,11 @@ def _point_numba_to(folder: Path | None) -> None:
 
 
 @contextmanager
-def cache_of_file(path: Path) -> Iterator[None]:
-    """Keep what a user's own file compiles in a folder named by the content of the file.
+def cache_for(name: str) -> Iterator[None]:
+    """Keep what is compiled within this block in a folder of its own.
 
-    numba itself compares size and time of change only; both stay the same when a file is restored from a backup.
+    numba itself compares size and time of change of a file only, and both stay the same when a file is restored from a
+    backup: the name of the folder of a user's own file is to contain a hash of its content.
     """
     import numba  # noqa: F401 - sets the folder of the package first
 
@@ -167,7 +168,7 @@ def cache_of_file(path: Path) -> Iterator[None]:
     if before is None:
         yield
         return
-    _point_numba_to(Path(before) / f"file-{hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]}")
+    _point_numba_to(Path(before) / name)
     try:
         yield
     finally:

@@ -51,6 +51,7 @@ from mrpipe.case_studies.devices import (
 )
 from mrpipe.dampers.plant import (
     ACCELERATION,
+    BOOKKEEPING,
     CHAIN_FUNCTIONS,
     DISPLACEMENT,
     DRIVE,
@@ -313,7 +314,8 @@ def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain:
     left, mean = (np.exp(-passed), (1.0 - np.exp(-passed)) / passed) if passed > 0.0 else (0.0, 0.0)
     sampling = settings[REALISATION] >= BINGHAM
     amplitude, estimate, energy = np.zeros((devices, 2)), np.zeros(control[1].shape[0]), np.zeros(3)
-    memory, trial, wire = np.zeros(chain[3][-1] + 5), np.zeros(chain[3][-1] + 5), np.zeros(WIRE_SIZE)
+    size = chain[3][-1] + BOOKKEEPING
+    memory, trial, wire = np.zeros(size), np.zeros(size), np.zeros(WIRE_SIZE)
     wire[FIRST] = 1.0
     advance(chain[0], chain[1], chain[2], chain[3], memory, wire, settings[DT])
     before, power = settings[COUNT] * wire[FORCE], 0.0

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mrpipe.cli import benchmark_command, inspect_commands, run_commands, stage_commands
+from mrpipe.cli import benchmark_command, effect_command, inspect_commands, run_commands, stage_commands
 
 app = typer.Typer(
     name="mrpipe",
@@ -39,3 +39,4 @@ run_commands.register(app)
 stage_commands.register(app)
 benchmark_command.register(app)
 inspect_commands.register(app)
+effect_command.register(app)

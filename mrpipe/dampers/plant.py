@@ -26,6 +26,7 @@ from numba import NumbaExperimentalFeatureWarning, float64, int64, njit, types, 
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.timing import look_ahead
+from mrpipe.errors import UserError
 
 # numba calls function pointers experimental; the signature below is fixed, which is the case that is stable
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
@@ -44,7 +45,7 @@ HYSTERESIS = 9  # hysteretic variable normalised to its limit, -1..1
 HYSTERETIC_FORCE = 10  # YIELD_FORCE x HYSTERESIS [N]
 VISCOUS_FORCE = 11  # N
 EXTRA_FORCE = 12  # forces that effects add [N]
-FORCE = 13  # at the load cell [N]
+FORCE = 13  # at the load cell [N]; at the start of a step that of the step before
 WORK = 14  # energy dissipated since the start [J]
 SLIP = 15  # path since the last reversal [m]
 SINCE_REVERSAL = 16  # time since the last reversal [s]
@@ -52,6 +53,10 @@ PAST_CURRENT = 17  # largest |effective current| so far in this run [A]
 RATE_YIELD = 18  # factor 0..1 of YIELD_FORCE from rate-dependent base forms (1 where unused)
 SPARE = 19  # for effects of the user's own
 WIRE_SIZE = 24
+
+BOOKKEEPING = 6
+"""Numbers that :func:`advance` keeps behind the chain's own state: work, slip, time since the last reversal, largest
+current, last velocity other than 0, last force."""
 
 STEP_SIGNATURE = void(float64[::1], float64[::1], float64[::1], float64)
 """The one compiled signature of a step: `@njit(STEP_SIGNATURE, cache=True)`."""
@@ -93,6 +98,8 @@ class Step:
     ahead_s
         Time by which it wants the motion from after the present instant [s]: a recorded displacement that is late. Only
         recordings can give that; a closed loop runs without such steps.
+    back_s, kept
+        Time that it looks back [s], and how many samples its memory keeps for this.
     """
 
     name: str
@@ -101,6 +108,8 @@ class Step:
     parameters: FloatArray
     state_size: int = 0
     ahead_s: float = 0.0
+    back_s: float = 0.0
+    kept: int = 0
 
 
 @dataclass(frozen=True)
@@ -113,6 +122,19 @@ class Chain:
     state_offsets: IntArray
     names: tuple[str, ...]
     ahead_s: float = 0.0
+    memories: tuple[tuple[str, float, int], ...] = ()
+
+    def check_interval(self, dt: float) -> None:
+        """Raise UserError where a step looks back further than its memory reaches at this interval [s]."""
+        for name, back_s, kept in self.memories:
+            if back_s > (kept - 2) * dt:
+                raise UserError(
+                    "damper model",
+                    name,
+                    f"looks back {back_s:.4g} s, its memory of {kept} samples reaches {(kept - 2) * dt:.4g} s at "
+                    f"{1.0 / dt:.6g} Hz",
+                    "use a lower sampling rate (prepare.working_rate_hz, simulate.plant_rate_hz) or a shorter time",
+                )
 
     @property
     def state_size(self) -> int:
@@ -143,12 +165,17 @@ def build_chain(steps: Sequence[Step]) -> Chain:
 
     Raises
     ------
-    ValueError
+    UserError
         If there are more than :data:`CHAIN_LENGTH` steps.
     """
     ordered = sorted([*steps, Step("sum", Phase.SUM, sum_step, np.zeros(0))], key=lambda step: step.phase)
     if len(ordered) > CHAIN_LENGTH:
-        raise ValueError(f"{len(ordered)} steps in a chain; at most {CHAIN_LENGTH}")
+        raise UserError(
+            "damper model",
+            ", ".join(step.name for step in ordered),
+            f"makes a chain of {len(ordered)} steps, at most {CHAIN_LENGTH} are possible",
+            "leave out effects, or choose forms with fewer steps",
+        )
     padding = CHAIN_LENGTH - len(ordered)
     parameters = [np.ascontiguousarray(step.parameters, dtype=np.float64) for step in ordered]
     return Chain(
@@ -158,6 +185,7 @@ def build_chain(steps: Sequence[Step]) -> Chain:
         state_offsets=np.cumsum([0, *(step.state_size for step in ordered)], dtype=np.int64),
         names=tuple(step.name for step in ordered),
         ahead_s=sum(step.ahead_s for step in ordered),
+        memories=tuple((step.name, step.back_s, step.kept) for step in ordered if step.back_s > 0.0),
     )
 
 
@@ -180,12 +208,14 @@ def advance(
 ) -> None:
     """Advance the chain by one step: set TIME, FIRST and the motion and drive on the wire first, read FORCE after.
 
-    `state` holds the chain's state followed by four bookkeeping numbers (see :func:`new_state`); WORK, SLIP,
-    SINCE_REVERSAL and PAST_CURRENT are kept here for all steps to read. WORK counts the force of the step before.
+    `state` holds the chain's state followed by numbers of bookkeeping (see :func:`new_state`); WORK, SLIP,
+    SINCE_REVERSAL and PAST_CURRENT are kept here for all steps to read. WORK counts the force of the step before. At
+    the start FORCE is the force of the step before, and everything else that steps write is 0: the force depends on
+    `state`, motion and drive alone, whatever a solver has tried on the same wire.
     """
     memory = state_offsets[-1]
     if wire[FIRST] > 0.5:
-        for index in range(memory, memory + 5):
+        for index in range(memory, memory + BOOKKEEPING):
             state[index] = 0.0
         state[memory + 4] = wire[VELOCITY]
     else:
@@ -196,13 +226,15 @@ def advance(
             state[memory + 4] = wire[VELOCITY]
         state[memory + 1] += abs(wire[VELOCITY]) * dt
         state[memory + 2] += dt
+    for index in range(CURRENT, WIRE_SIZE):
+        wire[index] = 0.0
+    wire[FORCE] = state[memory + 5]
     wire[WORK] = state[memory]
     wire[SLIP] = state[memory + 1]
     wire[SINCE_REVERSAL] = state[memory + 2]
     wire[PAST_CURRENT] = state[memory + 3]
     wire[CURRENT] = wire[DRIVE]
     wire[RATE_YIELD] = 1.0
-    wire[EXTRA_FORCE] = 0.0
     for index in range(parameter_offsets.shape[0] - 1):
         functions[index](
             wire,
@@ -212,6 +244,7 @@ def advance(
         )
     state[memory] += (wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]) * wire[VELOCITY] * dt
     state[memory + 3] = max(state[memory + 3], abs(wire[CURRENT]))
+    state[memory + 5] = wire[FORCE]
 
 
 @njit(
@@ -241,7 +274,7 @@ def _run(
     dt: float,
     wires: FloatArray,
 ) -> None:
-    state = np.zeros(state_offsets[-1] + 5)
+    state = np.zeros(state_offsets[-1] + BOOKKEEPING)
     wire = np.zeros(WIRE_SIZE)
     for index in range(displacement.shape[0]):
         wire[TIME] = index * dt
@@ -255,8 +288,8 @@ def _run(
 
 
 def new_state(chain: Chain) -> FloatArray:
-    """Return a fresh state for :func:`advance`: the chain's own and five numbers of bookkeeping."""
-    return np.zeros(chain.state_size + 5)
+    """Return a fresh state for :func:`advance`: the chain's own and :data:`BOOKKEEPING` more numbers."""
+    return np.zeros(chain.state_size + BOOKKEEPING)
 
 
 def run_chain(
@@ -279,7 +312,13 @@ def run_chain(
     Returns
     -------
     Shape (n, WIRE_SIZE): the wire after each step; column FORCE is the damper force [N].
+
+    Raises
+    ------
+    UserError
+        If a step looks back further than its memory reaches at this interval.
     """
+    chain.check_interval(float(dt))
     wires = np.empty((len(displacement), WIRE_SIZE))
     x, v, a, u = (
         np.ascontiguousarray(item, dtype=np.float64) for item in (displacement, velocity, acceleration, drive)

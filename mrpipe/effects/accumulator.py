@@ -8,7 +8,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import DISPLACEMENT, FORCE, STEP_SIGNATURE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -72,8 +72,8 @@ EFFECT = Effect(
         ),
     ),
     separated_by={
-        "migration": "dwell at several positions",
-        "inertia": "the same stroke at several frequencies",
-        "end-stop": "the same motion at a smaller amplitude",
+        "migration": Separation("dwell at several positions", ("positions",)),
+        "inertia": Separation("the same stroke at several frequencies", ("frequencies",)),
+        "end-stop": Separation("the same motion at a smaller amplitude", ("amplitudes",)),
     },
 )

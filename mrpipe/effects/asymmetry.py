@@ -21,7 +21,7 @@ from mrpipe.dampers.plant import (
     Phase,
     Step,
 )
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -125,5 +125,7 @@ EFFECT = Effect(
             {"friction": 0, "friction_rate": 1, "drag": 2},
         ),
     ),
-    separated_by={"offset": "constant drive at several speeds; rest at several drives"},
+    separated_by={
+        "offset": Separation("constant drive at several speeds; rest at several drives", ("constants", "rest"))
+    },
 )

@@ -8,7 +8,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -158,5 +158,5 @@ EFFECT = Effect(
             _lost,
         ),
     ),
-    separated_by={"migration": "slow small triangles about reversal at two currents"},
+    separated_by={"migration": Separation("slow small triangles about reversal at two currents", ("reversal",))},
 )

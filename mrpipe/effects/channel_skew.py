@@ -19,8 +19,10 @@ from mrpipe.dampers.plant import (
     idle_step,
 )
 from mrpipe.dampers.timing import between
-from mrpipe.effects.contract import Effect, EffectForm, Values, strength
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, strength
 
+INSTANTS = 1024
+"""Instants that the late force can look back."""
 _KEPT = 4  # displacement, velocity, acceleration and drive of an instant
 
 
@@ -58,7 +60,9 @@ def late_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray,
 
 
 def _late(values: Values) -> list[Step]:
-    return [Step("late-force", Phase.MOTION, late_force_step, np.array([values["skew"]]), _KEPT * 128 + 1)]
+    skew = values["skew"]
+    size = _KEPT * INSTANTS + 1
+    return [Step("late-force", Phase.MOTION, late_force_step, np.array([skew]), size, back_s=skew, kept=INSTANTS)]
 
 
 def _shift(values: Values) -> list[Step]:
@@ -87,5 +91,8 @@ EFFECT = Effect(
         ),
     ),
     sensor=True,
-    separated_by={"inertia": "time-stamp check, frequency sweep", "backlash": "the same stroke at several frequencies"},
+    separated_by={
+        "inertia": Separation("time-stamp check, frequency sweep", ("frequencies",)),
+        "backlash": Separation("the same stroke at several frequencies", ("frequencies",)),
+    },
 )

@@ -28,6 +28,20 @@ __all__ = [
 ]
 
 Needs = Literal["varying-drive", "varying-speed", "several-frequencies", "several-positions", "long-tests"]
+TestKind = Literal[
+    "speeds", "steps", "positions", "middle", "frequencies", "amplitudes", "long", "reversal", "constants", "rest"
+]
+"""Kinds of bench test: triangles at several speeds; steps of the drive; dwells at several positions; motion about
+another middle; several frequencies; other amplitudes; a long run with a pause; slow small triangles about reversal;
+constant drives at several speeds; rest at several drives."""
+TESTS_FOR: Mapping[Needs, TestKind] = {
+    "varying-drive": "steps",
+    "varying-speed": "speeds",
+    "several-frequencies": "frequencies",
+    "several-positions": "positions",
+    "long-tests": "long",
+}
+"""Need that a campaign does not meet -> kind of test that meets it."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +87,22 @@ class EffectForm:
 
 
 @dataclass(frozen=True)
+class Separation:
+    """A test that separates an effect from another one that looks alike.
+
+    Attributes
+    ----------
+    advice
+        A sentence for people.
+    kinds
+        Kinds of bench test that `close-loop` then proposes; empty where no bench test does it.
+    """
+
+    advice: str
+    kinds: tuple[TestKind, ...] = ()
+
+
+@dataclass(frozen=True)
 class Described:
     """What every effect says of itself, be it one of a damper or of a structure.
 
@@ -110,7 +140,7 @@ class Effect(Described):
     rig
         `damper` or `frame`.
     separated_by
-        Other effect -> test that tells the two apart.
+        Other effect -> test that separates the two.
     refinements
         Richer forms of the same physics, too supple to name it by: once it is named, one of them takes the form's place
         where it is better on tests left out.
@@ -121,7 +151,7 @@ class Effect(Described):
     needs: tuple[Needs, ...] = ()
     sensor: bool = False
     rig: Literal["damper", "frame"] = "damper"
-    separated_by: Mapping[str, str] = field(default_factory=dict)
+    separated_by: Mapping[str, Separation] = field(default_factory=dict)
     refinements: tuple[EffectForm, ...] = ()
 
     def form(self, name: str) -> EffectForm:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, FIRST, STEP_SIGNATURE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
 
-BUFFER = 512
+BUFFER = 2048
 """Samples of effective drive that the dead time can look back."""
 
 
@@ -82,7 +83,9 @@ def second_order_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
 
 
 def _dead_time(values: Values) -> list[Step]:
-    return [Step("dead-time", Phase.CURRENT_EFFECT, dead_time_step, np.array([values["delay"]]), BUFFER + 1)]
+    delay = values["delay"]
+    step = Step("dead-time", Phase.CURRENT_EFFECT, dead_time_step, np.array([delay]), BUFFER + 1)
+    return [replace(step, back_s=delay, kept=BUFFER)]
 
 
 def _lag(rising: float, falling: float) -> list[Step]:
@@ -160,5 +163,5 @@ EFFECT = Effect(
         ),
     ),
     needs=("varying-drive",),
-    separated_by={"remanence": "current steps up and down at constant velocity"},
+    separated_by={"remanence": Separation("current steps up and down at constant velocity", ("steps",))},
 )

@@ -10,7 +10,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import DISPLACEMENT, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -128,7 +128,7 @@ EFFECT = Effect(
         ),
     ),
     needs=("several-positions",),
-    separated_by={"accumulator": "the same motion at a smaller amplitude"},
+    separated_by={"accumulator": Separation("the same motion at a smaller amplitude", ("amplitudes",))},
     refinements=(
         EffectForm(
             "contact",

@@ -9,7 +9,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import FIRST, STEP_SIGNATURE, VISCOSITY, WORK, YIELD_FORCE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -72,5 +72,8 @@ EFFECT = Effect(
         EffectForm("viscosity-only", "c exp(-b Q)", (_LOSS, _TIME), _viscosity),
         EffectForm("rational", "alpha/(1 + b W)", (_LOSS,), _rational),
     ),
-    separated_by={"offset": "a long run, a cooling dwell, a repeat", "migration": "a long run with a cooling dwell"},
+    separated_by={
+        "offset": Separation("a long run, a cooling dwell, a repeat", ("long",)),
+        "migration": Separation("a long run with a cooling dwell", ("long",)),
+    },
 )

@@ -7,7 +7,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import ACCELERATION, CURRENT, FORCE, STEP_SIGNATURE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -53,7 +53,7 @@ EFFECT = Effect(
     ),
     needs=("several-frequencies",),
     separated_by={
-        "accumulator": "the same stroke at several frequencies",
-        "channel-skew": "time-stamp check, frequency sweep",
+        "accumulator": Separation("the same stroke at several frequencies", ("frequencies",)),
+        "channel-skew": Separation("time-stamp check, frequency sweep", ("frequencies",)),
     },
 )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import pkgutil
+import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -15,7 +17,7 @@ import mrpipe.effects as package
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.effects.contract import Effect
 from mrpipe.errors import UserError
-from mrpipe.numba_cache import cache_of_file
+from mrpipe.numba_cache import cache_for
 
 LOADS_FROM = ("mrpipe.effects",)
 """Packages that are walked at run time: their modules belong to the code version of a stage."""
@@ -44,8 +46,15 @@ def damper_effects() -> dict[str, Effect]:
     return {name: item for name, item in all_effects().items() if item.rig == "damper"}
 
 
-def effect_of_file(path: Path) -> object:
+def effect_of_file(path: Path, setting: str = "close_loop.effect_files") -> object:
     """Run a user's own file and return its EFFECT, of whatever kind; None where it defines none.
+
+    Parameters
+    ----------
+    path
+        The file.
+    setting
+        Where it was named, for messages.
 
     Raises
     ------
@@ -53,19 +62,23 @@ def effect_of_file(path: Path) -> object:
         If the file is missing or cannot be run.
     """
     if not Path(path).is_file():
-        raise UserError(path, "close_loop.effect_files", "no such file", "name a Python file that defines EFFECT")
-    name = f"mrpipe_user_effect_{Path(path).stem}"
+        raise UserError(path, setting, "no such file", "name a Python file that defines EFFECT")
+    content = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
+    name = f"mrpipe_user_effect_{Path(path).stem}_{content}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise UserError(path, "close_loop.effect_files", "is no Python file", "name a .py file that defines EFFECT")
+        raise UserError(path, setting, "is not a Python file", "name a .py file that defines EFFECT")
     module: ModuleType = importlib.util.module_from_spec(spec)
+    # compiled code that is loaded from the cache looks for its module by name
+    sys.modules[name] = module
     try:
-        with cache_of_file(path):
+        with cache_for(name):
             spec.loader.exec_module(module)
     except Exception as error:
-        # compilers say much: the first line tells what it is
+        del sys.modules[name]
+        # a compiler prints pages: the first line names the fault
         said = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
-        raise UserError(path, "close_loop.effect_files", f"cannot be run: {said}", "mend the file") from error
+        raise UserError(path, setting, f"cannot be run: {said}", "correct the file") from error
     return getattr(module, "EFFECT", None)
 
 

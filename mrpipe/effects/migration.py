@@ -21,7 +21,7 @@ from mrpipe.dampers.plant import (
     Phase,
     Step,
 )
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -144,8 +144,8 @@ EFFECT = Effect(
         ),
     ),
     separated_by={
-        "accumulator": "dwell at several positions",
-        "backlash": "slow small triangles about reversal at two currents",
-        "heating": "a long run with a cooling dwell",
+        "accumulator": Separation("dwell at several positions", ("positions",)),
+        "backlash": Separation("slow small triangles about reversal at two currents", ("reversal",)),
+        "heating": Separation("a long run with a cooling dwell", ("long",)),
     },
 )

@@ -8,7 +8,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, DRIVE, FORCE, STEP_SIGNATURE, TIME, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -72,5 +72,7 @@ EFFECT = Effect(
         ),
     ),
     sensor=True,
-    separated_by={"asymmetry": "constant drive at several speeds; rest at several drives"},
+    separated_by={
+        "asymmetry": Separation("constant drive at several speeds; rest at several drives", ("constants", "rest"))
+    },
 )

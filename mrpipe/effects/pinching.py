@@ -12,7 +12,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, DISPLACEMENT, FORCE, HYSTERESIS, STEP_SIGNATURE, YIELD_FORCE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -98,7 +98,7 @@ EFFECT = Effect(
             {"friction": 0, "friction_rate": 1},
         ),
     ),
-    separated_by={"migration": "the same motion about another middle"},
+    separated_by={"migration": Separation("the same motion about another middle", ("middle",))},
     refinements=(
         EffectForm("cusp", "alpha (1 - d exp(-|x - m|/w))", (_WIDTH, _NEAR_MIDDLE, _DEPTH), _aside(2.0), {"depth": 0}),
         EffectForm(

@@ -8,7 +8,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -71,7 +71,7 @@ EFFECT = Effect(
     ),
     needs=("varying-speed",),
     separated_by={
-        "stribeck": "triangular displacement at log-spaced speeds",
-        "rate-dependent-yield": "triangular displacement at log-spaced speeds",
+        "stribeck": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
+        "rate-dependent-yield": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
     },
 )

@@ -22,7 +22,7 @@ from mrpipe.dampers.plant import (
     Step,
 )
 from mrpipe.dampers.viscoplastic import follow_dashpot
-from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values, amplitude, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, amplitude, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -196,8 +196,8 @@ EFFECT = Effect(
     ),
     needs=("varying-speed",),
     separated_by={
-        "stribeck": "triangular displacement at log-spaced speeds",
-        "quadratic-drag": "triangular displacement at log-spaced speeds",
+        "stribeck": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
+        "quadratic-drag": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
     },
     refinements=(
         EffectForm(

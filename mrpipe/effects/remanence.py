@@ -12,7 +12,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, FIRST, PAST_CURRENT, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -290,7 +290,10 @@ EFFECT = Effect(
         ),
     ),
     needs=("varying-drive",),
-    separated_by={"delay": "current steps up and down at constant velocity", "saturation": "current steps up and down"},
+    separated_by={
+        "delay": Separation("current steps up and down at constant velocity", ("steps",)),
+        "saturation": Separation("current steps up and down", ("steps",)),
+    },
     refinements=(
         EffectForm(
             "many-plays",

@@ -10,7 +10,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, DRIVE, FIRST, STEP_SIGNATURE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Parameter, Values, shape
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -121,7 +121,10 @@ EFFECT = Effect(
         EffectForm("tanh", "us tanh(u/us)", (_SOFT,), _tanh),
         EffectForm("driver", "min(command, us), before the lag", (_INVERSE,), _command),
     ),
-    separated_by={"remanence": "current steps up and down", "heating": "constant drives, each begun cold"},
+    separated_by={
+        "remanence": Separation("current steps up and down", ("steps",)),
+        "heating": Separation("constant drives, each begun cold", ("constants",)),
+    },
     refinements=(
         EffectForm(
             "knee",

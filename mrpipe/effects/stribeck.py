@@ -10,7 +10,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, FORCE, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -95,8 +95,8 @@ EFFECT = Effect(
     ),
     needs=("varying-speed",),
     separated_by={
-        "quadratic-drag": "triangular displacement at log-spaced speeds",
-        "rate-dependent-yield": "triangular displacement at log-spaced speeds",
+        "quadratic-drag": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
+        "rate-dependent-yield": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
     },
     refinements=(
         EffectForm(

@@ -14,7 +14,6 @@ from mrpipe.dampers.plant import (
     CURRENT,
     DISPLACEMENT,
     DRIVE,
-    EXTRA_FORCE,
     FIRST,
     FORCE,
     HYSTERESIS,
@@ -99,6 +98,10 @@ def _run(
                 since += step
             if v != 0.0:
                 last = v
+            # as in `advance`: only the force of the step before stays
+            force = wire[FORCE]
+            wire[:] = 0.0
+            wire[FORCE] = force
             wire[TIME] = (index - starts[test]) * step
             wire[FIRST] = 1.0 if first else 0.0
             wire[DISPLACEMENT] = displacement[index]
@@ -111,7 +114,6 @@ def _run(
             wire[SINCE_REVERSAL] = since
             wire[PAST_CURRENT] = past
             wire[RATE_YIELD] = 1.0
-            wire[EXTRA_FORCE] = 0.0
             yields = 1.0
             viscous = 1.0
             tap = 0
@@ -157,6 +159,7 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
     -------
     Shape (COLUMNS + len(tapped), n).
     """
+    chain.check_interval(float(np.min(recordings.dt)))
     result = np.empty((COLUMNS + len(tapped), len(recordings.force)))
     motion = recordings.displacement, recordings.velocity, recordings.acceleration
     if chain.ahead_s:

@@ -203,6 +203,7 @@ def simulate_law(
     rate = controller.options.rate_hz
     per_sample = max(1, math.ceil(options.plant_rate_hz / rate - 1e-9))
     dt = 1.0 / (rate * per_sample)
+    chain.check_interval(dt)
     steps = max(1, round(excitation.duration_s / dt))
     ground = np.ascontiguousarray(excitation.at(dt * np.arange(steps + 1, dtype=np.float64)))
     every = max(1, round(1.0 / (dt * options.record_rate_hz)))

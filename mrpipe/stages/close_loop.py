@@ -72,8 +72,7 @@ def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Ef
     """Write the tests that would decide what is open, as settings for `record`; those of before stay in the list."""
     from mrpipe.tracing.bench.extra_tests import wanted_tests
 
-    untestable = {name: library[name].needs for name in traced.summary["untestable"] if name in library}
-    extra = wanted_tests(traced.summary, untestable, traced.training)
+    extra = wanted_tests(traced.summary, library, traced.training)
     listed = context.settings.laboratory.bench.tests
     names = {item.name for item in listed}
     new = [item for item in extra.tests if item["name"] not in names]

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from mrpipe.effects.library import all_effects
+from mrpipe.effects.structural.checks import checks_of
 from mrpipe.effects.structural.library import all_structural_effects, structural_effects
 from mrpipe.errors import UserError
 
@@ -21,6 +23,13 @@ def test_a_broken_file_is_a_users_mistake_in_one_line(tmp_path: Path, text: str)
         structural_effects((), [path])
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", list(all_structural_effects()))
+def test_an_effect_meets_every_demand(name: str) -> None:
+    checks = checks_of(all_structural_effects()[name], [*all_effects(), *all_structural_effects()])
+    assert [(item.form, item.demand, item.failure) for item in checks if not item.passed] == []
 
 
 @pytest.mark.property

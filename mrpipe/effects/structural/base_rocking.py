@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.effects.contract import Values, amplitude, shape
+from mrpipe.effects.contract import Separation, Values, amplitude, shape
 from mrpipe.effects.structural.contract import StructuralEffect, StructuralForm
 
 
@@ -64,7 +64,7 @@ EFFECT = StructuralEffect(
         ),
     ),
     separated_by={
-        "cubic-stiffness": "an inclinometer on the base, or the same motion at two amplitudes",
-        "joint-friction": "an inclinometer on the base",
+        "cubic-stiffness": Separation("an inclinometer on the base, or the same motion at two amplitudes"),
+        "joint-friction": Separation("an inclinometer on the base"),
     },
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mrpipe.effects.contract import strength
+from mrpipe.effects.contract import Separation, strength
 from mrpipe.effects.structural.contract import StructuralEffect, StructuralForm
 
 EFFECT = StructuralEffect(
@@ -21,7 +21,9 @@ EFFECT = StructuralEffect(
         ),
     ),
     separated_by={
-        "backlash": "slow small triangles at two currents: play is of one size, a brace stretches with the force",
-        "rate-dependent-yield": "a displacement sensor on the damper's rod",
+        "backlash": Separation(
+            "slow small triangles at two currents: play is of one size, a brace stretches with the force", ("reversal",)
+        ),
+        "rate-dependent-yield": Separation("a displacement sensor on the damper's rod"),
     },
 )

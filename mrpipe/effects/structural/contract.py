@@ -19,7 +19,7 @@ from typing import Any, Literal
 from numba import float64, void
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.effects.contract import Described, Parameter, Values
+from mrpipe.effects.contract import Described, Parameter, Separation, Values
 
 STEP_SIGNATURE = void(float64, float64, float64[::1], float64[::1], float64, float64[::1])
 """`step(position [m], rate [m/s], state, parameters, dt [s], out)`: writes one unit force for each amplitude."""
@@ -73,10 +73,10 @@ class StructuralEffect(Described):
     forms
         One or several functional shapes.
     separated_by
-        Other effect -> test that tells the two apart.
+        Other effect -> test that separates the two.
     """
 
     acts_on: Place
     forms: tuple[StructuralForm, ...]
     places: Literal["all", "one"] = "all"
-    separated_by: Mapping[str, str] = field(default_factory=dict)
+    separated_by: Mapping[str, Separation] = field(default_factory=dict)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mrpipe.effects.contract import strength
+from mrpipe.effects.contract import Separation, strength
 from mrpipe.effects.structural.contract import StructuralEffect, StructuralForm
 
 _TIME = strength("time", "s", "dead time beyond sampling and filters of the controller", "time", 0.0, 0.2, 0.01)
@@ -18,5 +18,5 @@ EFFECT = StructuralEffect(
         StructuralForm("drive-late", "drive(t) = inverse(desired force, motion)(t - T)", (_TIME,), ()),
         StructuralForm("law-late", "desired force(t) = law(state)(t - T)", (_TIME,), ()),
     ),
-    separated_by={"delay": "steps of the command at rest: the driver's lag shows without the controller"},
+    separated_by={"delay": Separation("steps of the command at rest: the driver's lag shows without the controller")},
 )

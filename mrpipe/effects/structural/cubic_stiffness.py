@@ -6,7 +6,7 @@ from __future__ import annotations
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.effects.contract import Parameter, amplitude, shape
+from mrpipe.effects.contract import Parameter, Separation, amplitude, shape
 from mrpipe.effects.structural.contract import STEP_SIGNATURE, StructuralEffect, StructuralForm
 
 
@@ -41,7 +41,11 @@ EFFECT = StructuralEffect(
         ),
     ),
     separated_by={
-        "impact": "the same motion at half the amplitude: a bumper is not reached, a cubic force falls to an eighth",
-        "joint-friction": "free decay from two amplitudes: stiffness shifts its frequency, friction ends it",
+        "impact": Separation(
+            "the same motion at half the amplitude: a bumper is not reached, a cubic force falls to an eighth"
+        ),
+        "joint-friction": Separation(
+            "free decay from two amplitudes: stiffness shifts its frequency, friction ends it"
+        ),
     },
 )

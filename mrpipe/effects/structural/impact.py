@@ -6,7 +6,7 @@ from __future__ import annotations
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.effects.contract import amplitude, shape
+from mrpipe.effects.contract import Separation, amplitude, shape
 from mrpipe.effects.structural.contract import STEP_SIGNATURE, StructuralEffect, StructuralForm
 
 
@@ -61,5 +61,5 @@ EFFECT = StructuralEffect(
         _form("hertz-positive", "k (x - gap)^1.5, one side", 1.0, 1.0),
         _form("hertz-negative", "k (x + gap)^1.5, one side", 1.0, -1.0),
     ),
-    separated_by={"cubic-stiffness": "the same motion at half the amplitude: a bumper is not reached"},
+    separated_by={"cubic-stiffness": Separation("the same motion at half the amplitude: a bumper is not reached")},
 )

@@ -8,7 +8,7 @@ import math
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.effects.contract import amplitude, shape
+from mrpipe.effects.contract import Separation, amplitude, shape
 from mrpipe.effects.structural.contract import STEP_SIGNATURE, StructuralEffect, StructuralForm
 
 
@@ -87,7 +87,9 @@ EFFECT = StructuralEffect(
         ),
     ),
     separated_by={
-        "cubic-stiffness": "free decay from two amplitudes: friction ends it, stiffness shifts its frequency",
-        "base-rocking": "free decay to rest: friction stops it at once",
+        "cubic-stiffness": Separation(
+            "free decay from two amplitudes: friction ends it, stiffness shifts its frequency"
+        ),
+        "base-rocking": Separation("free decay to rest: friction stops it at once"),
     },
 )

@@ -2,35 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from mrpipe.effects.contract import TESTS_FOR, Effect, TestKind
 from mrpipe.fitting.recordings import Recordings
 
-_KINDS = (
-    ("triangular displacement", "speeds"),
-    ("slow small triangles", "reversal"),
-    ("current steps", "steps"),
-    ("varying-drive", "steps"),
-    ("dwell at several positions", "positions"),
-    ("several-positions", "positions"),
-    ("about another middle", "middle"),
-    ("several frequencies", "frequencies"),
-    ("frequency sweep", "frequencies"),
-    ("several-frequencies", "frequencies"),
-    ("varying-speed", "speeds"),
-    ("smaller amplitude", "amplitudes"),
-    ("long run", "long"),
-    ("long-tests", "long"),
-    ("constant drive", "constants"),
-    ("rest at several drives", "rest"),
-)
-"""Words of the effects' own advice and needs -> kind of test."""
-
-_BY_STATE = {
+_BY_STATE: Mapping[str, TestKind] = {
     "displacement": "positions",
     "past of displacement": "reversal",
     "hysteresis": "reversal",
@@ -46,7 +27,7 @@ _BY_STATE = {
 }
 """State that an unknown residual depends on -> kind of test."""
 
-_IN_DOUBT = ("speeds", "steps", "amplitudes")
+_IN_DOUBT: tuple[TestKind, ...] = ("speeds", "steps", "amplitudes")
 
 
 @dataclass(frozen=True)
@@ -95,36 +76,41 @@ def range_of(recordings: Recordings) -> Range:
     return Range(scales.stroke, scales.speed, scales.drive, frequency, float(np.clip(np.median(lengths), 4.0, 20.0)))
 
 
-def kinds_in(advice: str) -> list[str]:
-    """Return the kinds of test that a sentence of advice or a need asks for."""
-    return list(dict.fromkeys(kind for words, kind in _KINDS if words in advice))
+def kinds_between(one: str, other: str, library: Mapping[str, Effect]) -> tuple[TestKind, ...]:
+    """Return the kinds of test that separate two effects, as either of them says; general ones where neither does."""
+    for name, rival in ((one, other), (other, one)):
+        separation = library[name].separated_by.get(rival) if name in library else None
+        if separation is not None and separation.kinds:
+            return separation.kinds
+    return _IN_DOUBT
 
 
-def wanted_tests(summary: Mapping[str, Any], needs: Mapping[str, Sequence[str]], recordings: Recordings) -> ExtraTests:
-    """Return the tests that a verdict leaves to be wished for.
+def wanted_tests(summary: Mapping[str, Any], library: Mapping[str, Effect], recordings: Recordings) -> ExtraTests:
+    """Return the tests that would decide what a verdict leaves open.
 
     Parameters
     ----------
     summary
-        Contract section 4: rivals of each effect, and what an unknown residual depends on.
-    needs
-        Effect that the campaign can't show -> what it needs for it.
+        What `close-loop --json` prints: rivals of each effect, what an unknown residual depends on, and the effects
+        that the campaign cannot show.
+    library
+        Effects by name: what separates them, and what they need.
     recordings
         Training tests.
     """
     span = range_of(recordings)
-    wanted: list[tuple[str, str]] = []
+    wanted: list[tuple[str, TestKind]] = []
     for effect in summary["effects"]:
-        advice = effect.get("separating_tests", {})
         for rival in effect["tied_with"]:
-            kinds = kinds_in(advice.get(rival, "")) or list(_IN_DOUBT)
+            kinds = kinds_between(effect["name"], rival, library)
             wanted += [(f"{effect['name']} or {rival}", kind) for kind in kinds]
     if summary["unexplained"]["structured"]:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
-        kinds = list(dict.fromkeys(_BY_STATE[state] for state in states if state in _BY_STATE)) or list(_IN_DOUBT)
+        kinds = tuple(dict.fromkeys(_BY_STATE[state] for state in states if state in _BY_STATE)) or _IN_DOUBT
         wanted += [("what is unexplained", kind) for kind in kinds]
-    for name, asked in needs.items():
-        wanted += [(f"whether there is {name}", kind) for need in asked for kind in kinds_in(need)]
+    for name in summary.get("untestable", {}):
+        asked = library[name].needs if name in library else ()
+        wanted += [(f"whether there is {name}", TESTS_FOR[need]) for need in asked]
     tests: dict[str, list[dict[str, Any]]] = {}
     reasons: dict[str, dict[str, Any]] = {}
     for decides, kind in wanted:
@@ -249,7 +235,7 @@ def _rest(span: Range) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-_MAKERS: Mapping[str, Callable[[Range], list[dict[str, Any]]]] = {
+_MAKERS: Mapping[TestKind, Callable[[Range], list[dict[str, Any]]]] = {
     "speeds": _speeds,
     "steps": _steps,
     "positions": _positions,

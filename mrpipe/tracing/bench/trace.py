@@ -392,7 +392,7 @@ def _named(
                 parameter_table(chosen, index, limits[index], options.drive_unit),
                 confidence_of(total, clear_lead(candidates, selection.noise), gain, options.rules),
                 rivals,
-                {name: term.effect.separated_by[name] for name in rivals if name in term.effect.separated_by},
+                {name: term.effect.separated_by[name].advice for name in rivals if name in term.effect.separated_by},
                 gain,
             )
         )

@@ -211,7 +211,7 @@ def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[d
             "remedy": effect.remedy,
             "corrected_in": "structure",
         }
-        tests = {name: effect.separated_by[name] for name in rivals if name in effect.separated_by}
+        tests = {name: effect.separated_by[name].advice for name in rivals if name in effect.separated_by}
         if tests:
             entry["separating_tests"] = tests
         if gain is not None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 from mrpipe.campaigns import load_campaign
 from mrpipe.config.sections.laboratory import CustomTest
+from mrpipe.effects.contract import TESTS_FOR, TestKind
 from mrpipe.effects.library import all_effects, damper_effects
 from mrpipe.laboratory.bench import BenchRig, record_bench
 from mrpipe.laboratory.blind import write_bench
@@ -19,7 +20,7 @@ from mrpipe.laboratory.motion import BenchTest
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench import extra_tests
-from mrpipe.tracing.bench.extra_tests import Range, kinds_in, wanted_tests
+from mrpipe.tracing.bench.extra_tests import Range, kinds_between, wanted_tests
 from mrpipe.tracing.bench.summary import Tracing, TracingOptions
 from mrpipe.tracing.bench.trace import trace_campaign
 
@@ -38,8 +39,17 @@ def span(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.property
 def test_every_advice_and_need_of_the_library_leads_to_tests() -> None:
     for effect in damper_effects().values():
-        for advice in (*effect.separated_by.values(), *effect.needs):
-            assert kinds_in(advice), f"{effect.name}: {advice}"
+        kinds: list[str] = [*(TESTS_FOR[need] for need in effect.needs)]
+        for rival, separation in effect.separated_by.items():
+            assert separation.advice
+            assert kinds_between(effect.name, rival, damper_effects()) == separation.kinds
+            kinds += separation.kinds
+        assert set(kinds) <= set(extra_tests._MAKERS)
+
+
+@pytest.mark.property
+def test_every_kind_of_test_can_be_made() -> None:
+    assert set(extra_tests._MAKERS) == set(get_args(TestKind))
 
 
 @pytest.mark.property
@@ -57,8 +67,10 @@ def test_every_kind_can_be_ordered_and_stays_within_the_campaign() -> None:
 
 @pytest.mark.property
 def test_rivals_unknowns_and_what_was_invisible_are_all_asked_for() -> None:
-    tie = {"name": "accumulator", "tied_with": ["inertia"], "separating_tests": {"inertia": "several frequencies"}}
-    found = wanted_tests(verdict(effects=[tie]), {"remanence": ("varying-drive",)}, None)  # type: ignore[arg-type]
+    library = damper_effects()
+    tie = {"name": "accumulator", "tied_with": ["inertia"]}
+    open_questions = verdict(effects=[tie], untestable={"remanence": "untestable: the drive is constant"})
+    found = wanted_tests(open_questions, library, None)  # type: ignore[arg-type]
     assert [item["decides"] for item in found.reasons] == ["accumulator or inertia", "whether there is remanence"]
     assert {"extra-steps-0.5", "extra-steps-1"} <= {item["name"] for item in found.tests}
     unknown = {"structured": True, "depends_on": [{"state": "time in test", "share": 0.3}]}
@@ -97,9 +109,8 @@ def test_the_tests_offered_tell_rivals_further_apart(tmp_path: Path, monkeypatch
         return trace_campaign([item.test for item in prepared], library, [], options, rng=np.random.default_rng(1))
 
     before = traced(first, "first")
-    advice = dict(library["accumulator"].separated_by)
-    tie = {"name": "accumulator", "tied_with": ["end-stop"], "separating_tests": advice}
-    offered = wanted_tests(verdict(effects=[tie]), {}, before.training)
+    tie = {"name": "accumulator", "tied_with": ["end-stop"]}
+    offered = wanted_tests(verdict(effects=[tie]), library, before.training)
     after = traced([*first, *(BenchTest(**item) for item in offered.tests)], "second")
     gaps = []
     for item in (before, after):
