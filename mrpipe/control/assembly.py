@@ -35,6 +35,10 @@ PERFECT_ROUNDING = 1.5
 """Rounding of friction for a perfect damper over that with a damper, because no yielding rounds its force."""
 
 
+LARGEST_SPEED_M_S = 0.5
+"""Speed at which the largest force of the damper is found."""
+
+
 @dataclass(frozen=True)
 class ControllerFactory:
     """Builds the controller of any law for one structure and one damper.
@@ -138,6 +142,7 @@ class ControllerFactory:
         if perfect:
             given = self.ideal_rounding_m_s
             rounding = PERFECT_ROUNDING * rounding if given is None else given
+        limit = settings.drive_limit or self.damper.drive_limit
         return ControllerOptions(
             rate_hz=settings.rate_hz or RATES_HZ[perfect],
             velocity="measured" if perfect else settings.velocity,
@@ -147,13 +152,24 @@ class ControllerFactory:
             inverse_request=settings.inverse_request,
             residual_force_n=settings.residual_force_n if residual_force_n is None else residual_force_n,
             low_pass_hz=settings.low_pass_hz,
-            drive_limit=settings.drive_limit or self.damper.drive_limit,
+            drive_limit=limit,
             dead_band_m_s=settings.dead_band_m_s,
             extremum_step_m=settings.extremum_step_m,
             friction_rounding_m_s=rounding,
             extremum_share=settings.extremum_share,
+            largest_displacement_m=settings.largest_displacement_m,
+            largest_velocity_m_s=settings.largest_velocity_m_s,
+            largest_acceleration_m_s2=settings.largest_acceleration_m_s2,
+            largest_force_n=settings.largest_force_n or self._largest_force(limit),
+            fault_hold_s=settings.fault_hold_s,
+            safe_drive=min(settings.safe_drive, limit),
             extremum_memory_s=settings.extremum_memory_periods * 2.0 * math.pi / self.calibrated.omega_0,
         )
+
+    def _largest_force(self, limit: float) -> float | None:
+        """Return ten times the force at the limit of the drive [N]: more than the damper can give."""
+        force = 10.0 * float(self.damper.quasi_static_force(LARGEST_SPEED_M_S, limit))
+        return force if math.isfinite(force) else None
 
     def _reference(self, law: Law, gains: Gains) -> Network | None:
         """Return the reference network for these gains: its force is proportional to the tuned gain of the law."""

@@ -8,6 +8,7 @@ What the closed loop, the virtual laboratory, the tracing of effects and the C e
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -32,6 +33,12 @@ _SOURCES = {
     "difference": kernel.VELOCITY_DIFFERENCE,
 }
 _CHANNELS = {"displacement": 0, "velocity": 1, "acceleration": 2, "force": 3}
+
+
+DYNAMIC_RANGE = 1e5
+"""Largest reading of a sensor over its noise, where the settings give none: 100 dB, more than 16 bits can hold."""
+
+_LARGEST_FORCE_N = 1e9
 
 
 @dataclass(frozen=True)
@@ -67,6 +74,14 @@ class ControllerOptions:
         How far the displacement must come back from an extremum to make it count: metres, or share of the amplitude.
     extremum_memory_s
         After this time without a new extremum the pending one counts; three quarters of a period suits.
+
+    largest_displacement_m, largest_velocity_m_s, largest_acceleration_m_s2, largest_force_n
+        Largest plausible readings; larger ones and those that are not finite are refused. None: what a sensor of
+        :data:`DYNAMIC_RANGE` can read.
+    fault_hold_s
+        How long a refused reading is replaced by the last good one before the drive goes to `safe_drive`.
+    safe_drive
+        Drive while the readings cannot be used.
     """
 
     rate_hz: float = 200.0
@@ -83,6 +98,12 @@ class ControllerOptions:
     extremum_step_m: float = 1e-4
     extremum_share: float = 0.1
     extremum_memory_s: float = 0.6
+    largest_displacement_m: float | None = None
+    largest_velocity_m_s: float | None = None
+    largest_acceleration_m_s2: float | None = None
+    largest_force_n: float | None = None
+    fault_hold_s: float = 0.02
+    safe_drive: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -247,6 +268,9 @@ class _Pack:
         self.layout = np.zeros(kernel.LAYOUT_SIZE, dtype=np.int64)
         self.layout[kernel.VELOCITY_SOURCE] = _SOURCES[options.velocity]
         self.networks: list[IntArray] = []
+        head[kernel.SAFE_DRIVE] = options.safe_drive
+        # a time that is a whole number of samples must not lose one to rounding
+        self.layout[kernel.HOLD] = math.floor(options.fault_hold_s * options.rate_hz + 1e-6)
 
     @property
     def at(self) -> int:
@@ -305,12 +329,16 @@ class _Pack:
     def finish(self, law: Law, gains: Gains, history: int, floors: int, networks: Mapping[str, Network]) -> Controller:
         """Return the controller."""
         observed = 2 * floors if "observer" in law.needs else 0
+        limits = _largest_readings(self.options, law, floors)
         layout = self.layout
+        layout[kernel.AT_LIMITS], layout[kernel.CHANNELS] = self.at, len(limits)
+        self.numbers.append(limits)
         layout[kernel.STATE_HISTORY] = kernel.S_HEAD
         layout[kernel.HISTORY] = history
         layout[kernel.STATE_OBSERVER] = kernel.S_HEAD + 4 * history
         layout[kernel.STATE_LAW] = kernel.S_HEAD + 4 * history + observed
-        layout[kernel.STATE_SIZE] = kernel.S_HEAD + 4 * history + observed + law.memory
+        layout[kernel.STATE_GOOD] = kernel.S_HEAD + 4 * history + observed + law.memory
+        layout[kernel.STATE_SIZE] = layout[kernel.STATE_GOOD] + len(limits)
         return Controller(
             law=law.name,
             force=law.force,
@@ -321,6 +349,26 @@ class _Pack:
             floors=floors,
             networks=networks,
         )
+
+
+def _largest_readings(options: ControllerOptions, law: Law, floors: int) -> FloatArray:
+    """Return the largest plausible reading of each measurement, shape (5 + floors,); 0 for those that are not read."""
+    noise = options.displacement_noise_m, options.acceleration_noise_m_s2
+    # a motion whose displacement and acceleration fill the range of their sensors has this velocity
+    motion = (noise[0], math.sqrt(noise[0] * noise[1]), noise[1])
+    given = options.largest_displacement_m, options.largest_velocity_m_s, options.largest_acceleration_m_s2
+    x, v, a = (DYNAMIC_RANGE * scale if limit is None else limit for scale, limit in zip(motion, given, strict=True))
+    if min(x, v, a) <= 0.0 or (options.largest_force_n or 1.0) <= 0.0:
+        raise UserError("controller", "largest_...", "is not positive", "give the largest plausible reading")
+    limits = np.zeros(kernel.MEASURED_FLOORS + floors)
+    limits[kernel.MEASURED_DISPLACEMENT], limits[kernel.MEASURED_ACCELERATION] = x, a
+    if options.velocity == "measured":
+        limits[kernel.MEASURED_VELOCITY] = v
+    if "floor-accelerations" in law.needs:
+        limits[kernel.MEASURED_GROUND] = limits[kernel.MEASURED_FLOORS :] = a
+    if "damper-force" in law.needs:
+        limits[kernel.MEASURED_FORCE] = options.largest_force_n or _LARGEST_FORCE_N
+    return limits
 
 
 def _low_pass(options: ControllerOptions) -> FloatArray:

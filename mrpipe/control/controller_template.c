@@ -18,6 +18,30 @@ static const int layout[] = {@LAYOUT@};
 static double larger(double a, double b) { return a > b ? a : b; }
 static double smaller(double a, double b) { return a < b ? a : b; }
 
+static int guard(double *state, const double *measured)
+{
+    double *good = state + layout[STATE_GOOD];
+    const double *limits = numbers + layout[AT_LIMITS];
+    int refused = 0;
+    for (int channel = 0; channel < layout[CHANNELS]; ++channel) {
+        if (limits[channel] <= 0.0) continue;
+        /* the comparison is false for a reading that is not a number */
+        if (fabs(measured[channel]) <= limits[channel])
+            good[channel] = measured[channel];
+        else
+            refused = 1;
+    }
+    if (!refused) {
+        if (state[S_FAULTS] > layout[HOLD])
+            for (int index = 0; index < layout[STATE_GOOD]; ++index) state[index] = 0.0;
+        state[S_FAULTS] = 0.0;
+        state[S_READY] = 1.0;
+        return 0;
+    }
+    state[S_FAULTS] = smaller(state[S_FAULTS] + 1.0, 1e9);
+    return state[S_READY] < 0.5 || state[S_FAULTS] > layout[HOLD] ? 2 : 1;
+}
+
 static void estimate(double *state, const double *measured)
 {
     const double x = measured[MEASURED_DISPLACEMENT], a = measured[MEASURED_ACCELERATION], dt = numbers[SAMPLE_TIME];
@@ -165,10 +189,21 @@ void @PREFIX@_controller_step(double state[@UPPER@_STATE_SIZE],
                               const double measured[@UPPER@_MEASURED_SIZE],
                               double command[@UPPER@_COMMAND_SIZE])
 {
-    estimate(state, measured);
+    const int fault = guard(state, measured);
+    if (fault == 2) {
+        for (int index = 0; index < COMMAND_SIZE; ++index) command[index] = 0.0;
+        command[COMMAND_DRIVE] = numbers[SAFE_DRIVE];
+        command[COMMAND_DISPLACEMENT] = state[S_X];
+        command[COMMAND_VELOCITY] = state[S_V];
+        command[COMMAND_AMPLITUDE] = state[S_AMPLITUDE];
+        command[COMMAND_FAULT] = 2.0;
+        return;
+    }
+    const double *readings = state + layout[STATE_GOOD];
+    estimate(state, readings);
     follow_motion(state);
-    remember(state, state[S_X], state[S_V], measured[MEASURED_ACCELERATION], 0.0);
-    const double wanted = law(state, measured);
+    remember(state, state[S_X], state[S_V], readings[MEASURED_ACCELERATION], 0.0);
+    const double wanted = law(state, readings);
     const int direct = layout[OUTPUT] == OUTPUT_DRIVE;
     const int clipped = !direct && wanted * state[S_DIRECTION] < 0.0;
     const double force = clipped ? 0.0 : wanted;
@@ -197,4 +232,5 @@ void @PREFIX@_controller_step(double state[@UPPER@_STATE_SIZE],
     command[COMMAND_CLIPPED] = clipped ? 1.0 : 0.0;
     command[COMMAND_SWITCHED] = switched ? 1.0 : 0.0;
     command[COMMAND_INVERSE] = asked;
+    command[COMMAND_FAULT] = fault;
 }

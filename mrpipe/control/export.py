@@ -34,6 +34,7 @@ _MACROS = (
     "COMMAND_CLIPPED",
     "COMMAND_SWITCHED",
     "COMMAND_INVERSE",
+    "COMMAND_FAULT",
     "COMMAND_SIZE",
 )
 _INNER_MACROS = tuple(
@@ -134,6 +135,19 @@ def _description(controller: Controller, prefix: str, details: dict[str, Any]) -
     }
 
 
+def _limits(controller: Controller) -> str:
+    """Return the largest plausible readings in words."""
+    at = int(controller.layout[kernel.AT_LIMITS])
+    named = {
+        "displacement": (kernel.MEASURED_DISPLACEMENT, "m"),
+        "acceleration": (kernel.MEASURED_ACCELERATION, "m/s2"),
+        "velocity": (kernel.MEASURED_VELOCITY, "m/s"),
+        "force": (kernel.MEASURED_FORCE, "N"),
+    }
+    limits = {name: (float(controller.numbers[at + place]), unit) for name, (place, unit) in named.items()}
+    return ", ".join(f"{name} {limit:.3g} {unit}" for name, (limit, unit) in limits.items() if limit > 0.0)
+
+
 def _places(prefix: str) -> dict[str, int]:
     names = (name for name in _MACROS if name.startswith(prefix) and not name.endswith("_SIZE"))
     return {name.removeprefix(prefix).lower(): getattr(kernel, name) for name in names}
@@ -147,6 +161,7 @@ def _readme(controller: Controller, prefix: str) -> str:
         if controller.floors
         else ""
     )
+    hold = int(controller.layout[kernel.HOLD])
     return f"""# Controller of law {controller.law}
 
 Plain C99 without allocation, files or libraries but `math.h`. Build with `cc -std=c99 -c controller.c` and link `-lm`;
@@ -159,8 +174,21 @@ Call `{prefix}_controller_reset` once, then `{prefix}_controller_step` every {co
 - `{upper}_MEASURED_VELOCITY`: damper velocity [m/s], read only where the controller was built without a filter{floors}
 
 and hold `command[{upper}_COMMAND_DRIVE]` (A or V, as the damper was measured) until the next call. The other entries of
-`command` tell the desired force before and after clipping, the estimated motion and whether clipping and switch acted.
-The damper force is positive where it resists the motion.
+`command` are the desired force before and after clipping, the estimated motion, whether clipping and switch acted, and
+`{upper}_COMMAND_FAULT`. The damper force is positive where it resists the motion.
+
+## Faulty readings
+
+A reading is refused if it is NaN or infinite, or larger than the largest plausible one ({_limits(controller)}).
+
+- For up to {hold} samples in a row ({1e3 * hold * controller.sample_time_s:.0f} ms) the last good reading replaces it;
+  `{upper}_COMMAND_FAULT` is 1.
+- After that, and before the first good sample, the drive is {controller.options.safe_drive:g};
+  `{upper}_COMMAND_FAULT` is 2.
+- At the next sample with good readings the controller starts anew, and `{upper}_COMMAND_FAULT` is 0.
+
+Whatever the readings are, the drive is finite and lies between 0 and the drive limit, and the memory stays finite. This
+holds for code compiled without `-ffast-math`, which would drop the test for NaN.
 
 `controller.json` holds gains, options and all numbers.
 """

@@ -33,6 +33,7 @@ COMMAND_AMPLITUDE = 5  # X of (4.18) [m]
 COMMAND_CLIPPED = 6  # 1 where clipping set the force to zero
 COMMAND_SWITCHED = 7  # 1 where the switch P2 (24) set the drive to zero
 COMMAND_INVERSE = 8  # drive of the inverse before switch, low-pass and limits [A]
+COMMAND_FAULT = 9  # 0; 1 while a refused reading is replaced by the last good one; 2 at the safe drive
 COMMAND_SIZE = 12
 
 # --- layout ---
@@ -52,6 +53,10 @@ STATE_OBSERVER = 12  # where in `state` the observer is
 STATE_SIZE = 13
 AT_LAW = 14  # where in `numbers` further numbers of the law are
 STATE_LAW = 15  # where in `state` the memory of the law is
+AT_LIMITS = 16  # where in `numbers` the largest plausible readings are; 0: not read
+STATE_GOOD = 17  # where in `state` the last good readings are
+CHANNELS = 18  # number of measurements
+HOLD = 19  # samples for which a refused reading is replaced by the last good one
 LAYOUT_SIZE = 24
 # a network in `layout`: layers, then neurons of each (input included), channels, past values, absolute, channel codes
 NET_AT = 0  # where in `numbers`
@@ -85,7 +90,8 @@ TABLE_SPEED = 20  # largest speed of the inverse table [m/s]
 TABLE_DRIVE = 21  # largest drive of the inverse table
 ROUNDING = 22  # speed over which the friction of fdns changes its sign [m/s]; 0: a jump
 MEMORY = 23  # how long an extremum counts [s]
-HEAD = 24
+SAFE_DRIVE = 24  # drive while the readings cannot be used
+HEAD = 32
 # a network in `numbers`: input scale, input shift, output scale, output shift, then weights by row and biases a layer
 
 # --- state ---
@@ -103,6 +109,8 @@ S_FORCE = 11  # last desired force
 S_DISPLACEMENT = 12  # last measured displacement
 S_AGE = 13  # time since the last extremum
 S_REQUEST = 14  # drive that a law commands itself
+S_FAULTS = 15  # samples in a row with a refused reading
+S_READY = 16  # 1 after the first sample whose readings were all good
 S_HEAD = 24
 
 WIDEST = 256  # neurons of a layer, several networks side by side included
@@ -112,6 +120,35 @@ LAW_SIGNATURE = float64(float64[::1], int64[::1], float64[::1], float64[::1])
 
 LAW_FUNCTION = types.FunctionType(LAW_SIGNATURE)
 """The compiled type of such a function, for the signatures of kernels that call it."""
+
+
+@njit(int64(float64[::1], int64[::1], float64[::1], float64[::1]), cache=True)
+def _guard(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> int:
+    """Take over the plausible readings; return 0 if all are, 1 while others are held, 2 if the drive must be safe.
+
+    A reading is refused if it is not finite or larger than its limit. After the safe drive the controller starts anew,
+    because its memory ends before the gap.
+    """
+    at, limits, refused = layout[STATE_GOOD], layout[AT_LIMITS], False
+    for channel in range(layout[CHANNELS]):
+        if numbers[limits + channel] <= 0.0:
+            continue
+        # the comparison is false for a reading that is not a number
+        if abs(measured[channel]) <= numbers[limits + channel]:
+            state[at + channel] = measured[channel]
+        else:
+            refused = True
+    if not refused:
+        if state[S_FAULTS] > layout[HOLD]:
+            for index in range(at):
+                state[index] = 0.0
+        state[S_FAULTS] = 0.0
+        state[S_READY] = 1.0
+        return 0
+    state[S_FAULTS] = min(state[S_FAULTS] + 1.0, 1e9)
+    if state[S_READY] < 0.5 or state[S_FAULTS] > layout[HOLD]:
+        return 2
+    return 1
 
 
 @njit(void(float64[::1], float64[::1], float64[::1], int64), cache=True)
@@ -288,13 +325,26 @@ def controller_step(
     command
         Shape (COMMAND_SIZE,), filled here; indices COMMAND_...
 
+    A reading that is not finite or not plausible is replaced by the last good one for a few samples; after that the
+    drive is the safe one until all readings are good again, and `command[COMMAND_FAULT]` reports it.
+
     Source: Figure 5.3; law, clipping P2 (22), inverse P2 (23), switch P2 (24), low-pass, limits.
     """
-    _estimate(numbers, state, measured, layout[VELOCITY_SOURCE])
+    fault = _guard(numbers, layout, state, measured)
+    if fault == 2:
+        command[:] = 0.0
+        command[COMMAND_DRIVE] = numbers[SAFE_DRIVE]
+        command[COMMAND_DISPLACEMENT] = state[S_X]
+        command[COMMAND_VELOCITY] = state[S_V]
+        command[COMMAND_AMPLITUDE] = state[S_AMPLITUDE]
+        command[COMMAND_FAULT] = 2.0
+        return
+    readings = state[layout[STATE_GOOD] : layout[STATE_GOOD] + layout[CHANNELS]]
+    _estimate(numbers, state, readings, layout[VELOCITY_SOURCE])
     _follow_motion(numbers, state)
     # a law with a network needs the histories of motion before the force of this instant is known
-    _remember(layout, state, state[S_X], state[S_V], measured[MEASURED_ACCELERATION], 0.0)
-    wanted = law(numbers, layout, state, measured)
+    _remember(layout, state, state[S_X], state[S_V], readings[MEASURED_ACCELERATION], 0.0)
+    wanted = law(numbers, layout, state, readings)
     force = wanted
     direct = layout[OUTPUT] == OUTPUT_DRIVE
     clipped = not direct and wanted * state[S_DIRECTION] < 0.0
@@ -328,3 +378,4 @@ def controller_step(
     command[COMMAND_CLIPPED] = 1.0 if clipped else 0.0
     command[COMMAND_SWITCHED] = 1.0 if switched else 0.0
     command[COMMAND_INVERSE] = asked
+    command[COMMAND_FAULT] = fault

@@ -52,3 +52,23 @@ class ControllerSettings(Section):
     )
     extremum_step_m: float = Field(1e-4, gt=0.0, description="Way back that makes an extremum count (X of fdns).")
     extremum_share: float = Field(0.1, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
+    largest_displacement_m: float | None = Field(
+        None,
+        gt=0.0,
+        description="Largest plausible displacement; larger readings are refused. null: 100 dB above the noise.",
+    )
+    largest_velocity_m_s: float | None = Field(
+        None, gt=0.0, description="The same for a measured velocity; null: from displacement and acceleration."
+    )
+    largest_acceleration_m_s2: float | None = Field(
+        None, gt=0.0, description="The same for accelerations; null: 100 dB above the noise."
+    )
+    largest_force_n: float | None = Field(
+        None, gt=0.0, description="The same for a measured force; null: ten times the largest force of the damper."
+    )
+    fault_hold_s: float = Field(
+        0.02,
+        ge=0.0,
+        description="Time for which the last good reading replaces a refused one; then the drive is `safe_drive`.",
+    )
+    safe_drive: float = Field(0.0, ge=0.0, description="Drive while readings are refused.")
