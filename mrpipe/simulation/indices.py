@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray
-from mrpipe.control.kernel import COMMAND_CLIPPED, COMMAND_SWITCHED
+from mrpipe.control.kernel import COMMAND_CLIPPED, COMMAND_FAULT, COMMAND_SWITCHED
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
 
@@ -197,6 +197,7 @@ def indices(
     commands = response.commands[samples] if samples.any() else response.commands
     result |= {
         "clipped_share": float(np.mean(commands[:, COMMAND_CLIPPED])),
+        "faulty_share": float(np.mean(commands[:, COMMAND_FAULT] > 0.0)),
         "switched_off_share": float(np.mean(commands[:, COMMAND_SWITCHED])),
         "saturated_share": float(np.mean(response.drive[steady] > 0.99 * drive_limit)),
         "rms_drive": _rms(response.drive[steady]),

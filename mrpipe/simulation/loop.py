@@ -16,7 +16,9 @@ from mrpipe.control.kernel import (
     MEASURED_ACCELERATION,
     MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
+    MEASURED_FORCE,
     MEASURED_GROUND,
+    MEASURED_VELOCITY,
 )
 from mrpipe.control.laws import law_named
 from mrpipe.dampers.drive import command_place, lag_step, polynomial_step
@@ -49,6 +51,32 @@ class SensorNoise:
     acceleration_bias_m_s2: float = 0.0
 
 
+MISSING, ZERO, STUCK = float("nan"), float("-inf"), float("inf")
+"""What stands in the noise of a sensor where a reading is missing, zero, or the one before."""
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """Faulty readings.
+
+    Attributes
+    ----------
+    mark
+        :data:`MISSING`, :data:`ZERO` or :data:`STUCK`.
+    sensor
+        `displacement`, `accelerometers`, `velocity`, `force` or `all`.
+    share
+        Share of the samples that begin a fault [1].
+    samples
+        Length of a fault.
+    """
+
+    mark: float
+    sensor: str = "all"
+    share: float = 0.01
+    samples: int = 1
+
+
 @dataclass(frozen=True)
 class LoopOptions:
     """How the loop is run.
@@ -68,6 +96,8 @@ class LoopOptions:
         Lag of the current driver besides what the damper's model has; 0: none.
     noise
         Of the sensors.
+    fault
+        Of the sensors; None: none.
     record_rate_hz
         Rate of the histories in the response.
     """
@@ -78,6 +108,7 @@ class LoopOptions:
     driver_time_constant_s: float = 0.0
     noise: SensorNoise = field(default_factory=SensorNoise)
     record_rate_hz: float = 1000.0
+    fault: SensorFault | None = None
 
 
 @dataclass(frozen=True)
@@ -216,6 +247,8 @@ def simulate_law(
     record = np.zeros((steps // every + 1, 3 * n + parts.T_SIZE))
     z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
     noise = _noise(options.noise, samples, n, rng)
+    if options.fault is not None:
+        _add_fault(noise, options.fault, rng)
     matrices = [np.ascontiguousarray(item) for item in (frame.mass, frame.damping, frame.stiffness, w)]
     plant = _plant(frame, w, dt)
     memory = controller.new_state()
@@ -302,6 +335,24 @@ def _noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generat
         result[:, MEASURED_ACCELERATION] = noise.acceleration_m_s2 * rng.standard_normal(samples)
     result[:, MEASURED_ACCELERATION] += noise.acceleration_bias_m_s2
     return result
+
+
+def _add_fault(noise: FloatArray, fault: SensorFault, rng: np.random.Generator | None) -> None:
+    """Mark the faulty readings in the noise; the first sample is good."""
+    if rng is None:
+        raise ValueError("a sensor fault needs a generator")
+    begins = np.flatnonzero(rng.random(len(noise)) < fault.share)
+    faulty = np.zeros(len(noise), dtype=bool)
+    for begin in begins:
+        faulty[max(begin, 1) : begin + fault.samples] = True
+    channels = {
+        "displacement": [MEASURED_DISPLACEMENT],
+        "velocity": [MEASURED_VELOCITY],
+        "force": [MEASURED_FORCE],
+        "accelerometers": [MEASURED_ACCELERATION, MEASURED_GROUND, *range(MEASURED_FLOORS, noise.shape[1])],
+        "all": list(range(noise.shape[1])),
+    }[fault.sensor]
+    noise[np.ix_(faulty, channels)] = fault.mark
 
 
 def _response(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from numba import float64, njit, void
 
 from mrpipe.artifacts import FloatArray
@@ -92,7 +94,11 @@ def sense(
     lower: FloatArray, gain: FloatArray, w: FloatArray, z: FloatArray, force: float, ground: float,
     noise: FloatArray, measured: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill the readings of the sensors; `lower` is the transposed lower half of A, `gain` the accelerations of 1 N."""
+    """Fill the readings of the sensors; `lower` is the transposed lower half of A, `gain` the accelerations of 1 N.
+
+    In the noise, infinity marks a reading that repeats the one before, minus infinity one that is 0.
+    """
+    before = measured.copy()
     n = w.shape[0]
     floors = measured[MEASURED_FLOORS:]
     multiply(lower, z, floors)
@@ -106,9 +112,14 @@ def sense(
         floors[floor] += noise[MEASURED_FLOORS + floor]
     measured[MEASURED_GROUND] = ground + noise[MEASURED_GROUND]
     measured[MEASURED_DISPLACEMENT] = x + noise[MEASURED_DISPLACEMENT]
-    measured[MEASURED_VELOCITY] = v
+    measured[MEASURED_VELOCITY] = v + noise[MEASURED_VELOCITY]
     measured[MEASURED_FORCE] = force + noise[MEASURED_FORCE]
     measured[MEASURED_ACCELERATION] = a + noise[MEASURED_ACCELERATION]
+    for channel in range(noise.shape[0]):
+        if noise[channel] == math.inf:
+            measured[channel] = before[channel]
+        elif noise[channel] == -math.inf:
+            measured[channel] = 0.0
 
 
 @njit(

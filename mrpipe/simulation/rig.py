@@ -19,8 +19,17 @@ from mrpipe.simulation import excitation as kinds
 from mrpipe.simulation.adjustment import adjusted_amplitude
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.ground_record import read_ground_record
-from mrpipe.simulation.loop import LoopOptions, Response, SensorNoise, simulate_law
-from mrpipe.simulation.settings import ExcitationSettings, SimulateSettings
+from mrpipe.simulation.loop import (
+    MISSING,
+    STUCK,
+    ZERO,
+    LoopOptions,
+    Response,
+    SensorFault,
+    SensorNoise,
+    simulate_law,
+)
+from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
 from mrpipe.structures import Frame, natural_modes
 
 RECORD_RATE_HZ = 1000.0
@@ -99,8 +108,16 @@ def loop_options(settings: SimulateSettings) -> LoopOptions:
         delay_s=settings.controller.delay_s,
         driver_time_constant_s=settings.driver_time_constant_s,
         noise=SensorNoise() if perfect else noise,
+        fault=_fault(sensors.fault),
         record_rate_hz=settings.record_rate_hz or (settings.plant_rate_hz if perfect else RECORD_RATE_HZ),
     )
+
+
+def _fault(settings: SensorFaultSettings) -> SensorFault | None:
+    marks = {"missing": MISSING, "zero": ZERO, "stuck": STUCK}
+    if settings.kind == "none":
+        return None
+    return SensorFault(marks[settings.kind], settings.sensor, settings.share, settings.samples)
 
 
 def excitation_of(rig: Rig, settings: ExcitationSettings) -> tuple[Excitation, Response | None]:
@@ -144,7 +161,7 @@ def _adjusted(
     tracking = rig.options.tracking
     if settings.adjust_with == "ideal" and tracking == "damper":
         tracking = "ideal"
-    options = replace(rig.options, noise=SensorNoise(), tracking=tracking)
+    options = replace(rig.options, noise=SensorNoise(), fault=None, tracking=tracking)
     gains = Gains(c_n_s_m=settings.reference_c_n_s_m)
     viscous = rig.controllers.build("vd", gains, perfect=tracking == "ideal")
     amplitude, response = adjusted_amplitude(

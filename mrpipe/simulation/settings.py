@@ -42,12 +42,28 @@ class ExcitationSettings(Section):
     file_unit: str = Field("m/s^2", description="Unit of the recorded acceleration, such as g or cm/s^2.")
 
 
+class SensorFaultSettings(Section):
+    """Faulty readings of the sensors in the loop."""
+
+    kind: Literal["none", "missing", "zero", "stuck"] = Field(
+        "none",
+        description="`missing`: the reading is not a number; `zero`: it is 0; `stuck`: the last reading is repeated, "
+        "as with samples that come late.",
+    )
+    sensor: Literal["displacement", "accelerometers", "velocity", "force", "all"] = Field(
+        "all", description="Which sensor."
+    )
+    share: float = Field(0.01, ge=0.0, le=1.0, description="Share of the samples that begin a fault.")
+    samples: int = Field(1, ge=1, description="Length of a fault in samples of the controller.")
+
+
 class SensorSettings(Section):
     """Noise of the sensors in the loop."""
 
     displacement_noise_m: float = Field(20e-6, ge=0.0, description="RMS noise of the damper displacement.")
     acceleration_noise_m_s2: float = Field(0.1, ge=0.0, description="RMS noise of each acceleration.")
     acceleration_bias_m_s2: float = Field(0.0, description="Constant bias of the damper's acceleration.")
+    fault: SensorFaultSettings = Field(SensorFaultSettings(), description="Faulty readings.")
 
 
 class SimulateSettings(Section):

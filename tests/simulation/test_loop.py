@@ -13,6 +13,7 @@ from mrpipe.dampers.drive import driver_lag_apart
 from mrpipe.dampers.plant import Phase, Step, build_chain, idle_step
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import LoopOptions, SensorNoise, at_rest, harmonic, recorded, simulate_law, sweep
+from mrpipe.simulation.loop import MISSING, STUCK, ZERO, SensorFault
 from mrpipe.simulation.parts import BOUC_WEN
 from mrpipe.simulation.reference import ReferenceController, reference_loop
 from mrpipe.structures import Frame, frequency_response, natural_modes, state_space
@@ -229,3 +230,17 @@ def test_same_seed_same_numbers(rig):
     first, _ = rig.run("fdns", options)
     second, _ = rig.run("fdns", options)
     assert np.array_equal(first.displacement, second.displacement)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("mark", [MISSING, ZERO, STUCK])
+@pytest.mark.parametrize("length", [1, 12])
+def test_sensor_faults_cost_little_and_never_break_the_loop(rig, mark, length):
+    """One sample in a hundred is missing, zero or late, or gaps of 60 ms: the loop goes on and stays controlled."""
+    _, values = rig.run("vd", LoopOptions())
+    fault = SensorFault(mark, "all", 0.01 / length, length)
+    response, faulty = rig.run("vd", LoopOptions(fault=fault))
+    assert np.all(np.isfinite(response.commands))
+    assert faulty["rms_x_top_m"] < 1.15 * values["rms_x_top_m"]
+    assert (faulty["faulty_share"] > 0.002) == bool(np.isnan(mark))
+    assert values["faulty_share"] == 0.0
