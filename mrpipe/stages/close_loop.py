@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.stages.close_loop_laws import closed_loop
 
 if TYPE_CHECKING:
     from mrpipe.effects.contract import Effect
@@ -16,6 +15,11 @@ if TYPE_CHECKING:
 
 CORRECTIONS = "corrections.yaml"
 NEXT_TESTS = "next-tests.yaml"
+_LACKING = {
+    "identify-frame": "identified frame",
+    "calibrate": "calibrated law",
+    "train-inverse": "inverse network",
+}
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
@@ -46,6 +50,53 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     _write(context, traced, summary)
     section.describe(context.report, section.Traced(traced, summary, settings.named_share, settings.least_share))
     return summary
+
+
+def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
+    """Return the part `closed_loop` of the JSON: each law measured, before, after and recalibrated."""
+    from dataclasses import replace
+
+    from mrpipe.campaigns import load_campaign
+    from mrpipe.control.assembly import ControllerFactory, inverse_network
+    from mrpipe.control.storage import read_calibrated
+    from mrpipe.reporting.closed_loop_words import in_words
+    from mrpipe.simulation.rig import Rig, loop_options
+    from mrpipe.structures import read_frame
+    from mrpipe.tracing.loop import study
+    from mrpipe.tracing.loop.augmented import damper_of
+    from mrpipe.tracing.loop.comparison import measured_runs
+
+    settings = context.settings.simulate
+    needed = ["identify-frame", "calibrate", *(["train-inverse"] if settings.controller.inverse == "network" else [])]
+    lacking = [_LACKING[name] for name in needed if name not in context.inputs]
+    if lacking:
+        return {"status": f"skipped: there is no {' and no '.join(lacking)}"}
+    context.progress(0.92, "closed loop")
+    frame = read_frame(context.artifact("identify-frame"))
+    damper = damper_of(traced.selection.base, traced.drive_unit)
+    inverse = inverse_network(settings.controller, lambda: context.artifact("train-inverse"))
+    calibrated = read_calibrated(context.artifact("calibrate"))
+    controllers = ControllerFactory(frame, damper, calibrated, settings.controller, inverse)
+    recorded = []
+    if "campaign:closed-loop" in context.inputs:
+        recorded = measured_runs(load_campaign(context.inputs["campaign:closed-loop"]))
+        if not recorded:
+            context.warn("no closed-loop recording names its law and has ground motion and floor displacements")
+    found = study.closed_loop(
+        study.LoopStudy(
+            Rig(frame, damper, controllers, replace(loop_options(settings), tracking="damper")),
+            traced,
+            tests,
+            settings,
+            context.settings.calibrate.expected_amplitude_m,
+            recorded,
+            context.rng,
+            context.seed,
+            context.jobs,
+            lambda fraction, text="": context.progress(0.92 + 0.06 * fraction, text),
+        )
+    )
+    return {**found, "statement": in_words(found)}
 
 
 def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:

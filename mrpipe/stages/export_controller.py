@@ -16,6 +16,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.export import controller_files
     from mrpipe.control.storage import read_calibrated
     from mrpipe.dampers.model import read_damper
+    from mrpipe.reporting import export_controller as section
     from mrpipe.structures import read_frame
 
     settings = context.settings.export
@@ -35,10 +36,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     files = controller_files(built, settings.prefix, details)
     for name, text in files.items():
         atomic_write_text(folder / name, text)
-    context.report.text(
-        f"Law {settings.law} as C99 at {built.options.rate_hz:g} Hz: {len(built.numbers)} numbers, {built.state_size} "
-        f"of memory, in `{FOLDER}/`."
-    )
+    section.describe(context.report, built, settings.law, FOLDER)
     return {
         "law": settings.law,
         "folder": str(folder),

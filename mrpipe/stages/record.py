@@ -182,21 +182,12 @@ def _summary(
     context: StageContext, campaign: str, tests: list[Any], declared: list[str], rate: float
 ) -> dict[str, Any]:
     """Return what is said of a recorded campaign; never its truth."""
-    import pandas as pd
+    from mrpipe.reporting import record as section
 
-    samples = sum(len(next(iter(test.columns.values()))) for test in tests)
+    rows = [(test.name, test.role, len(next(iter(test.columns.values())))) for test in tests]
+    samples = sum(count for _, _, count in rows)
     roles = [test.role for test in tests]
-    context.report.text(
-        f"The virtual laboratory recorded {len(tests)} tests ({samples / rate:.0f} s at {rate:g} Hz); declared "
-        f"effects: {', '.join(declared) or 'none'}. What else the rig has lies sealed beside the campaign."
-    )
-    table = pd.DataFrame(
-        [
-            {"test": test.name, "role": test.role, "seconds": len(next(iter(test.columns.values()))) / rate}
-            for test in tests
-        ]
-    )
-    context.report.table("tests", table, f"Tests of {campaign}.")
+    section.describe(context.report, section.RecordedCampaign(campaign, rows, declared, rate))
     return {
         "campaign": campaign,
         "tests": len(tests),

@@ -25,7 +25,7 @@ from mrpipe.reporting import close_loop as section
 from mrpipe.reporting.headlines import in_brief
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.stages import close_loop
-from mrpipe.stages.close_loop_laws import closed_loop
+from mrpipe.stages.close_loop import closed_loop
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
 from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing, TracingOptions

@@ -1,65 +1,84 @@
-"""The closed-loop part of `close-loop`: every law before, after, and with a controller made for the damper as it is."""
+"""The closed loop under every law: as it ran, on the damper with its effects, and with a renewed controller."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from mrpipe.pipeline.stage import StageContext
+import numpy as np
 
-if TYPE_CHECKING:
-    from mrpipe.control.controller import Controller
-    from mrpipe.control.gains import Gains
-    from mrpipe.control.inverse import InverseTable
-    from mrpipe.networks.network import Network
-    from mrpipe.signals.prepared import PreparedTest
-    from mrpipe.simulation.rig import Rig
-    from mrpipe.tracing.bench.summary import Tracing
-    from mrpipe.tracing.loop.augmented import ForceInUse
-    from mrpipe.tracing.loop.comparison import LoopRun
+from mrpipe.artifacts import Progress, no_progress
+from mrpipe.control.controller import Controller
+from mrpipe.control.gains import Gains
+from mrpipe.control.inverse import InverseTable
+from mrpipe.control.laws import law_named
+from mrpipe.networks.network import Network
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.simulation.rig import Rig, excitation_of
+from mrpipe.simulation.settings import SimulateSettings
+from mrpipe.tracing.bench.summary import Tracing
+from mrpipe.tracing.loop.augmented import (
+    CHANGED,
+    ForceInUse,
+    changed_share,
+    force_in_use,
+    plant_chain,
+    retrain_inverse,
+)
+from mrpipe.tracing.loop.comparison import (
+    Arrangement,
+    Bench,
+    LoopRun,
+    best_ways,
+    compare_laws,
+    simulated_runs,
+    with_unrecorded,
+)
+from mrpipe.tracing.loop.recalibration import gain_factor, switch_threshold
 
-PARTS = ("inverse", "switch", "gain")
-"""What is renewed in a controller, one after another."""
 
-_LACKING = {
-    "identify-frame": "identified frame",
-    "calibrate": "calibrated law",
-    "train-inverse": "inverse network",
-}
+@dataclass(frozen=True)
+class LoopStudy:
+    """What the closed loop is compared with.
+
+    Attributes
+    ----------
+    rig
+        Structure, controllers, and the damper without effects.
+    traced
+        The tracing: the damper without and with its effects.
+    tests
+        Prepared bench tests; an inverse network is retrained on their motions.
+    settings
+        Settings of the simulation.
+    expected_amplitude_m
+        Amplitude at the damper that the laws are calibrated for [m].
+    recorded
+        Recordings of the closed loop; empty for none.
+    rng, seed, jobs, progress
+        Randomness of a retrained inverse, seed of the sensor noise, processes, and progress.
+    """
+
+    rig: Rig
+    traced: Tracing
+    tests: Sequence[PreparedTest]
+    settings: SimulateSettings
+    expected_amplitude_m: float
+    recorded: Sequence[LoopRun]
+    rng: np.random.Generator
+    seed: int
+    jobs: int = 1
+    progress: Progress = no_progress
 
 
-def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
-    """Return the part `closed_loop` of the JSON: each law measured, before, after and recalibrated."""
-    from mrpipe.control.assembly import ControllerFactory, inverse_network
-    from mrpipe.control.storage import read_calibrated
-    from mrpipe.reporting.closed_loop_words import in_words
-    from mrpipe.simulation.rig import Rig, loop_options
-    from mrpipe.structures import read_frame
-    from mrpipe.tracing.loop.augmented import damper_of, plant_chain
-    from mrpipe.tracing.loop.comparison import Arrangement, Bench, best_ways, compare_laws
-
-    needed = ["identify-frame", "calibrate"]
-    if context.settings.simulate.controller.inverse == "network":
-        needed.append("train-inverse")
-    lacking = [_LACKING[name] for name in needed if name not in context.inputs]
-    if lacking:
-        return {"status": f"skipped: there is no {' and no '.join(lacking)}"}
-    context.progress(0.92, "closed loop")
-    frame = read_frame(context.artifact("identify-frame"))
-    damper = damper_of(traced.selection.base, traced.drive_unit)
-    settings = context.settings.simulate
-    controllers = ControllerFactory(
-        frame,
-        damper,
-        read_calibrated(context.artifact("calibrate")),
-        settings.controller,
-        inverse_network(settings.controller, lambda: context.artifact("train-inverse")),
-    )
-    position = controllers.calibrated.position
-    rig = Rig(frame, damper, controllers, replace(loop_options(settings), tracking="damper"))
-    bench = Bench(frame, position, rig.options, context.seed, traced.selection.base.problem.scales.stroke)
-    runs, status = _runs(context, rig)
+def closed_loop(study: LoopStudy) -> dict[str, Any]:
+    """Return each law measured, before, after and with a controller renewed for the damper with its effects."""
+    rig, traced = study.rig, study.traced
+    position = rig.controllers.calibrated.position
+    bench = Bench(rig.frame, position, rig.options, study.seed, traced.selection.base.problem.scales.stroke)
+    runs, status = _runs(study)
     base, chosen = plant_chain(traced.selection.base), plant_chain(traced.selection.chosen)
     ways = {
         "before": Arrangement(base, lambda run: _as_it_ran(rig, run)),
@@ -67,7 +86,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     }
     found: dict[str, Any] = {"status": status, "plant": _plant_words(traced)}
     if found["plant"]["effects"]:
-        renewed = _renewed(context, traced, rig, tests)
+        renewed = _renewed(study)
         offered = {
             ", ".join(parts) or "nothing": Arrangement(chosen, partial(_renewed_controller, rig, renewed, parts))
             for parts in ((), ("inverse",), ("inverse", "switch"), ("inverse", "switch", "gain"))
@@ -75,28 +94,18 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
         taken = best_ways(runs, offered, bench)
         found["controller"] = {**renewed.summary, "renewed": taken}
         ways["recalibrated"] = Arrangement(chosen, lambda run: offered[taken[run.law]].controller(run))
-    found |= compare_laws(runs, ways, bench)
-    return {**found, "statement": in_words(found)}
+    return found | compare_laws(runs, ways, bench)
 
 
-def _runs(context: StageContext, rig: Rig) -> tuple[list[LoopRun], str]:
+def _runs(study: LoopStudy) -> tuple[list[LoopRun], str]:
     """Return the recordings and every other law under their motion; without recordings all laws as simulate has it."""
-    from mrpipe.campaigns import load_campaign
-    from mrpipe.simulation.rig import excitation_of
-    from mrpipe.tracing.loop.comparison import measured_runs, simulated_runs, with_unrecorded
-
-    laws = rig.controllers.available()
-    recorded = []
-    if "campaign:closed-loop" in context.inputs:
-        recorded = measured_runs(load_campaign(context.inputs["campaign:closed-loop"]))
-        if not recorded:
-            context.warn("no closed-loop recording names its law and has ground motion and floor displacements")
+    laws, recorded = study.rig.controllers.available(), study.recorded
     if recorded:
-        runs = with_unrecorded(recorded, laws)
+        runs = with_unrecorded(list(recorded), laws)
         others = [law for law in laws if law not in {run.law for run in recorded}]
         more = f"; {', '.join(others)} predicted alone" if others else ""
         return runs, f"{len(recorded)} recordings replayed with their measured ground motion{more}"
-    excitation, _ = excitation_of(rig, context.settings.simulate.excitation)
+    excitation, _ = excitation_of(study.rig, study.settings.excitation)
     kind = excitation.details.get("kind", "given")
     return simulated_runs(excitation, laws), f"predicted alone under {kind} excitation: no closed-loop recordings"
 
@@ -116,8 +125,6 @@ def _plant_words(traced: Tracing) -> dict[str, Any]:
 
 
 def _given_gains(run: LoopRun) -> Gains | None:
-    from mrpipe.control.gains import Gains
-
     return Gains(**run.gains) if run.gains else None
 
 
@@ -135,17 +142,15 @@ class Renewed:
     summary: dict[str, Any]
 
 
-def _renewed(context: StageContext, traced: Tracing, rig: Rig, tests: list[PreparedTest]) -> Renewed:
+def _renewed(study: LoopStudy) -> Renewed:
     """Return inverse, switch and gains for the damper with its effects."""
-    from mrpipe.tracing.loop.augmented import CHANGED, changed_share, force_in_use, plant_chain
-    from mrpipe.tracing.loop.recalibration import switch_threshold
 
-    settings = context.settings.simulate.controller
-    calibrated = context.artifact("calibrate")
-    omega, amplitude = calibrated.scalar("omega_0"), context.settings.calibrate.expected_amplitude_m
+    rig, traced, settings = study.rig, study.traced, study.settings.controller
+    calibrated = rig.controllers.calibrated
+    omega, amplitude = calibrated.omega_0, study.expected_amplitude_m
     limit = min(settings.drive_limit or rig.damper.drive_limit, rig.damper.drive_limit)
     base, chosen = plant_chain(traced.selection.base), plant_chain(traced.selection.chosen)
-    training = [test for test in tests if test.role != "validation"]
+    training = [test for test in study.tests if test.role != "validation"]
     share = changed_share(base, chosen, training)
     before, after = (
         force_in_use(
@@ -153,7 +158,7 @@ def _renewed(context: StageContext, traced: Tracing, rig: Rig, tests: list[Prepa
             limit,
             stroke_m=traced.selection.base.problem.scales.stroke,
             omega=omega,
-            working_drive=_working_drive(rig, calibrated.scalar("laws/vd/c_n_s_m") * amplitude * omega, limit),
+            working_drive=_working_drive(rig, calibrated.gains_of("vd").c_n_s_m * amplitude * omega, limit),
         )
         for chain in (base, chosen)
     )
@@ -173,7 +178,7 @@ def _renewed(context: StageContext, traced: Tracing, rig: Rig, tests: list[Prepa
         inverse = after.table()
         summary["inverse"] = "rebuilt from the damper with its effects"
     else:
-        inverse = _retrained(context, traced, tests, limit, summary)
+        inverse = _retrained(study, limit, summary)
     factors = _factors(rig, before, after, omega, amplitude)
     summary["gain_factors"] = factors
     return Renewed(inverse, threshold, factors, summary)
@@ -181,28 +186,25 @@ def _renewed(context: StageContext, traced: Tracing, rig: Rig, tests: list[Prepa
 
 def _working_drive(rig: Rig, force_n: float, limit: float) -> float:
     """Return the drive at which the damper without effects gives the peak force of viscous damping."""
-    import numpy as np
-
     drive = np.linspace(0.0, limit, 101)
     forces = np.asarray(rig.damper.quasi_static_force(0.05, drive))
     return float(drive[min(int(np.searchsorted(np.maximum.accumulate(forces), force_n)), 100)])
 
 
-def _retrained(
-    context: StageContext, traced: Tracing, tests: list[PreparedTest], limit: float, summary: dict[str, Any]
-) -> Network:
-    from mrpipe.networks.network import read_network
-    from mrpipe.tracing.loop.augmented import plant_chain, retrain_inverse
+def _retrained(study: LoopStudy, limit: float, summary: dict[str, Any]) -> Network | InverseTable:
+    network = study.rig.controllers.inverse
+    if not isinstance(network, Network):
+        raise TypeError("the inverse of the controller is no network")
 
     again = retrain_inverse(
-        read_network(context.artifact("train-inverse"), "network"),
-        plant_chain(traced.selection.chosen),
-        [test for test in tests if test.role != "validation"],
-        [test for test in tests if test.role == "validation"],
+        network,
+        plant_chain(study.traced.selection.chosen),
+        [test for test in study.tests if test.role != "validation"],
+        [test for test in study.tests if test.role == "validation"],
         limit,
-        context.rng,
-        jobs=context.jobs,
-        progress=lambda fraction, text="": context.progress(0.92 + 0.06 * fraction, f"inverse {text}"),
+        study.rng,
+        jobs=study.jobs,
+        progress=lambda fraction, text="": study.progress(fraction, f"inverse {text}"),
     )
     summary["inverse"] = "retrained on the damper with its effects" if again.replaced else "kept: the better of both"
     summary["inverse_nrmse"] = {"before": again.before_nrmse, "after": again.after_nrmse}
@@ -211,8 +213,6 @@ def _retrained(
 
 def _factors(rig: Rig, before: ForceInUse, after: ForceInUse, omega: float, amplitude: float) -> dict[str, float]:
     """Return by what the gain of each law moves, from the calibrated gains."""
-    from mrpipe.control.laws import law_named
-    from mrpipe.tracing.loop.recalibration import gain_factor
 
     found = {}
     for name, gains in rig.controllers.calibrated.gains.items():
@@ -224,7 +224,6 @@ def _factors(rig: Rig, before: ForceInUse, after: ForceInUse, omega: float, ampl
 
 def _renewed_controller(rig: Rig, renewed: Renewed, parts: tuple[str, ...], run: LoopRun) -> Controller:
     """Return the controller of a run with some of its parts (`inverse`, `switch`, `gain`) renewed."""
-    from mrpipe.control.laws import law_named
 
     factor = renewed.factors.get(run.law, 1.0) if "gain" in parts else 1.0
     gains = _given_gains(run) or rig.controllers.calibrated.gains_of(run.law)
