@@ -39,6 +39,8 @@ class DataFile:
         Line of the first sample in a text file, 0 where lines mean nothing.
     aliases
         Other spellings of a name.
+    headers
+        Header lines of a text file, a word for each column; empty for other formats.
     """
 
     path: Path
@@ -50,6 +52,7 @@ class DataFile:
     parts: tuple[tuple[int, int], ...] = ()
     first_row: int = 0
     aliases: Mapping[str, str] = field(default_factory=dict)
+    headers: tuple[tuple[str, ...], ...] = ()
 
     def column(self, column: str | int, where: str) -> FloatArray:
         """Return one column, shape (n,).
@@ -62,7 +65,15 @@ class DataFile:
             If there is no such column, or it is no vector of numbers.
         """
         name, index = self._resolve(column, where)
-        values = self.fetch(name)
+        try:
+            values = self.fetch(name)
+        except UserError:
+            raise
+        except Exception as error:
+            said = " ".join(str(error).split())[:200] or type(error).__name__
+            raise UserError(
+                self.path, where, f"column {column!r} cannot be read ({said})", "export it again"
+            ) from error
         if isinstance(values, UserError):
             raise values
         array = np.asarray(values)

@@ -1,10 +1,10 @@
-"""Delimited text: csv and its relatives, and the text of a data logger with its pauses."""
+"""Delimited text as columns: header lines, delimiter, decimal sign, quotes and time stamps are found by themselves."""
 
 from __future__ import annotations
 
+import csv
 import io
 import re
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,39 +13,39 @@ import pandas as pd
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
+from mrpipe.campaigns.logger import read_logger
 from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
 
 _NUMBER = re.compile(r"^[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?$|^[+-]?(nan|inf(inity)?)$", re.IGNORECASE)
+_DATE = r"(?:\d{4}[-/]\d{1,2}[-/]\d{1,2}|\d{1,2}[./]\d{1,2}[./]\d{2,4})"
+_TIME = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s?[AaPp][Mm])?(?:Z|[+-]\d{2}:?\d{2})?"
+_STAMP = re.compile(rf"^(?:{_DATE}(?:[T ]{_TIME})?|{_TIME})$")
+_LABELS = {"name", "names", "channel", "channels", "signal", "signals"}
 
 
-def read_table(path: Path, layout: TextEntry | None = None) -> DataFile:
-    """Read delimited text; header lines, delimiter and decimal sign are found where `layout` does not give them.
+def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> DataFile:
+    """Return the columns of delimited text; what `layout` does not give is found.
 
-    A header is any line above the first row of numbers that has as many fields as it; where several have, each
-    of their words names its column. Without one, columns are called by position from 0. An empty column after a
-    trailing delimiter is dropped.
+    A header is any line above the first row of numbers that has as many fields as it, or one more (a column of
+    comments). Where several lines have, each of their words names its column; a line of numbers, such as that of the
+    identifiers which dSPACE writes, names none. Without a header, columns are called by position from 0. An empty
+    column after a trailing delimiter is left out. Time stamps become seconds from the first one.
 
     Raises
     ------
     UserError
-        If the file holds no row of numbers.
+        If the text holds no row of numbers.
     """
     layout = layout or TextEntry()
-    text = _decode(path)
     lines = text.splitlines()
     if lines and lines[0].lower().startswith("header size"):
-        return _read_logger(path, lines)
+        return read_logger(path, lines)
     comment = layout.comment or "%#"
     first, delimiter, decimal = _first_row(path, lines, layout, comment)
     fields = _split(lines[first], delimiter)
-    width = len(fields)
-    headers = [
-        [word.strip().strip("\"'") for word in _split(line.lstrip(comment).strip(), delimiter)]
-        for line in lines[layout.skip_lines : first]
-        if line.strip()
-    ]
-    headers = [row for row in headers if len(row) == width or (len(row) == width - 1 and fields[-1] == "")]
+    headers = _headers(lines[layout.skip_lines : first], delimiter, comment, fields)
+    width = max([len(fields), *(len(row) for row in headers)])
     frame = pd.read_csv(
         io.StringIO("\n".join(line for line in lines[first:] if line.strip() and line[0] not in comment)),
         sep=delimiter or r"\s+",
@@ -58,6 +58,8 @@ def read_table(path: Path, layout: TextEntry | None = None) -> DataFile:
         low_memory=False,
         na_values=[],
     )
+    if _labelled(fields):
+        frame.iloc[0, 0] = np.nan
     keep = [index for index in range(width) if not (index == width - 1 and frame[index].isna().all())]
     names = _names(headers, keep)
     aliases = {word: names[index] for row in headers for index, word in enumerate(row) if word and index < len(names)}
@@ -69,25 +71,40 @@ def read_table(path: Path, layout: TextEntry | None = None) -> DataFile:
         table=True,
         first_row=first + 1,
         aliases={word: name for word, name in aliases.items() if word not in names},
+        headers=tuple(tuple(row) for row in headers),
     )
 
 
-def _decode(path: Path) -> str:
-    raw = path.read_bytes()
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
+def _headers(lines: list[str], delimiter: str | None, comment: str, fields: list[str]) -> list[list[str]]:
+    """Return the lines above the first row that name columns, the most telling one first."""
+    width = len(fields)
+    rows = [_split(line.lstrip(comment).strip("\r\n"), delimiter) for line in lines if line.strip()]
+    rows = [[word.strip().strip("\"'") for word in row] for row in rows]
+    rows = [row for row in rows if len(row) in (width, width + 1) or (len(row) == width - 1 and fields[-1] == "")]
+    rows = [row for row in rows if len(row) <= width or not row[-1] or not _NUMBER.match(row[-1])]
+    rows = [row for row in rows if not _is_numeric(row[1:] if len(row) > 1 else row)]
+    # a line of units below the names comes later in the order anyway; a line labelled "name" comes first
+    return sorted(rows, key=lambda row: row[0].lower() not in _LABELS)
 
 
 def _split(line: str, delimiter: str | None) -> list[str]:
-    return line.split() if delimiter is None else [item.strip() for item in line.split(delimiter)]
+    if delimiter is None:
+        return line.split()
+    if '"' in line:
+        return [item.strip() for item in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+    return [item.strip() for item in line.split(delimiter)]
 
 
 def _is_numeric(fields: list[str]) -> bool:
-    """Whether every field is a number or empty, with a number among them."""
+    """Whether every field is a number, a time stamp or empty, with a number among them."""
     filled = [item for item in fields if item]
-    return bool(filled) and all(_NUMBER.match(item) for item in filled)
+    numbers = [item for item in filled if _NUMBER.match(item)]
+    return bool(numbers) and all(_NUMBER.match(item) or _STAMP.match(item) for item in filled)
+
+
+def _labelled(fields: list[str]) -> bool:
+    """Whether a row of numbers begins with a word, as the first one that dSPACE writes (`trace_values`)."""
+    return bool(fields[0]) and not _NUMBER.match(fields[0]) and not _STAMP.match(fields[0])
 
 
 def _first_row(path: Path, lines: list[str], layout: TextEntry, comment: str) -> tuple[int, str | None, str]:
@@ -101,10 +118,19 @@ def _first_row(path: Path, lines: list[str], layout: TextEntry, comment: str) ->
             fields = _split(line.strip() if delimiter is None else line, delimiter)
             if delimiter is not None and delimiter not in line:
                 continue
-            if _is_numeric(fields) and (delimiter is None or len(fields) > 1):
-                comma = delimiter != "," and any("," in item for item in fields)
+            rows = _is_numeric(fields) or _begins_with_label(fields, lines[index + 1 : index + 2], delimiter)
+            if rows and (delimiter is None or len(fields) > 1):
+                comma = any("," in item for item in fields if _NUMBER.match(item))
                 return index, delimiter, layout.decimal or ("," if comma else ".")
     raise UserError(path, "", "holds no row of numbers", "name a delimited text, or give text: {skip_lines, delimiter}")
+
+
+def _begins_with_label(fields: list[str], following: list[str], delimiter: str | None) -> bool:
+    """Whether a row is a label and numbers, and the next one the same without the label."""
+    if delimiter is None or len(fields) < 2 or not following or not _is_numeric(fields[1:]):
+        return False
+    below = _split(following[0], delimiter)
+    return len(below) == len(fields) and below[0] == "" and _is_numeric(below)
 
 
 def _names(headers: list[list[str]], keep: list[int]) -> list[str]:
@@ -118,9 +144,12 @@ def _names(headers: list[list[str]], keep: list[int]) -> list[str]:
 
 
 def _numbers(path: Path, column: Any, name: str, first: int) -> FloatArray:
-    """Return a column as floats; text within it is told with its line."""
+    """Return a column as floats; text in it that is no time stamp is reported with its line."""
     if column.dtype.kind in "fiub":
         return np.asarray(column, dtype=np.float64)
+    filled = column.dropna()
+    if len(filled) and all(_STAMP.match(str(item).strip()) for item in filled.iloc[[0, len(filled) // 2, -1]]):
+        return _seconds(path, column, name, first)
     numbers = pd.to_numeric(column, errors="coerce")
     wrong = numbers.isna() & column.notna()
     if wrong.any():
@@ -131,57 +160,14 @@ def _numbers(path: Path, column: Any, name: str, first: int) -> FloatArray:
     return np.asarray(numbers, dtype=np.float64)
 
 
-def _read_logger(path: Path, lines: list[str]) -> DataFile:
-    """Read a DAQ logger's text: header lines with the interval, then number, stamp, channels, events.
-
-    The clock counts samples within a part and takes the length of a pause from the stamps, so that it is exact
-    inside a part and keeps the order of parts.
-    """
-    notes = dict(line.split(":", 1) for line in lines[:30] if re.match(r"^[A-Za-z ]+:", line))
-    try:
-        header = int(notes["Header Size"])
-        interval = float(notes["Sampling Interval"])
-        words = [word.strip() for word in lines[header - 1].split(",")]
-    except (KeyError, ValueError, IndexError):
-        raise UserError(path, "line 1", "the logger's header is not whole", "export the file again") from None
-    channels = words[2:-1] if words[-1].lower().startswith("event") else words[2:]
-    rows = [line.split(",") for line in lines[header:] if line.strip()]
-    try:
-        values = np.array([[float(item) for item in row[2 : 2 + len(channels)]] for row in rows])
-    except ValueError:
-        raise UserError(path, "", "a row holds no numbers where the channels are", "export the file again") from None
-    if values.ndim != 2 or values.shape[1] != len(channels) or len(values) < 2:
-        raise UserError(path, "", "rows differ in length", "export the file again")
-    starts = [index for index, row in enumerate(rows) if len(row) > 2 + len(channels) and _begins(row[-1])]
-    starts = sorted({0, *starts})
-    ends = [*starts[1:], len(rows)]
-    time = np.empty(len(rows))
-    origin = _stamp(rows[0][1])
-    for start, end in zip(starts, ends, strict=True):
-        begin = (_stamp(rows[start][1]) - origin).total_seconds()
-        if start:
-            begin = max(begin, time[start - 1] + 2.0 * interval)
-        time[start:end] = begin + interval * np.arange(end - start)
-    return DataFile(
-        path=path,
-        names=tuple(channels),
-        fetch=lambda name: values[:, channels.index(name)],
-        table=True,
-        time_s=time,
-        sampling_rate_hz=1.0 / interval,
-        parts=tuple(zip(starts, ends, strict=True)),
-        first_row=header + 1,
-    )
-
-
-def _begins(event: str) -> bool:
-    return "resume" in event.lower() or "start" in event.lower()
-
-
-def _stamp(text: str) -> datetime:
-    for form in ("%m/%d/%Y %I:%M:%S.%f %p", "%m/%d/%Y %H:%M:%S.%f"):
-        try:
-            return datetime.strptime(text.strip(), form)
-        except ValueError:
-            continue
-    return datetime(2000, 1, 1)
+def _seconds(path: Path, column: Any, name: str, first: int) -> FloatArray:
+    """Return time stamps as seconds from the first one."""
+    text = column.astype(str).str.strip().str.replace(",", ".", regex=False)
+    day_first = bool(re.match(r"^\d{1,2}\.", text.iloc[0]))
+    stamps = pd.to_datetime(text, errors="coerce", dayfirst=day_first, format="mixed", utc=True)
+    wrong = stamps.isna()
+    if wrong.any():
+        row = int(np.argmax(wrong.to_numpy()))
+        where = f"line {first + 1 + row}, column {name}"
+        raise UserError(path, where, f"{column.iloc[row]!r} is no time stamp", "write it as 2026-03-01T12:00:00.000")
+    return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)

@@ -18,7 +18,7 @@ BACKWARDS = motion() | {"t": motion()["t"][::-1]}
 @pytest.mark.parametrize(
     ("columns", "changes", "expected"),
     [
-        (None, {"tests": [content()["tests"][0] | {"file": "no.csv"}, content()["tests"][1]]}, "no such file"),
+        (None, {"tests": [content()["tests"][0] | {"file": "no.csv"}, content()["tests"][1]]}, "data file not found"),
         (None, {"channels": {**CHANNELS, "force": {"column": "G", "unit": "N"}}}, "no column 'G'"),
         (None, {"channels": {**CHANNELS, "force": {"column": "F", "unit": "Newtons per"}}}, "is not a unit"),
         (BACKWARDS, {}, "a clock that increases with every sample expected"),

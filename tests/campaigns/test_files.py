@@ -167,7 +167,8 @@ def test_uff_without_its_package_is_told_in_a_line(tmp_path: Path, monkeypatch: 
 @pytest.mark.parametrize(
     ("name", "content", "expected"),
     [
-        ("a.xlsx", b"PK", "files that end in '.xlsx' are not read; use one of .csv"),
+        ("a.xls", b"PK", "files that end in '.xls' are not read; use one of .asc"),
+        ("a.xlsx", b"PK", "is damaged or not what its ending says"),
         ("a.mat", b"nothing of the kind", "is damaged or not what its ending says"),
         ("a.h5", b"nothing of the kind", "is damaged or not what its ending says"),
         ("a.json", b"{", "is damaged or not what its ending says"),
@@ -175,7 +176,7 @@ def test_uff_without_its_package_is_told_in_a_line(tmp_path: Path, monkeypatch: 
         ("a.csv", b"", "holds no row of numbers"),
         ("a.csv", b"only,words\nhere,too\n", "holds no row of numbers"),
         ("a.csv", b"t,x\n1,2\n2,3,4,5,6\n", "is damaged or not what its ending says"),
-        ("a.txt", b"Header Size: x\n", "the logger's header is not whole"),
+        ("a.txt", b"Header Size: x\n", "the logger's header is incomplete"),
     ],
 )
 def test_damaged_files_are_told_in_a_line(tmp_path: Path, name: str, content: bytes, expected: str) -> None:

@@ -121,7 +121,7 @@ def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: d
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"file": "three.csv"}, "three.csv: no such file; mend `file`"),
+        ({"file": "three.csv"}, "three.csv: data file not found; correct `file:`"),
         ({"role": "test"}, "tests[0].role: is 'test'; 'training', 'validation' or 'repeat' expected"),
         ({"role": None}, "tests[0].role: is missing"),
         ({"rolle": "x"}, "tests[0].rolle: unknown key"),
@@ -134,7 +134,7 @@ def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: d
         ({"segments_s": [[30, 40]]}, "[30, 40] holds no sample; the clock of one.csv runs from 0 to 3.999 s"),
         ({"name": "two"}, "tests[1].name: 'two' stands twice"),
         ({"part": 2}, "part: is 2, the file has 1"),
-        ({"file": "one.xls"}, "one.xls: no such file"),
+        ({"file": "one.xls"}, "one.xls: data file not found"),
         ({"drive": {"value": 1.0, "unit": "V"}}, "is in A in one test and in V in another"),
         ({"drive": {"value": 1.0, "column": "i", "unit": "A"}}, "either column or value expected, not both"),
         ({"drive": {"value": float("inf"), "unit": "A"}}, "a finite number expected"),

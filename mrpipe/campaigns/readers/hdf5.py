@@ -1,0 +1,53 @@
+"""HDF5 files, and MATLAB 7.3 files, which are HDF5."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from mrpipe.campaigns.columns import DataFile
+from mrpipe.campaigns.readers.reader import Reader, require_size
+from mrpipe.campaigns.schema import TextEntry
+
+
+def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
+    """Return the datasets of an HDF5 file; the fields of a compound dataset are columns of their own."""
+    names: list[str] = []
+
+    def note(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            fields = item.dtype.names
+            names.extend(f"{name}/{field}" for field in fields) if fields else names.append(name)
+
+    with h5py.File(path, "r") as handle:
+        handle.visititems(note)
+        rate = handle.attrs.get("sampling_rate_hz")
+
+    def fetch(name: str) -> Any:
+        with h5py.File(path, "r") as handle:
+            table, _, field = name.rpartition("/")
+            inside = name not in handle or not isinstance(handle[name], h5py.Dataset)
+            dataset = handle[table] if inside else handle[name]
+            require_size(path, int(dataset.size) * dataset.dtype.itemsize, dataset.id.get_storage_size())
+            values = np.asarray(dataset[field] if inside else dataset[()])
+        # MATLAB stores columns first, so its matrices appear transposed
+        return values.T if matlab else values
+
+    aliases = {f"/{name}": name for name in names} | {name.replace("/", "."): name for name in names if "/" in name}
+    return DataFile(
+        path=path,
+        names=tuple(names),
+        fetch=fetch,
+        sampling_rate_hz=None if rate is None else float(rate),
+        aliases=aliases,
+    )
+
+
+def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
+    return read_hdf5(path)
+
+
+READER = Reader((".h5", ".hdf5"), _read)
