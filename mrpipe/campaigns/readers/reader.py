@@ -15,6 +15,9 @@ from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
 
+LOADS_FROM: tuple[str, ...] = ()
+"""Only packages of other makers are imported by name here, none of mrpipe."""
+
 LARGEST_BYTES = 4 * 2**30
 """Largest size of a file or channel in memory; what claims more is refused before it is read."""
 
