@@ -10,10 +10,12 @@ import numpy as np
 from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.laws import LAW_SIZE, Law
 from mrpipe.dampers.plant import (
     CURRENT,
     DRIVE,
     FIRST,
+    PART_FORCE,
     STEP_SIGNATURE,
     VISCOSITY,
     YIELD_FORCE,
@@ -24,6 +26,9 @@ from mrpipe.dampers.plant import (
 
 POLYNOMIAL_SIZE = 4
 """Coefficients of each polynomial in the effective drive: up to the cube of (2.3)."""
+
+COEFFICIENT_STEPS = ("polynomial-coefficients", "drive-laws")
+"""Names of the steps that set yield force and viscosity from the effective drive."""
 
 
 @njit(float64(float64, float64, float64, float64), cache=True)
@@ -72,6 +77,32 @@ def polynomial_step(wire: FloatArray, state: FloatArray, parameters: FloatArray,
     wire[VISCOSITY] = parameters[4] + u * (parameters[5] + u * (parameters[6] + u * parameters[7]))
 
 
+@njit(float64(float64[::1], float64), cache=True)
+def law_value(law: FloatArray, drive: float) -> float:
+    """Return the value of a packed :class:`~mrpipe.dampers.laws.Law` at a drive, at least 0."""
+    if law[0] == 0.0:
+        value = law[1] + drive * (law[2] + drive * (law[3] + drive * (law[4] + drive * (law[5] + drive * law[6]))))
+        return max(value, 0.0)
+    ratio = drive / law[3]
+    if law[0] == 1.0:
+        share = math.tanh(ratio)
+    elif law[0] == 3.0:
+        share = ratio / (1.0 + abs(ratio))
+    elif abs(ratio) < 1e-2:
+        share = ratio / 3.0 - ratio**3 / 45.0
+    else:
+        share = 1.0 / math.tanh(ratio) - 1.0 / ratio
+    return max(law[1] + law[2] * share, 0.0)
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def laws_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: packed laws of yield force [N], viscosity [N s/m] and second part's force [N]."""
+    wire[YIELD_FORCE] = law_value(parameters[0:7], wire[CURRENT])
+    wire[VISCOSITY] = law_value(parameters[7:14], wire[CURRENT])
+    wire[PART_FORCE] = law_value(parameters[14:21], wire[CURRENT])
+
+
 def driver_lag(eta: float) -> Step:
     """Return the driver's lag (2.4), eta in 1/s."""
     return Step("driver-lag", Phase.CURRENT, lag_step, np.array([float(eta)]), state_size=2)
@@ -100,6 +131,15 @@ def polynomial_coefficients(yield_force: Sequence[float] | FloatArray, viscosity
     numbers[: len(yield_force)] = yield_force
     numbers[POLYNOMIAL_SIZE : POLYNOMIAL_SIZE + len(viscosity)] = viscosity
     return Step("polynomial-coefficients", Phase.COEFFICIENTS, polynomial_step, numbers)
+
+
+def coefficients(yield_force: Law, viscosity: Law, part: Law | None = None) -> Step:
+    """Return the step that sets yield force, viscosity and the force of a second part from the effective drive."""
+    both = (yield_force, viscosity)
+    if part is None and all(law.kind == "polynomial" and len(law.numbers) <= POLYNOMIAL_SIZE for law in both):
+        return polynomial_coefficients(yield_force.numbers, viscosity.numbers)
+    last = np.zeros(LAW_SIZE) if part is None else part.packed
+    return Step("drive-laws", Phase.COEFFICIENTS, laws_step, np.concatenate([*(law.packed for law in both), last]))
 
 
 @njit(void(float64[::1], int64[::1], float64[::1], float64, float64[::1]), cache=True)

@@ -21,10 +21,24 @@ import numpy as np
 from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
-from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, Phase, Step
+from mrpipe.dampers.parameters import Parameter, Values, shape
+from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, YIELD_FORCE, Phase, Step
 
 SUB_STEP = 0.05
 """Longest sub-step of other exponents, in yield displacements; the update is then accurate to about 1e-7."""
+
+
+# numbers that several base forms share
+YIELD_DISPLACEMENT = shape(
+    "yield_displacement", "m", "yield force over initial stiffness", "stroke", 1e-3, 2.0, (0.05, 0.15, 0.015)
+)
+GAMMA_SHARE = Parameter("gamma_share", "1", "gamma over gamma plus beta", "one", 0.02, 1.5, (0.5,))
+EXPONENT = shape("exponent", "1", "n of (2.2)", "one", 1.0, 8.0, (1.9, 1.1))
+
+
+def bouc_wen_numbers(values: Values) -> tuple[float, float, float]:
+    """Return yield displacement [m], share of gamma and exponent; gamma = beta and n = 2 where they are left out."""
+    return values["yield_displacement"], values.get("gamma_share", 0.5), values.get("exponent", 2.0)
 
 
 @njit(float64(float64, float64, float64), cache=True)
@@ -135,6 +149,31 @@ def hysteresis(yield_displacement: float, gamma_share: float = 0.5, exponent: fl
     """Return the Bouc-Wen hysteresis (2.2) as a step; see :func:`advance_hysteresis`."""
     numbers = np.array([yield_displacement, gamma_share, exponent], dtype=np.float64)
     return Step("hysteresis", Phase.HYSTERESIS, hysteresis_step, numbers, state_size=2)
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def growing_hysteresis_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: yield displacement [m] at the reference force, gamma share, exponent, power, reference force [N].
+
+    State: last displacement [m], zeta.
+    """
+    if wire[FIRST] > 0.5:
+        state[0] = wire[DISPLACEMENT]
+        state[1] = 0.0
+    # a tiny share of the reference keeps the yield displacement above zero where the damper has no yield force
+    ratio = max(wire[YIELD_FORCE] / parameters[4], 1e-9)
+    length = max(parameters[0] * ratio ** parameters[3], 1e-15)
+    state[1] = advance_hysteresis(state[1], wire[DISPLACEMENT] - state[0], length, parameters[1], parameters[2])
+    state[0] = wire[DISPLACEMENT]
+    wire[HYSTERESIS] = state[1]
+
+
+def growing_hysteresis(
+    yield_displacement: float, gamma_share: float, exponent: float, growth: float, reference_force: float
+) -> Step:
+    """Return Bouc-Wen's hysteresis with x_y = yield_displacement (F_y/reference_force)^growth [m], [N]."""
+    numbers = np.array([yield_displacement, gamma_share, exponent, growth, reference_force], dtype=np.float64)
+    return Step("growing-hysteresis", Phase.HYSTERESIS, growing_hysteresis_step, numbers, state_size=2)
 
 
 @njit(void(float64[::1], int64[::1], float64, float64, float64, float64[::1]), cache=True)

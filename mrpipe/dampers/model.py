@@ -1,55 +1,66 @@
-"""A parametric damper: a form, its numbers, and the chain of steps they make.
+"""A damper: a base form, its numbers, effects with theirs, and the chain of steps they make.
 
 The hysteretic variable is normalised to its limit, so that the numbers are those which measurements determine: the
 yield force F_y(u) = alpha(u) z_max [N], the yield displacement x_y = z_max/A [m], the share g = gamma/(gamma + beta).
 With z_max = (A/(gamma + beta))^(1/n) the thesis' alpha, A, gamma, beta of (2.1) to (2.3) follow from these once one of
-them is chosen (only three of the four can be told from measurements), see :func:`thesis_parameters`.
+them is chosen, because measurements determine only three of the four, see :func:`thesis_parameters`.
 
-Parameters by form (SI; `u` is the drive in A or V; polynomial coefficients from the constant `_a` up to the cube `_d`,
-those left out are 0):
-
-| form | parameters |
-| --- | --- |
-| all | `c0_a`..`_d` (N s/m, N s/m/u, ...), `yield_force_a`..`_d` (N, N/u, ...), `eta` (1/s; left out: no lag) |
-| `bouc-wen`, `dahl` | `yield_displacement` (m), `gamma_share`, `exponent` |
-| `bingham` | `transition_velocity` (m/s; 0: a jump) |
-| `modified-bouc-wen` | as bouc-wen, and `c1_a`, `c1_b`, `k0`, `k1` (N/m), `x0` (m) |
-| `rounded-yield` | as bouc-wen, and `rounded_force_a`..`_d`, `velocity_scale` (m/s): + alpha_v(u) tanh(v/v0) |
-| `power-yield` | as bouc-wen, and `reference_velocity` (m/s), `velocity_exponent`: yield force x (v/v_ref)^p |
-| `saturating-dashpot` | `spring_rate` (1/m), `velocity_scale` (m/s): z' = q (v - v0 atanh z) |
+The numbers of every damper (SI; `u` is the drive in A or V): the laws of the drive `yield_force`, `c0` and, where the
+form has a second yielding part, that part's (see :func:`mrpipe.dampers.laws.law_names`: `yield_force_a` [N],
+`yield_force_b` [N/u], ...; coefficients that are left out are 0), `eta` [1/s] (left out: no lag; with `eta_fall` it
+is the rate of a rising drive only), and those that the form lists (`mrpipe/dampers/forms/<form>.py`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray, ParameterSet
 from mrpipe.dampers import drive as _drive
-from mrpipe.dampers import hysteresis as _hysteresis
-from mrpipe.dampers import modified as _modified
-from mrpipe.dampers import viscoplastic as _viscoplastic
+from mrpipe.dampers.form import BaseForm, Strength
+from mrpipe.dampers.in_use import steady_force
+from mrpipe.dampers.laws import Law, law_of, law_unit
+from mrpipe.dampers.library import base_form, base_forms
+from mrpipe.dampers.parameters import Values
 from mrpipe.dampers.plant import FORCE, Chain, Step, build_chain, run_chain
 from mrpipe.errors import UserError
 
-KNOWN_FORMS = (
-    "bouc-wen",
-    "modified-bouc-wen",
-    "bingham",
-    "dahl",
-    "rounded-yield",
-    "power-yield",
-    "saturating-dashpot",
-)
-"""Every form that a model can have."""
-
-HYSTERETIC_FORMS = ("bouc-wen", "modified-bouc-wen", "dahl", "rounded-yield", "power-yield")
-"""Forms that hold the Bouc-Wen hysteresis."""
-
 _TESTED = {"displacement": "m", "velocity": "m/s"}
+
+_BLOCK_UNITS = {"yield_force": "N", "c0": "N*s/m", "c1": "N*s/m", "alpha": "N/m"}
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An effect of a damper with its numbers.
+
+    Attributes
+    ----------
+    name, form
+        Effect and its functional shape, as the library of effects names them.
+    values
+        Its numbers, SI.
+    units
+        Their units.
+    sensor
+        A fault of sensors: it belongs to the records, not to the damper, and stays out of the chain.
+    steps
+        (values) -> steps of the chain.
+    file
+        The user's own file that defines the effect; empty for effects of the library.
+    """
+
+    name: str
+    form: str
+    values: Mapping[str, float]
+    units: Mapping[str, str]
+    sensor: bool
+    steps: Callable[[Values], list[Step]] = field(compare=False, repr=False)
+    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,19 +70,41 @@ class DamperModel:
     Attributes
     ----------
     form
-        One of :data:`KNOWN_FORMS`.
+        Name of a base form, see :mod:`mrpipe.dampers.library`.
     parameters
-        Name -> value, SI, named as in the table of this module.
+        Name -> value, SI, named as this module says.
     drive_unit
         `A` or `V`.
     drive_limit
         Largest drive that the damper takes (and that the numbers hold for), in `drive_unit`.
+    laws
+        Block -> kind of its law of the drive; polynomials where left out.
+    effects
+        What acts besides the base form.
+    stroke_m
+        Half the largest peak-to-peak displacement of the tests [m]: effects with a memory need it for the force at
+        constant speed.
+    form_file
+        The user's own file that defines the form; empty for forms of the library.
     """
 
     form: str
     parameters: Mapping[str, float]
     drive_unit: str = "A"
     drive_limit: float = math.inf
+    laws: Mapping[str, str] = field(default_factory=dict)
+    effects: tuple[Addition, ...] = ()
+    stroke_m: float = 0.01
+    form_file: str = ""
+
+    @property
+    def base(self) -> BaseForm:
+        """The base form."""
+        return base_form(self.form, self.form_file)
+
+    def law(self, block: str) -> Law:
+        """Return the law of the drive of `yield_force`, `c0` or another block of the form."""
+        return law_of(block, self.parameters, self.laws.get(block, "polynomial"))
 
     def polynomial(self, name: str) -> FloatArray:
         """Return the four coefficients `<name>_a` .. `<name>_d`, constant first."""
@@ -79,42 +112,29 @@ class DamperModel:
 
     def yield_force(self, drive: FloatArray | float) -> FloatArray:
         """Return F_y(u) [N] at rest of all lags, of the shape of `drive`."""
-        return _polynomial(drive, self.polynomial("yield_force"))
+        return self.law("yield_force")(drive)
 
     def viscosity(self, drive: FloatArray | float) -> FloatArray:
         """Return c0(u) [N s/m], of the shape of `drive`."""
-        return _polynomial(drive, self.polynomial("c0"))
+        return self.law("c0")(drive)
+
+    def base_steps(self) -> list[Step]:
+        """Return the steps of the base form, its laws and the lag of the driver."""
+        numbers, base = self.parameters, self.base
+        steps = [_drive.coefficients(*(self.law(block) for block in base.blocks))]
+        eta = numbers.get("eta", math.inf)
+        if math.isfinite(eta):
+            falling = numbers.get("eta_fall")
+            steps.append(_drive.driver_lag(eta) if falling is None else _drive.driver_lag_apart(eta, falling))
+        return [*steps, *base.steps(numbers)]
 
     def steps(self) -> list[Step]:
-        """Return the steps of the model, to be put in a chain with those of effects."""
-        numbers = self.parameters
-        steps = [_drive.polynomial_coefficients(self.polynomial("yield_force"), self.polynomial("c0"))]
-        if math.isfinite(numbers.get("eta", math.inf)):
-            steps.append(_drive.driver_lag(numbers["eta"]))
-        if self.form == "bingham":
-            steps.append(_viscoplastic.velocity_sign(numbers.get("transition_velocity", 0.0)))
-        elif self.form == "saturating-dashpot":
-            steps.append(_viscoplastic.saturating_dashpot(numbers["spring_rate"], numbers["velocity_scale"]))
-        elif self.form == "modified-bouc-wen":
-            steps.extend(
-                _modified.series_dashpot(
-                    *self._hysteresis(),
-                    series_viscosity=(numbers["c1_a"], numbers.get("c1_b", 0.0)),
-                    inner_stiffness=numbers.get("k0", 0.0),
-                    outer_stiffness=numbers.get("k1", 0.0),
-                    rest_displacement=numbers.get("x0", 0.0),
-                )
-            )
-        else:
-            steps.append(_hysteresis.hysteresis(*self._hysteresis()))
-        if self.form == "power-yield":
-            steps.append(_viscoplastic.power_of_velocity(numbers["reference_velocity"], numbers["velocity_exponent"]))
-        if self.form == "rounded-yield":
-            steps.append(_viscoplastic.rounded_yield(numbers["velocity_scale"], self.polynomial("rounded_force")))
-        return steps
+        """Return the steps of the damper with its effects; faults of sensors are not part of it."""
+        added = [step for item in self.effects if not item.sensor for step in item.steps(item.values)]
+        return [*self.base_steps(), *added]
 
     def chain(self, extra: Sequence[Step] = ()) -> Chain:
-        """Return the chain of the model's steps and `extra` ones (effects)."""
+        """Return the chain of the damper's steps and `extra` ones."""
         return build_chain([*self.steps(), *extra])
 
     def force(
@@ -139,61 +159,43 @@ class DamperModel:
     def quasi_static_force(self, velocity: FloatArray | float, drive: FloatArray | float) -> FloatArray:
         """Return the post-yield force [N]: the hysteresis fully yielded in the direction of motion, no lag.
 
-        This is what inverses work with. `velocity` [m/s] and `drive` broadcast against each other. The springs of the
-        modified Bouc-Wen model are left out, for they need the displacement.
+        This is what inverses work with. `velocity` [m/s] and `drive` broadcast against each other. Springs are left
+        out, because they need the displacement. With effects the force is simulated over the stroke of the tests at
+        constant speed, the mean of both directions.
         """
-        speed = np.abs(np.asarray(velocity, dtype=np.float64))
-        numbers = self.parameters
-        viscous = self.viscosity(drive) * speed
-        force = self.yield_force(drive)
-        if self.form == "power-yield":
-            force = force * (speed / numbers["reference_velocity"]) ** numbers["velocity_exponent"]
-        elif self.form == "saturating-dashpot":
-            force = force * np.tanh(speed / numbers["velocity_scale"])
-        elif self.form == "bingham" and numbers.get("transition_velocity", 0.0) > 0.0:
-            force = force * np.tanh(speed / numbers["transition_velocity"])
-        elif self.form == "rounded-yield":
-            rounded = _polynomial(drive, self.polynomial("rounded_force"))
-            force = force + rounded * np.tanh(speed / numbers["velocity_scale"])
-        total = force + viscous
-        if self.form == "modified-bouc-wen":
-            # below the speed at which the series dashpot carries the yield force it alone moves
-            series = numbers["c1_a"] + numbers.get("c1_b", 0.0) * np.asarray(drive, dtype=np.float64)
-            total = np.minimum(series * speed, series * total / (self.viscosity(drive) + series))
+        if any(not item.sensor for item in self.effects):
+            return steady_force(self.chain(), velocity, drive, self.stroke_m, self.drive_limit)
+        speed, u = np.broadcast_arrays(np.abs(np.asarray(velocity, dtype=np.float64)), np.asarray(drive, np.float64))
+        base = self.base
+        part = self.law(base.part)(u) if base.part else np.zeros_like(u)
+        total = base.post_yield(self.parameters, Strength(speed, u, self.yield_force(u), self.viscosity(u), part))
         return np.asarray(np.sign(velocity) * total, dtype=np.float64)
 
-    def _hysteresis(self) -> tuple[float, float, float]:
-        numbers = self.parameters
-        if self.form == "dahl":
-            return numbers["yield_displacement"], 1.0, 1.0
-        return numbers["yield_displacement"], numbers.get("gamma_share", 0.5), numbers.get("exponent", 2.0)
+    def unit(self, name: str) -> str:
+        """Return the SI unit of a parameter."""
+        return parameter_unit(name, self.drive_unit, self.base)
 
 
-def _polynomial(drive: FloatArray | float, coefficients: FloatArray) -> FloatArray:
-    values = np.polynomial.polynomial.polyval(np.asarray(drive, dtype=np.float64), coefficients)
-    return np.asarray(values, dtype=np.float64)
+def parameter_unit(name: str, drive_unit: str, form: BaseForm | None = None) -> str:
+    """Return the SI unit of a parameter of :class:`DamperModel` (or of :func:`thesis_parameters`).
 
-
-def parameter_unit(name: str, drive_unit: str) -> str:
-    """Return the SI unit of a parameter of :class:`DamperModel` (or of :func:`thesis_parameters`)."""
-    base = {"yield_force": "N", "rounded_force": "N", "c0": "N*s/m", "c1": "N*s/m", "alpha": "N/m"}
-    stem, _, letter = name.rpartition("_")
-    if stem in base and letter in ("a", "b", "c", "d"):
-        power = "abcd".index(letter)
-        return base[stem] + ("" if power == 0 else f"/{drive_unit}" + ("" if power == 1 else f"^{power}"))
-    return {
-        "eta": "1/s",
-        "yield_displacement": "m",
-        "transition_velocity": "m/s",
-        "reference_velocity": "m/s",
-        "velocity_scale": "m/s",
-        "spring_rate": "1/m",
-        "k0": "N/m",
-        "k1": "N/m",
-        "x0": "m",
-        "gamma": "1/m^2",
-        "beta": "1/m^2",
-    }.get(name, "1")
+    Parameters
+    ----------
+    drive_unit
+        `A` or `V`.
+    form
+        Form that the parameter belongs to; forms of the library are searched where it is left out.
+    """
+    stem, _, suffix = name.rpartition("_")
+    forms = list(base_forms().values()) if form is None else [form]
+    for item in forms:
+        unit = item.unit(name)
+        if unit is not None:
+            return unit.replace("drive", drive_unit)
+    blocks = _BLOCK_UNITS | {item.part: "N" for item in forms if item.part}
+    if stem in blocks and suffix in (*"abcdef", "saturating", "scale"):
+        return law_unit(blocks[stem], suffix, drive_unit)
+    return {"eta": "1/s", "eta_fall": "1/s", "x0": "m", "gamma": "1/m^2", "beta": "1/m^2"}.get(name, "1")
 
 
 def thesis_parameters(model: DamperModel, A: float = 1000.0) -> dict[str, float]:
@@ -207,9 +209,10 @@ def thesis_parameters(model: DamperModel, A: float = 1000.0) -> dict[str, float]
     ValueError
         If the form holds no Bouc-Wen hysteresis.
     """
-    if model.form not in HYSTERETIC_FORMS:
+    numbers = model.base.hysteresis
+    if numbers is None:
         raise ValueError(f"form {model.form!r} has no gamma, beta and A")
-    yield_displacement, share, exponent = model._hysteresis()
+    yield_displacement, share, exponent = numbers(model.parameters)
     z_max = yield_displacement * A
     total = A / z_max**exponent
     alpha = {
@@ -234,8 +237,9 @@ def damper_from_parameter_set(parameters: ParameterSet) -> DamperModel:
     """
     source = f"configs/dampers/{parameters.name}"
     given = {name: float(value) for name, value in parameters.values.items()}
-    if parameters.model not in KNOWN_FORMS:
-        raise UserError(source, "model", f"{parameters.model!r} is no damper form", f"known: {', '.join(KNOWN_FORMS)}")
+    known = base_forms()
+    if parameters.model not in known:
+        raise UserError(source, "model", f"{parameters.model!r} is no damper form", f"known: {', '.join(known)}")
     if "drive_limit" not in given:
         raise UserError(source, "parameters", "no drive_limit", "write {value: 4, unit: A}")
     drive_limit = given.pop("drive_limit")
@@ -266,22 +270,66 @@ def _from_thesis_notation(given: Mapping[str, float]) -> dict[str, float]:
 
 
 def write_damper(artifact: ArtifactWriter, model: DamperModel, group: str = "damper") -> None:
-    """Write a model to `group` of an artifact: a scalar dataset with its unit for each parameter."""
+    """Write a model to `group` of an artifact: a scalar dataset with its unit for each parameter.
+
+    Effects go into `group/effects/<place>` in the same way.
+    """
     for name, value in model.parameters.items():
-        artifact.put(f"{group}/parameters/{name}", float(value), unit=parameter_unit(name, model.drive_unit))
-    artifact.attributes(group, form=model.form, drive_unit=model.drive_unit, drive_limit=float(model.drive_limit))
+        artifact.put(f"{group}/parameters/{name}", float(value), unit=model.unit(name))
+    artifact.put_json(f"{group}/laws", dict(model.laws))
+    artifact.attributes(
+        group,
+        form=model.form,
+        form_file=model.form_file,
+        drive_unit=model.drive_unit,
+        drive_limit=float(model.drive_limit),
+        stroke_m=float(model.stroke_m),
+    )
+    for place, item in enumerate(model.effects):
+        where = f"{group}/effects/{place}"
+        for name, value in item.values.items():
+            artifact.put(f"{where}/parameters/{name}", float(value), unit=item.units.get(name, "1"))
+        artifact.attributes(where, name=item.name, form=item.form, file=item.file, sensor=item.sensor)
 
 
-def read_damper(artifact: Artifact, group: str = "damper") -> DamperModel:
-    """Read what :func:`write_damper` wrote."""
+def read_damper(
+    artifact: Artifact, group: str = "damper", *, effect: Callable[[str, str, str], Addition] | None = None
+) -> DamperModel:
+    """Read what :func:`write_damper` wrote.
+
+    Parameters
+    ----------
+    effect
+        (name, form, file) -> the effect without its numbers; see :func:`mrpipe.effects.damper.read_damper`.
+
+    Raises
+    ------
+    ValueError
+        If the damper has effects and no `effect` is given.
+    """
     notes = artifact.attributes(group)
-    names = artifact.members(f"{group}/parameters")
+    added = []
+    for place in sorted(artifact.members(f"{group}/effects"), key=int):
+        where = f"{group}/effects/{place}"
+        if effect is None:
+            raise ValueError("the damper has effects: read it with mrpipe.effects.damper.read_damper")
+        marks = artifact.attributes(where)
+        found = effect(str(marks["name"]), str(marks["form"]), str(marks["file"]))
+        added.append(replace(found, values=_scalars(artifact, f"{where}/parameters")))
     return DamperModel(
         form=str(notes["form"]),
-        parameters={name: artifact.scalar(f"{group}/parameters/{name}") for name in names},
+        parameters=_scalars(artifact, f"{group}/parameters"),
         drive_unit=str(notes["drive_unit"]),
         drive_limit=float(notes["drive_limit"]),
+        laws=artifact.json(f"{group}/laws"),
+        effects=tuple(added),
+        stroke_m=float(notes["stroke_m"]),
+        form_file=str(notes["form_file"]),
     )
+
+
+def _scalars(artifact: Artifact, group: str) -> dict[str, float]:
+    return {name: artifact.scalar(f"{group}/{name}") for name in artifact.members(group)}
 
 
 def write_tested(artifact: ArtifactWriter, largest: Mapping[str, float]) -> None:

@@ -9,11 +9,10 @@ monotone scalar equation: the trapezoidal rule in w, stable however stiff the yi
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, njit, void
+from numba import float64, njit
 
-from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.hysteresis import advance_hysteresis
-from mrpipe.dampers.motion import Motion
 from mrpipe.dampers.plant import (
     CURRENT,
     DISPLACEMENT,
@@ -21,6 +20,8 @@ from mrpipe.dampers.plant import (
     FIRST,
     FORCE,
     HYSTERESIS,
+    INNER_DISPLACEMENT,
+    OUTER_VELOCITY,
     RATE_YIELD,
     STEP_SIGNATURE,
     VELOCITY,
@@ -29,10 +30,6 @@ from mrpipe.dampers.plant import (
     Phase,
     Step,
 )
-
-# two places of the wire that no other step uses
-INNER_DISPLACEMENT = 22
-OUTER_VELOCITY = 23
 
 
 @njit(
@@ -124,12 +121,18 @@ def series_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt:
 
 
 @njit(STEP_SIGNATURE, cache=True)
-def spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: k0, k1 [N/m], x0 [m]. Gives the wire its outer velocity back."""
-    force = parameters[0] * wire[INNER_DISPLACEMENT] + parameters[1] * (wire[DISPLACEMENT] - parameters[2])
+def inner_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: k0 [N/m]. Gives the wire its outer velocity back."""
+    force = parameters[0] * wire[INNER_DISPLACEMENT]
     wire[EXTRA_FORCE] += force
     wire[FORCE] += force
     wire[VELOCITY] = wire[OUTER_VELOCITY]
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def outer_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: k1 [N/m], x0 [m]."""
+    wire[FORCE] += parameters[0] * (wire[DISPLACEMENT] - parameters[1])
 
 
 def series_dashpot(
@@ -140,8 +143,8 @@ def series_dashpot(
     inner_stiffness: float,
     outer_stiffness: float = 0.0,
     rest_displacement: float = 0.0,
-) -> tuple[Step, Step]:
-    """Return the two steps of the modified Bouc-Wen model (P4): hysteresis behind c1 and k0, and the springs' forces.
+) -> list[Step]:
+    """Return the steps of the modified Bouc-Wen model (P4): hysteresis behind c1 and k0, and the force of each spring.
 
     Parameters
     ----------
@@ -155,89 +158,9 @@ def series_dashpot(
         x0 [m].
     """
     inner = np.array([yield_displacement, gamma_share, exponent, *series_viscosity, inner_stiffness])
-    outer = np.array([inner_stiffness, outer_stiffness, rest_displacement])
-    return (
+    outer = np.array([outer_stiffness, rest_displacement])
+    return [
         Step("series-dashpot", Phase.HYSTERESIS, series_step, inner, state_size=3),
-        Step("springs", Phase.FORCE_EFFECT, spring_step, outer),
-    )
-
-
-@njit(
-    void(
-        float64[::1],
-        float64[::1],
-        int64[::1],
-        float64[::1],
-        float64[::1],
-        float64[::1],
-        float64[::1],
-        float64[::1],
-        float64[::1],
-    ),
-    cache=True,
-)
-def _series(
-    displacement: FloatArray,
-    velocity: FloatArray,
-    starts: IntArray,
-    dt: FloatArray,
-    yield_force: FloatArray,
-    viscosity: FloatArray,
-    series_viscosity: FloatArray,
-    numbers: FloatArray,
-    result: FloatArray,
-) -> None:
-    stiffness, yield_displacement, gamma_share, exponent = numbers[0], numbers[1], numbers[2], numbers[3]
-    for test in range(starts.shape[0] - 1):
-        w = 0.0
-        zeta = 0.0
-        for index in range(starts[test], starts[test + 1]):
-            c0 = max(viscosity[index], 0.0)
-            c1 = max(series_viscosity[index], 0.0)
-            strength = max(yield_force[index], 0.0)
-            if index > starts[test]:
-                increment = displacement[index] - displacement[index - 1]
-                change = inner_increment(
-                    w, zeta, increment, dt[test], strength, c0, c1, stiffness, yield_displacement, gamma_share, exponent
-                )
-                w += change
-                zeta = advance_hysteresis(zeta, change, yield_displacement, gamma_share, exponent)
-            inner = (c1 * velocity[index] - strength * zeta - stiffness * w) / (c0 + c1)
-            result[index] = strength * zeta + c0 * inner + stiffness * w
-
-
-def force_series(
-    motion: Motion,
-    yield_force: FloatArray,
-    viscosity: FloatArray,
-    series_viscosity: FloatArray,
-    inner_stiffness: float,
-    hysteresis: tuple[float, float, float],
-) -> FloatArray:
-    """Return the force [N] without k1's, shape (n,), over recordings laid end to end.
-
-    Parameters
-    ----------
-    motion
-        The recordings.
-    yield_force, viscosity, series_viscosity
-        alpha z_max [N], c0 and c1 [N s/m] at each sample, shape (n,).
-    inner_stiffness
-        k0 [N/m].
-    hysteresis
-        Yield displacement [m], gamma share, exponent.
-    """
-    result = np.empty(len(motion.displacement))
-    numbers = np.array([inner_stiffness, *hysteresis])
-    _series(
-        motion.displacement,
-        motion.velocity,
-        motion.starts,
-        motion.dt,
-        yield_force,
-        viscosity,
-        series_viscosity,
-        numbers,
-        result,
-    )
-    return result
+        Step("inner-spring", Phase.FORCE_EFFECT, inner_spring_step, np.array([inner_stiffness])),
+        Step("outer-spring", Phase.FORCE_EFFECT, outer_spring_step, outer),
+    ]

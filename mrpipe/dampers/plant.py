@@ -44,14 +44,18 @@ VISCOSITY = 8  # c0(u) [N s/m]
 HYSTERESIS = 9  # hysteretic variable normalised to its limit, -1..1
 HYSTERETIC_FORCE = 10  # YIELD_FORCE x HYSTERESIS [N]
 VISCOUS_FORCE = 11  # N
-EXTRA_FORCE = 12  # forces that effects add [N]
+EXTRA_FORCE = 12  # force of the base form that no linear coefficient scales, such as that of an inner spring [N]
 FORCE = 13  # at the load cell [N]; at the start of a step that of the step before
 WORK = 14  # energy dissipated since the start [J]
 SLIP = 15  # path since the last reversal [m]
 SINCE_REVERSAL = 16  # time since the last reversal [s]
 PAST_CURRENT = 17  # largest |effective current| so far in this run [A]
 RATE_YIELD = 18  # factor 0..1 of YIELD_FORCE from rate-dependent base forms (1 where unused)
-SPARE = 19  # for effects of the user's own
+PART_FORCE = 19  # force of a second yielding part [N], from its own law of the drive (0 where a form has none)
+PART = 20  # its normalised force, -1..1
+SUM_VELOCITY = 21  # velocity that the sum of (2.1) used: that of the inner element where a form has one [m/s]
+INNER_DISPLACEMENT = 22  # deformation of an inner element [m]
+OUTER_VELOCITY = 23  # velocity of the rod while an inner element's stands in its place [m/s]
 WIRE_SIZE = 24
 
 BOOKKEEPING = 6
@@ -154,8 +158,9 @@ def idle_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
 
 @njit(STEP_SIGNATURE, cache=True)
 def sum_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Add up (2.1): f = alpha z + c0 v."""
-    wire[HYSTERETIC_FORCE] = wire[YIELD_FORCE] * wire[RATE_YIELD] * wire[HYSTERESIS]
+    """Add up (2.1): f = alpha z + c0 v, with a second yielding part where the form has one."""
+    wire[HYSTERETIC_FORCE] = wire[YIELD_FORCE] * wire[RATE_YIELD] * wire[HYSTERESIS] + wire[PART_FORCE] * wire[PART]
+    wire[SUM_VELOCITY] = wire[VELOCITY]
     wire[VISCOUS_FORCE] = wire[VISCOSITY] * wire[VELOCITY]
     wire[FORCE] = wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]
 

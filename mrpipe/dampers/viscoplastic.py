@@ -1,7 +1,7 @@
-"""Yield that depends on speed: Bingham's jump, and the forms in which the yield force rounds with velocity.
+"""Steps of yield that depends on speed: Bingham's jump, powers of the speed, a spring in series with a dashpot.
 
-Real recordings ask for these more than for any other refinement of the Bouc-Wen model: the force goes on rising with
-speed, steeply first, then ever less.
+On real recordings these forms gain more than any other refinement of the Bouc-Wen model, because the force of a real
+damper goes on rising with speed, steeply at first and then less and less.
 """
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
@@ -14,13 +14,15 @@ from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.plant import (
-    CURRENT,
+    ACCELERATION,
+    DISPLACEMENT,
     FIRST,
+    FORCE,
     HYSTERESIS,
+    OUTER_VELOCITY,
     RATE_YIELD,
     STEP_SIGNATURE,
     VELOCITY,
-    VISCOSITY,
     Phase,
     Step,
 )
@@ -64,22 +66,41 @@ def power_of_velocity(reference_velocity: float, exponent: float) -> Step:
 
 
 @njit(STEP_SIGNATURE, cache=True)
-def rounded_yield_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: velocity scale [m/s], four coefficients of the additional yield force [N, N/A, ...]."""
-    u = wire[CURRENT]
-    force = parameters[1] + u * (parameters[2] + u * (parameters[3] + u * parameters[4]))
-    ratio = wire[VELOCITY] / parameters[0]
-    # tanh(r)/r, so that the term enters as a viscosity that falls with speed
-    share = math.tanh(ratio) / ratio if abs(ratio) > 1e-6 else 1.0
-    wire[VISCOSITY] += force * share / parameters[0]
+def outer_velocity_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Give the wire the rod's velocity back after an inner element's has stood in its place."""
+    wire[VELOCITY] = wire[OUTER_VELOCITY]
 
 
-def rounded_yield(velocity_scale: float, coefficients: FloatArray) -> Step:
-    """Return alpha_v(u) tanh(v/v0) beside the hysteresis; it is entered as the viscosity alpha_v tanh(v/v0)/v."""
-    numbers = np.zeros(5)
-    numbers[0] = velocity_scale
-    numbers[1 : 1 + len(coefficients)] = coefficients
-    return Step("rounded-yield", Phase.COEFFICIENT_EFFECT, rounded_yield_step, numbers)
+def outer_velocity() -> Step:
+    """Return the step that ends the part of a chain in which an inner element's velocity stands on the wire."""
+    return Step("outer-velocity", Phase.FORCE_EFFECT, outer_velocity_step, np.zeros(0))
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def parallel_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: stiffness [N/m]."""
+    wire[FORCE] += parameters[0] * wire[DISPLACEMENT]
+
+
+def parallel_spring(stiffness: float) -> Step:
+    """Return a spring [N/m] parallel to the damper."""
+    return Step("parallel-spring", Phase.FORCE_EFFECT, parallel_spring_step, np.array([float(stiffness)]))
+
+
+@njit(float64(float64[::1], float64[::1]), cache=True)
+def direction_of_change(wire: FloatArray, state: FloatArray) -> float:
+    """Return 1 while the velocity rises, -1 while it falls, and what it was where it does not change.
+
+    State: last velocity [m/s], direction.
+    """
+    if wire[FIRST] > 0.5:
+        state[1] = 1.0 if wire[ACCELERATION] >= 0.0 else -1.0
+    elif wire[VELOCITY] > state[0]:
+        state[1] = 1.0
+    elif wire[VELOCITY] < state[0]:
+        state[1] = -1.0
+    state[0] = wire[VELOCITY]
+    return state[1]
 
 
 @njit(float64(float64, float64, float64), cache=True)

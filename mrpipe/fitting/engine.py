@@ -8,18 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
+from mrpipe.dampers.laws import Law
 from mrpipe.dampers.plant import Chain, Step, build_chain
 from mrpipe.fitting.kernel import (
     COLUMNS,
     CURRENT_AT,
     HYSTERESIS_AT,
-    VELOCITY_AT,
+    KNOWN_AT,
+    PART_AT,
+    SUM_VELOCITY_AT,
     VISCOSITY_AT,
     YIELD_AT,
     run_recordings,
 )
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
+
+COUPLING_PASSES = 6
+"""So often the laws that a coupled form reads are renewed at the end of a fit."""
 
 OLDEST_JACOBIAN = 3
 """After so many steps the Jacobian is taken by differences again."""
@@ -34,7 +40,7 @@ class Fit:
     theta
         Searched values as the search sees them.
     linear
-        Coefficients: yield force and viscosity (in powers of drive over its scale), then amplitudes.
+        Coefficients: of the laws of the drive (in the basis of their shapes), then amplitudes.
     test_offsets
         Offset of each test [N].
     cost
@@ -42,7 +48,7 @@ class Fit:
     residual
         Weighted residual, shape (n,), 0 where not compared.
     at_bound
-        Names of searched parameters and amplitudes at a bound.
+        Names of searched parameters and amplitudes of terms at a bound.
     """
 
     problem: Problem
@@ -60,36 +66,35 @@ class Fit:
         return self.cost / max(int(np.count_nonzero(self.problem.root_weight)), 1)
 
     @property
-    def polynomials(self) -> tuple[FloatArray, FloatArray]:
-        """Return yield force and viscosity in powers of the drive."""
-        base, drive = self.problem.base, self.problem.scales.drive
-        split = base.yield_order + 1
-        forces = self.linear[:split] / drive ** np.arange(split)
-        count = base.viscosity_order + 1
-        return forces, self.linear[split : split + count] / drive ** np.arange(count)
+    def laws(self) -> tuple[Law, ...]:
+        """Return the laws of the drive: yield force, viscosity and, where the form has one, a second part's force."""
+        return self.problem.base.laws_of(self.linear, self.base_values, self.problem.scales.drive)
 
     @property
     def term_values(self) -> list[dict[str, float]]:
         """Return the values of each term with its amplitudes."""
-        values = self.problem.values(self.theta)[1:]
-        first = self.problem.base.yield_order + self.problem.base.viscosity_order + 2
-        for (index, parameter), value in zip(self.problem.amplitudes, self.linear[first:], strict=True):
-            values[index][parameter.name] = float(value)
-        return values
+        return self._all_values()[1:]
 
     @property
     def base_values(self) -> dict[str, float]:
-        """Return the values of the base form."""
-        return self.problem.values(self.theta)[0]
+        """Return the values of the base form with its amplitudes."""
+        return self._all_values()[0]
+
+    def _all_values(self) -> list[dict[str, float]]:
+        values = self.problem.values(self.theta)
+        first = self.problem.base.columns
+        for (index, parameter), value in zip(self.problem.amplitudes, self.linear[first:], strict=True):
+            values[index + 1][parameter.name] = float(value)
+        return values
 
     def chain(self) -> Chain:
-        """Return the chain with these numbers; amplitudes scale with the fit's own reference."""
+        """Return the chain with these numbers."""
         return build_chain(self.steps())
 
     def steps(self) -> list[Step]:
         """Return all steps of the fitted damper."""
         problem = self.problem
-        steps = problem.base.steps(self.base_values, *self.polynomials)
+        steps = problem.base.steps(self.base_values, *self.laws)
         for term, values in zip(problem.terms, self.term_values, strict=True):
             steps.extend(term.form.steps(values))
         return steps
@@ -98,35 +103,40 @@ class Fit:
 def chain_of(problem: Problem, theta: FloatArray) -> tuple[Chain, tuple[int, ...], list[int]]:
     """Return chain, tapped places (rising) and, for each amplitude, which of the taps is its."""
     values = problem.values(theta)
-    steps = problem.base.steps(values[0], *problem.reference)
+    steps = _with_taps(problem.base.steps(values[0], *problem.reference), problem.base.form.amplitude_steps, -1, 1)
     for index, (term, given) in enumerate(zip(problem.terms, values[1:], strict=True)):
-        made = term.form.steps(given)
-        for name, place in term.form.amplitude_steps.items():
-            made[place] = replace(made[place], name=f"tap:{index}:{name}")
-        steps.extend(made)
+        steps.extend(_with_taps(term.form.steps(given), term.form.amplitude_steps, index, 0))
     chain = build_chain(steps)
     places = [chain.names.index(f"tap:{index}:{p.name}") for index, p in problem.amplitudes]
     tapped = tuple(sorted(places))
     return chain, tapped, [tapped.index(place) for place in places]
 
 
+def _with_taps(steps: list[Step], amplitude_steps: Mapping[str, int], index: int, first: int) -> list[Step]:
+    for name, place in amplitude_steps.items():
+        steps[first + place] = replace(steps[first + place], name=f"tap:{index}:{name}")
+    return steps
+
+
 def regressors(problem: Problem, theta: FloatArray) -> FloatArray:
     """Return the columns of all linear coefficients, shape (c, n), not weighted."""
     chain, tapped, order = chain_of(problem, theta)
     wires = run_recordings(chain, problem.recordings, tapped)
-    share = wires[CURRENT_AT] / problem.scales.drive
-    base = problem.base
-    columns = np.empty((base.yield_order + base.viscosity_order + 2 + len(order), wires.shape[1]))
-    column = wires[HYSTERESIS_AT] * wires[YIELD_AT]
+    base, drive = problem.base, problem.scales.drive
+    share = wires[CURRENT_AT] / drive
+    signals = (
+        wires[HYSTERESIS_AT] * wires[YIELD_AT],
+        wires[SUM_VELOCITY_AT] * wires[VISCOSITY_AT],
+        wires[PART_AT],
+    )
+    columns = np.empty((base.columns + len(order), wires.shape[1]))
     row = 0
-    for _ in range(base.yield_order + 1):
-        columns[row] = column
-        column = column * share
-        row += 1
-    column = wires[VELOCITY_AT] * wires[VISCOSITY_AT]
-    for _ in range(base.viscosity_order + 1):
-        columns[row] = column
-        column = column * share
+    scales = base.scale_shares(problem.values(theta)[0], drive)
+    for law, signal, scale in zip(base.laws, signals, scales, strict=False):
+        columns[row : row + law.count] = law.basis(share, scale) * signal
+        row += law.count
+    if base.form.known:
+        columns[row] = wires[KNOWN_AT]
         row += 1
     for place in order:
         columns[row] = wires[COLUMNS + place]
@@ -190,61 +200,123 @@ def centred(rows: FloatArray, w: Weighting) -> tuple[FloatArray, FloatArray]:
     return (rows - np.repeat(means, lengths, axis=-1)) * w.root, means
 
 
-def solve(problem: Problem, theta: FloatArray, w: Weighting) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Return weighted residual at the samples compared, coefficients, means of each test, and what sits at a bound."""
+@dataclass(frozen=True)
+class Solved:
+    """A problem solved for its linear coefficients at given searched values.
+
+    Attributes
+    ----------
+    residual
+        Weighted residual at the samples compared, shape (m,).
+    linear
+        Coefficients.
+    means
+        Offset of each test present [N].
+    at_bound
+        Which coefficients sit at a bound.
+    """
+
+    residual: FloatArray
+    linear: FloatArray
+    means: FloatArray
+    at_bound: BoolArray
+
+    @property
+    def cost(self) -> float:
+        """Sum of squared weighted residuals."""
+        return float(self.residual @ self.residual)
+
+
+def solve(problem: Problem, theta: FloatArray, w: Weighting) -> Solved:
+    """Return the problem solved for its linear coefficients; a coupled form reads the laws of the reference."""
     columns = regressors(problem, theta)[:, w.at]
+    count = len(columns)
     if not np.all(np.isfinite(columns)):
-        return np.full(len(w.at), 1e6), np.zeros(len(columns)), np.zeros(len(w.starts)), np.ones(len(columns), bool)
+        wrong = np.full(len(w.at), 1e6)
+        return Solved(wrong, np.zeros(count), np.zeros(len(w.starts)), np.ones(count, bool))
     rows, means = centred(columns, w)
     target, target_means = centred(problem.recordings.force[w.at][None], w)
     low, high = linear_bounds(problem)
     linear, at_bound = bounded_solution(rows @ rows.T, rows @ target[0], low, high)
-    return target[0] - linear @ rows, linear, target_means[0] - linear @ means, at_bound
+    offsets = target_means[0] - linear @ means
+    return Solved(target[0] - linear @ rows, linear, offsets, at_bound)
 
 
 def linear_bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """Return bounds of the linear coefficients."""
-    free = problem.base.yield_order + problem.base.viscosity_order + 2
+    """Return bounds of the linear coefficients: no law of the drive is negative, a known force has the factor 1."""
+    known = int(problem.base.form.known)
+    free = problem.base.columns - known
     bounds = [parameter.bounds(problem.scales) for _, parameter in problem.amplitudes]
-    low = np.concatenate([np.full(free, -np.inf), [item[0] for item in bounds]])
-    return low, np.concatenate([np.full(free, np.inf), [item[1] for item in bounds]])
+    low = np.concatenate([np.zeros(free), np.ones(known), [item[0] for item in bounds]])
+    return low, np.concatenate([np.full(free, np.inf), np.ones(known), [item[1] for item in bounds]])
 
 
 def bounded_solution(
     gram: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Solve the normal equations within bounds: what leaves them is put on the bound and the rest solved again."""
+    """Solve the normal equations within bounds by active sets; also return which coefficients sit at a bound.
+
+    What leaves its bounds is put on the bound and the rest solved again; a bound that the gradient points away from is
+    released (Lawson and Hanson 1974, Solving Least Squares Problems, chapter 23).
+    """
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     scaled = gram / np.outer(scale, scale)
     scaled[np.diag_indices_from(scaled)] += 1e-10
     target = right / scale
+    low, high = low * scale, high * scale
     solution = np.zeros(len(right))
-    fixed = np.zeros(len(right), dtype=np.bool_)
-    for _ in range(len(right) + 1):
+    fixed = low == high
+    solution[fixed] = low[fixed]
+    for _ in range(3 * len(right) + 1):
         free = ~fixed
         rest = target[free] - scaled[np.ix_(free, fixed)] @ solution[fixed]
         solution[free] = np.linalg.solve(scaled[np.ix_(free, free)], rest)
-        outside = free & ((solution < low * scale - 1e-12) | (solution > high * scale + 1e-12))
-        if not outside.any():
+        outside = free & ((solution < low - 1e-12) | (solution > high + 1e-12))
+        if outside.any():
+            solution[outside] = np.clip(solution[outside], low[outside], high[outside])
+            fixed |= outside
+            continue
+        slope = target - scaled @ solution
+        inward = fixed & (low < high) & np.where(solution <= low, slope > 1e-9, slope < -1e-9)
+        if not inward.any():
             break
-        solution[outside] = np.clip(solution[outside], (low * scale)[outside], (high * scale)[outside])
-        fixed |= outside
+        fixed[int(np.argmax(np.where(inward, np.abs(slope), 0.0)))] = False
     return solution / scale, fixed
 
 
 def fit(problem: Problem, start: FloatArray, *, iterations: int = 15, tolerance: float = 2e-4) -> Fit:
-    """Fit from a start by Levenberg-Marquardt on the projected residual."""
+    """Fit from a start by Levenberg-Marquardt on the projected residual.
+
+    The steps of a coupled form read the laws of the drive, which are themselves fitted. Post-yield forces determine the
+    laws whatever the path to yield is: the search is repeated with the laws that the one before gave, until they agree.
+    """
+    if not problem.base.form.coupled:
+        return _search(problem, start, iterations, tolerance)
+    each = max(3, iterations // 3)
+    best = found = _search(problem, start, each, tolerance)
+    idle = 0
+    for _ in range(COUPLING_PASSES):
+        before = best.cost
+        found = _search(replace(problem, reference=found.laws), found.theta, each, tolerance)
+        best = min(best, found, key=lambda item: item.cost)
+        idle = idle + 1 if best.cost > 0.99 * before else 0
+        if idle == 2:
+            break
+    return best
+
+
+def _search(problem: Problem, start: FloatArray, iterations: int, tolerance: float) -> Fit:
     w = weighting(problem)
     low, high = problem.bounds()
     theta = np.clip(start, low, high)
-    residual, linear, means, fixed = solve(problem, theta, w)
-    cost = float(residual @ residual)
-    damping, done, jacobian, age = 1e-3, 0, np.zeros((len(theta), len(residual))), OLDEST_JACOBIAN
+    found = solve(problem, theta, w)
+    cost = found.cost
+    damping, done, jacobian, age = 1e-3, 0, np.zeros((len(theta), len(found.residual))), OLDEST_JACOBIAN
     for done in range(1, iterations + 1):  # noqa: B007 - counted for the report
         if age >= OLDEST_JACOBIAN:
-            jacobian, age = jacobian_of(problem, theta, residual, w, low, high), 0
-        gram, gradient = jacobian @ jacobian.T, jacobian @ residual
-        diagonal = np.maximum(np.diag(gram), 1e-12 * max(float(np.max(np.diag(gram))), 1e-300))
+            jacobian, age = jacobian_of(problem, theta, found.residual, w, low, high), 0
+        gram, gradient = jacobian @ jacobian.T, jacobian @ found.residual
+        diagonal = np.maximum(np.diag(gram), 1e-12 * max(float(np.max(np.diag(gram), initial=0.0)), 1e-300))
         before, improved = cost, False
         for _ in range(5 if age == 0 else 2):
             free = ~(((theta <= low) & (gradient > 0)) | ((theta >= high) & (gradient < 0)))
@@ -253,15 +325,13 @@ def fit(problem: Problem, start: FloatArray, *, iterations: int = 15, tolerance:
                 matrix = gram[np.ix_(free, free)] + damping * np.diag(diagonal[free])
                 step[free] = -np.linalg.lstsq(matrix, gradient[free], rcond=None)[0]
             trial = np.clip(theta + np.clip(step, -1.0, 1.0), low, high)
-            found = solve(problem, trial, w)
-            new = float(found[0] @ found[0])
-            if new < cost:
+            tried = solve(problem, trial, w)
+            if tried.cost < cost:
                 moved = trial - theta
-                missed = found[0] - residual - moved @ jacobian
-                # a run for every parameter is dear: between two Jacobians by differences Broyden's update will do
+                missed = tried.residual - found.residual - moved @ jacobian
+                # a run for every parameter is expensive: between two Jacobians by differences Broyden's update serves
                 jacobian += np.outer(moved / max(float(moved @ moved), 1e-300), missed)
-                theta, cost, improved = trial, new, True
-                residual, linear, means, fixed = found
+                theta, cost, improved, found = trial, tried.cost, True, tried
                 damping = max(damping * 0.2, 1e-9)
                 break
             damping *= 8.0
@@ -271,7 +341,7 @@ def fit(problem: Problem, start: FloatArray, *, iterations: int = 15, tolerance:
             break
         else:
             age = OLDEST_JACOBIAN
-    return _finish(problem, theta, w, (residual, linear, means, fixed), done)
+    return finish(problem, theta, w, done)
 
 
 def jacobian_of(
@@ -286,35 +356,37 @@ def jacobian_of(
         width = -width if theta[k] + width > high[k] else width
         moved = theta.copy()
         moved[k] += width
-        rows[k] = (solve(problem, moved, w)[0] - residual) / width
+        rows[k] = (solve(problem, moved, w).residual - residual) / width
     return rows
 
 
-def _finish(
-    problem: Problem,
-    theta: FloatArray,
-    w: Weighting,
-    found: tuple[FloatArray, FloatArray, FloatArray, BoolArray],
-    iterations: int,
-) -> Fit:
-    residual, linear, means, fixed = found
+def finish(problem: Problem, theta: FloatArray, w: Weighting, iterations: int = 0) -> Fit:
+    """Return the fit at these searched values; the laws that a coupled form reads are then those of the fit."""
+    found = solve(problem, theta, w)
+    if problem.base.form.coupled and np.any(found.linear):
+        for _ in range(COUPLING_PASSES):
+            laws = problem.base.laws_of(found.linear, problem.values(theta)[0], problem.scales.drive)
+            problem = replace(problem, reference=laws)
+            found = solve(problem, theta, w)
     low, high = problem.bounds()
     margin = 1e-3 * (high - low)
     names = [
         parameter.name
         for (index, parameter), t, a, b, m in zip(problem.searched, theta, low, high, margin, strict=True)
-        if index >= 0 and (t <= a + m or t >= b - m) and parameter.upper / max(parameter.lower, 1e-12) > 1.01
+        if index >= 0 and (t <= a + m or t >= b - m)
     ]
-    first = problem.base.yield_order + problem.base.viscosity_order + 2
-    names += [p.name for (_, p), stuck in zip(problem.amplitudes, fixed[first:], strict=True) if stuck]
+    first = problem.base.columns
+    names += [
+        p.name for (k, p), stuck in zip(problem.amplitudes, found.at_bound[first:], strict=True) if stuck and k >= 0
+    ]
     full = np.zeros(len(problem.recordings.force))
-    full[w.at] = residual
+    full[w.at] = found.residual
     offsets = np.zeros(problem.recordings.tests)
     if problem.offsets:
-        offsets[np.unique(w.test)] = means
+        offsets[np.unique(w.test)] = found.means
     else:
-        offsets[:] = means[0]
-    return Fit(problem, theta, linear, offsets, float(residual @ residual), full, tuple(names), iterations)
+        offsets[:] = found.means[0]
+    return Fit(problem, theta, found.linear, offsets, found.cost, full, tuple(names), iterations)
 
 
 def predict(found: Fit, recordings: Recordings) -> FloatArray:

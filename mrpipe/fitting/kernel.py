@@ -8,20 +8,24 @@ import numpy as np
 from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.drive import COEFFICIENT_STEPS
 from mrpipe.dampers.plant import (
     ACCELERATION,
     CHAIN_FUNCTIONS,
     CURRENT,
     DISPLACEMENT,
     DRIVE,
+    EXTRA_FORCE,
     FIRST,
     FORCE,
     HYSTERESIS,
     HYSTERETIC_FORCE,
+    PART,
     PAST_CURRENT,
     RATE_YIELD,
     SINCE_REVERSAL,
     SLIP,
+    SUM_VELOCITY,
     TIME,
     VELOCITY,
     VISCOSITY,
@@ -34,10 +38,12 @@ from mrpipe.dampers.plant import (
 from mrpipe.dampers.timing import look_ahead
 from mrpipe.fitting.recordings import Recordings
 
-COLUMNS = 8
-CURRENT_AT, VELOCITY_AT, HYSTERESIS_AT, YIELD_AT, VISCOSITY_AT, FORCE_AT, WORK_AT, DISPLACEMENT_AT = range(COLUMNS)
-"""Rows of what :func:`run_recordings` returns: effective drive, velocity and displacement of the damper, z, factors by
-which effects change yield force and viscosity, force, work."""
+COLUMNS = 11
+CURRENT_AT, VELOCITY_AT, HYSTERESIS_AT, YIELD_AT, VISCOSITY_AT, FORCE_AT, WORK_AT, DISPLACEMENT_AT = range(8)
+SUM_VELOCITY_AT, PART_AT, KNOWN_AT = 8, 9, 10
+"""Rows of what :func:`run_recordings` returns: effective drive, velocity of the damper, z, factors by which effects
+change yield force and viscosity, force, work, displacement, velocity of the viscous element, second yielding part,
+force of the base form that no linear coefficient scales."""
 
 
 @njit(
@@ -141,6 +147,9 @@ def _run(
             result[FORCE_AT, index] = wire[FORCE]
             result[WORK_AT, index] = work
             result[DISPLACEMENT_AT, index] = wire[DISPLACEMENT]
+            result[SUM_VELOCITY_AT, index] = wire[SUM_VELOCITY]
+            result[PART_AT, index] = wire[PART]
+            result[KNOWN_AT, index] = wire[EXTRA_FORCE]
 
 
 def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...] = ()) -> FloatArray:
@@ -149,7 +158,7 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
     Parameters
     ----------
     chain
-        With one step named `polynomial-coefficients`.
+        With one step of :func:`mrpipe.dampers.drive.coefficients`.
     recordings
         The tests.
     tapped
@@ -170,7 +179,7 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
         recordings.drive,
         recordings.starts,
         recordings.dt,
-        chain.names.index("polynomial-coefficients"),
+        next(place for place, name in enumerate(chain.names) if name in COEFFICIENT_STEPS),
         np.array(tapped, dtype=np.int64),
         result,
     )

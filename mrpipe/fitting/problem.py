@@ -3,55 +3,88 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.drive import driver_lag, driver_lag_apart, polynomial_coefficients
-from mrpipe.dampers.hysteresis import hysteresis
+from mrpipe.dampers.drive import coefficients, driver_lag, driver_lag_apart
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.laws import Law, LawShape
+from mrpipe.dampers.parameters import Parameter, Scales, shape
 from mrpipe.dampers.plant import Step
-from mrpipe.effects.contract import Effect, EffectForm, EffectScales, Parameter, shape
+from mrpipe.effects.contract import Effect, EffectForm
 from mrpipe.fitting.recordings import Recordings
+
+ETA = shape("eta", "1/s", "rate of the driver's lag (2.4)", "one", 2.0, 3000.0, (100.0, 30.0))
+ETA_FALL = shape("eta_fall", "1/s", "rate where the drive falls", "one", 2.0, 3000.0, (100.0,))
 
 
 @dataclass(frozen=True)
-class BaseForm:
-    """The declared damper: Bouc-Wen hysteresis with its exponent fixed or free, or Dahl."""
+class Base:
+    """The base form of a problem: a form of the library, the shapes of its laws of the drive, and the driver's lag.
 
-    name: str = "bouc-wen"
-    exponent: float = 2.0
-    exponent_free: bool = False
-    gamma_free: bool = True
-    gamma_share: float = 0.5
-    yield_order: int = 3
-    viscosity_order: int = 1
+    Attributes
+    ----------
+    form
+        The base form.
+    laws
+        Shape of the law of each block of the form.
+    lag_known
+        The drive varies within tests, so that measurements determine its lag.
+    lag_apart
+        The lag has another rate where the drive falls.
+    held
+        Parameters that are not searched, and their values: references of the form, and what a caller fixes.
+    """
+
+    form: BaseForm
+    laws: tuple[LawShape, ...]
     lag_known: bool = True
     lag_apart: bool = False
+    held: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Name of the form."""
+        return self.form.name
+
+    @property
+    def columns(self) -> int:
+        """Number of linear coefficients before the amplitudes: of all laws, and one for a known force."""
+        return sum(law.count for law in self.laws) + int(self.form.known)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Return what is searched."""
-        found = [shape("yield_displacement", "m", "displacement at which it yields", "stroke", 1e-3, 2.0, (0.04, 0.12))]
-        if self.gamma_free:
-            found.append(Parameter("gamma_share", "1", "gamma over gamma plus beta", "one", 0.02, 1.5, (0.5,)))
-        if self.exponent_free:
-            found.append(shape("exponent", "1", "n of (2.2)", "one", 1.0, 8.0, (1.9,)))
+        found = [item for item in self.form.searched if item.name not in self.held]
+        for block, law in zip(self.form.blocks, self.laws, strict=True):
+            if law.saturates:
+                name = f"{block}_scale"
+                found.append(shape(name, "drive", "drive at which the law saturates", "drive", 0.05, 20.0, (0.5,)))
         if self.lag_known:
-            found.append(shape("eta", "1/s", "rate of the drive's lag", "one", 2.0, 3000.0, (100.0,)))
+            found.append(ETA)
         if self.lag_known and self.lag_apart:
-            found.append(shape("eta_fall", "1/s", "rate where the drive falls", "one", 2.0, 3000.0, (100.0,)))
+            found.append(ETA_FALL)
         return tuple(found)
 
-    def steps(self, values: Mapping[str, float], yield_force: FloatArray, viscosity: FloatArray) -> list[Step]:
-        """Return the steps with these polynomials (in powers of the drive)."""
-        steps = [
-            polynomial_coefficients(yield_force, viscosity),
-            hysteresis(
-                values["yield_displacement"],
-                values.get("gamma_share", self.gamma_share),
-                values.get("exponent", self.exponent),
-            ),
+    def scale_shares(self, values: Mapping[str, float], drive: float) -> list[float]:
+        """Return the scale of each law over the drive limit; 1 for laws that do not saturate."""
+        return [
+            values[f"{block}_scale"] / drive if law.saturates else 1.0
+            for block, law in zip(self.form.blocks, self.laws, strict=True)
         ]
+
+    def laws_of(self, linear: FloatArray, values: Mapping[str, float], drive: float) -> tuple[Law, ...]:
+        """Return the laws with these linear coefficients; `drive` is the largest drive [A or V]."""
+        found, first = [], 0
+        for law, share in zip(self.laws, self.scale_shares(values, drive), strict=True):
+            found.append(law.law(linear[first : first + law.count], drive, share))
+            first += law.count
+        return tuple(found)
+
+    def steps(self, values: Mapping[str, float], *laws: Law) -> list[Step]:
+        """Return the steps with these laws of the drive."""
+        steps = [coefficients(*laws), *self.form.steps(values)]
         if self.lag_known:
             apart = "eta_fall" in values
             steps.append(driver_lag_apart(values["eta"], values["eta_fall"]) if apart else driver_lag(values["eta"]))
@@ -88,7 +121,7 @@ class Problem:
     scales
         Scales of bounds and starts.
     reference
-        Yield force and viscosity polynomials that effects scale with (see :class:`Fit`).
+        Laws of the base form that effects scale with, and that coupled forms read.
     window_share
         Moving average over this share of a period that the records went through.
     offsets
@@ -96,11 +129,11 @@ class Problem:
     """
 
     recordings: Recordings
-    base: BaseForm
+    base: Base
     terms: tuple[Term, ...]
     root_weight: FloatArray
-    scales: EffectScales
-    reference: tuple[FloatArray, FloatArray]
+    scales: Scales
+    reference: tuple[Law, ...]
     window_share: float = 0.0
     offsets: bool = True
 
@@ -114,8 +147,9 @@ class Problem:
 
     @property
     def amplitudes(self) -> list[tuple[int, Parameter]]:
-        """Return (term index, parameter) of all amplitudes."""
-        return [(index, item) for index, term in enumerate(self.terms) for item in term.form.amplitudes]
+        """Return (term index or -1 for the base, parameter) of all amplitudes."""
+        own = [(-1, item) for item in self.base.form.amplitudes]
+        return own + [(index, item) for index, term in enumerate(self.terms) for item in term.form.amplitudes]
 
     def encode(self, values: Sequence[float]) -> FloatArray:
         """Return searched values as the search sees them."""
@@ -135,6 +169,7 @@ class Problem:
     def values(self, theta: FloatArray) -> list[dict[str, float]]:
         """Return values by name: of the base first, then of each term, amplitudes 1."""
         found: list[dict[str, float]] = [{} for _ in range(len(self.terms) + 1)]
+        found[0] |= self.base.held
         for (index, parameter), value in zip(self.searched, self.decode(theta), strict=True):
             found[index + 1][parameter.name] = value
         for index, parameter in self.amplitudes:

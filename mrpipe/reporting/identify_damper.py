@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from mrpipe.dampers.comparison import JudgedFit
-from mrpipe.dampers.scoring import shown_loops, yield_curves
+from mrpipe.fitting.comparison import JudgedFit
+from mrpipe.fitting.scoring import shown_loops, yield_curves
 from mrpipe.reporting.dampers import comparison_bars, damper_loops, yield_force_curves
 from mrpipe.reporting.sink import Sink
 from mrpipe.signals.prepared import PreparedTest
@@ -41,10 +41,12 @@ def describe(sink: Sink, result: IdentifiedDamper) -> None:
     """Write the section."""
     tests, judged, chosen, summary = result.tests, result.judged, result.chosen, result.summary
     sink.text(
-        f"Damper model {chosen.fit.form.name} ({chosen.fit.form.summary}): NRMSE {chosen.training.nrmse:.3f} on the "
-        f"training tests, {chosen.validation.nrmse:.3f} on the validation tests; of the forms compared "
-        f"{summary['comparison'][0]['form']} does best on them."
+        f"Damper model {chosen.fit.form.name} ({chosen.fit.form.summary}; {chosen.fit.form.source}): NRMSE "
+        f"{chosen.training.nrmse:.3f} on the training tests, {chosen.validation.nrmse:.3f} on the validation tests. "
+        f"{summary['reason']} Of the forms compared {summary['comparison'][0]['form']} has the smallest error there."
     )
+    if summary["drive_law"]:
+        sink.text(f"Law of the drive: {summary['drive_law']['reason']}.")
     tables = {
         "parameters": (pd.DataFrame(summary["parameters"]).T.rename_axis("name").reset_index(), "Parameters (SI)."),
         "thesis-parameters": (
@@ -54,6 +56,14 @@ def describe(sink: Sink, result: IdentifiedDamper) -> None:
         "comparison": (
             pd.DataFrame(summary["comparison"]),
             "Model forms by their error on the validation tests, which no fit has seen.",
+        ),
+        "ranking": (
+            pd.DataFrame(summary["ranking"]),
+            "All forms by their error on a share of the training samples; those near the best were fitted to all.",
+        ),
+        "drive-law": (
+            pd.DataFrame((summary["drive_law"] or {}).get("predictions", [])),
+            "Yield force and viscosity at the levels of drive, between and beyond them, with standard deviations.",
         ),
         "tests": (pd.DataFrame(summary["tests"]), "Error of each test."),
     }

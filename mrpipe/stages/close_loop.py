@@ -59,11 +59,11 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     from mrpipe.campaigns import load_campaign
     from mrpipe.control.assembly import ControllerFactory, inverse_network
     from mrpipe.control.storage import read_calibrated
+    from mrpipe.fitting.damper import damper_model
     from mrpipe.reporting.closed_loop_words import in_words
     from mrpipe.simulation.rig import Rig, loop_options
     from mrpipe.structures import read_frame
     from mrpipe.tracing.loop import study
-    from mrpipe.tracing.loop.augmented import damper_of
     from mrpipe.tracing.loop.comparison import measured_runs
 
     settings = context.settings.simulate
@@ -73,7 +73,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
         return {"status": f"skipped: there is no {' and no '.join(lacking)}"}
     context.progress(0.92, "closed loop")
     frame = read_frame(context.artifact("identify-frame"))
-    damper = damper_of(traced.selection.base, traced.drive_unit)
+    damper = damper_model(traced.selection.base, traced.drive_unit)
     inverse = inverse_network(settings.controller, lambda: context.artifact("train-inverse"))
     calibrated = read_calibrated(context.artifact("calibrate"))
     controllers = ControllerFactory(frame, damper, calibrated, settings.controller, inverse)

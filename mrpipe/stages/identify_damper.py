@@ -9,16 +9,17 @@ from mrpipe.errors import StageSkipped
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.dampers.comparison import JudgedFit
+    from mrpipe.config.sections.identify_damper import IdentifyDamperSettings
+    from mrpipe.fitting.comparison import Comparison, FitOptions, JudgedFit
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     import numpy as np
 
-    from mrpipe.dampers.comparison import FitOptions, compare_forms
-    from mrpipe.dampers.forms import FORMS
-    from mrpipe.dampers.samples import scales_of, smooth_motion
-    from mrpipe.dampers.summary import findings
+    from mrpipe.dampers.library import forms_named
+    from mrpipe.fitting.comparison import compare_forms
+    from mrpipe.fitting.samples import smooth_motion
+    from mrpipe.fitting.summary import findings
     from mrpipe.reporting import identify_damper as section
     from mrpipe.signals.prepared import read_prepared
 
@@ -29,56 +30,68 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     training = [test for test in tests if test.role == "training"]
     if not training:
         raise StageSkipped("identify-damper: the campaign has no training test")
-    scales = scales_of(
-        training,
-        yield_order=settings.yield_order,
-        viscosity_order=settings.viscosity_order,
-        assumed_eta=settings.assumed_eta_per_s,
+    by_choice = settings.form == "best"
+    named = [*settings.compare, *([] if by_choice or not settings.compare else [settings.form])]
+    forms = forms_named(list(dict.fromkeys(named)), settings.form_files)
+    if not by_choice and settings.form not in forms:
+        forms_named([settings.form], settings.form_files)
+    comparison = compare_forms(
+        list(forms.values()),
+        tests,
+        fit_options(settings),
+        folds=settings.folds if by_choice else 0,
+        keep=(*settings.compare, *(() if by_choice else (settings.form,))),
+        progress=context.progress,
     )
-    options = FitOptions(
-        method=settings.method,
-        starts=settings.starts,
+    chosen = _chosen(comparison, settings.form)
+    for line in findings(chosen.fit):
+        context.warn(line)
+    summary = _summary(comparison, chosen, settings.reference_A)
+    largest = {
+        "displacement": max(float(np.abs(test.displacement_m).max()) for test in training),
+        "velocity": max(float(np.abs(test.velocity_m_s).max()) for test in training),
+    }
+    _write(context, comparison.judged, chosen, summary, largest)
+    section.describe(context.report, section.IdentifiedDamper(tests, comparison.judged, chosen, summary))
+    return summary
+
+
+def fit_options(settings: IdentifyDamperSettings) -> FitOptions:
+    """Return how forms are fitted, from the settings."""
+    from mrpipe.dampers.library import form_of_file
+    from mrpipe.fitting.comparison import FitOptions
+    from mrpipe.fitting.form_fit import FitMethod
+
+    files = {form_of_file(path).name: str(path) for path in settings.form_files}
+    return FitOptions(
+        method=FitMethod(settings.method, settings.starts, assumed_eta=settings.assumed_eta_per_s, form_files=files),
         cycles=settings.cycles,
         maximum_samples=settings.maximum_samples,
         raw_force=settings.force == "raw",
         offsets=settings.offset_per_test,
         equal_tests=settings.equal_tests,
+        drive_law=settings.drive_law,
+        yield_order=settings.yield_order,
+        viscosity_order=settings.viscosity_order,
     )
-    by_choice = settings.form == "best"
-    names = list(dict.fromkeys([*settings.compare, *([] if by_choice else [settings.form])]))
-    judged = compare_forms(
-        [FORMS[name] for name in names],
-        tests,
-        scales,
-        options,
-        folds=settings.folds if by_choice else 0,
-        progress=context.progress,
-    )
-    chosen = _chosen(judged, settings.form)
-    for line in findings(chosen.fit):
-        context.warn(line)
-    summary = _summary(judged, chosen, settings.reference_A)
-    largest = {
-        "displacement": max(float(np.abs(test.displacement_m).max()) for test in training),
-        "velocity": max(float(np.abs(test.velocity_m_s).max()) for test in training),
-    }
-    _write(context, judged, chosen, summary, largest)
-    section.describe(context.report, section.IdentifiedDamper(tests, judged, chosen, summary))
-    return summary
 
 
-def _chosen(judged: Sequence[JudgedFit], form: str) -> JudgedFit:
-    from mrpipe.dampers.comparison import best_by_folds
+def _chosen(comparison: Comparison, form: str) -> JudgedFit:
+    from mrpipe.fitting.comparison import best_by_folds
 
+    judged = comparison.judged
     return best_by_folds(judged) if form == "best" else next(item for item in judged if item.fit.form.name == form)
 
 
-def _summary(judged: Sequence[JudgedFit], chosen: JudgedFit, reference: float) -> dict[str, Any]:
-    from mrpipe.dampers.summary import (
+def _summary(comparison: Comparison, chosen: JudgedFit, reference: float) -> dict[str, Any]:
+    from mrpipe.fitting.comparison import reason_of_choice
+    from mrpipe.fitting.summary import (
         comparison_rows,
         correlation_rows,
+        law_summary,
         number_or_none,
         parameter_table,
+        rank_rows,
         test_rows,
         thesis_table,
     )
@@ -86,15 +99,19 @@ def _summary(judged: Sequence[JudgedFit], chosen: JudgedFit, reference: float) -
     model = chosen.fit.model
     return {
         "form": chosen.fit.form.name,
+        "source": chosen.fit.form.source,
+        "reason": reason_of_choice(chosen, comparison.judged),
         "drive_unit": model.drive_unit,
         "drive_limit": model.drive_limit,
+        "drive_law": law_summary(comparison, chosen),
         "parameters": parameter_table(chosen.fit),
         "thesis_parameters": thesis_table(chosen.fit, reference),
         "training_nrmse": chosen.training.nrmse,
         "validation_nrmse": number_or_none(chosen.validation.nrmse),
         "validation_fit_percent": number_or_none(chosen.validation.fit_percent),
         "validation_r2": number_or_none(chosen.validation.r2),
-        "comparison": comparison_rows(judged),
+        "comparison": comparison_rows(comparison.judged),
+        "ranking": rank_rows(comparison),
         "correlated": correlation_rows(chosen.fit),
         "start_nrmse": list(chosen.fit.start_nrmse),
         "tests": test_rows(chosen),
@@ -120,10 +137,8 @@ def _write(
         artifact.put("covariance", fit.covariance, unit="1", dims=dims, description="units: those of the parameters")
         artifact.put("correlation", fit.correlation, unit="1", dims=dims)
         artifact.put_json("parameter_names", list(fit.names))
-        artifact.put_json("parameters", summary["parameters"])
-        artifact.put_json("thesis_parameters", summary["thesis_parameters"])
-        artifact.put_json("comparison", summary["comparison"])
-        artifact.put_json("tests", summary["tests"])
+        for name in ("parameters", "thesis_parameters", "comparison", "ranking", "drive_law", "tests"):
+            artifact.put_json(name, summary[name])
 
 
 STAGE = Stage(

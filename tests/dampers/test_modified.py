@@ -8,8 +8,6 @@ from scipy.integrate import solve_ivp
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.dampers.model import DamperModel, damper_from_parameter_set, thesis_parameters
-from mrpipe.dampers.modified import force_series
-from mrpipe.dampers.motion import join
 
 
 def _p4_equations(times, amplitude, omega, volts, numbers, thesis):
@@ -61,40 +59,3 @@ def test_the_chain_solves_p4_equations(volts, series_share):
     late = slice(50, None)
     error = np.sqrt(np.mean((force[late] - expected[late]) ** 2) / np.mean(expected**2))
     assert error < 2e-3
-
-
-@pytest.mark.property
-def test_series_and_chain_agree():
-    rng = np.random.default_rng(5)
-    displacement = np.cumsum(np.cumsum(rng.normal(size=500))) * 1e-7
-    velocity = np.gradient(displacement, 1e-3)
-    zero, drive = np.zeros(500), np.full(500, 2.0)
-    model = DamperModel(
-        "modified-bouc-wen",
-        {
-            "yield_displacement": 2e-4,
-            "gamma_share": 0.7,
-            "exponent": 2.0,
-            "yield_force_a": 30.0,
-            "yield_force_b": 20.0,
-            "c0_a": 40.0,
-            "c1_a": 4000.0,
-            "c1_b": 100.0,
-            "k0": 500.0,
-        },
-    )
-    motion = join([(displacement, velocity, zero, drive, 1e-3)])
-    full = np.ones(500)
-    series = force_series(motion, 70.0 * full, 40.0 * full, 4200.0 * full, 500.0, (2e-4, 0.7, 2.0))
-    np.testing.assert_allclose(model.force(displacement, velocity, zero, drive, 1e-3), series, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.property
-def test_a_rigid_series_dashpot_leaves_the_simplified_model():
-    shared = {"yield_displacement": 3e-4, "gamma_share": 0.5, "exponent": 2.0, "yield_force_a": 80.0, "c0_a": 60.0}
-    times = np.arange(0.0, 1.0, 1e-3)
-    omega = 2 * np.pi * 2
-    motion = (5e-3 * np.sin(omega * times), 5e-3 * omega * np.cos(omega * times), 0 * times, 0 * times, 1e-3)
-    simple = DamperModel("bouc-wen", shared).force(*motion)
-    rigid = DamperModel("modified-bouc-wen", {**shared, "c1_a": 1e10}).force(*motion)
-    np.testing.assert_allclose(rigid[1:], simple[1:], atol=1e-3)

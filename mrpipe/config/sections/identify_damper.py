@@ -2,57 +2,56 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
+from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.config.section import Section
-
-FormName = Literal[
-    "bouc-wen",
-    "bouc-wen-n",
-    "dahl",
-    "bingham",
-    "rounded-yield",
-    "power-yield",
-    "saturating-dashpot",
-    "modified-bouc-wen",
-]
+from mrpipe.dampers.forms import form_names
 
 
 class IdentifyDamperSettings(Section):
     """Which parametric damper is fitted to the bench tests, and how."""
 
-    form: Literal[FormName, "best"] = Field(
+    form_files: tuple[Path, ...] = Field(
+        (), description="Python files of your own, each of which defines one more base form as FORM."
+    )
+    form: str = Field(
         "bouc-wen",
         description="Form of the damper that later stages use: one by name (bouc-wen is the thesis' simplified "
-        "Bouc-Wen, 2.1 to 2.4), or best: the one with the fewest parameters within one standard error of the smallest "
-        "cross-validated error on the training tests.",
+        "Bouc-Wen, 2.1 to 2.4; mrpipe/dampers/forms holds all), or best: the one with the fewest parameters within one "
+        "standard error of the smallest cross-validated error on the training tests.",
     )
-    compare: tuple[FormName, ...] = Field(
-        (
-            "bouc-wen",
-            "dahl",
-            "bingham",
-            "rounded-yield",
-            "power-yield",
-            "saturating-dashpot",
-            "modified-bouc-wen",
-        ),
-        description="Forms that are fitted and compared by their error on the validation tests.",
+    compare: tuple[str, ...] = Field(
+        (),
+        description="Forms that are compared; empty for all of the library. Every form is ranked on a share of the "
+        "samples, those near the best are fitted to all and judged on the validation tests.",
+    )
+    drive_law: Literal["cross-validated", "polynomial"] = Field(
+        "cross-validated",
+        description="How yield force and viscosity depend on the drive. cross-validated: the law with the fewest "
+        "numbers that predicts levels of drive left out of the fit, among constant, linear, polynomial, monotone and "
+        "saturating laws (tanh, Langevin, Froehlich), none of them negative. polynomial: of the degrees below.",
     )
     method: Literal["least-squares", "nelder-mead"] = Field(
         "least-squares",
         description="least-squares: trust region over the nonlinear parameters, linear ones projected out; "
-        "nelder-mead: the simplex of thesis 2.2 in its place, restarted until it gains nothing (over a minute for "
-        "modified-bouc-wen).",
+        "nelder-mead: the simplex of thesis 2.2 in its place, restarted until it gains nothing (slow).",
     )
     starts: int = Field(2, ge=1, le=20, description="How many starts of each form are followed to the end.")
     yield_order: int = Field(
-        3, ge=0, le=3, description="Degree of the yield force in the drive (2.3); lowered to what the levels can tell."
+        3,
+        ge=0,
+        le=5,
+        description="Largest degree of the yield force in the drive (2.3); lowered to what the levels determine.",
     )
     viscosity_order: int = Field(
-        1, ge=0, le=3, description="Degree of the viscosity in the drive (2.3); lowered to what the levels can tell."
+        1,
+        ge=0,
+        le=3,
+        description="Largest degree of the viscosity in the drive (2.3); lowered to what the levels determine.",
     )
     smooth_motion: bool = Field(
         True,
@@ -67,7 +66,9 @@ class IdentifyDamperSettings(Section):
         "filtered", description="The measured force to fit and to judge by: as prepared, or without its low-pass."
     )
     offset_per_test: bool = Field(
-        True, description="Fit an offset of the force in each training test, beside what prepare took out."
+        True,
+        description="Fit an offset of the force in each training test, in addition to what prepare took out; else one "
+        "for all tests.",
     )
     equal_tests: bool = Field(
         False, description="Weight each test by its own force, so that weak tests count as much as strong ones."
@@ -75,12 +76,25 @@ class IdentifyDamperSettings(Section):
     assumed_eta_per_s: float = Field(
         100.0,
         gt=0.0,
-        description="Rate of the drive's lag (2.4) given to the damper where every test holds the drive constant, so "
-        "that measurements say nothing of it.",
+        description="Rate of the drive's lag (2.4) given to the damper where every test holds the drive constant, "
+        "because such tests do not determine it.",
     )
     folds: int = Field(5, ge=2, le=20, description="Parts of the cross-validation where form is best.")
+
     reference_A: float = Field(  # noqa: N815 - the thesis' symbol
         1000.0,
         gt=0.0,
-        description="A of (2.2) for which alpha, gamma and beta are reported: only three of the four can be told.",
+        description="A of (2.2) for which alpha, gamma and beta are reported: measurements determine only three of "
+        "the four.",
     )
+
+    @field_validator("form", "compare")
+    @classmethod
+    def _forms_are_known(cls, value: str | tuple[str, ...], info: ValidationInfo) -> str | tuple[str, ...]:
+        # a user's own file may define any name: it is looked at when the stage is checked
+        if not info.data.get("form_files"):
+            known = form_names()
+            for name in (value,) if isinstance(value, str) else value:
+                if name not in known and name != "best":
+                    raise ValueError(f"no base form {name!r}; {nearest(name, known)}")
+        return value

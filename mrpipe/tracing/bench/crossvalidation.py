@@ -126,7 +126,7 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
     # the Jacobian of the projected residual gives the searched values; amplitudes are differentiated with them
     searched = jacobian_of(problem, found.theta, residual, w, low, high)
     linear = centred(regressors(problem, found.theta)[:, w.at], w)[0]
-    first = problem.base.yield_order + problem.base.viscosity_order + 2
+    first = problem.base.columns
     recordings = problem.recordings
     length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
     within = ((np.arange(len(recordings.force)) - recordings.starts[recordings.test]) // length[recordings.test])[w.at]
@@ -144,6 +144,8 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
             pair = [float(np.exp(min(e, 60.0))) if parameter.logarithmic else float(e * unit) for e in edges]
             result[index][parameter.name] = (pair[0], pair[1])
     for k, (index, parameter) in enumerate(problem.amplitudes):
+        if index < 0:
+            continue
         half = factor * deviation[len(problem.searched) + first + k]
         value = float(found.linear[first + k])
         result[index][parameter.name] = (value - half, value + half)

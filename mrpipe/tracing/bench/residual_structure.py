@@ -155,7 +155,7 @@ def location(residual: FloatArray, found: Fit, recordings: Recordings, states: S
     total = max(float(np.sum(squares)), 1e-300)
     z, v = states.values["hysteresis"], states.values["velocity"]
     y = np.sign(v) * z
-    length = found.base_values["yield_displacement"]
+    length = found.base_values.get("yield_displacement", 0.1 * found.problem.scales.stroke)
     reversal = (y < 0.0) | (states.values["past of displacement"] < 0.5 * length)
     post = (y > 0.9) & ~reversal
     rate = states.values["rate of drive"]

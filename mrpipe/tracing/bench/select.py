@@ -168,7 +168,7 @@ def on_all(before: Fit, drafted: Fit, *, iterations: int) -> Fit:
     problem = replace(before.problem, terms=(*before.problem.terms, drafted.problem.terms[-1]))
     both = [drafted.theta, np.concatenate([before.theta, drafted.theta[len(before.theta) :]])]
     w = weighting(problem)
-    start = min(both, key=lambda theta: float(np.sum(solve(problem, theta, w)[0] ** 2)))
+    start = min(both, key=lambda theta: solve(problem, theta, w).cost)
     return fit(problem, start, iterations=iterations)
 
 

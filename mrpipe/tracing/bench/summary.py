@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import FREE_EXPONENT, Baseline, ladder
@@ -101,7 +100,6 @@ class Summary:
         untested: Mapping[str, str],
         window: float,
         declared: list[str],
-        effects: Mapping[str, Effect],
     ) -> Tracing:
         """Return the tracing with all that is printed.
 
@@ -124,7 +122,7 @@ class Summary:
             "noise_from": f"{self.baseline.repeats} repeated pairs" if self.baseline.repeats else "sensor channels",
             "before": _score_json(score_before),
             "residual": self._residual(states),
-            "base_form": self._ladder(options, found.measured, effects.get("rate-dependent-yield")),
+            "base_form": self._ladder(options, found.measured),
             "nuisances": self._nuisances(named, window),
             "effects": effects_found,
             "further_terms": [item.as_json() for item in further],
@@ -233,11 +231,9 @@ class Summary:
             for item in self.selection.rounds[0]
         }
 
-    def _ladder(self, options: TracingOptions, measured: FloatArray, rate_forms: Effect | None) -> dict[str, Any]:
+    def _ladder(self, options: TracingOptions, measured: FloatArray) -> dict[str, Any]:
         base = self.selection.base
-        first = self.selection.rounds[0] if self.selection.rounds else ()
-        known = [item.fit for item in first if rate_forms is not None and item.name == rate_forms.name]
-        fits = ladder(base, rate_forms, known[0] if known else None)
+        fits = ladder(base)
         judged = self.found.recordings
         errors = {name: score(judged, measured, predict(f, judged)).nrmse for name, f in fits.items()}
         if options.model not in errors:

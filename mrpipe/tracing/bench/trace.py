@@ -24,7 +24,7 @@ from mrpipe.fitting.recordings import (
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import (
     Baseline,
-    base_form,
+    declared_base,
     fit_baseline,
     noise_level_of,
     with_form,
@@ -106,7 +106,7 @@ def trace_campaign(
         refusal = f"the model {options.model} does not predict the validation tests (NRMSE {error:.3g})"
     if refusal:
         return _nothing_traced(
-            f"{refusal}: nothing is traced", ordered, found, first, training, reasons, declared, effects, options, jobs
+            f"{refusal}: nothing is traced", ordered, found, first, training, reasons, declared, options, jobs
         )
     baseline, selection = _select(first, training, able, declared, options, rng, jobs, progress)
     window = selection.base.problem.window_share
@@ -142,13 +142,13 @@ def trace_campaign(
         judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
     causes = [held(item, judgement) for item in causes]
     report = Summary(selection, baseline, training, offsets, found, judgement, ordered)
-    return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared], effects)
+    return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared])
 
 
 def _first_baseline(
     training: Recordings, declared: Sequence[Effect], effects: Mapping[str, Effect], options: TracingOptions
 ) -> Baseline:
-    base = base_form(training, options.model, options.yield_order, options.viscosity_order)
+    base = declared_base(training, options.model, options.yield_order, options.viscosity_order)
     return fit_baseline(
         training, base, _of_the_base(declared, effects, options), model_error_share=options.model_error_share
     )
@@ -170,7 +170,6 @@ def _nothing_traced(
     training: Recordings,
     untested: Mapping[str, str],
     declared: Sequence[Effect],
-    effects: Mapping[str, Effect],
     options: TracingOptions,
     jobs: int,
 ) -> Tracing:
@@ -181,7 +180,7 @@ def _nothing_traced(
         words = f"{reason}; {judgement.verdict.sentence}"
         judgement = replace(judgement, verdict=replace(judgement.verdict, sentence=words))
     report = Summary(selection, baseline, training, None, found, judgement, ordered)
-    return report.build(options, (), (), untested, 0.0, [item.name for item in declared], effects)
+    return report.build(options, (), (), untested, 0.0, [item.name for item in declared])
 
 
 def _select(

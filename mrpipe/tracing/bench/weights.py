@@ -35,7 +35,7 @@ def sensor_deviation(found: Fit, recordings: Recordings, *, draws: int = 3, seed
     draws, seed
         Number of noise records simulated, and what they are drawn from.
     """
-    chain = build_chain(found.problem.base.steps(found.base_values, *found.polynomials))
+    chain = build_chain(found.problem.base.steps(found.base_values, *found.laws))
     rng = np.random.default_rng(seed)
     calm = run_recordings(chain, recordings)[FORCE_AT]
     spread = np.zeros(len(calm))

@@ -9,7 +9,6 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.control.inverse import InverseTable
-from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import FORCE, Chain, build_chain, run_chain
 from mrpipe.fitting.engine import Fit
 from mrpipe.networks.assembly import History, join, samples
@@ -40,26 +39,10 @@ CHANGED = 0.01
 """RMS change of the force over its RMS at which an effect counts as changing the inverse."""
 
 
-def damper_of(found: Fit, drive_unit: str) -> DamperModel:
-    """Return the base of a fit as a damper model, as controllers and their inverse want it."""
-    values = found.base_values
-    base = found.problem.base
-    yield_force, viscosity = found.polynomials
-    numbers = {
-        "yield_displacement": values["yield_displacement"],
-        "gamma_share": values.get("gamma_share", base.gamma_share),
-        "exponent": values.get("exponent", base.exponent),
-        "eta": values.get("eta", 100.0),
-    }
-    numbers |= {f"yield_force_{letter}": float(v) for letter, v in zip("abcd", yield_force, strict=False)}
-    numbers |= {f"c0_{letter}": float(v) for letter, v in zip("abcd", viscosity, strict=False)}
-    return DamperModel(base.name, numbers, drive_unit, found.problem.scales.drive)
-
-
 def plant_chain(found: Fit) -> Chain:
     """Return the chain for the closed loop; faults of sensors stay out of the plant, a lag unknown is left out."""
     problem = found.problem
-    steps = problem.base.steps(found.base_values, *found.polynomials)
+    steps = problem.base.steps(found.base_values, *found.laws)
     for term, values in zip(problem.terms, found.term_values, strict=True):
         if not term.effect.sensor:
             steps.extend(term.form.steps(values))

@@ -20,7 +20,7 @@ from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import base_form, fit_baseline
+from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
 from mrpipe.tracing.bench.summary import Tracing, TracingOptions
 from mrpipe.tracing.bench.trace import trace_campaign
 
@@ -128,7 +128,7 @@ def find_brace(tests: Sequence[PreparedTest], options: TracingOptions, declared:
         recordings = record_tests(
             [_moved(item, share * unit) for item in training], rate_hz=options.fit_rate_hz, longest_s=SEARCHED_S
         )
-        base = base_form(recordings, options.model, options.yield_order, options.viscosity_order)
+        base = declared_base(recordings, options.model, options.yield_order, options.viscosity_order)
         baseline = fit_baseline(recordings, base, declared)
         noise.append(baseline.noise)
         tried[share] = baseline.fit

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mrpipe.fitting.recordings import Recordings, record_tests
+from mrpipe.fitting.start import best_fit, first_problem
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import base_form, best_start, first_problem
+from mrpipe.tracing.bench.baseline import declared_base
 from mrpipe.tracing.bench.nuisances import RecordGain, record_gains, session_gain, with_lag_apart
 from tests.tracing.bench.rig import RATE, hysteresis
 
@@ -100,7 +101,7 @@ def switched(rise: float, fall: float) -> Recordings:
 @pytest.mark.planted
 def test_a_drive_that_falls_slowly_is_told_from_one_lag_for_both() -> None:
     given = switched(150.0, 40.0)
-    found = best_start(first_problem(given, base_form(given, "bouc-wen", 1, 0)))
+    found = best_fit(first_problem(given, declared_base(given, "bouc-wen", 1, 0)))
     apart = with_lag_apart(found)
     assert apart.base_values["eta"] == pytest.approx(150.0, rel=0.15)
     assert apart.base_values["eta_fall"] == pytest.approx(40.0, rel=0.15)
@@ -109,5 +110,5 @@ def test_a_drive_that_falls_slowly_is_told_from_one_lag_for_both() -> None:
 @pytest.mark.planted
 def test_one_lag_stays_one() -> None:
     given = switched(90.0, 90.0)
-    found = best_start(first_problem(given, base_form(given, "bouc-wen", 1, 0)))
+    found = best_fit(first_problem(given, declared_base(given, "bouc-wen", 1, 0)))
     assert with_lag_apart(found) is found

@@ -8,13 +8,13 @@ import pytest
 
 from mrpipe.artifacts import config_directory
 from mrpipe.campaigns import load_campaign
-from mrpipe.effects.library import damper_effects
-from mrpipe.effects.yielding_parts import with_yielding_parts
+from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import fit, predict, start_of
 from mrpipe.fitting.recordings import record_tests
+from mrpipe.fitting.start import first_problem, fit_with_form
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
-from mrpipe.tracing.bench.baseline import base_form, first_problem, with_form
+from mrpipe.tracing.bench.baseline import declared_base
 from mrpipe.tracing.bench.error_measures import judged_part, score
 from mrpipe.tracing.bench.nuisances import record_gains, session_gain
 from mrpipe.tracing.bench.validation import first_parts
@@ -26,18 +26,17 @@ def test_a_yield_in_parts_fits_labcontrol_and_leaves_the_gain_of_its_held_out_se
     tests = [item.test for item in prepare_campaign(campaign, PreparationOptions()).tests]
     training = record_tests([test for test in tests if test.role == "training"][::2], longest_s=10.0)
     validation = record_tests([test for test in tests if test.role == "validation"], longest_s=15.0)
-    problem = first_problem(training, base_form(training, "bouc-wen", 3, 1))
+    problem = first_problem(training, declared_base(training, "bouc-wen", 3, 1))
     base = fit(problem, start_of(problem, {"yield_displacement": 3e-4}, []), iterations=8)
-    rate = with_yielding_parts(damper_effects())["rate-dependent-yield"]
-    rounded = with_form(base, rate, "own-dashpot", iterations=8)
+    rounded = fit_with_form(base, base_form("yielding-part"))
 
     errors = {}
-    for name, found in (("bouc-wen", base), ("own-dashpot", rounded)):
+    for name, found in (("bouc-wen", base), ("yielding-part", rounded)):
         simulated = predict(found, validation)
         judged = judged_part(validation, simulated, None, first_parts(validation, 1 / 3))
         errors[name] = score(judged.recordings, judged.measured, simulated).nrmse
-    assert errors["own-dashpot"] < 0.8 * errors["bouc-wen"]
-    assert errors["own-dashpot"] < 0.11
+    assert errors["yielding-part"] < 0.8 * errors["bouc-wen"]
+    assert errors["yielding-part"] < 0.11
 
     trained = predict(rounded, training)
     own = judged_part(training, trained, None, first_parts(training, 1 / 3))

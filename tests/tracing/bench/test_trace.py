@@ -79,7 +79,7 @@ def test_a_hysteresis_of_another_shape_is_a_base_form_and_no_effect() -> None:
     # Dahl's law under a declared exponent of 2 looks like a late rise
     summary = traced_with("dahl", ("migration", "accumulator")).summary
     assert summary["effects"] == []
-    assert summary["base_form"]["taken"] == "bouc-wen-free-exponent"
+    assert summary["base_form"]["taken"] == "bouc-wen-n"
     assert summary["after"]["nrmse"] < 0.4 * summary["before"]["nrmse"]
     assert not summary["unexplained"]["structured"]
     assert "base form" in summary["verdict"]

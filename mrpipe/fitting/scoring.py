@@ -9,7 +9,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.model import DamperModel
-from mrpipe.dampers.samples import settled
+from mrpipe.fitting.samples import settled
 from mrpipe.signals.prepared import PreparedTest
 
 

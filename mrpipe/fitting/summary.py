@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from mrpipe.dampers.comparison import JudgedFit
-from mrpipe.dampers.fit import FormFit
-from mrpipe.dampers.model import HYSTERETIC_FORMS, DamperModel, parameter_unit, thesis_parameters
+from mrpipe.dampers.model import parameter_unit, thesis_parameters
+from mrpipe.fitting.comparison import Comparison, JudgedFit
+from mrpipe.fitting.drive_laws import law_values
+from mrpipe.fitting.form_fit import FormFit
+from mrpipe.fitting.start import distinct_levels
 
 
 def parameter_table(fit: FormFit) -> dict[str, dict[str, Any]]:
     """Return name -> value, unit, standard error (None for what was not fitted) and whether it ended at a bound."""
-    unit = fit.model.drive_unit
     rows: dict[str, dict[str, Any]] = {}
     for name, value in fit.model.parameters.items():
         error = fit.standard_error(name)
         rows[name] = {
             "value": float(value),
-            "unit": parameter_unit(name, unit),
+            "unit": fit.model.unit(name),
             "standard_error": error if np.isfinite(error) else None,
             "at_bound": name in fit.at_bound,
         }
@@ -32,7 +34,7 @@ def thesis_table(fit: FormFit, A: float) -> dict[str, dict[str, Any]]:
 
     Empty for forms without a Bouc-Wen hysteresis.
     """
-    if fit.model.form not in HYSTERETIC_FORMS:
+    if fit.form.hysteresis is None or fit.model.laws:
         return {}
     model = fit.model
     values = thesis_parameters(model, A)
@@ -40,7 +42,7 @@ def thesis_table(fit: FormFit, A: float) -> dict[str, dict[str, Any]]:
     for column, name in enumerate(fit.names):
         value = model.parameters[name]
         step = 1e-6 * (abs(value) or 1.0)
-        moved = DamperModel(model.form, {**model.parameters, name: value + step}, model.drive_unit, model.drive_limit)
+        moved = replace(model, parameters={**model.parameters, name: value + step})
         changed = thesis_parameters(moved, A)
         slopes[:, column] = [(changed[key] - values[key]) / step for key in values]
     errors = np.sqrt(np.maximum(np.diag(slopes @ fit.covariance @ slopes.T), 0.0))
@@ -76,8 +78,9 @@ def comparison_rows(judged: Sequence[JudgedFit]) -> list[dict[str, Any]]:
             "typical_left_out_nrmse": number_or_none(item.typical_left_out_nrmse),
             "parameter_count": len(item.fit.names),
             "spread_over_starts": float(np.ptp(item.fit.start_nrmse)),
-            "evaluations": item.fit.evaluations,
+            "iterations": item.fit.fit.iterations,
             "at_bound": list(item.fit.at_bound),
+            "undetermined": list(item.undetermined),
             "notes": list(item.fit.notes),
         }
         for item in judged
@@ -115,22 +118,45 @@ def test_rows(judged: JudgedFit) -> list[dict[str, Any]]:
 def findings(fit: FormFit) -> list[str]:
     """Return what the user should know of a fit, a line each."""
     lines = []
-    scales = fit.scales
-    if not scales.lag_known:
+    problem = fit.fit.problem
+    if not problem.base.lag_known:
         lines.append(
-            "the drive is constant in every test, so its lag cannot be told: "
-            f"eta = {scales.assumed_eta:g} 1/s is assumed"
+            "the drive is constant in every test, which does not determine its lag: "
+            f"eta = {fit.model.parameters['eta']:g} 1/s is assumed"
         )
     lines += [f"{fit.form.name}: {note}" for note in fit.notes]
-    # what a note tells of is told once
+    # a parameter that a note mentions needs no line of its own
     silent = [name for name in fit.at_bound if not any(name in note for note in fit.notes)]
     lines += [f"{fit.form.name}: {name} ended at its bound, the data do not determine it" for name in silent]
-    if scales.yield_order < 3:
-        lines.append(
-            f"{scales.yield_order + 1} level(s) of drive: the yield force is of degree {scales.yield_order} in it"
-        )
-    drive = np.linspace(0.0, scales.drive_limit, 50)
+    levels = distinct_levels(problem.recordings)
+    if levels < 4:
+        lines.append(f"{levels} level(s) of drive: the yield force is {problem.base.laws[0].name} in it")
+    drive = np.linspace(0.0, problem.scales.drive, 50)
     strength = fit.model.yield_force(drive)
     if np.any(np.diff(strength) < -0.02 * np.max(np.abs(strength))):
         lines.append("the yield force falls with the drive somewhere on its range: an inverse is not unique there")
     return lines
+
+
+def law_summary(comparison: Comparison, chosen: JudgedFit) -> dict[str, Any] | None:
+    """Return the laws of the drive, why they were chosen, and their predictions with deviations; None if not asked."""
+    choice = comparison.laws
+    if choice is None:
+        return None
+    return {
+        "yield_force": choice.laws[0].name,
+        "c0": choice.laws[1].name,
+        "reason": choice.reason,
+        "candidates": [
+            {"law": name, "error_on_levels_left_out": left_out, "error_on_levels": inside}
+            for name, left_out, inside in choice.candidates
+        ],
+        "predictions": law_values(choice, chosen.fit.fit.laws),
+    }
+
+
+def rank_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return a row for each form that was ranked: its error on the share of the samples, and whether it was fitted."""
+    fitted = {item.fit.form.name for item in comparison.judged}
+    rows = [{"form": name, "draft_nrmse": error, "fitted": name in fitted} for name, error in comparison.drafts.items()]
+    return sorted(rows, key=lambda row: float(row["draft_nrmse"]))

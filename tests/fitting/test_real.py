@@ -8,9 +8,10 @@ import pytest
 
 from mrpipe.artifacts import config_directory
 from mrpipe.campaigns import load_campaign
-from mrpipe.dampers.comparison import FitOptions, compare_forms
-from mrpipe.dampers.forms import FORMS
-from mrpipe.dampers.samples import scales_of, smooth_motion
+from mrpipe.dampers.library import base_form
+from mrpipe.fitting.comparison import FitOptions, compare_forms
+from mrpipe.fitting.form_fit import FitMethod
+from mrpipe.fitting.samples import smooth_motion
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 
@@ -19,9 +20,8 @@ def judged_forms(name: str, forms: tuple[str, ...]):
     campaign = load_campaign(config_directory() / "campaigns" / f"{name}.yaml")
     prepared = prepare_campaign(campaign, PreparationOptions())
     tests = smooth_motion([item.test for item in prepared.tests])
-    training = [test for test in tests if test.role == "training"]
-    options = FitOptions(starts=1, maximum_samples=15_000)
-    judged = compare_forms([FORMS[form] for form in forms], tests, scales_of(training), options)
+    options = FitOptions(FitMethod(starts=1), maximum_samples=15_000)
+    judged = compare_forms([base_form(form) for form in forms], tests, options, keep=forms).judged
     return {item.fit.form.name: item for item in judged}
 
 
@@ -40,7 +40,7 @@ def test_held_out_errors_are_those_of_the_prototype_and_yield_rounds_with_speed(
 def test_the_lag_of_a_voltage_driven_damper_is_told_where_the_voltage_switches(public_data: Path):
     judged = judged_forms("dyke", ("bouc-wen",))
     fit = judged["bouc-wen"].fit
-    assert fit.scales.lag_known
+    assert fit.fit.problem.base.lag_known
     # some 10 ms from command to force, as the switching recording shows to the eye
     assert 60.0 < fit.model.parameters["eta"] < 250.0
     assert fit.model.drive_unit == "V"

@@ -1,0 +1,10 @@
+"""Base forms of a damper, one file each; :mod:`mrpipe.dampers.library` finds them by walking this package."""
+
+from __future__ import annotations
+
+import pkgutil
+
+
+def form_names() -> tuple[str, ...]:
+    """Return the names of all forms without loading them: a file `bouc_wen.py` holds the form `bouc-wen`."""
+    return tuple(item.name.replace("_", "-") for item in pkgutil.iter_modules(__path__))

@@ -1,0 +1,28 @@
+"""Bouc-Wen model whose initial stiffness is constant: its yield displacement grows with the yield force."""
+
+from __future__ import annotations
+
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.hysteresis import GAMMA_SHARE, growing_hysteresis
+from mrpipe.dampers.parameters import Values, shape
+from mrpipe.dampers.plant import Step
+
+
+def _steps(values: Values) -> list[Step]:
+    share, exponent = values.get("gamma_share", 0.5), values.get("exponent", 2.0)
+    # x_y = F_y/k: the yield displacement at 1 N, growing in proportion to the yield force
+    return [growing_hysteresis(1.0 / values["initial_stiffness"], share, exponent, 1.0, 1.0)]
+
+
+FORM = BaseForm(
+    name="bouc-wen-stiffness",
+    summary="Bouc-Wen hysteresis with exponent 2 and a constant initial stiffness k: x_y = F_y(u)/k",
+    source="Spencer, Dyke, Sain, Carlson 1997, J. Eng. Mech. 123, 230-238 (A and z alike for all voltages)",
+    parameters=(
+        shape("initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)),
+        GAMMA_SHARE,
+    ),
+    steps=_steps,
+    coupled=True,
+    family="bouc-wen",
+)

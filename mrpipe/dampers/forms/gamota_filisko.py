@@ -1,0 +1,98 @@
+"""Model of Gamota and Filisko: a Bingham element in series with a standard linear solid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import float64, njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.parameters import Values, shape
+from mrpipe.dampers.plant import (
+    FIRST,
+    HYSTERESIS,
+    OUTER_VELOCITY,
+    STEP_SIGNATURE,
+    VELOCITY,
+    VISCOSITY,
+    YIELD_FORCE,
+    Phase,
+    Step,
+)
+from mrpipe.dampers.viscoplastic import outer_velocity
+
+_SDIRK = 1.0 - math.sqrt(0.5)
+
+
+@njit(float64(float64, float64, float64, float64), cache=True)
+def _stage_force(slope: float, right: float, creep: float, yield_force: float) -> float:
+    """Return f with slope f + creep max(|f| - F_y, 0) sign f = right."""
+    force = right / slope
+    if abs(force) <= yield_force:
+        return force
+    return math.copysign((abs(right) + creep * yield_force) / (slope + creep), right)
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def gamota_filisko_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: k1, c1, k2 of the solid [N/m, N s/m, N/m]. State: Kelvin deformation, force/k2 [m], last velocity.
+
+    Two-stage diagonally implicit Runge-Kutta (L-stable, second order). Each stage is one piecewise linear equation in
+    the force. The velocity of the Bingham element takes the place of the rod's.
+    """
+    v = wire[VELOCITY]
+    wire[OUTER_VELOCITY] = v
+    if wire[FIRST] > 0.5:
+        state[0] = 0.0
+        state[1] = 0.0
+        state[2] = v
+        wire[HYSTERESIS] = 0.0
+        wire[VELOCITY] = 0.0
+        return
+    k1, c1, k2 = parameters[0], parameters[1], parameters[2]
+    strength = max(wire[YIELD_FORCE], 0.0)
+    viscosity = max(wire[VISCOSITY], 1e-12 * c1)
+    h = _SDIRK * dt
+    kelvin, spring = state[0], state[1]
+    slope = 1.0 / k2 + h / (c1 + k1 * h)
+    first_kelvin, first_spring = kelvin, spring
+    rate_kelvin, rate_spring = 0.0, 0.0
+    for stage in range(2):
+        if stage == 0:
+            speed = state[2] + _SDIRK * (v - state[2])
+        else:
+            speed = v
+            first_kelvin = kelvin + (1.0 - _SDIRK) * dt * rate_kelvin
+            first_spring = spring + (1.0 - _SDIRK) * dt * rate_spring
+        right = first_spring + h * (speed + k1 * first_kelvin / (c1 + k1 * h))
+        force = _stage_force(slope, right, h / viscosity, strength)
+        rate_kelvin = (force - k1 * first_kelvin) / (c1 + k1 * h)
+        rate_spring = (force / k2 - first_spring) / h
+    state[0] = first_kelvin + h * rate_kelvin
+    state[1] = first_spring + h * rate_spring
+    state[2] = v
+    force = k2 * state[1]
+    excess = max(abs(force) - strength, 0.0)
+    wire[HYSTERESIS] = min(max(force / strength, -1.0), 1.0) if strength > 0.0 else 0.0
+    wire[VELOCITY] = math.copysign(excess / viscosity, force)
+
+
+def _steps(values: Values) -> list[Step]:
+    numbers = np.array([values["solid_stiffness"], values["solid_viscosity"], values["spring_stiffness"]])
+    return [Step("gamota-filisko", Phase.HYSTERESIS, gamota_filisko_step, numbers, 3), outer_velocity()]
+
+
+FORM = BaseForm(
+    name="gamota-filisko",
+    summary="Bingham element in series with a Kelvin element (k1, c1) and a spring k2",
+    source="Gamota and Filisko 1991, J. Rheol. 35, 399-425",
+    parameters=(
+        shape("solid_stiffness", "N/m", "k1", "force/stroke", 0.3, 3000.0, (30.0, 8.0)),
+        shape("solid_viscosity", "N*s/m", "c1", "force/speed", 0.01, 1000.0, (1.0, 10.0)),
+        shape("spring_stiffness", "N/m", "k2", "force/stroke", 0.5, 3000.0, (40.0, 10.0)),
+    ),
+    steps=_steps,
+    coupled=True,
+)

@@ -1,0 +1,44 @@
+"""Hysteretic biviscous model."""
+
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
+from mrpipe.dampers.parameters import Parameter, Values, shape
+from mrpipe.dampers.plant import HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.viscoplastic import direction_of_change
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def hysteretic_biviscous_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: yield velocity, hysteresis velocity [m/s]. State: last velocity, direction of its change."""
+    late = wire[VELOCITY] - parameters[1] * direction_of_change(wire, state)
+    wire[HYSTERESIS] = min(max(late / parameters[0], -1.0), 1.0)
+
+
+def _steps(values: Values) -> list[Step]:
+    numbers = np.array([values["yield_velocity"], values["hysteresis_velocity"]])
+    return [Step("hysteretic-biviscous", Phase.HYSTERESIS, hysteretic_biviscous_step, numbers, 2)]
+
+
+def _post_yield(values: Values, at: Strength) -> FloatArray:
+    width, late = values["yield_velocity"], values["hysteresis_velocity"]
+    both = [np.clip((at.speed - side * late) / width, -1.0, 1.0) for side in (-1.0, 1.0)]
+    return rounded_sum(0.5 * (both[0] + both[1]), at)
+
+
+FORM = BaseForm(
+    name="hysteretic-biviscous",
+    summary="biviscous, its branches shifted by a velocity v_0 against the direction of acceleration",
+    source="Wereley, Pang, Kamath 1998, J. Intell. Mater. Syst. Struct. 9, 642-649; Pang, Kamath, Wereley 1998",
+    parameters=(
+        shape("yield_velocity", "m/s", "speed at which it yields", "speed", 1e-3, 1.0, (0.05, 0.2)),
+        Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
+    ),
+    steps=_steps,
+    post_yield=_post_yield,
+)

@@ -1,0 +1,42 @@
+"""LuGre model for MR dampers."""
+
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.hysteresis import YIELD_DISPLACEMENT, hysteresis
+from mrpipe.dampers.parameters import Values, amplitude
+from mrpipe.dampers.plant import FORCE, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def bristle_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: sigma_1 [N s/m]."""
+    speed = wire[VELOCITY]
+    wire[FORCE] += parameters[0] * (speed - abs(speed) * wire[HYSTERESIS])
+
+
+def _numbers(values: Values) -> tuple[float, float, float]:
+    return values["yield_displacement"], 1.0, 1.0
+
+
+def _steps(values: Values) -> list[Step]:
+    bristles = Step("bristle-damping", Phase.FORCE_EFFECT, bristle_step, np.array([values.get("sigma_1", 0.0)]))
+    return [hysteresis(*_numbers(values)), bristles]
+
+
+FORM = BaseForm(
+    name="lugre",
+    summary="bristles z' = v - |v| z/x_y with their own damping: F_y z/x_y + sigma_1 z' + c0 v",
+    source="Jimenez and Alvarez-Icaza 2005, Struct. Control Health Monit. 12, 91-116; Canudas de Wit et al. 1995",
+    parameters=(
+        YIELD_DISPLACEMENT,
+        amplitude("sigma_1", "N*s/m", "damping of the bristles", "force/speed", 0.0, 50.0),
+    ),
+    steps=_steps,
+    amplitude_steps={"sigma_1": 1},
+)

@@ -1,0 +1,79 @@
+"""All base forms, found by walking `dampers/forms`; a user's own from files that the configuration names."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import mrpipe.dampers.forms as package
+from mrpipe.artifacts.yaml_source import nearest
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.user_file import module_of_file
+from mrpipe.errors import UserError
+
+LOADS_FROM = ("mrpipe.dampers.forms",)
+"""Packages that are walked at run time: their modules belong to the code version of a stage."""
+
+DEFAULT_FORM = "bouc-wen"
+"""The thesis' simplified Bouc-Wen model (2.1) to (2.4)."""
+
+
+@cache
+def base_forms() -> dict[str, BaseForm]:
+    """Return name -> base form of every module of `dampers/forms` that defines FORM, simple forms first."""
+    modules = (
+        importlib.import_module(f"{package.__name__}.{item.name}") for item in pkgutil.iter_modules(package.__path__)
+    )
+    found = [form for form in (getattr(module, "FORM", None) for module in modules) if isinstance(form, BaseForm)]
+    found.sort(key=lambda form: (form.name != DEFAULT_FORM, len(form.searched), form.name))
+    return {form.name: form for form in found}
+
+
+def form_of_file(path: Path | str) -> BaseForm:
+    """Load the FORM of a user's own file.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, cannot be run, or defines no FORM.
+    """
+    path = Path(path)
+    remedy = "name a Python file that defines FORM = BaseForm(...) as mrpipe/dampers/forms/*.py do"
+    form = getattr(module_of_file(path, "identify_damper.form_files", remedy), "FORM", None)
+    if not isinstance(form, BaseForm):
+        raise UserError(path, "FORM", "is missing", remedy)
+    return form
+
+
+def forms_named(names: Sequence[str], files: Sequence[Path | str] = ()) -> dict[str, BaseForm]:
+    """Return the forms of these names (all where none), with those of the user's files.
+
+    Raises
+    ------
+    UserError
+        If a name is not known.
+    """
+    known = base_forms()
+    own = {form.name: form for form in map(form_of_file, files)}
+    for name in names:
+        if name not in known and name not in own:
+            known_names = {**known, **own}
+            raise UserError("configuration", "base form", f"no base form {name!r}", nearest(name, known_names))
+    chosen = {name: {**known, **own}[name] for name in names} if names else dict(known)
+    return {**chosen, **own}
+
+
+def base_form(name: str, file: str = "") -> BaseForm:
+    """Return one base form; `file` is the user's file that defines it, if any.
+
+    Raises
+    ------
+    UserError
+        If the name is not known.
+    """
+    if file:
+        return form_of_file(file)
+    return forms_named([name])[name]

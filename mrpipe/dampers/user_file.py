@@ -1,0 +1,46 @@
+"""A user's own Python file, run as a module with a cache of its own for compiled code."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+from mrpipe.errors import UserError
+from mrpipe.numba_cache import cache_for
+
+
+def module_of_file(path: Path, setting: str, remedy: str) -> ModuleType:
+    """Return the module of a file; its name holds a hash of its content, so that an edited file is a new module.
+
+    Parameters
+    ----------
+    setting, remedy
+        Where the file was named and what it has to define, for messages.
+
+    Raises
+    ------
+    UserError
+        If the file is missing or cannot be run.
+    """
+    if not path.is_file():
+        raise UserError(path, setting, "no such file", remedy)
+    content = hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+    name = f"mrpipe_user_{path.stem}_{content}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise UserError(path, setting, "is not a Python file", remedy)
+    module = importlib.util.module_from_spec(spec)
+    # compiled code that is loaded from the cache looks for its module by name
+    sys.modules[name] = module
+    try:
+        with cache_for(name):
+            spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        # a compiler prints pages: the first line names the fault
+        said = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
+        raise UserError(path, setting, f"cannot be run: {said}", "correct the file") from error
+    return module

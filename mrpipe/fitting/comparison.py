@@ -1,0 +1,316 @@
+"""Several base forms fitted to the same tests and judged on tests that no fit has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.laws import LawShape
+from mrpipe.fitting.drive_laws import LawChoice, choose_laws
+from mrpipe.fitting.engine import centred, fit, regressors, weighting
+from mrpipe.fitting.form_fit import FitMethod, FormFit, fit_form, form_problem
+from mrpipe.fitting.problem import Problem
+from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.samples import bench_recordings, blocks_of, thinned
+from mrpipe.fitting.scoring import PooledScore, TestScore, pool, score_tests
+from mrpipe.fitting.start import base_of, best_fit, best_starts, distinct_levels, first_problem, polynomial_laws
+from mrpipe.signals.prepared import PreparedTest
+
+WORTHWHILE = 0.01
+"""Share of the error that a parameter at its bound must gain to be kept there."""
+
+DRAFT_SAMPLES = 12_000
+"""Forms are ranked on about so many samples; only those that may win are fitted to all."""
+
+CONTENDER = 1.3
+"""Forms that leave more than the best draft by this factor are not fitted to all samples."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How forms are fitted.
+
+    Attributes
+    ----------
+    method
+        How a form is searched.
+    cycles, maximum_samples, raw_force
+        See :func:`mrpipe.fitting.samples.bench_recordings`.
+    offsets
+        An offset for each test; else one for all.
+    equal_tests
+        Weight each test by its own force.
+    drive_law
+        `cross-validated` chooses the laws of the drive by leaving out whole levels; `polynomial` takes those of the
+        degrees below.
+    yield_order, viscosity_order
+        Largest degrees of polynomials in the drive.
+    """
+
+    method: FitMethod = field(default_factory=FitMethod)
+    cycles: int = 2
+    maximum_samples: int = 30_000
+    raw_force: bool = False
+    offsets: bool = True
+    equal_tests: bool = False
+    drive_law: str = "cross-validated"
+    yield_order: int = 3
+    viscosity_order: int = 1
+
+
+@dataclass(frozen=True)
+class JudgedFit:
+    """A fitted form with its errors.
+
+    Attributes
+    ----------
+    fit
+        The form and its numbers.
+    tests
+        Score of every test, in the order given.
+    training, validation
+        Pooled figures; not a number where there are no tests of the role.
+    cross_validated_nrmse, left_out_nrmse
+        NRMSE over training tests left out in turn, pooled and of each test (of each stretch where there are few
+        tests); None and empty where not asked for.
+    """
+
+    fit: FormFit
+    tests: tuple[TestScore, ...]
+    training: PooledScore
+    validation: PooledScore
+    cross_validated_nrmse: float | None = None
+    left_out_nrmse: tuple[float, ...] = ()
+
+    @property
+    def typical_left_out_nrmse(self) -> float:
+        """Geometric mean of the NRMSE of tests left out: strong and weak tests count alike."""
+        return float(np.exp(np.mean(np.log(self.left_out_nrmse)))) if self.left_out_nrmse else float("nan")
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Searched parameters that ended at a bound or whose standard error exceeds half of their value."""
+        fit = self.fit
+        vague = [
+            name
+            for name, value in fit.values.items()
+            if np.isfinite(fit.standard_error(name)) and fit.standard_error(name) > 0.5 * abs(value)
+        ]
+        return tuple(dict.fromkeys([*fit.at_bound, *vague]))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison of forms found.
+
+    Attributes
+    ----------
+    judged
+        The forms that were fitted to all samples, in the order given.
+    drafts
+        NRMSE of every form on a share of the samples.
+    laws
+        The choice of the laws of the drive; None where it was not asked for.
+    """
+
+    judged: tuple[JudgedFit, ...]
+    drafts: Mapping[str, float]
+    laws: LawChoice | None
+
+
+def best_by_folds(judged: Sequence[JudgedFit]) -> JudgedFit:
+    """Return the simplest form among those within one standard error of the best on tests left out.
+
+    Every test counts alike (logarithm of its NRMSE): pooled, the strongest tests alone would decide, and a damper that
+    is wrong by a fifth without drive is useless for control. Two forms err on the same tests, so the standard error is
+    that of their difference, test by test. Simplest: fewest parameters, and of those the fewest that are not linear.
+
+    Raises
+    ------
+    ValueError
+        If a form was not cross-validated.
+    """
+    if any(not item.left_out_nrmse for item in judged):
+        raise ValueError("every form must be cross-validated")
+    best = min(judged, key=lambda item: item.typical_left_out_nrmse)
+    close = []
+    for item in judged:
+        difference = np.log(item.left_out_nrmse) - np.log(best.left_out_nrmse)
+        error = np.std(difference, ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
+        if np.mean(difference) <= error:
+            close.append(item)
+    return min(close, key=lambda item: (len(item.fit.names), len(item.fit.values), item.typical_left_out_nrmse))
+
+
+def reason_of_choice(chosen: JudgedFit, judged: Sequence[JudgedFit]) -> str:
+    """Return in a sentence why a form was chosen."""
+    name = chosen.fit.form.name
+    if not chosen.left_out_nrmse:
+        return f"{name} is the form that identify_damper.form names."
+    best = min(judged, key=lambda item: item.typical_left_out_nrmse)
+    error = 100.0 * chosen.typical_left_out_nrmse
+    if best is chosen:
+        return f"{name} is taken because it has the smallest error on tests left out ({error:.1f} %)."
+    return (
+        f"{name} is taken because it has the fewest parameters ({len(chosen.fit.names)}) of the forms whose error on "
+        f"tests left out ({error:.1f} %) lies within one standard error of the best ({best.fit.form.name}, "
+        f"{100.0 * best.typical_left_out_nrmse:.1f} %)."
+    )
+
+
+def compare_forms(
+    forms: Sequence[BaseForm],
+    tests: Sequence[PreparedTest],
+    options: FitOptions,
+    *,
+    folds: int = 0,
+    keep: Sequence[str] = (),
+    progress: Progress = no_progress,
+) -> Comparison:
+    """Rank every form on a share of the training samples, fit those that may win to all, and score them on all tests.
+
+    Parameters
+    ----------
+    folds
+        Above 1: cross-validate the fitted forms in so many parts.
+    keep
+        Names of forms that are fitted to all samples whatever their rank.
+    """
+    training = [test for test in tests if test.role == "training"]
+    unit = training[0].drive_unit or "A"
+    recordings = bench_recordings(
+        training, cycles=options.cycles, maximum_samples=options.maximum_samples, raw_force=options.raw_force
+    )
+    weights = _equal_weights(recordings) if options.equal_tests else None
+    laws, choice = _laws(forms[0], recordings, options)
+    drafts, starts = _drafts(forms, recordings, laws, options, progress)
+    least = min(drafts.values())
+    chosen = [form for form in forms if drafts[form.name] <= CONTENDER * least or form.name in keep]
+    judged = []
+    for place, form in enumerate(chosen):
+        progress(0.4 + 0.6 * place / len(chosen), f"fit {form.name}")
+        base = base_of(recordings, form, laws)
+        problem = form_problem(recordings, base, offsets=options.offsets, weights=weights)
+        warm = starts[form.name] if len(forms) > len(keep) + 1 else None
+        found = _settled_shape(fit_form(problem, options.method, drive_unit=unit, warm=warm), options, unit)
+        item = judge(found, tests, raw_force=options.raw_force)
+        if folds > 1:
+            pooled, each = cross_validate(found, folds)
+            item = replace(item, cross_validated_nrmse=pooled, left_out_nrmse=each)
+        judged.append(item)
+    progress(1.0, "fitted")
+    return Comparison(tuple(judged), drafts, choice)
+
+
+def _laws(form: BaseForm, recordings: Recordings, options: FitOptions) -> tuple[tuple[LawShape, ...], LawChoice | None]:
+    plain = polynomial_laws(form, distinct_levels(recordings), options.yield_order, options.viscosity_order)
+    if options.drive_law == "polynomial" or distinct_levels(recordings) == 1:
+        return plain, None
+    small = thinned(recordings, 2 * DRAFT_SAMPLES)
+    found = best_fit(replace(first_problem(small, base_of(small, form, plain)), offsets=options.offsets))
+    choice = choose_laws(found)
+    return choice.laws, choice
+
+
+def _drafts(
+    forms: Sequence[BaseForm],
+    recordings: Recordings,
+    laws: Sequence[LawShape],
+    options: FitOptions,
+    progress: Progress,
+) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+    """Return the NRMSE of every form on a share of the samples, and where its search ended."""
+    if len(forms) == 1:
+        return {forms[0].name: 0.0}, {}
+    small = thinned(recordings, DRAFT_SAMPLES)
+    errors: dict[str, float] = {}
+    ends: dict[str, dict[str, float]] = {}
+    for place, form in enumerate(forms):
+        progress(0.4 * place / len(forms), f"rank {form.name}")
+        problem = form_problem(small, base_of(small, form, laws), offsets=options.offsets)
+        points = best_starts(problem, options.method.starts)
+        found = min((fit(problem, point, iterations=12) for point in points), key=lambda item: item.cost)
+        w = weighting(problem)
+        force = centred(problem.recordings.force[w.at][None], w)[0][0]
+        errors[form.name] = float(np.sqrt(found.cost / max(float(force @ force), 1e-300)))
+        ends[form.name] = found.base_values
+    return errors, ends
+
+
+def judge(fit: FormFit, tests: Sequence[PreparedTest], *, raw_force: bool = False) -> JudgedFit:
+    """Score a fit on all tests."""
+    scores = score_tests(fit.model, tests, raw_force=raw_force)
+    return JudgedFit(
+        fit=fit,
+        tests=scores,
+        training=pool([score for score in scores if score.role == "training"]),
+        validation=pool([score for score in scores if score.role == "validation"]),
+    )
+
+
+def cross_validate(found: FormFit, folds: int) -> tuple[float, tuple[float, ...]]:
+    """Return the NRMSE on what was left out in turn, pooled and of each test or stretch.
+
+    Whole tests are left out where there are enough of them, else parts of them. The model runs over all of the motion
+    each time; the forces left out are not compared in the fit.
+    """
+    problem = found.fit.problem
+    recordings = problem.recordings
+    _, group = np.unique(
+        recordings.test if recordings.tests >= 2 * folds else blocks_of(recordings), return_inverse=True
+    )
+    error, force = np.zeros(group.max() + 1), np.zeros(group.max() + 1)
+    used = problem.root_weight > 0.0
+    for fold in range(folds):
+        out = used & (group % folds == fold)
+        rest = replace(problem, root_weight=np.where(out, 0.0, problem.root_weight))
+        if not out.any() or not np.any(rest.root_weight):
+            continue
+        again = fit(rest, found.fit.theta, iterations=6, tolerance=1e-4)
+        calculated = again.linear @ regressors(again.problem, again.theta)
+        missed = recordings.force - calculated
+        # the offset of a test that was left out whole is that of the others
+        offsets = _offsets(again.problem, again.test_offsets)
+        missed = missed - offsets[recordings.test]
+        error += np.bincount(group[out], weights=missed[out] ** 2, minlength=len(error))
+        force += np.bincount(group[out], weights=recordings.force[out] ** 2, minlength=len(force))
+    seen = force > 0.0
+    errors = np.sqrt(np.maximum(error[seen], 1e-300) / force[seen])
+    return float(np.sqrt(error.sum() / force.sum())), tuple(float(value) for value in errors)
+
+
+def _offsets(problem: Problem, offsets: FloatArray) -> FloatArray:
+    compared = np.bincount(problem.recordings.test, weights=problem.root_weight, minlength=len(offsets)) > 0.0
+    return np.where(compared, offsets, float(np.median(offsets[compared])))
+
+
+def _settled_shape(found: FormFit, options: FitOptions, unit: str) -> FormFit:
+    """Return the fit with gamma = beta where the data do not determine their ratio.
+
+    On many real loops the share of gamma runs to its bound and gains next to nothing there. It is taken as the thesis
+    prints it (gamma = beta, share 0.5) unless that costs more than :data:`WORTHWHILE` of the error.
+    """
+    if "gamma_share" not in found.at_bound:
+        return found
+    problem = found.fit.problem
+    base = replace(problem.base, held={**problem.base.held, "gamma_share": 0.5})
+    plain = fit_form(replace(problem, base=base), options.method, drive_unit=unit, warm=found.fit.base_values)
+    gain = 1.0 - found.training_nrmse / plain.training_nrmse
+    if gain > WORTHWHILE:
+        value = found.values["gamma_share"]
+        note = f"gamma_share ended at its bound {value:.3g}; gamma = beta costs {gain:.0%} in error"
+        return replace(found, notes=(note,))
+    note = f"gamma_share ran to its bound for a gain of {gain:.1%}: gamma = beta is taken (0.5)"
+    return replace(plain, notes=(note,))
+
+
+def _equal_weights(recordings: Recordings) -> FloatArray:
+    used = recordings.used
+    total = np.bincount(recordings.test[used], weights=recordings.force[used] ** 2, minlength=recordings.tests)
+    power = total / np.maximum(np.bincount(recordings.test[used], minlength=recordings.tests), 1)
+    weights = 1.0 / np.sqrt(np.maximum(power, 1e-12 * power.max()))[recordings.test]
+    return np.asarray(weights / np.sqrt(np.mean(weights[used] ** 2)), dtype=np.float64)

@@ -1,0 +1,60 @@
+"""A fit as a damper model: base form with its numbers, effects with theirs."""
+
+from __future__ import annotations
+
+from mrpipe.dampers.laws import law_names
+from mrpipe.dampers.model import Addition, DamperModel
+from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.problem import Term
+
+ASSUMED_ETA = 100.0
+"""Rate of the driver's lag [1/s] given to a damper where every test holds the drive constant."""
+
+
+def damper_model(
+    found: Fit, drive_unit: str, *, effects: bool = False, assumed_eta: float = ASSUMED_ETA, form_file: str = ""
+) -> DamperModel:
+    """Return the damper of a fit.
+
+    Parameters
+    ----------
+    drive_unit
+        `A` or `V`.
+    effects
+        Take the effects along; the base form alone where False.
+    assumed_eta
+        Rate of the lag [1/s] where the recordings do not determine it.
+    form_file
+        The user's own file that defines the base form, if any.
+    """
+    base, scales = found.problem.base, found.problem.scales
+    numbers: dict[str, float] = {}
+    kinds: dict[str, str] = {}
+    for block, law in zip(base.form.blocks, found.laws, strict=True):
+        names = law_names(block, law)
+        numbers |= dict(zip(names, law.numbers, strict=True))
+        if law.kind != "polynomial":
+            kinds[block] = law.kind
+    values = {name: value for name, value in found.base_values.items() if name not in numbers}
+    numbers |= values
+    if not base.lag_known:
+        numbers["eta"] = assumed_eta
+    added = [
+        addition(term, given, drive_unit) for term, given in zip(found.problem.terms, found.term_values, strict=True)
+    ]
+    return DamperModel(
+        base.name,
+        numbers,
+        drive_unit,
+        scales.drive,
+        kinds,
+        tuple(added) if effects else (),
+        scales.stroke,
+        form_file,
+    )
+
+
+def addition(term: Term, values: dict[str, float], drive_unit: str) -> Addition:
+    """Return an effect of a fit with its numbers, as a damper holds it."""
+    units = {item.name: item.unit.replace("drive", drive_unit) for item in term.form.parameters}
+    return Addition(term.effect.name, term.form.name, values, units, term.effect.sensor, term.form.steps)

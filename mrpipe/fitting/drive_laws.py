@@ -1,0 +1,358 @@
+"""Which law of the drive: chosen by leaving out whole levels of drive, because a damper works between its levels too.
+
+At given steps of the base form the force is linear in F_y(u) and c0(u). Sums of products of the signals over each level
+of drive therefore hold all that any law needs, and hundreds of fits take milliseconds.
+
+A law is judged by its error on levels that its fit has not seen. Only levels inside the range are left out: the ends
+would ask for extrapolation, which no law of the drive supports. Of laws that predict alike the one with fewest numbers
+is taken. A law may have at most as many numbers as there are levels; one with as many numbers as levels cannot be
+judged in this way and is taken only where every simpler law misses the levels themselves.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.laws import Law, LawShape
+from mrpipe.fitting.engine import Fit, bounded_solution, centred, regressors, weighting
+from mrpipe.fitting.kernel import CURRENT_AT, run_recordings
+from mrpipe.fitting.start import LEVEL_SHARE, drive_varies, mean_levels
+
+SCALE_SHARES = (0.1, 0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.7, 2.5, 5.0)
+"""Scales of saturating laws that are tried, as shares of the largest drive."""
+
+BINS = 8
+"""A drive that varies is sorted into so many levels."""
+
+CELLS = 32
+"""Within each of which the law is taken as constant over so many parts of the whole range."""
+
+YIELD_LAWS = (
+    LawShape("polynomial", 0), LawShape("polynomial", 1), LawShape("tanh"), LawShape("langevin"),
+    LawShape("froehlich"), LawShape("monotone", 2), LawShape("polynomial", 2), LawShape("monotone", 3),
+    LawShape("polynomial", 3), LawShape("monotone", 4), LawShape("monotone", 5),
+)  # fmt: skip
+VISCOSITY_LAWS = YIELD_LAWS[:7]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Sums over the samples of each test and drive.
+
+    Attributes
+    ----------
+    drive
+        Mean effective drive over the limit, shape (k,).
+    level
+        Level of drive that each belongs to, shape (k,).
+    gram, right, power
+        Products of the signals of yield force and viscosity, with the force, and of the force with itself; shapes
+        (k, 2, 2), (k, 2), (k,).
+    limit
+        Largest drive [A or V].
+    """
+
+    drive: FloatArray
+    level: IntArray
+    gram: FloatArray
+    right: FloatArray
+    power: FloatArray
+    limit: float
+
+    @property
+    def levels(self) -> int:
+        """Number of levels."""
+        return int(self.level.max()) + 1
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A pair of laws with its errors.
+
+    Attributes
+    ----------
+    laws
+        Shapes of yield force and viscosity.
+    inside
+        Logarithm of the squared error over the squared force of each level, shape (levels,).
+    left_out
+        The same of each inner level by fits that have not seen it, shape (levels - 2,); empty where it has more numbers
+        than the levels left support.
+    """
+
+    laws: tuple[LawShape, LawShape]
+    inside: FloatArray
+    left_out: FloatArray
+
+    @property
+    def numbers(self) -> int:
+        """Numbers of both laws."""
+        return self.laws[0].numbers + self.laws[1].numbers
+
+
+@dataclass(frozen=True)
+class LawChoice:
+    """The laws that were chosen, and how far their predictions are known.
+
+    Attributes
+    ----------
+    laws
+        Shapes of yield force and viscosity.
+    reason
+        Why, in a sentence.
+    candidates
+        All laws of the yield force that were judged: name, typical error on levels left out (None where it cannot be
+        judged), typical error on the levels themselves.
+    drives
+        Shape (d,) [A or V]: the levels, and drives between and a fifth beyond them.
+    values, deviations
+        Value of each law and its standard deviation at these drives, shape (2, d); by fits without each level in turn
+        and by other laws that predict as well.
+    """
+
+    laws: tuple[LawShape, LawShape]
+    reason: str
+    candidates: tuple[tuple[str, float | None, float], ...]
+    drives: FloatArray
+    values: FloatArray
+    deviations: FloatArray
+
+
+def cells_of(found: Fit) -> Cells:
+    """Return the sums that laws are fitted to, from a fit of any form."""
+    problem = found.problem
+    flat = LawShape("polynomial", 0)
+    base = replace(problem.base, laws=(flat,) * len(problem.base.laws))
+    plain = replace(problem, base=base, reference=found.laws)
+    w = weighting(problem)
+    columns = centred(regressors(plain, found.theta)[:, w.at], w)[0]
+    force = centred(problem.recordings.force[w.at][None], w)[0][0]
+    own = regressors(problem, found.theta)[:, w.at]
+    own = centred(own, w)[0]
+    # what is neither yield force nor viscosity stays as the fit has it
+    first = sum(law.count for law in problem.base.laws[:2])
+    force = force - found.linear[first:] @ own[first:]
+    current = run_recordings(found.chain(), problem.recordings)[CURRENT_AT][w.at]
+    limit = problem.scales.drive
+    test = problem.recordings.test[w.at]
+    share = current / limit
+    if drive_varies(problem.recordings):
+        part = np.clip((share * CELLS).astype(np.int64), 0, CELLS - 1)
+        level = part * BINS // CELLS
+    else:
+        level = levels_of_tests(mean_levels(problem.recordings), limit)[test]
+        part = level
+    key = np.unique(test * (CELLS + 1) + part, return_inverse=True)[1]
+    signals = columns[:2]
+    count = int(key.max()) + 1
+    size = np.bincount(key)
+    gram = np.empty((count, 2, 2))
+    for a, b in itertools.product(range(2), range(2)):
+        gram[:, a, b] = np.bincount(key, weights=signals[a] * signals[b])
+    right = np.stack([np.bincount(key, weights=signal * force) for signal in signals], axis=1)
+    _, level = np.unique(level, return_inverse=True)
+    return Cells(
+        np.bincount(key, weights=share) / size,
+        np.round(np.bincount(key, weights=level) / size).astype(np.int64),
+        gram,
+        np.asarray(right, dtype=np.float64),
+        np.asarray(np.bincount(key, weights=force**2), dtype=np.float64),
+        limit,
+    )
+
+
+def levels_of_tests(means: FloatArray, limit: float) -> IntArray:
+    """Return the level of drive of each test from its mean drive, shape (tests,)."""
+    order = np.argsort(means, kind="stable")
+    steps = np.diff(means[order], prepend=means[order[0]]) > LEVEL_SHARE * limit
+    found = np.empty(len(means), dtype=np.int64)
+    found[order] = np.cumsum(steps)
+    return found
+
+
+def fit_laws(
+    cells: Cells, laws: tuple[LawShape, LawShape], keep: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
+    """Fit two laws to the levels kept; return squared errors of all cells, coefficients, and the scales' shares."""
+    weight = np.ones(len(cells.drive)) if keep is None else keep
+    best: tuple[float, FloatArray, FloatArray, tuple[float, float]] | None = None
+    for scales in itertools.product(*(SCALE_SHARES if law.saturates else (1.0,) for law in laws)):
+        bases = [law.basis(cells.drive, scale) for law, scale in zip(laws, scales, strict=True)]
+        stacked = np.concatenate(bases)
+        owner = np.repeat([0, 1], [len(basis) for basis in bases])
+        pairs = cells.gram[:, owner][:, :, owner]
+        gram = np.einsum("k,kab,ak,bk->ab", weight, pairs, stacked, stacked)
+        right = np.einsum("k,ka,ak->a", weight, cells.right[:, owner], stacked)
+        low, high = np.zeros(len(right)), np.full(len(right), np.inf)
+        linear = bounded_solution(gram, right, low, high)[0]
+        values = linear[:, None] * stacked
+        error = cells.power - 2.0 * np.einsum("ka,ak->k", cells.right[:, owner], values)
+        error = error + np.einsum("kab,ak,bk->k", pairs, values, values)
+        cost = float(np.sum(weight * error))
+        if best is None or cost < best[0]:
+            best = cost, error, linear, (float(scales[0]), float(scales[1]))
+    assert best is not None
+    return best[1], best[2], best[3]
+
+
+def judge(cells: Cells, laws: tuple[LawShape, LawShape]) -> Judged:
+    """Return the errors of a pair of laws on the levels, seen and not seen by the fit."""
+    # every level counts alike: without this the strongest would decide alone
+    power = np.bincount(cells.level, weights=cells.power)
+    alike = 1.0 / np.maximum(power, 1e-12 * power.max())[cells.level]
+    inside = _by_level(cells, fit_laws(cells, laws, alike)[0])
+    left_out = []
+    if max(law.numbers for law in laws) < cells.levels:
+        for level in range(1, cells.levels - 1):
+            error = fit_laws(cells, laws, np.where(cells.level == level, 0.0, alike))[0]
+            left_out.append(_by_level(cells, error)[level])
+    return Judged(laws, inside, np.array(left_out))
+
+
+def _by_level(cells: Cells, error: FloatArray) -> FloatArray:
+    power = np.bincount(cells.level, weights=cells.power)
+    return np.log(np.maximum(np.bincount(cells.level, weights=error), 1e-9 * power) / np.maximum(power, 1e-300))
+
+
+def _risk(item: Judged) -> FloatArray:
+    """Return what a law is judged by: its errors on inner levels left out, and on all levels as seen."""
+    return np.concatenate([item.left_out, item.inside])
+
+
+def _best(judged: Sequence[Judged]) -> Judged:
+    """Return the law with fewest numbers among those within one standard error of the best."""
+    best = min(judged, key=lambda item: float(np.mean(_risk(item))))
+    close = []
+    for item in judged:
+        difference = _risk(item) - _risk(best)
+        error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
+        # an error that differs by less than a tenth of its square is alike, whatever its spread
+        if float(np.mean(difference)) <= max(error, 0.1) and float(np.mean(difference)) < 0.5:
+            close.append(item)
+    return min(close, key=lambda item: (item.numbers, float(np.mean(_risk(item)))))
+
+
+def choose_laws(
+    found: Fit, *, largest_yield_order: int = 5, largest_viscosity_order: int = 2, saturating: bool = True
+) -> LawChoice:
+    """Choose the laws of yield force and viscosity.
+
+    Parameters
+    ----------
+    found
+        A fit of a base form to all training tests, with laws at least as rich as the levels support.
+    largest_yield_order, largest_viscosity_order
+        Highest degree of polynomials.
+    saturating
+        Consider laws that saturate.
+    """
+    cells = cells_of(found)
+    levels = cells.levels
+
+    def offered(laws: Sequence[LawShape], order: int) -> list[LawShape]:
+        return [
+            law
+            for law in laws
+            if law.numbers <= levels and (saturating if law.saturates else law.order <= order)
+        ]  # fmt: skip
+
+    yields = offered(YIELD_LAWS, largest_yield_order)
+    viscous = offered(VISCOSITY_LAWS, largest_viscosity_order)
+    viscosity = LawShape("polynomial", min(1, levels - 1, largest_viscosity_order))
+    strongest, judged = yields[0], []
+    for _ in range(2):
+        judged = [judge(cells, (law, viscosity)) for law in yields]
+        strongest = _pick(judged, levels).laws[0]
+        viscosity = _pick([judge(cells, (strongest, law)) for law in viscous], levels).laws[1]
+    chosen = strongest, viscosity
+    drives, values, deviations = _predictions(cells, chosen, [item for item in judged if len(item.left_out)])
+    table = tuple(
+        (item.laws[0].name, _typical(item.left_out) if len(item.left_out) else None, _typical(item.inside) or 0.0)
+        for item in judged
+    )
+    return LawChoice(chosen, _reason(chosen, judged, levels), table, drives, values, deviations)
+
+
+def _pick(judged: Sequence[Judged], levels: int) -> Judged:
+    testable = [item for item in judged if len(item.left_out)]
+    if levels < 3 or not testable:
+        return _best([replace(item, left_out=np.zeros(0)) for item in judged])
+    best = _best(testable)
+    others = [item for item in judged if not len(item.left_out)]
+    if not others:
+        return best
+    # a law that misses the very levels it was fitted to is refuted, whether or not a richer one can be judged
+    richest = min(others, key=lambda item: (float(np.round(np.mean(item.inside), 1)), item.numbers))
+    missed = best.inside - richest.inside
+    error = float(np.std(missed, ddof=1)) / np.sqrt(len(missed))
+    return richest if float(np.mean(missed)) > max(error, 0.3) else best
+
+
+def _typical(errors: FloatArray) -> float | None:
+    return float(np.exp(0.5 * np.mean(errors))) if len(errors) else None
+
+
+def _reason(chosen: tuple[LawShape, LawShape], judged: Sequence[Judged], levels: int) -> str:
+    item = next(item for item in judged if item.laws[0] == chosen[0])
+    names = f"yield force {chosen[0].name}, viscosity {chosen[1].name} in the drive"
+    if levels == 1:
+        return f"{names}: the tests hold one level of drive"
+    if not len(item.left_out):
+        return f"{names}: {levels} levels of drive support no law that could be judged on a level left out"
+    error = _typical(item.left_out) or 0.0
+    return f"{names}: the fewest numbers among laws that predict levels left out alike (error {100.0 * error:.1f} %)"
+
+
+def _predictions(
+    cells: Cells, chosen: tuple[LawShape, LawShape], others: Sequence[Judged]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return drives, values and standard deviations of both laws there."""
+    at = np.unique(np.round([float(np.mean(cells.drive[cells.level == k])) for k in range(cells.levels)], 6))
+    share = np.unique(np.concatenate([at, 0.5 * (at[1:] + at[:-1]), [at[-1] + 0.2 * max(at[-1], 0.0)]]))
+
+    def values(laws: tuple[LawShape, LawShape], keep: FloatArray | None) -> FloatArray:
+        _, linear, scales = fit_laws(cells, laws, keep)
+        split = laws[0].count
+        pieces = linear[:split], linear[split:]
+        found: list[Callable[[FloatArray], FloatArray]] = [
+            law.law(piece, 1.0, scale) for law, piece, scale in zip(laws, pieces, scales, strict=True)
+        ]
+        return np.stack([law(share) for law in found])
+
+    whole = values(chosen, None)
+    spread = np.zeros_like(whole)
+    if cells.levels > max(law.numbers for law in chosen) and cells.levels > 1:
+        without = np.stack([values(chosen, (cells.level != level).astype(np.float64)) for level in range(cells.levels)])
+        spread = np.sum((without - whole) ** 2, axis=0) * (cells.levels - 1) / cells.levels
+    alike = _alike(others, chosen)
+    if alike:
+        rivals = np.stack([values((laws[0], chosen[1]), None) for laws in alike])
+        spread = spread + np.mean((rivals - whole) ** 2, axis=0)
+    return share * cells.limit, whole, np.sqrt(spread)
+
+
+def _alike(judged: Sequence[Judged], chosen: tuple[LawShape, LawShape]) -> list[tuple[LawShape, LawShape]]:
+    own = next((item for item in judged if item.laws[0] == chosen[0]), None)
+    if own is None:
+        return [item.laws for item in judged]
+    limit = float(np.mean(_risk(own))) + 0.5
+    return [item.laws for item in judged if item is not own and float(np.mean(_risk(item))) < limit]
+
+
+def law_values(choice: LawChoice, laws: Sequence[Law]) -> list[dict[str, float]]:
+    """Return a row for each drive of a choice: drive, values of the fitted laws and their standard deviations, SI."""
+    return [
+        {
+            "drive": float(drive),
+            "yield_force_n": float(laws[0](float(drive))),
+            "yield_force_deviation_n": float(choice.deviations[0, place]),
+            "c0_n_s_m": float(laws[1](float(drive))),
+            "c0_deviation_n_s_m": float(choice.deviations[1, place]),
+        }
+        for place, drive in enumerate(choice.drives)
+    ]

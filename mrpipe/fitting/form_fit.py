@@ -1,0 +1,281 @@
+"""One base form fitted to bench tests: searched from several starts, with covariance and what bounds it ran into."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.laws import law_names
+from mrpipe.dampers.model import DamperModel
+from mrpipe.errors import DivergedError
+from mrpipe.fitting.damper import ASSUMED_ETA, damper_model
+from mrpipe.fitting.engine import Fit, centred, finish, fit, regressors, solve, start_of, weighting
+from mrpipe.fitting.problem import Base, Problem
+from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.samples import blocks_of
+from mrpipe.fitting.start import best_starts, first_problem
+
+NELDER_MEAD_ITERATIONS = 1000
+NELDER_MEAD_ERROR = 0.01
+"""The thesis' stopping rules (section 2.2): at most 1000 iterations, an RMS error known to 0.01 N."""
+
+
+@dataclass(frozen=True)
+class FormFit:
+    """A fitted form.
+
+    Attributes
+    ----------
+    fit
+        The fit of the engine: problem, searched values, linear coefficients.
+    model
+        The damper.
+    training_nrmse
+        RMS error over RMS force at the samples of the fit, offsets of the tests taken out.
+    covariance
+        Shape (p, p), of the model's parameters.
+    names
+        Names of its rows.
+    correlation
+        Shape (p, p), from the curvature alone.
+    at_bound
+        Searched parameters that ended at a bound.
+    start_nrmse
+        What each start ended at, best first: the spread over starts.
+    notes
+        What the user should know of how it was fitted.
+    """
+
+    fit: Fit
+    model: DamperModel
+    training_nrmse: float
+    covariance: FloatArray
+    names: tuple[str, ...]
+    correlation: FloatArray
+    at_bound: tuple[str, ...] = ()
+    start_nrmse: tuple[float, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def form(self) -> BaseForm:
+        """The base form."""
+        return self.fit.problem.base.form
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Searched parameters."""
+        found = self.fit.base_values
+        return {item.name: found[item.name] for item in self.fit.problem.base.parameters()}
+
+    def standard_error(self, name: str) -> float:
+        """Return the standard error of a parameter in its own unit; not a number where it was not searched."""
+        if name not in self.names:
+            return float("nan")
+        place = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[place, place], 0.0)))
+
+    def correlated(self, limit: float = 0.95) -> list[tuple[str, str, float]]:
+        """Return pairs of parameters whose correlation is above `limit` in size, the closest first."""
+        pairs = [
+            (self.names[row], self.names[column], float(self.correlation[row, column]))
+            for row in range(len(self.names))
+            for column in range(row + 1, len(self.names))
+            if abs(self.correlation[row, column]) > limit
+        ]
+        return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+
+@dataclass(frozen=True)
+class FitMethod:
+    """How a form is searched.
+
+    Attributes
+    ----------
+    method
+        `least-squares` (Levenberg-Marquardt) or `nelder-mead` (restarted from where it ended until it gains nothing,
+        as in section 2.2 of the thesis).
+    starts
+        How many starting points, the best at first sight, are followed to the end.
+    iterations
+        Most steps of the search from each start.
+    assumed_eta
+        Rate of the driver's lag [1/s] where the tests do not determine it.
+    form_files
+        Name of a form -> the user's own file that defines it.
+    """
+
+    method: str = "least-squares"
+    starts: int = 2
+    iterations: int = 40
+    assumed_eta: float = ASSUMED_ETA
+    form_files: Mapping[str, str] | None = None
+
+
+def form_problem(
+    recordings: Recordings, base: Base, *, offsets: bool = True, weights: FloatArray | None = None
+) -> Problem:
+    """Return the problem of one form.
+
+    Parameters
+    ----------
+    offsets
+        An offset for each test; else one for all.
+    weights
+        Factor on the error of each sample, shape (n,); 1 where left out.
+    """
+    problem = first_problem(recordings, base)
+    root = problem.root_weight if weights is None else problem.root_weight * weights
+    return replace(problem, root_weight=root, offsets=offsets)
+
+
+def fit_form(
+    problem: Problem, method: FitMethod = FitMethod(), *, drive_unit: str = "A", warm: Mapping[str, float] | None = None
+) -> FormFit:
+    """Fit one form.
+
+    Parameters
+    ----------
+    problem
+        See :func:`form_problem`.
+    warm
+        Parameters to start from in place of the form's own starts.
+
+    Raises
+    ------
+    DivergedError
+        If the model's force is not finite for some trial.
+    """
+    begins = [start_of(problem, warm, [])] if warm is not None else best_starts(problem, method.starts)
+    ends = []
+    for begin in begins:
+        if len(begin) and method.method == "nelder-mead":
+            ends.append(_nelder_mead(problem, begin))
+        else:
+            ends.append(fit(problem, begin, iterations=method.iterations, tolerance=1e-7))
+    ends.sort(key=lambda item: item.cost)
+    return form_fit(ends[0], method, drive_unit, tuple(_nrmse(end) for end in ends))
+
+
+def form_fit(found: Fit, method: FitMethod, drive_unit: str, start_nrmse: tuple[float, ...] = ()) -> FormFit:
+    """Return a fit with its covariance and its damper."""
+    problem = found.problem
+    if not np.all(np.isfinite(found.residual)) or not np.any(found.linear):
+        raise DivergedError(f"fit of {problem.base.name}: the model's force is not finite; narrow the bounds")
+    names, matrix = parameter_names(found)
+    covariance, correlation = _uncertainty(found, matrix)
+    low, high = problem.bounds() if len(found.theta) else (np.zeros(0), np.zeros(0))
+    margin = 1e-3 * (high - low)
+    bound = tuple(
+        parameter.name
+        for (_, parameter), t, a, b, m in zip(problem.searched, found.theta, low, high, margin, strict=True)
+        if not a + m < t < b - m
+    )
+    file = (method.form_files or {}).get(problem.base.name, "")
+    return FormFit(
+        fit=found,
+        model=damper_model(found, drive_unit, assumed_eta=method.assumed_eta, form_file=file),
+        training_nrmse=_nrmse(found),
+        covariance=covariance,
+        names=names,
+        correlation=correlation,
+        at_bound=bound,
+        start_nrmse=start_nrmse or (_nrmse(found),),
+    )
+
+
+def parameter_names(found: Fit) -> tuple[tuple[str, ...], FloatArray]:
+    """Return the names of the model's parameters, and the matrix that yields them from searched and linear numbers.
+
+    It turns coefficients in the basis of the laws into the laws' own numbers; the rest it passes on.
+    """
+    base, problem = found.problem.base, found.problem
+    names = [parameter.name for _, parameter in problem.searched]
+    blocks = [np.eye(len(names))]
+    drive = problem.scales.drive
+    scales = base.scale_shares(found.base_values, drive)
+    for block, shape, law, scale in zip(base.form.blocks, base.laws, found.laws, scales, strict=True):
+        names += law_names(block, law)[: shape.count]
+        blocks.append(shape.matrix(drive, scale))
+    names += [parameter.name for _, parameter in problem.amplitudes]
+    blocks.append(np.eye(len(problem.amplitudes)))
+    return tuple(names), block_diagonal(blocks)
+
+
+def block_diagonal(blocks: list[FloatArray]) -> FloatArray:
+    """Return square matrices along one diagonal."""
+    size = sum(len(block) for block in blocks)
+    matrix = np.zeros((size, size))
+    row = 0
+    for block in blocks:
+        matrix[row : row + len(block), row : row + len(block)] = block
+        row += len(block)
+    return matrix
+
+
+def _nrmse(found: Fit) -> float:
+    w = weighting(found.problem)
+    force = centred(found.problem.recordings.force[w.at][None], w)[0][0]
+    return float(np.sqrt(found.cost / max(float(force @ force), 1e-300)))
+
+
+def _nelder_mead(problem: Problem, begin: FloatArray) -> Fit:
+    w = weighting(problem)
+    low, high = problem.bounds()
+    force = centred(problem.recordings.force[w.at][None], w)[0][0]
+    size = float(np.linalg.norm(force))
+    rms = float(np.sqrt(np.mean(problem.recordings.force[w.at] ** 2)))
+    error = NELDER_MEAD_ERROR / rms
+    options = {"maxiter": NELDER_MEAD_ITERATIONS, "fatol": 0.01 * error, "xatol": 1e-4}
+
+    def cost(share: FloatArray) -> float:
+        return float(np.sqrt(solve(problem, low + share * (high - low), w).cost)) / size
+
+    end, best = (begin - low) / (high - low), np.inf
+    for _ in range(10):
+        found = minimize(cost, end, method="Nelder-Mead", bounds=[(0.0, 1.0)] * len(begin), options=options)
+        end = found.x
+        if best - found.fun < error:
+            break
+        best = found.fun
+    return finish(problem, low + np.asarray(end) * (high - low), w)
+
+
+def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return covariance and correlation of the model's parameters.
+
+    What a model leaves is no white noise, so the covariance is the sandwich over stretches of the recordings whose
+    errors are correlated; the correlation is that of the curvature alone.
+    """
+    problem = found.problem
+    w = weighting(problem)
+    residual = found.residual[w.at]
+    columns = centred(regressors(problem, found.theta)[:, w.at], w)[0]
+    calculated = found.linear @ columns
+    values = problem.decode(found.theta)
+    slopes = []
+    for place, value in enumerate(values):
+        step = 1e-4 * (abs(value) or problem.scales.of(problem.searched[place][1].scale))
+        theta = problem.encode([*values[:place], value + step, *values[place + 1 :]])
+        moved = centred(regressors(problem, theta)[:, w.at], w)[0]
+        slopes.append((found.linear @ moved - calculated) / step)
+    free = columns
+    if problem.base.form.known:
+        free = np.delete(columns, problem.base.columns - 1, axis=0)
+    # rows are the derivatives of the model's force: the sign cancels in both products below
+    jacobian = np.linalg.inv(matrix).T @ np.vstack([*slopes, free])
+    size = np.linalg.norm(jacobian, axis=1)
+    size[size == 0.0] = 1.0
+    jacobian /= size[:, None]
+    inverse = np.linalg.pinv(jacobian @ jacobian.T, rcond=1e-13, hermitian=True)
+    _, block = np.unique(blocks_of(problem.recordings)[w.at], return_inverse=True)
+    scores = np.stack([np.bincount(block, weights=row * residual) for row in jacobian])
+    blocks = scores.shape[1]
+    meat = scores @ scores.T * (blocks / max(blocks - 1, 1))
+    deviation = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
+    covariance = inverse @ meat @ inverse / np.outer(size, size)
+    return covariance, inverse / np.outer(deviation, deviation)

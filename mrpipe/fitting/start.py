@@ -1,0 +1,143 @@
+"""From a base form and recordings to a first fit: levels of drive, shapes of the laws, starts of the search."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.laws import Law, LawShape, constant_law
+from mrpipe.dampers.library import DEFAULT_FORM, base_form
+from mrpipe.fitting.engine import Fit, fit, solve, start_of, weighting
+from mrpipe.fitting.problem import Base, Problem
+from mrpipe.fitting.recordings import Recordings
+
+VARYING_SHARE = 0.05
+"""A drive that changes within a test by this share of the largest drive counts as varying."""
+
+LEVEL_SHARE = 0.02
+"""Levels of drive that differ by less than this share of the largest drive count as one."""
+
+MANY_LEVELS = 99
+"""Number of levels where the drive varies within tests."""
+
+MOST_STARTS = 36
+"""Of more combinations of the parameters' starts, this many are tried, evenly picked."""
+
+
+def drive_varies(recordings: Recordings) -> bool:
+    """Return whether the drive changes within any test."""
+    largest = float(np.max(np.abs(recordings.drive)))
+    pieces = [recordings.drive[a:b] for a, b in itertools.pairwise(recordings.starts)]
+    return largest > 0.0 and any(float(np.ptp(piece)) > VARYING_SHARE * largest for piece in pieces)
+
+
+def mean_levels(recordings: Recordings) -> FloatArray:
+    """Return the mean drive of each test [A or V], shape (tests,)."""
+    return np.array([float(np.mean(recordings.drive[a:b])) for a, b in itertools.pairwise(recordings.starts)])
+
+
+def distinct_levels(recordings: Recordings) -> int:
+    """Return how many levels of drive the tests hold; :data:`MANY_LEVELS` where it varies within tests."""
+    largest = float(np.max(np.abs(recordings.drive)))
+    if largest == 0.0:
+        return 1
+    if drive_varies(recordings):
+        return MANY_LEVELS
+    return 1 + int(np.sum(np.diff(np.sort(mean_levels(recordings))) > LEVEL_SHARE * largest))
+
+
+def polynomial_laws(form: BaseForm, levels: int, yield_order: int, viscosity_order: int) -> tuple[LawShape, ...]:
+    """Return polynomial laws of these degrees, lowered to what the levels of drive determine."""
+    orders = {"c0": viscosity_order}
+    return tuple(LawShape("polynomial", min(orders.get(block, yield_order), levels - 1)) for block in form.blocks)
+
+
+def base_of(
+    recordings: Recordings, form: BaseForm, laws: Sequence[LawShape], held: Mapping[str, float] | None = None
+) -> Base:
+    """Return the base of a problem: a form with its laws, its references fixed by the scales of the recordings.
+
+    Parameters
+    ----------
+    laws
+        One for each block of the form; the first one serves further blocks.
+    held
+        Parameters that are not searched.
+    """
+    shapes = [*laws[: len(form.blocks)], *[laws[0]] * (len(form.blocks) - len(laws))]
+    fixed = {**form.constants(recordings.scales()), **(held or {})}
+    return Base(form, tuple(shapes), lag_known=drive_varies(recordings), held=fixed)
+
+
+def first_reference(base: Base, recordings: Recordings) -> tuple[Law, ...]:
+    """Return laws of the right size before anything is fitted: constant in the drive."""
+    scales = recordings.scales()
+    viscosity = constant_law(0.1 * scales.force / max(scales.speed, 1e-9))
+    return tuple(viscosity if block == "c0" else constant_law(scales.force) for block in base.form.blocks)
+
+
+def first_problem(recordings: Recordings, base: Base) -> Problem:
+    """Return the unweighted problem with no effect.
+
+    The laws that a coupled form reads are those of a simple hysteresis: its post-yield force is much the same.
+    """
+    scales = recordings.scales()
+    weight = recordings.used / scales.force
+    problem = Problem(recordings, base, (), weight, scales, first_reference(base, recordings))
+    if not base.form.coupled:
+        return problem
+    plain = first_problem(recordings, replace(base, form=base_form(DEFAULT_FORM), laws=base.laws[:2], held={}))
+    found = solve(plain, start_of(plain, {}, []), weighting(plain))
+    laws = plain.base.laws_of(found.linear, plain.values(start_of(plain, {}, []))[0], scales.drive)
+    return replace(problem, reference=laws)
+
+
+def start_points(problem: Problem) -> list[FloatArray]:
+    """Return the combinations of the starts of all searched parameters, at most :data:`MOST_STARTS`."""
+    choices = [parameter.start_values(problem.scales) for _, parameter in problem.searched]
+    combinations = list(itertools.product(*choices))
+    step = -(-len(combinations) // MOST_STARTS)
+    low, high = problem.bounds() if choices else (np.zeros(0), np.zeros(0))
+    return [np.clip(problem.encode(values), low, high) for values in combinations[::step]]
+
+
+def best_starts(problem: Problem, count: int) -> list[FloatArray]:
+    """Return the `count` starting points that leave least, the best first."""
+    w = weighting(problem)
+    points = start_points(problem)
+    costs = [solve(problem, point, w).cost for point in points]
+    return [points[place] for place in np.argsort(costs, kind="stable")[:count]]
+
+
+def best_fit(problem: Problem, *, starts: int = 2, iterations: int = 12) -> Fit:
+    """Fit from the starting points that promise most and return the best."""
+    fits = [fit(problem, point, iterations=iterations) for point in best_starts(problem, starts)]
+    return min(fits, key=lambda item: item.cost)
+
+
+def with_form(found: Fit, form: BaseForm) -> Problem:
+    """Return the problem of a fit with another base form, its laws and weights as they are."""
+    problem = found.problem
+    base = problem.base
+    held = form.constants(problem.scales)
+    laws = tuple(base.laws[min(place, 1)] if place < 2 else base.laws[0] for place in range(len(form.blocks)))
+    reference = (*found.laws[:2], *[found.laws[0]] * (len(form.blocks) - 2))
+    return replace(problem, base=replace(base, form=form, laws=laws, held=held), reference=reference)
+
+
+def fit_with_form(found: Fit, form: BaseForm, *, starts: int = 2, iterations: int = 12) -> Fit:
+    """Return the fit with another base form, from its own starts; the terms start where they are."""
+    problem = with_form(found, form)
+    own = best_starts(replace(problem, terms=()), starts)
+    fits = []
+    for point in own:
+        values = replace(problem, terms=()).values(point)[0]
+        shared = {name: value for name, value in found.base_values.items() if name in ("eta", "eta_fall")}
+        start = start_of(problem, {**values, **shared}, found.term_values)
+        fits.append(fit(problem, start, iterations=iterations))
+    return min(fits, key=lambda item: item.cost)

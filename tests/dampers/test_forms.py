@@ -1,0 +1,262 @@
+"""Base forms against an independent adaptive integration, their stability and dissipation, and their contract."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.forms import form_names
+from mrpipe.dampers.library import base_form, base_forms, form_of_file
+from mrpipe.dampers.model import DamperModel
+from mrpipe.dampers.parameters import Scales
+from mrpipe.errors import UserError
+from mrpipe.units import conversion
+
+SCALES = Scales(stroke=0.01, speed=0.08, acceleration=1.0, drive=2.0, force=100.0, time=5.0)
+OMEGA, STROKE = 8.0, 0.01
+YIELD, VISCOSITY, PART, DRIVE = 90.0, 250.0, 40.0, 1.0
+LAWS = {"yield_force_a": 50.0, "yield_force_b": 40.0, "c0_a": 100.0, "c0_b": 150.0}
+
+NUMBERS: dict[str, dict[str, float]] = {
+    "bouc-wen": {"yield_displacement": 8e-4, "gamma_share": 0.7},
+    "bouc-wen-n": {"yield_displacement": 8e-4, "gamma_share": 0.7, "exponent": 1.4},
+    "bouc-wen-stiffness": {"initial_stiffness": 8e4, "gamma_share": 0.7},
+    "bouc-wen-free": {
+        "yield_displacement": 8e-4, "gamma_share": 0.7, "exponent": 1.4, "growth": 0.6, "reference_force": 60.0,
+    },
+    "dahl": {"yield_displacement": 8e-4},
+    "dahl-stiffness": {"initial_stiffness": 8e4},
+    "bingham": {"transition_velocity": 0.01},
+    "bingham-spring": {"spring_stiffness": 6e4},
+    "biviscous": {"yield_velocity": 0.02},
+    "hysteretic-biviscous": {"yield_velocity": 0.02, "hysteresis_velocity": 0.008},
+    "hyperbolic-tangent": {"velocity_scale": 0.015, "shift": 0.6, "stiffness": 900.0},
+    "hysteretic-sigmoid": {"velocity_scale": 0.02, "hysteresis_velocity": 0.008},
+    "algebraic": {"velocity_scale": 0.015, "frequency": 1.5},
+    "lugre": {"yield_displacement": 8e-4, "sigma_1": 200.0},
+    "gamota-filisko": {"solid_stiffness": 8e4, "solid_viscosity": 600.0, "spring_stiffness": 6e4},
+    "modified-bouc-wen": {
+        "yield_displacement": 8e-4, "gamma_share": 0.7, "c1_a": 4e3, "c1_b": 1e3, "k0": 800.0, "k1": 300.0,
+    },
+    "rounded-yield": {
+        "yield_displacement": 8e-4, "gamma_share": 0.7, "velocity_scale": 0.03, "rounded_force_a": PART,
+    },
+    "power-yield": {
+        "yield_displacement": 8e-4, "gamma_share": 0.7, "velocity_exponent": 0.3, "reference_velocity": 0.05,
+    },
+    "logarithmic-yield": {"yield_displacement": 8e-4, "gamma_share": 0.7, "gain": 0.3, "velocity_scale": 5e-3},
+    "saturating-dashpot": {"spring_rate": 1500.0, "velocity_scale": 0.02},
+    "yielding-part": {
+        "yield_displacement": 8e-4, "gamma_share": 0.7, "spring_rate": 1500.0, "velocity_scale": 0.02,
+        "part_force_a": PART,
+    },
+    "creeping-yield": {"elastic_rate": 1200.0, "creep_speed": 0.01, "creep_exponent": 3.0, "gamma_share": 0.7},
+}  # fmt: skip
+
+
+def model(name: str) -> DamperModel:
+    return DamperModel(name, {**LAWS, **NUMBERS[name]}, drive_limit=2.0, stroke_m=STROKE)
+
+
+def motion(dt: float, seconds: float = 1.6) -> tuple[np.ndarray, ...]:
+    """Two sines, so that loops do not close upon themselves."""
+    t = np.arange(0.0, seconds, dt)
+    return t, position(t), speed(t)
+
+
+def position(t):
+    return STROKE * (0.8 * np.sin(OMEGA * t) + 0.25 * np.sin(2.7 * OMEGA * t))
+
+
+def speed(t):
+    return STROKE * OMEGA * (0.8 * np.cos(OMEGA * t) + 0.675 * np.cos(2.7 * OMEGA * t))
+
+
+def bouc_wen_rate(z, v, x_y, share, n=2.0):
+    """Equation (2.2) over z_max: independent of the closed form that the program uses."""
+    return (v - share * abs(v) * z * abs(z) ** (n - 1.0) - (1.0 - share) * v * abs(z) ** n) / x_y
+
+
+def integrated(rate, start, t):
+    answer = solve_ivp(rate, (t[0], t[-1]), start, t_eval=t, rtol=1e-8, atol=1e-10, max_step=1e-3, method="LSODA")
+    return answer.y
+
+
+def expected(name: str, t: np.ndarray) -> np.ndarray:
+    p, x, v = NUMBERS[name], position(t), speed(t)
+    viscous = VISCOSITY * v
+    share, exponent = p.get("gamma_share", 0.5), p.get("exponent", 2.0)
+    if name in ("dahl", "dahl-stiffness", "lugre"):
+        share, exponent = 1.0, 1.0
+    length = p.get("yield_displacement", math.nan)
+    if "initial_stiffness" in p:
+        length = YIELD / p["initial_stiffness"]
+    if "growth" in p:
+        length = p["yield_displacement"] * (YIELD / p["reference_force"]) ** p["growth"]
+    if name == "modified-bouc-wen":
+        c1 = p["c1_a"] + p["c1_b"] * DRIVE
+
+        def inner(time, state):
+            z, w = state
+            w_rate = (c1 * speed(time) - YIELD * z - p["k0"] * w) / (VISCOSITY + c1)
+            return [bouc_wen_rate(z, w_rate, length, share), w_rate]
+
+        z, w = integrated(inner, [0.0, 0.0], t)
+        w_rate = (c1 * v - YIELD * z - p["k0"] * w) / (VISCOSITY + c1)
+        return YIELD * z + VISCOSITY * w_rate + p["k0"] * w + p["k1"] * x
+    if name == "bingham-spring":
+        k = p["spring_stiffness"]
+
+        def spring(time, state):
+            excess = max(abs(k * state[0]) - YIELD, 0.0)
+            return [speed(time) - math.copysign(excess / VISCOSITY, state[0])]
+
+        return k * integrated(spring, [0.0], t)[0]
+    if name == "gamota-filisko":
+        k1, c1, k2 = p["solid_stiffness"], p["solid_viscosity"], p["spring_stiffness"]
+
+        def solid(time, state):
+            kelvin, elastic = state
+            force = k2 * elastic
+            kelvin_rate = (force - k1 * kelvin) / c1
+            slip = math.copysign(max(abs(force) - YIELD, 0.0) / VISCOSITY, force)
+            return [kelvin_rate, speed(time) - slip - kelvin_rate]
+
+        return k2 * integrated(solid, [0.0, 0.0], t)[1]
+    if name in ("saturating-dashpot", "yielding-part"):
+        q, v0 = p["spring_rate"], p["velocity_scale"]
+
+        def dashpot(time, state):
+            return [q * (speed(time) - v0 * math.atanh(min(max(state[0], -1 + 1e-12), 1 - 1e-12)))]
+
+        z = integrated(dashpot, [0.0], t)[0]
+        if name == "saturating-dashpot":
+            return YIELD * z + viscous
+        hysteresis = integrated(lambda s, z: [bouc_wen_rate(z[0], speed(s), length, share)], [0.0], t)[0]
+        return YIELD * hysteresis + PART * z + viscous
+    if name == "creeping-yield":
+
+        def creep(time, state):
+            z, rate = state[0], speed(time)
+            bends = share * abs(rate) * z * abs(z) + (1.0 - share) * rate * z * z
+            creeps = p["creep_speed"] * abs(z) ** p["creep_exponent"] * np.sign(z)
+            return [p["elastic_rate"] * (rate - bends - creeps)]
+
+        return YIELD * integrated(creep, [0.0], t)[0] + viscous
+    rising = np.gradient(v, t) > 0.0
+    late = np.where(rising, 1.0, -1.0) * p.get("hysteresis_velocity", 0.0)
+    static = {
+        "bingham": lambda: np.tanh(v / p["transition_velocity"]),
+        "biviscous": lambda: np.clip(v / p["yield_velocity"], -1, 1),
+        "hysteretic-biviscous": lambda: np.clip((v - late) / p["yield_velocity"], -1, 1),
+        "hyperbolic-tangent": lambda: np.tanh(v / p["velocity_scale"] + p["shift"] * np.sign(x)),
+        "hysteretic-sigmoid": lambda: 2.0 / (1.0 + np.exp(-2.0 * (v - late) / p["velocity_scale"])) - 1.0,
+        "algebraic": lambda: (v + p["frequency"] * x) / np.hypot(p["velocity_scale"], v + p["frequency"] * x),
+    }
+    if name in static:
+        return YIELD * static[name]() + viscous + p.get("stiffness", 0.0) * x
+    z = integrated(lambda s, z: [bouc_wen_rate(z[0], speed(s), length, share, exponent)], [0.0], t)[0]
+    force = YIELD * z + viscous
+    if name == "lugre":
+        force = force + p["sigma_1"] * (v - np.abs(v) * z)
+    if name == "rounded-yield":
+        force = force + PART * np.tanh(v / p["velocity_scale"])
+    if name == "power-yield":
+        force = YIELD * z * (np.abs(v) / p["reference_velocity"]) ** p["velocity_exponent"] + viscous
+    if name == "logarithmic-yield":
+        force = YIELD * z * (1.0 + p["gain"] * np.log1p(np.abs(v) / p["velocity_scale"])) + viscous
+    return force
+
+
+def test_every_form_of_the_library_is_tested() -> None:
+    assert set(base_forms()) == set(NUMBERS)
+    assert set(form_names()) == set(NUMBERS), "a file is named as its form"
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("name", sorted(NUMBERS))
+def test_a_form_gives_what_its_equations_integrate_to(name: str) -> None:
+    t, x, v = motion(1e-3)
+    force = model(name).force(x, v, np.gradient(v, t), np.full_like(t, DRIVE), 1e-3)
+    truth = expected(name, t)
+    compared = np.ones(len(t), dtype=bool)
+    if "hysteretic" in name:
+        # at turning points of the velocity the direction of its change is known to a sample only
+        turns = np.flatnonzero(np.diff(np.sign(np.gradient(v, t))))
+        compared[np.concatenate([[0], turns - 1, turns, turns + 1])] = False
+    error = np.sqrt(np.mean((force - truth)[compared] ** 2) / np.mean(truth[compared] ** 2))
+    assert error < 0.003
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", sorted(NUMBERS))
+def test_a_form_stays_stable_and_dissipative_at_coarse_steps(name: str) -> None:
+    for dt in (2e-3, 0.02):
+        t = np.arange(0.0, 5.0 * 2.0 * np.pi / OMEGA, dt)
+        x, v = STROKE * np.sin(OMEGA * t), STROKE * OMEGA * np.cos(OMEGA * t)
+        force = model(name).force(x, v, -(OMEGA**2) * x, np.full_like(t, DRIVE), dt)
+        limit = YIELD * 2.0 + PART + VISCOSITY * STROKE * OMEGA + 400.0 * STROKE * OMEGA + 2000.0 * STROKE
+        assert np.all(np.abs(force) < limit)
+        last = t > 2.0 * np.pi / OMEGA
+        assert np.sum((force * v)[last]) > 0.0
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", sorted(NUMBERS))
+def test_the_post_yield_force_is_what_the_chain_settles_at(name: str) -> None:
+    damper = model(name)
+    stretch = np.arange(0.0, 1.0, 1e-3)
+    # the middle of the stroke comes last: there the laws that depend on the displacement give their mean force
+    x = 0.05 * (stretch - stretch[-1])
+    force = damper.force(x, 0.0 * stretch + 0.05, 0.0 * stretch, 0.0 * stretch + DRIVE, 1e-3)
+    found = float(damper.quasi_static_force(0.05, DRIVE))
+    # the inner spring of the modified model, which takes part of the motion, is left out of the post-yield force
+    inner = damper.parameters.get("k0", 0.0) * np.ptp(x)
+    assert force[-1] == pytest.approx(found, rel=0.03 if name == "hysteretic-sigmoid" else 5e-3, abs=inner)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("form", list(base_forms().values()), ids=lambda form: form.name)
+def test_every_form_keeps_its_contract(form: BaseForm) -> None:
+    assert form.summary
+    assert any(character.isdigit() for character in form.source), "a reference has a year"
+    values = {p.name: p.start_values(SCALES)[0] for p in form.parameters}
+    steps = form.steps(values)
+    assert sorted(form.amplitude_steps) == sorted(p.name for p in form.amplitudes)
+    assert all(0 <= place < len(steps) for place in form.amplitude_steps.values())
+    for parameter in form.parameters:
+        low, high = parameter.bounds(SCALES)
+        assert conversion(parameter.unit.replace("drive", "A")) == 1.0
+        assert parameter.role == "constant" or low < high
+        if parameter.role != "amplitude":
+            assert all(low <= value <= high for value in parameter.start_values(SCALES))
+    if form.part:
+        assert form.blocks[2] == form.part
+
+
+@pytest.mark.property
+def test_a_users_own_form_is_one_file(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    source = Path(base_forms.__wrapped__.__code__.co_filename).parent / "forms" / "biviscous.py"
+    path.write_text(source.read_text(encoding="utf-8").replace('name="biviscous"', 'name="mine"'), encoding="utf-8")
+    form = form_of_file(path)
+    assert base_form("mine", str(path)).name == form.name == "mine"
+    damper = DamperModel("mine", {**LAWS, "yield_velocity": 0.02}, form_file=str(path))
+    assert float(damper.quasi_static_force(0.05, DRIVE)) == pytest.approx(YIELD + 0.05 * VISCOSITY)
+
+
+@pytest.mark.property
+def test_a_faulty_file_is_reported_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such file"):
+        form_of_file(tmp_path / "none.py")
+    path = tmp_path / "empty.py"
+    path.write_text("x = 1\n", encoding="utf-8")
+    with pytest.raises(UserError, match="FORM"):
+        form_of_file(path)
+    with pytest.raises(UserError, match="did you mean bingham"):
+        base_form("binghamm")
