@@ -80,13 +80,21 @@ def record(
 def simulate(
     options: CommonOptions,
     law: Annotated[str, typer.Option(metavar="LAW", help=f"{', '.join(law_names())}; or all.")],
+    damper: Annotated[
+        str | None,
+        typer.Option(metavar="DAMPER", help="identified, traced (by close-loop), a set of configs/dampers, or a file."),
+    ] = None,
 ) -> None:
     """Run the closed loop under a control law."""
+    from dataclasses import replace
+
     from mrpipe.artifacts.yaml_source import nearest
 
     known = law_names()
     if law != "all" and law not in known:
         raise UserError("--law", law, "is not a control law", nearest(law, [*known, "all"]))
+    if damper is not None:
+        options = replace(options, overrides=[*options.overrides, f"simulate.damper={damper}"])
     build_and_print([f"simulate-{item}" for item in (known if law == "all" else [law])], options)
 
 

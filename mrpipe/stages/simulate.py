@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.control.laws import law_names
@@ -10,6 +11,9 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
     from mrpipe.simulation.rig import Rig
+
+DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
+"""Dampers of this run by name, and the stage whose artifact holds each."""
 
 
 def simulate_stage(law: str) -> Stage:
@@ -19,6 +23,7 @@ def simulate_stage(law: str) -> Stage:
         summary=f"Run the closed loop under law {law}.",
         run=lambda context: _run(context, law),
         inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+        conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
         settings=("simulate",),
         family="simulate",
         outputs=(f"response-{law}.h5",),
@@ -52,7 +57,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     if viscous is not None:
         against = indices(viscous, excitation, **judged)
         values["rms_x_top_over_vd"] = values["rms_x_top_m"] / against["rms_x_top_m"]
-    tested = read_tested(context.artifact("identify-damper")) if settings.damper == "identified" else {}
+    tested = read_tested(context.artifact("identify-damper")) if settings.damper in DAMPERS else {}
     ranges = check_ranges(rig, controller, response, tested)
     for check in ranges:
         if check.warning:
@@ -71,10 +76,9 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
 
 
 def _rig(context: StageContext) -> Rig:
-    from mrpipe.artifacts import load_parameter_set
     from mrpipe.control.assembly import ControllerFactory, inverse_network
     from mrpipe.control.storage import read_calibrated
-    from mrpipe.dampers.model import damper_from_parameter_set, read_damper
+    from mrpipe.effects.damper import damper_named
     from mrpipe.simulation.rig import Rig, loop_options
     from mrpipe.structures import frame_from_parameter_set, read_frame
 
@@ -83,13 +87,12 @@ def _rig(context: StageContext) -> Rig:
         frame = read_frame(context.artifact("identify-frame"))
     else:
         frame = frame_from_parameter_set(settings.frame)
-    if settings.damper == "identified":
-        damper = read_damper(context.artifact("identify-damper"))
-    else:
-        damper = damper_from_parameter_set(load_parameter_set("dampers", settings.damper))
+    dampers = {name: partial(context.artifact, stage) for name, stage in DAMPERS.items()}
+    damper = damper_named(settings.damper, dampers)
     controllers = ControllerFactory(
         frame,
-        damper,
+        # the controller knows the damper that it was designed for, not what the tracing has found since
+        damper_named("identified", dampers) if settings.damper == "traced" else damper,
         read_calibrated(context.artifact("calibrate")),
         settings.controller,
         inverse_network(settings.controller, lambda: context.artifact("train-inverse")),
