@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,8 +14,18 @@ from mrpipe.errors import UserError
 _RIGS = ("bench", "frame", "closed-loop")
 
 
-def build_and_print(names: list[str], options: CommonOptions) -> None:
+def build_and_print(names: list[str], options: CommonOptions, together: tuple[str, ...] = ()) -> None:
     """Bring stages up to date and print the summary of each.
+
+    Parameters
+    ----------
+    names
+        Stages.
+    options
+        Of the command.
+    together
+        Kinds of stages, such as `simulate` and `resonance`, whose results for one law are printed as one document under
+        the name of the first kind.
 
     Raises
     ------
@@ -40,7 +50,8 @@ def build_and_print(names: list[str], options: CommonOptions) -> None:
         summaries = {
             outcome.stage: {"warnings": outcome.manifest.warnings, **outcome.manifest.summary} for outcome in outcomes
         }
-        print_json(summaries if len(names) > 1 else summaries[outcomes[0].stage])
+        merged = _merged(summaries, together)
+        print_json(merged if len(merged) > 1 else next(iter(merged.values())))
         return
     for outcome in outcomes:
         note = " (up to date)" if outcome.what == "reused" else ""
@@ -50,6 +61,19 @@ def build_and_print(names: list[str], options: CommonOptions) -> None:
         else:
             print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
     print(f"in {pipeline.run_directory}")
+
+
+def _merged(summaries: dict[str, dict[str, Any]], kinds: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    """Return one document per law: what later kinds found is added to that of the first kind."""
+    merged: dict[str, dict[str, Any]] = {}
+    for name, summary in summaries.items():
+        kind = next((kind for kind in kinds if name.startswith(f"{kind}-")), "")
+        key = f"{kinds[0]}-{name.removeprefix(f'{kind}-')}" if kind else name
+        known = merged.setdefault(key, {"warnings": []})
+        warnings = [*known["warnings"], *summary["warnings"]]
+        known.update(summary)
+        known["warnings"] = warnings
+    return merged
 
 
 def _plain_command(name: str) -> Callable[..., None]:
@@ -80,22 +104,19 @@ def record(
 def simulate(
     options: CommonOptions,
     law: Annotated[str, typer.Option(metavar="LAW", help=f"{', '.join(law_names())}; or all.")],
-    damper: Annotated[
-        str | None,
-        typer.Option(metavar="DAMPER", help="identified, traced (by close-loop), a set of configs/dampers, or a file."),
-    ] = None,
+    resonance: Annotated[
+        bool, typer.Option("--resonance", help="Also find the loop's own resonance and the response over frequency.")
+    ] = False,
 ) -> None:
     """Run the closed loop under a control law."""
-    from dataclasses import replace
-
     from mrpipe.artifacts.yaml_source import nearest
 
     known = law_names()
     if law != "all" and law not in known:
         raise UserError("--law", law, "is not a control law", nearest(law, [*known, "all"]))
-    if damper is not None:
-        options = replace(options, overrides=[*options.overrides, f"simulate.damper={damper}"])
-    build_and_print([f"simulate-{item}" for item in (known if law == "all" else [law])], options)
+    laws = known if law == "all" else (law,)
+    kinds = ("simulate", "resonance") if resonance else ("simulate",)
+    build_and_print([f"{kind}-{item}" for item in laws for kind in kinds], options, together=kinds)
 
 
 @with_common_options("campaign")

@@ -1,12 +1,9 @@
-"""Frame tests as arrays: excitations and responses, and the floor of each."""
+"""Frame tests as arrays: what excites, what answers, on which floor."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,21 +15,6 @@ ACCELERATION = "floor_acceleration"
 DISPLACEMENT = "floor_displacement"
 
 
-class Place(NamedTuple):
-    """A floor (0 is the ground) and a direction (empty where the campaign has one direction only)."""
-
-    floor: int
-    direction: str = ""
-
-
-class Sensor(NamedTuple):
-    """What a sensor measures and where."""
-
-    floor: int
-    direction: str
-    is_displacement: bool
-
-
 @dataclass(frozen=True)
 class FrameTest:
     """One recorded test of a frame.
@@ -40,31 +22,25 @@ class FrameTest:
     Attributes
     ----------
     name, kind
-        As in campaign.yaml; kind is sweep, random, ambient or free-decay.
+        As in campaign.yaml; kind is sweep, random or free-decay.
     sampling_rate_hz
         Rate of all channels.
     excitation
-        Ground acceleration [m/s2], or shaker force [N] where `shaker_floor` is not 0; shape (m,). None where it was
-        not measured.
+        Ground acceleration [m/s2], or shaker force [N] where `shaker_floor` is not 0; shape (m,). None where a decay
+        test recorded none.
     responses
-        Shape (m, s): absolute acceleration [m/s2] of each measured floor, or its displacement relative to the ground
-        [m] where `is_displacement` is true.
+        Shape (m, n): absolute acceleration [m/s2] of each floor, or its displacement relative to the ground [m] where
+        `is_displacement` says so.
     is_displacement
-        Shape (s,).
+        Shape (n,).
     shaker_floor
         0 for excitation by the base.
     mode
-        Mode of a decay test, from 1; 0 where the campaign does not name it.
+        Mode that a decay test is for, from 1; 0 where it was not told.
     displacements
-        Floor (from 1) and displacement [m], shape (m,), where lasers measured beside accelerometers.
+        Floor (from 1) -> displacement [m], shape (m,), where lasers were there beside accelerometers.
     role
         training, validation or repeat; validation tests are kept for verification where there are others.
-    places
-        Place of each column of `responses`; empty where column i is floor i + 1.
-    further_inputs
-        Place and values of the excitations beside the first one.
-    direction
-        Direction of the first excitation; empty where the campaign has one direction only.
     """
 
     name: str
@@ -77,26 +53,11 @@ class FrameTest:
     mode: int = 0
     displacements: tuple[tuple[int, FloatArray], ...] = ()
     role: str = "training"
-    places: tuple[Place, ...] = ()
-    further_inputs: tuple[tuple[Place, FloatArray], ...] = ()
-    direction: str = ""
-
-    @property
-    def sensors(self) -> tuple[Sensor, ...]:
-        """Place and kind of each column of `responses`."""
-        places = self.places or tuple(Place(floor) for floor in range(1, self.responses.shape[1] + 1))
-        return tuple(Sensor(*place, flag) for place, flag in zip(places, self.is_displacement, strict=True))
-
-    @property
-    def inputs(self) -> dict[Place, FloatArray]:
-        """Measured excitations, each of shape (m,), and where they act."""
-        first = {} if self.excitation is None else {Place(self.shaker_floor, self.direction): self.excitation}
-        return {**first, **dict(self.further_inputs)}
 
     @property
     def floors(self) -> int:
-        """Highest floor with a sensor."""
-        return max(sensor.floor for sensor in self.sensors)
+        """Number of floors n."""
+        return int(self.responses.shape[1])
 
     @property
     def duration_s(self) -> float:
@@ -104,53 +65,26 @@ class FrameTest:
         return self.responses.shape[0] / self.sampling_rate_hz
 
 
-_FLOOR_CHANNEL = re.compile(r"^(floor_acceleration|floor_displacement)_([1-9][0-9]*)(?:_([a-z][a-z0-9]*))?$")
-_GROUND_CHANNEL = re.compile(r"^ground_acceleration(?:_([a-z][a-z0-9]*))?$")
-_FORCE_CHANNEL = re.compile(r"^input_force(?:_([a-z0-9]+))?$")
+def _floor_numbers(recording: Recording, quantity: str) -> set[int]:
+    prefix = f"{quantity}_"
+    return {int(key[len(prefix) :]) for key in recording.channels if key.startswith(prefix)}
 
 
-def _sensors(recording: Recording) -> dict[Sensor, str]:
-    """Return the sensors of a recording and their channels; a displacement only where no accelerometer is."""
-    found: dict[Sensor, str] = {}
-    for name in recording.channels:
-        match = _FLOOR_CHANNEL.match(name)
-        if match:
-            found[Sensor(int(match.group(2)), match.group(3) or "", match.group(1) == DISPLACEMENT)] = name
-    return {
-        sensor: name
-        for sensor, name in sorted(found.items())
-        if not (sensor.is_displacement and sensor._replace(is_displacement=False) in found)
-    }
-
-
-def _shaker_floor(recording: Recording, channel: str, source: Path, floors: int) -> int:
+def _shaker_floor(recording: Recording, source: Path, floors: int) -> int:
     details = recording.details
-    own = details.get(f"{channel}_floor")
-    named = own if own is not None else details.get("floor", details.get("shaker_floor"))
-    place = f"tests.{recording.name}.channels.{channel}"
+    named = details.get("floor", details.get("input_force_floor", details.get("shaker_floor")))
     if named is None:
+        place = f"tests.{recording.name}.channels.input_force"
         raise UserError(source, place, "does not say on which floor the shaker acts", "add floor: 1 (or another)")
     floor = int(named)
     if not 1 <= floor <= floors:
-        raise UserError(source, f"{place}.floor", f"is {floor}", f"the frame has floors 1 to {floors}")
+        place = f"tests.{recording.name}.channels.input_force.floor"
+        raise UserError(source, place, f"is {floor}", f"the frame has floors 1 to {floors}")
     return floor
 
 
-def _inputs(recording: Recording, source: Path, floors: int) -> dict[Place, FloatArray]:
-    """Return the measured excitations: forces first, then ground motion."""
-    forces, ground = {}, {}
-    for name, values in recording.channels.items():
-        force, base = _FORCE_CHANNEL.match(name), _GROUND_CHANNEL.match(name)
-        if force:
-            direction = str(recording.details.get(f"{name}_direction") or "")
-            forces[Place(_shaker_floor(recording, name, source, floors), direction)] = values
-        elif base:
-            ground[Place(0, base.group(1) or "")] = values
-    return {**forces, **ground}
-
-
 def _cut(recording: Recording) -> slice:
-    # a modal fit needs an unbroken record, so the longest segment of a test is used
+    # tests of a frame are used whole or as one stretch: a modal fit needs an unbroken record
     if not recording.segments:
         return slice(None)
     start, stop = max(recording.segments, key=lambda item: item[1] - item[0])
@@ -163,55 +97,49 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
     Parameters
     ----------
     recording
-        With channels floor_acceleration_i or floor_displacement_i, and ground_acceleration or input_force.
+        With channels floor_acceleration_i or floor_displacement_i and ground_acceleration or input_force.
     source
         campaign.yaml, for messages.
     floors
-        Number of floors; 0 takes the highest floor with a channel.
+        Number of floors; 0 takes it from the channels.
 
     Raises
     ------
     UserError
-        If no floor has a channel, the floor of the shaker is missing or does not exist, or a forced test has no
-        excitation.
+        If a floor has no channel, or the shaker's floor is not told or is not there.
     """
-    sensors = _sensors(recording)
-    place = f"tests.{recording.name}.channels"
-    if not sensors:
-        raise UserError(source, place, f"no {ACCELERATION}_1", "one floor at least needs a channel")
-    n = floors or max(sensor.floor for sensor in sensors)
-    beyond = [name for sensor, name in sensors.items() if sensor.floor > n]
-    if beyond:
-        raise UserError(source, f"{place}.{beyond[0]}", "is above the top floor", f"the frame has floors 1 to {n}")
+    accelerations = _floor_numbers(recording, ACCELERATION)
+    displacements = _floor_numbers(recording, DISPLACEMENT)
+    seen = accelerations | displacements
+    n = floors or max(seen, default=0)
+    missing = sorted(set(range(1, n + 1)) - seen)
+    if missing or not seen:
+        place = f"tests.{recording.name}.channels"
+        name = f"{ACCELERATION}_{missing[0] if missing else 1}"
+        raise UserError(source, place, f"no {name}", "every floor needs its acceleration (or displacement) channel")
     part = _cut(recording)
-    inputs = [(where, values[part]) for where, values in _inputs(recording, source, n).items()]
-    if not inputs and recording.kind in {"sweep", "random"}:
-        raise UserError(
-            source,
-            place,
-            "no ground_acceleration",
-            "add it, or input_force with its floor, or write kind: ambient where the excitation was not measured",
-        )
-    first, values = inputs[0] if inputs else (Place(0), None)
-    lasers = sorted(
-        (int(match.group(2)), name)
-        for name in recording.channels
-        if (match := _FLOOR_CHANNEL.match(name)) and match.group(1) == DISPLACEMENT and not match.group(3)
-    )
+    is_displacement = tuple(floor not in accelerations for floor in range(1, n + 1))
+    names = [f"{DISPLACEMENT if d else ACCELERATION}_{i}" for i, d in enumerate(is_displacement, start=1)]
+    responses = np.column_stack([recording.channels[name][part] for name in names])
+    shaker = 0
+    excitation = recording.channels.get("ground_acceleration")
+    if "input_force" in recording.channels:
+        shaker = _shaker_floor(recording, source, n)
+        excitation = recording.channels["input_force"]
+    if excitation is None and recording.kind != "free-decay":
+        place = f"tests.{recording.name}.channels"
+        raise UserError(source, place, "no ground_acceleration", "add it, or input_force with its floor")
     return FrameTest(
         name=recording.name,
         kind=recording.kind,
         sampling_rate_hz=recording.sampling_rate_hz,
-        excitation=None if recording.kind == "ambient" else values,
-        responses=np.column_stack([recording.channels[name][part] for name in sensors.values()]),
-        is_displacement=tuple(sensor.is_displacement for sensor in sensors),
-        shaker_floor=first.floor,
+        excitation=None if excitation is None else excitation[part],
+        responses=responses,
+        is_displacement=is_displacement,
+        shaker_floor=shaker,
         mode=int(recording.details.get("mode") or 0),
         role=recording.role,
-        displacements=tuple((floor, recording.channels[name][part]) for floor, name in lasers),
-        places=tuple(Place(sensor.floor, sensor.direction) for sensor in sensors),
-        further_inputs=() if recording.kind == "ambient" else tuple(inputs[1:]),
-        direction=first.direction,
+        displacements=tuple((i, recording.channels[f"{DISPLACEMENT}_{i}"][part]) for i in sorted(displacements)),
     )
 
 
@@ -226,52 +154,43 @@ class FrameTests:
     decays
         Free-decay tests.
     floor_masses
-        Shape (n,) [kg]; nan where unknown.
+        Shape (n,) [kg].
     source
         campaign.yaml, for messages.
-    ambient
-        Tests whose excitation was not measured.
     """
 
     forced: tuple[FrameTest, ...]
     decays: tuple[FrameTest, ...]
     floor_masses: FloatArray
     source: Path
-    ambient: tuple[FrameTest, ...] = ()
 
 
 def frame_tests(campaign: Campaign) -> FrameTests:
-    """Return the forced, ambient and decay tests of a frame campaign.
+    """Return the forced and decay tests of a frame campaign.
 
     Raises
     ------
     UserError
-        If the rig is no shear-frame, no forced or ambient test is there, or masses are too few or not positive.
+        If the rig is no shear-frame, no sweep or random test is there, or the masses are missing, too few or not
+        positive.
     """
     source = campaign.directory / "campaign.yaml"
     if campaign.rig != "shear-frame":
         raise UserError(source, "rig", f"is {campaign.rig!r}", "identify-frame needs a campaign of a shear-frame")
-    used = [item for item in campaign.recordings if item.kind in {"sweep", "random", "ambient"}]
-    if not used:
-        raise UserError(source, "tests", "no test of kind sweep or random", "mode shapes need a forced or ambient test")
+    forced_recordings = [item for item in campaign.recordings if item.kind in {"sweep", "random"}]
+    if not forced_recordings:
+        raise UserError(source, "tests", "no test of kind sweep or random", "mode shapes need a forced test")
+    forced = tuple(frame_test(item, source) for item in forced_recordings)
+    floors = max(item.floors for item in forced)
+    forced = tuple(frame_test(item, source, floors) for item in forced_recordings)
+    decays = tuple(frame_test(item, source, floors) for item in campaign.recordings if item.kind == "free-decay")
     masses = np.asarray(campaign.floor_masses_kg, dtype=np.float64)
-    floors = masses.size or max(frame_test(item, source).floors for item in used)
-    if masses.size:
-        _check_masses(masses, [frame_test(item, source) for item in used], source)
-    else:
-        masses = np.full(floors, np.nan)
-
-    def of_kind(*kinds: str) -> tuple[FrameTest, ...]:
-        return tuple(frame_test(item, source, floors) for item in campaign.recordings if item.kind in kinds)
-
-    return FrameTests(of_kind("sweep", "random"), of_kind("free-decay"), masses, source, of_kind("ambient"))
-
-
-def _check_masses(masses: FloatArray, tests: Sequence[FrameTest], source: Path) -> None:
     place = "frame.floor_masses_kg"
-    floors = max(test.floors for test in tests)
-    if masses.size < floors:
+    if masses.size == 0:
+        raise UserError(source, place, "is missing", f"give the masses of the {floors} floors in kg")
+    if masses.size != floors:
         raise UserError(source, place, f"has {masses.size} entries", f"the channels are of {floors} floors")
     for floor, mass in enumerate(masses, start=1):
-        if np.isinf(mass) or mass <= 0.0:
+        if not (np.isfinite(mass) and mass > 0.0):
             raise UserError(source, place, f"mass of floor {floor} is {mass:g} kg", "give a positive mass in kg")
+    return FrameTests(forced, decays, masses, source)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.records import FrameTest, Place, Sensor
+from mrpipe.modal.records import FrameTest
 
 ComplexArray = NDArray[np.complex128]
 
@@ -42,59 +41,31 @@ class RecordSpectrum:
     ----------
     omega
         Shape (m,) [rad/s].
-    excitations
-        Shape (m, k), a column an input.
-    inputs
-        Where each input acts; floor 0 is the ground.
+    excitation
+        Shape (m,).
     responses
-        Shape (m, s), a column a sensor.
-    sensors
-        Place and kind of each sensor.
+        Shape (m, n).
+    is_displacement
+        Shape (n,).
+    shaker_floor
+        0 for excitation by the base.
     dt
         Sampling interval [s].
     """
 
     omega: FloatArray
-    excitations: ComplexArray
-    inputs: tuple[Place, ...]
+    excitation: ComplexArray
     responses: ComplexArray
-    sensors: tuple[Sensor, ...]
+    is_displacement: tuple[bool, ...]
+    shaker_floor: int
     dt: float
-
-    @property
-    def excitation(self) -> ComplexArray:
-        """The first input, shape (m,)."""
-        return np.asarray(self.excitations[:, 0])
-
-    def input_columns(self, inputs: Sequence[Place]) -> ComplexArray:
-        """Return the spectra of `inputs`, shape (m, len(inputs)); zero where the test has no such input."""
-        columns = np.zeros((self.omega.size, len(inputs)), dtype=np.complex128)
-        for index, place in enumerate(inputs):
-            if place in self.inputs:
-                columns[:, index] = self.excitations[:, self.inputs.index(place)]
-        return columns
 
     def below(self, omega: float) -> RecordSpectrum:
         """Return the lines up to `omega` [rad/s]."""
         inside = self.omega <= omega
         return replace(
-            self, omega=self.omega[inside], excitations=self.excitations[inside], responses=self.responses[inside]
+            self, omega=self.omega[inside], excitation=self.excitation[inside], responses=self.responses[inside]
         )
-
-    def every(self, stride: int) -> RecordSpectrum:
-        """Return each `stride`-th line: the model of the fit holds at every line by itself."""
-        return replace(
-            self,
-            omega=self.omega[::stride],
-            excitations=self.excitations[::stride],
-            responses=self.responses[::stride],
-        )
-
-
-def thinned(spectra: Sequence[RecordSpectrum], lines: int) -> tuple[RecordSpectrum, ...]:
-    """Return spectra with about `lines` lines in all where they have more; long records then cost no more time."""
-    stride = max(1, round(sum(item.omega.size for item in spectra) / lines))
-    return tuple(item.every(stride) for item in spectra)
 
 
 def averaged_responses(test: FrameTest, segment_s: float) -> FrequencyResponses:
@@ -131,15 +102,14 @@ def record_spectrum(test: FrameTest, band_hz: tuple[float, float]) -> RecordSpec
     frequency = np.fft.rfftfreq(samples, 1.0 / test.sampling_rate_hz)
     frequency = np.asarray(frequency, dtype=np.float64)
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1]) & (frequency > 0.0)
-    values = np.column_stack(list(test.inputs.values()))
-    excitations = np.fft.rfft(values - values.mean(axis=0), axis=0)[inside]
+    excitation = np.fft.rfft(test.excitation - test.excitation.mean())[inside]
     responses = np.fft.rfft(test.responses - test.responses.mean(axis=0), axis=0)[inside]
     return RecordSpectrum(
         omega=np.asarray(2.0 * np.pi * frequency[inside], dtype=np.float64),
-        excitations=excitations,
-        inputs=tuple(test.inputs),
+        excitation=excitation,
         responses=responses,
-        sensors=test.sensors,
+        is_displacement=test.is_displacement,
+        shaker_floor=test.shaker_floor,
         dt=1.0 / test.sampling_rate_hz,
     )
 
@@ -157,7 +127,7 @@ def excited_band(tests: tuple[FrameTest, ...], share: float = 0.03) -> tuple[flo
         rate = test.sampling_rate_hz
         length = int(min(8.0, 0.25 * test.duration_s) * rate)
         frequency, power = signal.welch(test.excitation, fs=rate, nperseg=length, detrend="constant")
-        # the first lines contain the drift of the sensor
+        # the first lines hold the sensor's drift
         power[:2] = 0.0
         falling = np.sort(power)[::-1]
         usual = falling[int(np.searchsorted(np.cumsum(falling), 0.5 * falling.sum()))]
@@ -166,13 +136,3 @@ def excited_band(tests: tuple[FrameTest, ...], share: float = 0.03) -> tuple[flo
         lows.append(float(frequency[inside[0]]))
         highs.append(float(frequency[inside[-1]]))
     return max(min(lows), 1e-3), max(highs)
-
-
-def all_inputs(spectra: Sequence[RecordSpectrum]) -> tuple[Place, ...]:
-    """Return the inputs of all tests; in the order of the tests."""
-    return tuple(dict.fromkeys(place for item in spectra for place in item.inputs))
-
-
-def all_sensors(spectra: Sequence[RecordSpectrum]) -> tuple[Sensor, ...]:
-    """Return the sensors of all tests, lowest floor first."""
-    return tuple(sorted(dict.fromkeys(sensor for item in spectra for sensor in item.sensors)))

@@ -70,7 +70,6 @@ class Pipeline:
     outcomes: dict[str, Outcome] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.stages = {name: stage.for_configuration(self.loaded.config) for name, stage in self.stages.items()}
         self._manifests = self.run_directory / "manifests"
         self._hashes = FileHashes(self.run_directory / "manifests" / ".hashes.json")
 

@@ -29,7 +29,7 @@ from mrpipe.simulation import kernel, parts
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
-Tracking = Literal["damper", "ideal", "continuous"]
+Tracking = Literal["damper", "ideal", "continuous", "unclipped"]
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ class LoopOptions:
         `damper`: the chain gives the force. `ideal`: the damper gives the clipped desired force of the controller and
         holds it from sample to sample, as errata section B has it. `continuous`: the law acts on the true motion at
         every instant and its force is never active, which is for vd, vdps and vdns only: the others have a memory,
-        and no step is small enough for what fdns then does (docs/numerics.md).
+        and no step is small enough for what fdns then does (docs/numerics.md). `unclipped`: as `continuous`, but the
+        force may be active, so that the loop is linear; this serves comparison with the exact frequency response.
     delay_s
         From sampling to output of the controller.
     driver_time_constant_s
@@ -305,7 +306,7 @@ def _run_numbers(
     track = parts.TRACK_DAMPER
     if options.tracking == "ideal":
         track = parts.TRACK_SAMPLED
-    elif options.tracking == "continuous":
+    elif options.tracking in ("continuous", "unclipped"):
         if not law_named(controller.law).linear:
             raise UserError(
                 "simulate", "tracking", f"law {controller.law} cannot run in continuous time", "give ideal or damper"
@@ -320,6 +321,7 @@ def _run_numbers(
     lag = options.driver_time_constant_s
     run[parts.R_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
     run[parts.R_C], run[parts.R_K] = controller.gains.c_n_s_m, controller.gains.k_n_m
+    run[parts.R_CLIPPED] = 0.0 if options.tracking == "unclipped" else 1.0
     return counts, run
 
 

@@ -25,7 +25,8 @@ R_DT = 0
 R_LAG = 1  # share of the way to the command that the driver goes in a step, 1 without lag
 R_C = 2
 R_K = 3
-R_SIZE = 4
+R_CLIPPED = 4  # 1: the force of a perfect damper is never active; 0: it follows the linear law
+R_SIZE = 5
 
 # --- integers of the run ---
 I_STEPS = 0
@@ -50,9 +51,9 @@ T_SIZE = 8
 
 @njit(float64(float64[::1], float64, float64), cache=True)
 def ideal_force(run: FloatArray, x: float, v: float) -> float:
-    """Return the force of a perfect damper: law (4.14), clipped by P2 (22). It never falls with v."""
+    """Return the force of a perfect damper: law (4.14), clipped by P2 (22) unless the run is linear."""
     force = run[R_C] * v + run[R_K] * x
-    return force if force * v >= 0.0 else 0.0
+    return force if run[R_CLIPPED] == 0.0 or force * v >= 0.0 else 0.0
 
 
 # parameters and state of the plain chain: lag, polynomials, hysteresis, sum

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray
-from mrpipe.control.assembly import ControllerFactory
+from mrpipe.artifacts import Artifact, FloatArray, load_parameter_set
+from mrpipe.control.assembly import ControllerFactory, inverse_network
 from mrpipe.control.controller import Controller
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law
-from mrpipe.dampers.model import DamperModel
+from mrpipe.control.storage import read_calibrated
+from mrpipe.dampers.model import DamperModel, damper_from_parameter_set, read_damper
 from mrpipe.dampers.plant import Chain
 from mrpipe.simulation import excitation as kinds
 from mrpipe.simulation.adjustment import adjusted_amplitude
@@ -30,7 +31,7 @@ from mrpipe.simulation.loop import (
     simulate_law,
 )
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
-from mrpipe.structures import Frame, natural_modes
+from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes, read_frame
 
 RECORD_RATE_HZ = 1000.0
 """Rate of the histories where the settings give none; with a perfect damper, whose force jumps, every plant step."""
@@ -95,6 +96,40 @@ class Rig:
             rng=rng,
             initial_state=initial_state,
         )
+
+
+def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact]) -> Rig:
+    """Return the rig of a run.
+
+    Parameters
+    ----------
+    settings
+        Of the simulation: which frame, damper and controller.
+    artifact
+        Opens the artifact of a stage by its name: `identify-frame`, `identify-damper`, `calibrate`, `train-inverse`.
+
+    Raises
+    ------
+    UserError
+        If a parameter set is not there.
+    """
+    if settings.frame == "identified":
+        frame = read_frame(artifact("identify-frame"))
+    else:
+        frame = frame_from_parameter_set(settings.frame)
+    if settings.damper == "identified":
+        damper = read_damper(artifact("identify-damper"))
+    else:
+        damper = damper_from_parameter_set(load_parameter_set("dampers", settings.damper))
+    controllers = ControllerFactory(
+        frame,
+        damper,
+        read_calibrated(artifact("calibrate")),
+        settings.controller,
+        inverse_network(settings.controller, lambda: artifact("train-inverse")),
+        settings.ideal_rounding_m_s,
+    )
+    return Rig(frame, damper, controllers, loop_options(settings))
 
 
 def loop_options(settings: SimulateSettings) -> LoopOptions:

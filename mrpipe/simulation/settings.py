@@ -70,16 +70,12 @@ class SimulateSettings(Section):
     """The closed loop."""
 
     frame: str = Field("identified", description="Frame: `identified`, or a set of configs/frames or its YAML file.")
-    damper: str = Field(
-        "identified",
-        description="Damper in the loop: `identified`; `traced`, the one with the base form and effects that "
-        "close-loop found, under the controller of the identified one; a damper artifact (.h5) of another run; "
-        "or a set of configs/dampers or its YAML file.",
-    )
-    tracking: Literal["damper", "ideal", "continuous"] = Field(
+    damper: str = Field("identified", description="Damper: `identified`, or a set of configs/dampers or its YAML file.")
+    tracking: Literal["damper", "ideal", "continuous", "unclipped"] = Field(
         "damper",
         description="The damper gives the force; `ideal`: the controller has perfect sensors and its clipped force is "
-        "held from sample to sample (errata section B); `continuous`: vd, vdps, vdns at every instant, never active.",
+        "held from sample to sample; `continuous`: vd, vdps, vdns act at every instant and are never active; "
+        "`unclipped`: the same, but the force may be active, so that the loop is linear.",
     )
     plant_rate_hz: float = Field(2000.0, ge=100.0, description="Steps of the plant a second.")
     record_rate_hz: float | None = Field(
@@ -100,3 +96,24 @@ class SimulateSettings(Section):
     excitation: ExcitationSettings = Field(ExcitationSettings(), description="What shakes the base.")
     controller: ControllerSettings = Field(ControllerSettings(), description="The real-time controller.")
     sensors: SensorSettings = Field(SensorSettings(), description="Noise of the sensors.")
+
+
+class ResonanceSettings(Section):
+    """Response of the closed loop over the excitation frequency."""
+
+    band_rad_s: tuple[float, float] | None = Field(
+        None,
+        description="Lowest and highest frequency; null: from 0.75 times the free frequency of the calibrated mode to "
+        "1.2 times its frequency with a locked damper.",
+    )
+    points: int = Field(19, ge=5, description="Frequencies of the grid; the resonances are refined in addition.")
+    amplitude_factors: tuple[float, ...] = Field(
+        (1.0,),
+        min_length=1,
+        description="Amplitudes of the base acceleration in multiples of that of `simulate.excitation`.",
+    )
+    tolerance: float = Field(
+        2e-3, gt=0.0, description="Relative change of the RMS values from window to window that counts as steady."
+    )
+    window_cycles: int = Field(6, ge=2, description="Cycles over which an RMS value is taken.")
+    most_cycles: int = Field(160, ge=20, description="Longest run at one frequency.")

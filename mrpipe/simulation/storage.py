@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 from mrpipe.simulation.loop import Response
+from mrpipe.simulation.response_curve import QUANTITIES, ResponseCurve
 
 _FLOORS = {
     "displacement": "m",
@@ -40,3 +43,16 @@ def read_histories(artifact: Artifact) -> dict[str, FloatArray]:
     """Return the histories by name."""
     names = [*(name.removesuffix("_s") for name in _HISTORIES), *_FLOORS, "drive"]
     return {name: artifact.array(name) for name in names}
+
+
+def write_curves(artifact: ArtifactWriter, curves: Sequence[ResponseCurve]) -> None:
+    """Write response curves: a group `amplitude_<k>` for each amplitude of the base acceleration."""
+    for number, curve in enumerate(curves, start=1):
+        group = f"amplitude_{number}"
+        artifact.put(f"{group}/base_amplitude", curve.base_amplitude_m_s2, unit="m/s^2")
+        artifact.put(f"{group}/frequency", curve.frequency_rad_s, unit="rad/s", dims=("frequency",))
+        artifact.put(f"{group}/resonance", curve.resonance_rad_s, unit="rad/s")
+        for name in QUANTITIES:
+            unit = "m/s^2" if name.endswith("_m_s2") else "m"
+            plain = name.removesuffix("_m_s2").removesuffix("_m")
+            artifact.put(f"{group}/{plain}", curve.column(name), unit=unit, dims=("frequency",))

@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mrpipe.control.laws import law_names
 from mrpipe.pipeline.stage import Stage, StageContext
-
-if TYPE_CHECKING:
-    from mrpipe.simulation.rig import Rig
-
-DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
-"""Dampers of this run by name, and the stage whose artifact holds each."""
 
 
 def simulate_stage(law: str) -> Stage:
@@ -23,7 +16,6 @@ def simulate_stage(law: str) -> Stage:
         summary=f"Run the closed loop under law {law}.",
         run=lambda context: _run(context, law),
         inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-        conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
         settings=("simulate",),
         family="simulate",
         outputs=(f"response-{law}.h5",),
@@ -34,13 +26,13 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     from mrpipe.dampers.model import read_tested
     from mrpipe.reporting import simulate as report
     from mrpipe.simulation.indices import indices
-    from mrpipe.simulation.rig import excitation_of, release_state
+    from mrpipe.simulation.rig import excitation_of, read_rig, release_state
     from mrpipe.simulation.storage import write_response
     from mrpipe.simulation.training_range import check_ranges, ranges_as_json
     from mrpipe.thesis.printed import PRINTED
 
     settings = context.settings.simulate
-    rig = _rig(context)
+    rig = read_rig(settings, context.artifact)
     controller = rig.controller(law)
     excitation, viscous = excitation_of(rig, settings.excitation)
     context.progress(0.4, f"loop under {law}")
@@ -57,7 +49,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     if viscous is not None:
         against = indices(viscous, excitation, **judged)
         values["rms_x_top_over_vd"] = values["rms_x_top_m"] / against["rms_x_top_m"]
-    tested = read_tested(context.artifact("identify-damper")) if settings.damper in DAMPERS else {}
+    tested = read_tested(context.artifact("identify-damper")) if settings.damper == "identified" else {}
     ranges = check_ranges(rig, controller, response, tested)
     for check in ranges:
         if check.warning:
@@ -73,32 +65,6 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     report.describe_ranges(context.report, ranges)
     details = {"excitation": excitation.details, "drive_unit": rig.damper.drive_unit}
     return {"law": law, **values, **details, "training_range": ranges_as_json(ranges)}
-
-
-def _rig(context: StageContext) -> Rig:
-    from mrpipe.control.assembly import ControllerFactory, inverse_network
-    from mrpipe.control.storage import read_calibrated
-    from mrpipe.effects.damper import damper_named
-    from mrpipe.simulation.rig import Rig, loop_options
-    from mrpipe.structures import frame_from_parameter_set, read_frame
-
-    settings = context.settings.simulate
-    if settings.frame == "identified":
-        frame = read_frame(context.artifact("identify-frame"))
-    else:
-        frame = frame_from_parameter_set(settings.frame)
-    dampers = {name: partial(context.artifact, stage) for name, stage in DAMPERS.items()}
-    damper = damper_named(settings.damper, dampers)
-    controllers = ControllerFactory(
-        frame,
-        # the controller knows the damper that it was designed for, not what the tracing has found since
-        damper_named("identified", dampers) if settings.damper == "traced" else damper,
-        read_calibrated(context.artifact("calibrate")),
-        settings.controller,
-        inverse_network(settings.controller, lambda: context.artifact("train-inverse")),
-        settings.ideal_rounding_m_s,
-    )
-    return Rig(frame, damper, controllers, loop_options(settings))
 
 
 STAGES = tuple(simulate_stage(law) for law in law_names())

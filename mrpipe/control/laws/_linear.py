@@ -27,7 +27,11 @@ POSITIVE_STIFFNESS = GainRange(
     "k_n_m", "positive stiffness", lambda plant: (0.0, plant.static_stiffness_n_m), optional=True
 )
 NEGATIVE_STIFFNESS = GainRange(
-    "k_n_m", "negative stiffness", lambda plant: (-0.98 * plant.static_stiffness_n_m, 0.0), optional=True
+    # beyond the static stiffness too, because the clipped force is never active and so cannot destabilise the structure
+    "k_n_m",
+    "negative stiffness",
+    lambda plant: (-2.5 * plant.static_stiffness_n_m, 0.0),
+    optional=True,
 )
 
 

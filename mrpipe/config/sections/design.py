@@ -1,0 +1,5 @@
+"""Settings of `mrpipe design`."""
+
+from mrpipe.design.options import DesignSettings
+
+__all__ = ["DesignSettings"]

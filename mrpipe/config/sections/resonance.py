@@ -1,0 +1,5 @@
+"""Settings of `simulate --resonance`."""
+
+from mrpipe.simulation.settings import ResonanceSettings
+
+__all__ = ["ResonanceSettings"]

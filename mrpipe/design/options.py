@@ -1,0 +1,50 @@
+"""Settings of `mrpipe design`: the section `design` of the configuration."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from mrpipe.options import Section
+
+
+class MotionSettings(Section):
+    """A recorded base motion that the design must withstand."""
+
+    file: str = Field(..., description="Text or CSV of two columns: time [s] and acceleration.")
+    unit: str = Field("m/s^2", description="Unit of the acceleration.")
+    scale: float = Field(1.0, gt=0.0, description="Factor on the record.")
+
+
+class DesignSettings(Section):
+    """The law and gains with the smallest largest response of the real loop."""
+
+    laws: tuple[str, ...] = Field(
+        (), description="Laws in the race; empty: all that are calibrated, and the passive ones."
+    )
+    weights: dict[str, float] = Field(
+        {"rms_x_top_m": 1.0},
+        min_length=1,
+        description="Weights of the largest values of rms_x_top_m, rms_x1_m, rms_a1_m_s2, rms_a_top_m_s2 and "
+        "rms_stroke_m, each relative to law vd at its calibrated gains.",
+    )
+    amplitude_factors: tuple[float, ...] = Field(
+        (0.75, 1.0),
+        min_length=1,
+        description="Amplitudes of the base acceleration in multiples of that of `simulate.excitation`.",
+    )
+    band_rad_s: tuple[float, float] | None = Field(
+        None, description="Lowest and highest frequency; null: that of `resonance`, by default around the target mode."
+    )
+    motions: tuple[MotionSettings, ...] = Field((), description="Recorded base motions, in addition.")
+    stroke_limit_m: float | None = Field(None, gt=0.0, description="Largest stroke of the damper; null: not limited.")
+    fixed_gains: dict[str, dict[str, float]] = Field(
+        {}, description="Gains that are not searched: law -> gain -> value, such as {vdns: {k_n_m: -4500}}."
+    )
+    also_free: bool = Field(
+        False, description="Search laws with fixed gains a second time with all gains free; reported as `unrestricted`."
+    )
+    grid: int = Field(7, ge=3, description="Values of a single gain before the local search.")
+    evaluations: int = Field(14, ge=3, description="Most evaluations of the local search per free gain.")
+    draws: int = Field(
+        24, ge=0, description="Structures and dampers drawn from their uncertainty, for the probability of each law."
+    )

@@ -1,0 +1,122 @@
+"""The design problem of a run: its loop, the laws in the race, and what is uncertain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.control.gains import Gains
+from mrpipe.control.law import GainRange, Plant
+from mrpipe.control.laws import all_laws
+from mrpipe.dampers.model import DamperModel, parameter_unit
+from mrpipe.design.options import DesignSettings
+from mrpipe.design.search import FreeGain
+from mrpipe.design.study import LawUnderDesign
+from mrpipe.design.uncertainty import Draw
+from mrpipe.errors import UserError
+from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.loop import Response
+from mrpipe.simulation.response_curve import QUANTITIES, Run
+from mrpipe.simulation.rig import Rig
+
+SMALLEST_SHARE = 0.02
+"""Where a gain may be zero, the search on logarithms ends at this share of its largest value."""
+
+
+@dataclass(frozen=True)
+class LoopOf:
+    """Gives the loop of a law; may be sent to another process.
+
+    Attributes
+    ----------
+    rig
+        Structure, damper, controllers and options. The controllers know the nominal damper.
+    seed
+        Of the sensor noise, which is the same in all runs, so that gains are compared under the same conditions.
+    """
+
+    rig: Rig
+    seed: int
+
+    def __call__(self, law: str, gains: Gains) -> Run:
+        """Return the function that runs the loop of a law under an excitation."""
+        controller = self.rig.controller(law, gains)
+        chain = self.rig.damper.chain()
+
+        def run(excitation: Excitation) -> Response:
+            return self.rig.run(controller, excitation, chain=chain, rng=np.random.default_rng(self.seed))
+
+        return run
+
+    def drawn(self, item: Draw) -> LoopOf:
+        """Return the loop with a drawn structure and damper; the controllers stay those of the nominal ones."""
+        damper = scaled_force(item.damper, item.force_factor)
+        return replace(self, rig=replace(self.rig, frame=item.frame, damper=damper))
+
+
+def scaled_force(damper: DamperModel, factor: float) -> DamperModel:
+    """Return the damper with all its force coefficients times a factor."""
+    parameters = {
+        name: value * factor if parameter_unit(name, damper.drive_unit).startswith("N") else value
+        for name, value in damper.parameters.items()
+    }
+    return replace(damper, parameters=parameters)
+
+
+def laws_in_the_race(
+    settings: DesignSettings, plant: Plant, calibrated: Mapping[str, Gains]
+) -> tuple[list[LawUnderDesign], list[LawUnderDesign], dict[str, str]]:
+    """Return the laws under design, the same with all gains free where some are fixed, and why laws are left out.
+
+    Parameters
+    ----------
+    settings
+        Of the design.
+    plant
+        Gives the bounds of the gains.
+    calibrated
+        Law -> calibrated gains.
+
+    Raises
+    ------
+    UserError
+        If a law or a gain does not exist.
+    """
+    known = all_laws()
+    for name in (*settings.laws, *settings.fixed_gains):
+        if name not in known:
+            raise UserError("design.laws", name, "is not a control law", f"one of {', '.join(known)}")
+    for name in settings.weights:
+        if name not in QUANTITIES:
+            raise UserError("design.weights", name, "is not a quantity", f"one of {', '.join(QUANTITIES)}")
+    entries, free_entries, left_out = [], [], {}
+    for name in settings.laws or known:
+        law = known[name]
+        if law.calibrated and name not in calibrated:
+            left_out[name] = "it is not calibrated"
+            continue
+        start = calibrated.get(name, Gains())
+        fixed = settings.fixed_gains.get(name, {})
+        for gain in fixed:
+            if gain not in law.gain_names:
+                raise UserError(
+                    f"design.fixed_gains.{name}", gain, "is not a gain of this law", ", ".join(law.gain_names) or "none"
+                )
+        free = tuple(_free(gain, plant) for gain in law.gains if gain.name not in fixed)
+        entries.append(LawUnderDesign(name, start.changed(**fixed), free, name))
+        if fixed and settings.also_free:
+            every = tuple(_free(gain, plant) for gain in law.gains)
+            free_entries.append(LawUnderDesign(name, start.changed(**fixed), every, f"{name}, unrestricted"))
+    return entries, free_entries, left_out
+
+
+def _free(gain: GainRange, plant: Plant) -> FreeGain:
+    """Return the range of a gain without zero, which has no logarithm."""
+    low, high = gain.bounds(plant)
+    largest = max(abs(low), abs(high))
+    sign = math.copysign(1.0, high if abs(high) >= abs(low) else low)
+    smallest = max(min(abs(low), abs(high)), SMALLEST_SHARE * largest)
+    return FreeGain(gain.name, *sorted((sign * smallest, sign * largest)))

@@ -1,0 +1,218 @@
+"""Frames and dampers drawn from what their identification leaves uncertain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.model import DamperModel
+from mrpipe.structures import Frame, natural_modes
+
+
+@dataclass(frozen=True)
+class FrameUncertainty:
+    """Standard deviations of the modal parameters of a frame.
+
+    Attributes
+    ----------
+    frequency_relative
+        Of each natural frequency over the frequency, shape (n,) [1].
+    damping_ratio
+        Of each damping ratio, shape (n,) [1].
+    """
+
+    frequency_relative: FloatArray
+    damping_ratio: FloatArray
+
+
+@dataclass(frozen=True)
+class DamperUncertainty:
+    """Covariance of the parameters of a damper, and its model error.
+
+    Attributes
+    ----------
+    names
+        Parameters of the covariance, length p.
+    covariance
+        Shape (p, p), units of the parameters.
+    force_relative
+        Standard deviation of a common factor on the force [1]: the error of the model on tests that it was not fitted
+        to. The covariance alone says only how well this form of model is determined.
+    """
+
+    names: tuple[str, ...]
+    covariance: FloatArray
+    force_relative: float = 0.0
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One realisation of structure and damper.
+
+    Attributes
+    ----------
+    frame, damper
+        The realisation.
+    force_factor
+        Factor on the damper force.
+    numbers
+        Uncertain quantity -> deviation in standard deviations, for the sensitivities.
+    """
+
+    frame: Frame
+    damper: DamperModel
+    force_factor: float
+    numbers: Mapping[str, float]
+
+
+def draw(
+    frame: Frame,
+    damper: DamperModel,
+    frame_uncertainty: FrameUncertainty,
+    damper_uncertainty: DamperUncertainty,
+    rng: np.random.Generator,
+) -> Draw:
+    """Draw one structure and one damper.
+
+    Parameters
+    ----------
+    frame, damper
+        As identified.
+    frame_uncertainty, damper_uncertainty
+        What is uncertain.
+    rng
+        Generator of the draw.
+    """
+    numbers: dict[str, float] = {}
+    drawn_frame = _drawn_frame(frame, frame_uncertainty, rng, numbers)
+    drawn_damper = _drawn_damper(damper, damper_uncertainty, rng, numbers)
+    force = rng.standard_normal()
+    numbers["damper_force"] = float(force)
+    factor = max(0.1, 1.0 + damper_uncertainty.force_relative * float(force))
+    return Draw(drawn_frame, drawn_damper, factor, numbers)
+
+
+def _drawn_frame(
+    frame: Frame, uncertainty: FrameUncertainty, rng: np.random.Generator, numbers: dict[str, float]
+) -> Frame:
+    """Change frequencies and damping ratios of the modes; masses and mode shapes stay.
+
+    K + M Phi diag(omega'^2 - omega^2) Phi' M with mass-normalised Phi has the changed frequencies; C likewise.
+    """
+    modes = natural_modes(frame)
+    omega, shapes = modes.angular_frequencies, modes.mode_shapes
+    shapes = shapes / np.sqrt(np.einsum("im,ij,jm->m", shapes, frame.mass, shapes))
+    z_omega, z_damping = rng.standard_normal((2, len(omega)))
+    numbers.update({f"frequency_{k + 1}": float(z) for k, z in enumerate(z_omega)})
+    numbers.update({f"damping_ratio_{k + 1}": float(z) for k, z in enumerate(z_damping)})
+    changed = omega * (1.0 + uncertainty.frequency_relative * z_omega)
+    ratio = np.diag(shapes.T @ frame.damping @ shapes) / (2.0 * omega)
+    drawn = np.maximum(ratio + uncertainty.damping_ratio * z_damping, 0.1 * ratio)
+    left = frame.mass @ shapes
+    stiffness = frame.stiffness + (left * (changed**2 - omega**2)) @ left.T
+    damping = frame.damping + (left * (2.0 * drawn * changed - 2.0 * ratio * omega)) @ left.T
+    return Frame(frame.mass, damping, stiffness, frame.name)
+
+
+def _drawn_damper(
+    damper: DamperModel, uncertainty: DamperUncertainty, rng: np.random.Generator, numbers: dict[str, float]
+) -> DamperModel:
+    """Draw the parameters from their covariance; a parameter keeps its sign and at least a tenth of its size."""
+    if not uncertainty.names:
+        return damper
+    deviation = np.sqrt(np.maximum(np.diag(uncertainty.covariance), 0.0))
+    values, vectors = np.linalg.eigh(uncertainty.covariance)
+    step = vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(values)))
+    parameters = dict(damper.parameters)
+    for name, change, sigma in zip(uncertainty.names, step, deviation, strict=True):
+        if name not in parameters or sigma == 0.0:
+            continue
+        numbers[name] = float(change / sigma)
+        nominal = parameters[name]
+        changed = nominal + float(change)
+        parameters[name] = changed if changed * nominal > 0.1 * nominal**2 else 0.1 * nominal
+    return replace(damper, parameters=parameters)
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """How sure the choice of the law is.
+
+    Attributes
+    ----------
+    probability_best
+        Law -> share of draws in which it has the smallest objective.
+    regret
+        Mean excess of the chosen law's objective over the best one of each draw [1].
+    regret_p90
+        The same, exceeded in one draw of ten.
+    sensitivities
+        Uncertain quantity -> rank correlation with the lead of the chosen law over the runner-up, largest first.
+    values
+        Law -> objective in each draw, shape (draws,).
+    """
+
+    probability_best: Mapping[str, float]
+    regret: float
+    regret_p90: float
+    sensitivities: Mapping[str, float]
+    values: Mapping[str, FloatArray]
+
+
+def rank(laws: Sequence[str], chosen: str, draws: Sequence[Draw], objective: Callable[[str, Draw], float]) -> Ranking:
+    """Evaluate every law in every draw.
+
+    Parameters
+    ----------
+    laws, chosen
+        Laws in the race, and the one that the design chose.
+    draws
+        Realisations; every law sees the same ones.
+    objective
+        Of a law in a draw.
+    """
+    table = np.array([[objective(law, item) for law in laws] for item in draws])
+    best = np.argmin(table, axis=1)
+    place = laws.index(chosen)
+    lowest = table.min(axis=1)
+    regret = table[:, place] / lowest - 1.0
+    others = np.delete(table, place, axis=1)
+    lead = others.min(axis=1) - table[:, place] if others.size else np.zeros(len(draws))
+    return Ranking(
+        {law: float(np.mean(best == k)) for k, law in enumerate(laws)},
+        float(np.mean(regret)),
+        float(np.quantile(regret, 0.9)),
+        _sensitivities(draws, lead),
+        {law: table[:, k] for k, law in enumerate(laws)},
+    )
+
+
+def _sensitivities(draws: Sequence[Draw], lead: FloatArray) -> dict[str, float]:
+    from scipy.stats import spearmanr
+
+    if len(draws) < 4 or np.ptp(lead) == 0.0:
+        return {}
+    found = {}
+    for name in draws[0].numbers:
+        column = np.array([item.numbers[name] for item in draws])
+        if np.ptp(column) > 0.0:
+            found[name] = float(spearmanr(column, lead).statistic)
+    return dict(sorted(found.items(), key=lambda item: -abs(item[1])))
+
+
+def test_for(parameter: str) -> str:
+    """Return the test that determines an uncertain quantity better."""
+    if parameter.startswith("frequency_"):
+        return f"slow sweep of the structure through mode {parameter.rpartition('_')[2]} at the amplitude of operation"
+    if parameter.startswith("damping_ratio_"):
+        return f"free decay of the structure in mode {parameter.rpartition('_')[2]}"
+    if parameter == "damper_force":
+        return "repeat of the damper's validation tests on another day and at the temperature of operation"
+    if parameter == "eta":
+        return "steps of the drive at constant velocity of the damper"
+    if parameter.startswith("c0"):
+        return "triangular motion of the damper at several speeds, at the drive of operation"
+    return "slow triangular motion of the damper at drives between zero and the limit"

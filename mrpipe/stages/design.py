@@ -1,0 +1,88 @@
+"""`design`: the law and gains with the smallest largest response of the real loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.pipeline.stage import Stage, StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.design.uncertainty import DamperUncertainty, FrameUncertainty
+    from mrpipe.simulation.rig import Rig
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    import time
+
+    from mrpipe.control.calibration import CalibrationOptions, plant_of
+    from mrpipe.design.results import study_as_json, write_design
+    from mrpipe.design.run import load_of, run_design
+    from mrpipe.reporting import design as report
+    from mrpipe.simulation.resonance import default_band
+    from mrpipe.simulation.rig import excitation_of, read_rig
+
+    began = time.perf_counter()
+    settings, simulate = context.settings.design, context.settings.simulate
+    rig = read_rig(simulate, context.artifact)
+    excitation, _ = excitation_of(rig, simulate.excitation)
+    amplitude = _amplitude(excitation.details)
+    band = settings.band_rad_s or context.settings.resonance.band_rad_s or default_band(context.artifact("calibrate"))
+    load = load_of(settings, amplitude, band)
+    plant = plant_of(rig.frame, rig.position, CalibrationOptions(mode=context.settings.calibrate.target_mode))
+    result = run_design(
+        rig,
+        plant,
+        settings,
+        load,
+        _uncertainty(context, rig),
+        absolute=simulate.accelerations == "absolute",
+        rng=context.rng,
+        jobs=context.jobs,
+        progress=context.progress,
+    )
+    for law, why in result.left_out.items():
+        context.warn(f"law {law} is not in the race, because {why}")
+    summary = study_as_json(result.study, result.free, result.front, result.ranking, settings.weights)
+    with context.write("design.h5") as artifact:
+        write_design(artifact, result.study, summary)
+    report.describe(context.report, result, summary)
+    return {**summary, "seconds": time.perf_counter() - began}
+
+
+def _amplitude(details: Mapping[str, Any]) -> float:
+    from mrpipe.errors import UserError
+
+    if "base_amplitude_m_s2" not in details:
+        raise UserError(
+            "simulate.excitation", "kind", f"{details.get('kind')} has no amplitude", "set kind: harmonic for a design"
+        )
+    return float(details["base_amplitude_m_s2"])
+
+
+def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, DamperUncertainty]:
+    import numpy as np
+
+    from mrpipe.design.run import damper_uncertainty, frame_uncertainty
+    from mrpipe.design.uncertainty import DamperUncertainty, FrameUncertainty
+
+    simulate = context.settings.simulate
+    n = rig.frame.floors
+    frame = FrameUncertainty(np.zeros(n), np.zeros(n))
+    if simulate.frame == "identified":
+        frame = frame_uncertainty(context.artifact("identify-frame"), rig.frame)
+    damper = DamperUncertainty((), np.zeros((0, 0)))
+    if simulate.damper == "identified":
+        damper = damper_uncertainty(context.artifact("identify-damper"))
+    return frame, damper
+
+
+STAGE = Stage(
+    name="design",
+    summary="Find the law and gains with the smallest largest response over frequency and amplitude.",
+    run=_run,
+    inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+    after=("simulate", "resonance"),
+    settings=("design", "simulate", "resonance", "calibrate.target_mode"),
+    outputs=("design.h5",),
+)

@@ -1,0 +1,46 @@
+"""`simulate --law LAW --resonance`: the response over frequency and the loop's own resonance; one stage per law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mrpipe.control.laws import law_names
+from mrpipe.pipeline.stage import Stage, StageContext
+
+
+def resonance_stage(law: str) -> Stage:
+    """Return the stage that measures the response over frequency under `law`."""
+    return Stage(
+        name=f"resonance-{law}",
+        summary=f"Find the resonance of the closed loop under law {law}.",
+        run=lambda context: _run(context, law),
+        inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+        settings=("simulate", "resonance"),
+        family="resonance",
+        outputs=(f"resonance-{law}.h5",),
+    )
+
+
+def _run(context: StageContext, law: str) -> Mapping[str, Any]:
+    from mrpipe.reporting import resonance as report
+    from mrpipe.simulation.resonance import default_band, measure_resonance
+    from mrpipe.simulation.rig import excitation_of, read_rig
+    from mrpipe.simulation.storage import write_curves
+
+    rig = read_rig(context.settings.simulate, context.artifact)
+    settings = context.settings.resonance
+    excitation, _ = excitation_of(rig, context.settings.simulate.excitation)
+    band = settings.band_rad_s or default_band(context.artifact("calibrate"))
+    absolute = context.settings.simulate.accelerations == "absolute"
+    curves = measure_resonance(rig, law, excitation, band, settings, absolute, context.rng, context.progress)
+    for warning in curves.warnings:
+        context.warn(warning)
+    with context.write(f"resonance-{law}.h5") as artifact:
+        write_curves(artifact, curves.curves)
+        artifact.attributes("/", law=law)
+    report.describe(context.report, law, curves)
+    return {"law": law, **curves.as_json()}
+
+
+STAGES = tuple(resonance_stage(law) for law in law_names())
