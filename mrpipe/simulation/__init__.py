@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from mrpipe.simulation.excitation import Excitation, amplitude_for, at_rest, harmonic, recorded, sweep
     from mrpipe.simulation.loop import LoopOptions, Response, SensorNoise, simulate_law
 
+LOADS_FROM: tuple[str, ...] = ()  # the modules loaded at first use are those imported above
+
 __all__ = [
     "Excitation",
     "LoopOptions",

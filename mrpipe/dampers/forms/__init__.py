@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pkgutil
 
+LOADS_FROM: tuple[str, ...] = ()  # only names are read here; mrpipe.dampers.library loads the files
+
 
 def form_names() -> tuple[str, ...]:
     """Return the names of all forms without loading them: a file `bouc_wen.py` holds the form `bouc-wen`."""
