@@ -115,20 +115,65 @@ def _shown(value: Any) -> str | None:
 @with_common_options(*_NOT_FOR_FILES)
 def init(
     options: CommonOptions,
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory to lay out; made if missing.")],
+    directory: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Directory of the project; made if missing. It names the project.")
+    ],
+    source: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="FOLDER",
+            help="Folder of measured files: propose channels, units, signs and roles from headers and samples.",
+        ),
+    ] = None,
+    rig: Annotated[
+        str | None,
+        typer.Option(metavar="RIG", help="bench, frame or both. Default: bench, or what the files of --from hold."),
+    ] = None,
 ) -> None:
-    """Lay out a project for a rig of one's own."""
+    """Create a project for your own rig."""
+    from mrpipe.artifacts.yaml_source import nearest
     from mrpipe.cli.output import print_json
     from mrpipe.cli.project import lay_out
 
-    written = lay_out(directory)
+    if rig not in (None, "bench", "frame", "both"):
+        raise UserError("--rig", str(rig), "is no rig", nearest(str(rig), ("bench", "frame", "both")))
+    project = lay_out(directory, rig, source)  # type: ignore[arg-type]
     if options.json:
-        print_json({"directory": str(directory), "written": [str(path) for path in written]})
+        print_json(
+            {
+                "directory": str(directory),
+                "name": project.name,
+                "written": [str(path) for path in project.written],
+                "campaigns": [
+                    {
+                        "rig": item.rig,
+                        "channels": item.channels,
+                        "tests": [{"name": name, "role": role} for name, role in item.tests],
+                        "unsure": list(item.unsure),
+                        "skipped": list(item.skipped),
+                    }
+                    for item in project.proposals
+                ],
+            }
+        )
         return
-    for path in written:
+    for path in project.written:
         print(path)
-    print(f"next: fill in {directory / 'data' / 'my-rig' / 'campaign.yaml'},")
-    print(f"then: cd {directory} && mrpipe run configs/my-rig.yaml")
+    for item in project.proposals:
+        print(f"{item.rig}: {len(item.tests)} tests")
+        for channel, column in item.channels.items():
+            print(f"  {channel}: {column}")
+        for name, role in item.tests:
+            print(f"  {name}: {role}")
+        for line in item.unsure:
+            print(f"  check: {line}")
+        for line in item.skipped:
+            print(f"  not used: {line}")
+    verb = "check the lines marked UNSURE in" if project.proposals else "fill in"
+    files = " and ".join(str(directory / item / "campaign.yaml") for item in project.campaigns)
+    print(f"next: {verb} {files},")
+    print(f"then: cd {directory} && mrpipe check configs/{project.name}.yaml && mrpipe run configs/{project.name}.yaml")
 
 
 def register(app: typer.Typer) -> None:

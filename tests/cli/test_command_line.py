@@ -100,7 +100,7 @@ def test_explain_lists_settings_with_values(capsys: pytest.CaptureFixture[str]) 
 
 def test_init_lays_out_a_project_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["init", str(tmp_path / "rig")]) == 0
-    assert (tmp_path / "rig" / "data" / "my-rig" / "campaign.yaml").is_file()
+    assert (tmp_path / "rig" / "data" / "rig" / "campaign.yaml").is_file()
     assert run(["init", str(tmp_path / "rig")]) == 2
     assert "exists already" in capsys.readouterr().err
 

@@ -95,7 +95,7 @@ def _frame(change: Callable[[dict[str, np.ndarray]], None] = lambda channels: No
     changed = dict(recordings[1].channels)
     change(changed)
     recordings[1] = replace(recordings[1], channels=changed)
-    return Campaign("own", "shear-frame", Path("own"), tuple(recordings))
+    return Campaign("own", "shear-frame", Path("own"), tuple(recordings), floor_masses_kg=(1.0, 1.0, 1.0))
 
 
 def _kill(channels: dict[str, np.ndarray]) -> None:
@@ -125,6 +125,12 @@ def _spike(channels: dict[str, np.ndarray]) -> None:
 )
 def test_faults_of_a_frame(change: Callable[[dict[str, np.ndarray]], None], expected: set[tuple[str, str]]) -> None:
     assert _names(_frame(change)) == expected
+
+
+@pytest.mark.planted
+def test_missing_masses_are_said() -> None:
+    (found,) = judge(replace(_frame(), floor_masses_kg=()))
+    assert (found.name, found.severity) == ("masses-missing", "warning")
 
 
 @pytest.mark.planted

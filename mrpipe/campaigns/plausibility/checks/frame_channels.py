@@ -25,6 +25,13 @@ def _judge(campaign: Campaign) -> Iterator[Finding]:
         yield from _channels(test)
         for kind in ("acceleration", "displacement", "velocity"):
             yield from _floors(test, kind)
+    if not campaign.floor_masses_kg and any(test.kind != "closed-loop" for test in campaign.recordings):
+        yield Finding(
+            name="masses-missing",
+            severity="warning",
+            sentence="the masses of the floors are not given, so mass and stiffness matrices cannot be identified",
+            remedy="write frame: {floor_masses_kg: [...]} with the masses in kg, lowest floor first",
+        )
     records = [(test.name, _moving(test)) for test in campaign.recordings]
     roles = {test.name: test.role for test in campaign.recordings}
     for overlap in find_overlaps([item for item in records if item[1]]):

@@ -1,0 +1,278 @@
+"""From a folder of measured files to the text of campaign.yaml."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mrpipe import units
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.columns import DataFile
+from mrpipe.campaigns.files import all_readers, ending_of
+from mrpipe.campaigns.proposal.columns import (
+    Column,
+    Guess,
+    Layout,
+    floor_columns,
+    lay_out_bench,
+    lay_out_frame,
+    open_columns,
+)
+from mrpipe.campaigns.proposal.kinds import kind_of, law_of, mode_of
+from mrpipe.campaigns.proposal.roles import Condition, condition_of, drive_in_name, propose_roles
+from mrpipe.campaigns.proposal.text import TestText, campaign_text
+from mrpipe.errors import UserError
+
+Rig = Literal["bench", "frame", "both"]
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A proposed campaign.
+
+    Attributes
+    ----------
+    rig
+        `bench` or `frame`.
+    text
+        Text of campaign.yaml, with comments.
+    channels
+        Channel -> column and unit, for a summary.
+    tests
+        Name of each test and its role or kind.
+    unsure
+        What the user should check, one line each.
+    skipped
+        Files that could not be read, with the reason.
+    """
+
+    rig: Literal["bench", "frame"]
+    text: str
+    channels: dict[str, str]
+    tests: tuple[tuple[str, str], ...]
+    unsure: tuple[str, ...]
+    skipped: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _File:
+    path: Path
+    file: DataFile
+    columns: list[Column]
+    layout: Layout
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate as far as it can be told [Hz], else 1000."""
+        time = self.layout.channels.get("time")
+        if time is not None:
+            steps = np.diff(self.samples(time.column)) * units.conversion(time.unit)
+            return float(1.0 / max(float(np.median(steps)), 1e-9))
+        return self.file.sampling_rate_hz or 1000.0
+
+    def samples(self, column: str) -> FloatArray:
+        """Return a column's samples, shape (n,)."""
+        return next(item.values for item in self.columns if item.name == column)
+
+
+def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) -> list[Proposal]:
+    """Propose one campaign for each rig whose tests a folder holds.
+
+    Parameters
+    ----------
+    folder
+        Folder of data files; files in folders within it count too.
+    name
+        Name of the campaign.
+    rig
+        Rig, or None to find it from the channels.
+    beside
+        Folder of the future campaign.yaml.
+
+    Raises
+    ------
+    UserError
+        If the folder holds no readable data file, or none of the rig that is asked for.
+    """
+    paths, skipped = _data_files(folder), []
+    files: list[_File] = []
+    for path in paths:
+        try:
+            file, columns = open_columns(path)
+        except UserError as error:
+            skipped.append(f"{path.relative_to(folder)}: {error.problem}")
+            continue
+        if len(columns) < 2:
+            skipped.append(f"{path.relative_to(folder)}: fewer than two columns of numbers")
+            continue
+        as_frame = rig == "frame" or (rig != "bench" and floor_columns(columns) >= 2)
+        layout = lay_out_frame(columns, file) if as_frame else lay_out_bench(columns, file)
+        files.append(_File(path, file, columns, layout))
+    if not files:
+        reason = f" ({skipped[0]})" if skipped else ""
+        raise UserError(
+            folder, "", f"holds no readable data file{reason}", f"one of {', '.join(sorted(all_readers()))}"
+        )
+    proposals = []
+    for kind, wanted in (("bench", "damper-bench"), ("frame", "shear-frame")):
+        chosen = [item for item in files if item.layout.rig == wanted]
+        if chosen:
+            label = f"{name}-{kind}" if len({item.layout.rig for item in files}) > 1 else name
+            proposals.append(_propose(chosen, folder, label, kind == "bench", beside, skipped))
+    found = {item.rig for item in proposals}
+    missing = {"bench", "frame"} - found if rig == "both" else {rig} - found if rig else set()
+    if missing:
+        raise UserError(folder, f"--rig {rig}", f"no test of a {missing.pop()} was found", "name another folder or rig")
+    return proposals
+
+
+def _data_files(folder: Path) -> list[Path]:
+    known = all_readers()
+    found = sorted(path for path in folder.rglob("*") if path.is_file() and ending_of(path) in known)
+    return [path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts)][:500]
+
+
+def _propose(
+    files: list[_File], folder: Path, name: str, bench: bool, beside: Path, skipped: Sequence[str]
+) -> Proposal:
+    shared = _shared(files)
+    unsure = [f"channel {key}: {guess.unsure}" for key, guess in shared.items() if guess.unsure]
+    if bench:
+        unsure += [
+            f"channel {key}: not found; write its column and unit"
+            for key in ("displacement", "force")
+            if key not in shared
+        ]
+    tests, why, notes = _bench_tests(files, folder, shared) if bench else _frame_tests(files, folder, shared)
+    unsure += notes
+    unused = sorted({column for item in files for column in item.layout.unused})
+    has_clock = all("time" in item.layout.channels or item.file.time_s is not None for item in files)
+    rated = has_clock or all(item.file.sampling_rate_hz for item in files)
+    if not rated:
+        unsure.append("sampling rate: no clock in the files; 1000 Hz is a placeholder")
+    text = campaign_text(
+        name=name,
+        rig="damper-bench" if bench else "shear-frame",
+        directory=os.path.relpath(folder.resolve(), beside.resolve()),
+        sampling_rate_hz=None if rated else 1000.0,
+        channels=shared,
+        tests=tests,
+        why=why,
+        unused=unused,
+        unsure=unsure,
+        skipped=skipped,
+        columns=[(item.name, item.header.quantity, item.header.unit) for item in files[0].columns],
+    )
+    channels = {key: f"{guess.column or guess.value} [{guess.unit}]" for key, guess in shared.items()}
+    listed = tuple((item.name, item.role or item.kind) for item in tests)
+    return Proposal("bench" if bench else "frame", text, channels, listed, tuple(unsure), tuple(skipped))
+
+
+def _shared(files: list[_File]) -> dict[str, Guess]:
+    """Return the channels of the campaign: for each the guess that most files share."""
+    names = list(dict.fromkeys(key for item in files for key in item.layout.channels))
+    shared = {}
+    for key in names:
+        guesses = [item.layout.channels[key] for item in files if key in item.layout.channels]
+        shared[key] = max(
+            guesses, key=lambda guess: sum((g.column, g.unit) == (guess.column, guess.unit) for g in guesses)
+        )
+    return shared
+
+
+def _own(item: _File, shared: dict[str, Guess]) -> dict[str, Guess]:
+    """Return the channels of a file that differ from those of the campaign."""
+    return {
+        key: guess
+        for key, guess in item.layout.channels.items()
+        if (guess.column, guess.unit) != (shared[key].column, shared[key].unit)
+    }
+
+
+def _test_name(path: Path, folder: Path) -> str:
+    relative = path.relative_to(folder)
+    parts = [*relative.parent.parts, relative.name[: -len(ending_of(path))]]
+    return "-".join(parts).replace(" ", "_").strip(".") or "test"
+
+
+def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> tuple[list[TestText], str, list[str]]:
+    notes: list[str] = []
+    tests, conditions = [], []
+    for item in files:
+        own = _own(item, shared)
+        drive = item.layout.channels.get("drive")
+        if drive is None:
+            stated = drive_in_name(item.path.stem)
+            value, unit = stated or (0.0, "A")
+            own["drive"] = Guess(
+                "", unit, "" if stated else "no drive in the file or its name: 0 A is a placeholder", value=value
+            )
+            if not stated:
+                notes.append(f"test {_test_name(item.path, folder)}: drive not found, 0 A is a placeholder")
+        conditions.append(_condition(item, own))
+        tests.append(
+            TestText(name=_test_name(item.path, folder), file=item.path.relative_to(folder).as_posix(), channels=own)
+        )
+    found = propose_roles([item.path for item in files], conditions)
+    if len(files) == 1:
+        time = files[0].layout.channels.get("time")
+        clock = files[0].samples(time.column) * units.conversion(time.unit) if time else None
+        first, last = (
+            (clock[0], clock[-1]) if clock is not None else (0.0, files[0].columns[0].values.size / files[0].rate)
+        )
+        middle = float(first + 0.65 * (last - first))
+        tests = [
+            replace(tests[0], name=f"{tests[0].name}-1", role="training", segments=((float(first), middle),)),
+            replace(tests[0], name=f"{tests[0].name}-2", role="validation", segments=((middle, float(last) + 1.0),)),
+        ]
+        notes.append("roles: one file only, so training and validation are parts of one record")
+        return tests, found.why, notes
+    tests = [replace(test, role=role) for test, role in zip(tests, found.roles, strict=True)]
+    if "repeated" not in found.why and "names" not in found.why:
+        notes.append(f"roles: {found.why}")
+    return tests, found.why, notes
+
+
+def _condition(item: _File, own: dict[str, Guess]) -> Condition:
+    displacement = item.layout.channels.get("displacement")
+    values = item.samples(displacement.column) if displacement else np.zeros(100)
+    size = units.conversion(displacement.unit) if displacement else 1.0
+    drive = item.layout.channels.get("drive")
+    if drive is not None:
+        levels = item.samples(drive.column) * units.conversion(drive.unit)
+    else:
+        stated = own["drive"]
+        levels = np.full(values.size, (stated.value or 0.0) * units.conversion(stated.unit))
+    return condition_of(np.nan_to_num(values) * size, np.nan_to_num(levels), item.rate)
+
+
+def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> tuple[list[TestText], str, list[str]]:
+    tests, notes = [], []
+    for item in files:
+        channels = {
+            key: np.nan_to_num(item.samples(guess.column))
+            for key, guess in item.layout.channels.items()
+            if guess.column
+        }
+        kind, doubt = kind_of(item.path, channels, item.rate)
+        name = _test_name(item.path, folder)
+        if doubt:
+            notes.append(f"test {name}: kind {kind}, {doubt}")
+        tests.append(
+            TestText(
+                name=name,
+                file=item.path.relative_to(folder).as_posix(),
+                channels=_own(item, shared),
+                kind=kind,
+                law=law_of(item.path) if kind == "closed-loop" else "",
+                mode=mode_of(item.path) if kind == "free-decay" else None,
+                doubt=doubt,
+            )
+        )
+    notes.append("frame: floor_masses_kg is not known; write the masses where they are known")
+    return tests, "kinds from the names of the files where they state them", notes

@@ -1,0 +1,163 @@
+"""A folder of files becomes a campaign: channels, units, roles and kinds, and what is unsure is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from mrpipe.campaigns import load_campaign
+from mrpipe.campaigns.plausibility import judge
+from mrpipe.campaigns.proposal import Proposal, propose_campaigns
+from mrpipe.campaigns.proposal.words import read_header
+from mrpipe.errors import UserError
+from tests.campaigns.plausibility.rig import sound_tests
+from tests.campaigns.proposal.rigs import bench_folder, frame_folder
+
+HEADERS = [
+    ("Kraft (kN)", "force", "kN"),
+    ("Weg [mm]", "displacement", "mm"),
+    ("Strom", "current", ""),
+    ("Force", "force", ""),
+    ("Disp", "displacement", ""),
+    ("a_1", "acceleration", ""),
+    ("Disp, LVDT (mm)", "displacement", "mm"),
+    ("Load Cell (lbf)", "force", "lbf"),
+    ("Fuerza [N]", "force", "N"),
+    ("Desplazamiento/mm", "displacement", "mm"),
+    ("Déplacement (mm)", "displacement", "mm"),
+    ("Accélération_m/s^2", "acceleration", "m/s^2"),
+    ("Spulenstrom in mA", "current", "mA"),
+    ("Tensione [V]", "voltage", "V"),
+    ("Temps (s)", "time", "s"),
+    ("Time, rel (ms)", "time", "ms"),
+    ("F_N", "force", "N"),
+    ("forceDamper [N]", "force", "N"),
+    ("Dämpferkraft (N)", "force", "N"),
+    ("Prędkość [m/s]", "velocity", "m/s"),
+    ("Kanal 7", "", ""),
+    ("Temperature (degC)", "", ""),
+]
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(("text", "quantity", "unit"), HEADERS)
+def test_headers_of_many_languages(text: str, quantity: str, unit: str) -> None:
+    header = read_header(text)
+    assert (header.quantity, header.unit) == (quantity, unit)
+
+
+@pytest.mark.golden
+def test_floors_and_commands_in_headers() -> None:
+    floors = ("Etage 2 (g)", "accFloor3 [m/s2]", "Tisch (g)", "a_g", "Roof acc", "piso 1 (cm/s2)")
+    assert [read_header(text).floor for text in floors] == [2, 3, 0, 0, -1, 1]
+    assert read_header("Force command (N)").command and not read_header("Force (N)").command
+
+
+def _proposed(folder: Path, beside: Path, rig: str | None = None) -> tuple[Proposal, Path]:
+    (proposal,) = propose_campaigns(folder, "own", rig, beside)  # type: ignore[arg-type]
+    beside.mkdir(parents=True)
+    (beside / "campaign.yaml").write_text(proposal.text, encoding="utf-8")
+    return proposal, beside
+
+
+@pytest.mark.planted
+def test_foreign_headers_decimal_commas_and_mixed_units(tmp_path: Path) -> None:
+    proposal, beside = _proposed(bench_folder(tmp_path / "Messdaten"), tmp_path / "p" / "data" / "own")
+    campaign = load_campaign(beside)
+    assert proposal.rig == "bench" and campaign.drive_unit == "A" and len(campaign.recordings) == 8
+    assert judge(campaign) == () and campaign.findings == ()
+    assert campaign.with_role("training") and campaign.with_role("validation")
+    for test, truth in zip(campaign.recordings, sound_tests(8, seed=1), strict=True):
+        np.testing.assert_allclose(test.channels["displacement"], truth.displacement_m, atol=1e-8)
+        np.testing.assert_allclose(test.channels["force"], truth.force_n, atol=2e-3)
+        np.testing.assert_allclose(test.channels["drive"], truth.drive, atol=1e-6)
+
+
+@pytest.mark.planted
+def test_a_frame_is_recognised_with_floors_and_kinds(tmp_path: Path) -> None:
+    proposal, beside = _proposed(frame_folder(tmp_path / "Turm", sweep_s=20.0), tmp_path / "p" / "data" / "own")
+    campaign = load_campaign(beside)
+    assert proposal.rig == "frame" and campaign.rig == "shear-frame"
+    assert [(test.kind, test.details.get("mode")) for test in campaign.recordings] == [
+        *[("free-decay", mode) for mode in (1, 2, 3)],
+        *[("sweep", None)] * 2,
+    ]
+    assert "floor_acceleration_3" in campaign.recordings[0].channels
+    assert any("floor_masses_kg" in line for line in proposal.unsure)
+
+
+@pytest.mark.planted
+def test_a_folder_with_bench_and_frame_becomes_two_campaigns(tmp_path: Path) -> None:
+    bench_folder(tmp_path / "all" / "damper", 4, samples=400)
+    frame_folder(tmp_path / "all" / "tower", sweep_s=5.0)
+    found = propose_campaigns(tmp_path / "all", "own", "both", tmp_path / "p" / "data" / "own")
+    assert [(item.rig, len(item.tests)) for item in found] == [("bench", 4), ("frame", 5)]
+
+
+@pytest.mark.planted
+def test_files_without_headers_are_guessed_and_marked(tmp_path: Path) -> None:
+    folder = tmp_path / "raw"
+    folder.mkdir()
+    for index, test in enumerate(sound_tests(4)):
+        rows = np.column_stack([test.time_s, 1e3 * test.displacement_m, test.force_n])
+        np.savetxt(folder / f"run{index}_{0.5 * index:g}A.csv", rows, delimiter=",", fmt="%.7g")
+    proposal, beside = _proposed(folder, tmp_path / "p" / "data" / "own")
+    campaign = load_campaign(beside)
+    np.testing.assert_allclose(
+        campaign.recordings[1].channels["displacement"], sound_tests(4)[1].displacement_m, atol=1e-8
+    )
+    assert [float(test.channels["drive"][0]) for test in campaign.recordings] == [0.0, 0.5, 1.0, 1.5]
+    assert "UNSURE" in proposal.text and any("displacement" in line for line in proposal.unsure)
+
+
+@pytest.mark.planted
+def test_repeats_and_names_settle_roles(tmp_path: Path) -> None:
+    folder = tmp_path / "raw"
+    folder.mkdir()
+    for index, test in enumerate([*sound_tests(4), *sound_tests(4, seed=9)]):
+        rows = np.column_stack([test.time_s, test.displacement_m, test.drive, test.force_n])
+        np.savetxt(folder / f"run{index}.csv", rows, delimiter=",", header="t,x (m),i (A),F (N)", comments="")
+    (proposal,) = propose_campaigns(folder, "own", None, tmp_path / "p")
+    assert [role for _, role in proposal.tests] == ["training"] * 4 + ["validation"] * 4
+    for path in sorted(folder.glob("*.csv"))[:2]:
+        path.rename(folder / f"valid_{path.name}")
+    (proposal,) = propose_campaigns(folder, "own", None, tmp_path / "p")
+    assert [name for name, role in proposal.tests if role == "validation"] == ["valid_run0", "valid_run1"]
+
+
+@pytest.mark.planted
+def test_one_file_is_split_into_training_and_validation(tmp_path: Path) -> None:
+    folder = tmp_path / "raw"
+    folder.mkdir()
+    test = sound_tests(2)[1]
+    rows = np.column_stack([test.time_s, test.displacement_m, test.drive, test.force_n])
+    np.savetxt(folder / "one.csv", rows, delimiter=",", header="t,x (m),i (A),F (N)", comments="")
+    _, beside = _proposed(folder, tmp_path / "p" / "data" / "own")
+    campaign = load_campaign(beside)
+    assert [test.role for test in campaign.recordings] == ["training", "validation"]
+    assert not {item.name for item in judge(campaign)} & {"same-record"}
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", ["a'b", 'a"b', "a: b", "- a", "#a", "null", "1e3", "Größe ä", "{x}", "a\\b"])
+def test_awkward_file_names_and_headers_give_valid_yaml(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / name
+    folder.mkdir()
+    test = sound_tests(2)[1]
+    rows = np.column_stack([test.time_s, test.displacement_m, test.drive, test.force_n])
+    header = f'"t {name.replace(chr(34), "")}",x (m),i (A),F (N)'
+    for index in (1, 2):
+        np.savetxt(folder / f"{name}{index}.csv", rows, delimiter=",", header=header, comments="")
+    (proposal,) = propose_campaigns(folder, name, None, tmp_path / "p")
+    content = yaml.safe_load(proposal.text)
+    assert content["campaign"] == name and content["tests"][0]["file"] == f"{name}1.csv"
+
+
+@pytest.mark.golden
+def test_a_folder_that_holds_nothing_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("only words\n")
+    with pytest.raises(UserError, match="holds no readable data file"):
+        propose_campaigns(tmp_path, "own", None, tmp_path / "p")
