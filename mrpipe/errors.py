@@ -44,5 +44,9 @@ class StageSkipped(MrpipeError):
     """A stage has no data to work on; the message says which (no failure in `mrpipe run`)."""
 
 
+class StageFailed(MrpipeError):
+    """A stage cannot be built because one that it needs has failed in this run."""
+
+
 class DivergedError(MrpipeError):
     """A fit or a simulation diverged; the message says where and what to try."""

@@ -55,6 +55,19 @@ def library_versions() -> dict[str, str]:
     return {name: version(name) for name in ("numpy", "scipy", "scikit-learn")}
 
 
+@contextmanager
+def hdf5_in_memory(path: Path) -> Iterator[h5py.File]:
+    """Yield a new HDF5 file that is put together in memory and written to `path` at the end.
+
+    The HDF5 library ends the process where a disk is full; an ordinary write raises OSError.
+    """
+    with h5py.File(path.name, "w", driver="core", backing_store=False, track_order=True) as handle:
+        yield handle
+        handle.flush()
+        image = handle.id.get_file_image()
+    Path(path).write_bytes(image)
+
+
 class ArtifactWriter:
     """Fills one artifact; use :meth:`create`, which moves it into place only when all went well."""
 
@@ -65,7 +78,7 @@ class ArtifactWriter:
     @contextmanager
     def create(cls, path: Path, provenance: Provenance) -> Iterator[ArtifactWriter]:
         """Open a new artifact that appears at `path` when the block ends without an exception."""
-        with atomic_path(path) as temporary, h5py.File(temporary, "w", track_order=True) as handle:
+        with atomic_path(path) as temporary, hdf5_in_memory(temporary) as handle:
             attributes = handle.attrs
             attributes["schema"] = SCHEMA
             attributes["stage"] = provenance.stage
@@ -137,7 +150,7 @@ class Artifact:
         try:
             with h5py.File(self.path, "r") as handle:
                 self.root: dict[str, Any] = {key: _plain(value) for key, value in handle.attrs.items()}
-        except OSError as error:
+        except (OSError, RuntimeError, KeyError) as error:
             raise UserError(self.path, "", "not a readable HDF5 file", "build it again with --force") from error
         if self.root.get("schema") != SCHEMA:
             raise UserError(self.path, "attribute schema", f"is {self.root.get('schema')!r}", f"{SCHEMA!r} expected")
@@ -147,8 +160,18 @@ class Artifact:
         """Name of the stage that wrote the file."""
         return str(self.root["stage"])
 
+    @contextmanager
+    def _open(self) -> Iterator[h5py.File]:
+        try:
+            with h5py.File(self.path, "r") as handle:
+                yield handle
+        except (OSError, RuntimeError) as error:
+            raise UserError(
+                self.path, "", f"is damaged ({' '.join(str(error).split())[:120]})", "run the stage that writes it"
+            ) from error
+
     def __contains__(self, name: str) -> bool:
-        with h5py.File(self.path, "r") as handle:
+        with self._open() as handle:
             return name in handle
 
     def array(self, name: str) -> FloatArray:
@@ -173,21 +196,21 @@ class Artifact:
 
     def unit(self, name: str) -> str:
         """Return the unit of a dataset."""
-        with h5py.File(self.path, "r") as handle:
+        with self._open() as handle:
             return str(handle[name].attrs["unit"])
 
     def attributes(self, group: str) -> dict[str, Any]:
         """Return the attributes of a group or dataset."""
-        with h5py.File(self.path, "r") as handle:
+        with self._open() as handle:
             return {key: _plain(value) for key, value in handle[group].attrs.items()}
 
     def members(self, group: str = "/") -> list[str]:
         """Return the names inside a group in the order of writing (empty where there is no such group)."""
-        with h5py.File(self.path, "r") as handle:
+        with self._open() as handle:
             return list(handle[group].keys()) if group in handle else []
 
     def _read(self, name: str) -> Any:
-        with h5py.File(self.path, "r") as handle:
+        with self._open() as handle:
             if name not in handle:
                 raise UserError(self.path, name, "no such dataset", "build the artifact again with --force")
             return handle[name][()]

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-import h5py
 import numpy as np
 import yaml
 
 from mrpipe.artifacts import FloatArray, atomic_path, atomic_write_text
+from mrpipe.artifacts.hdf5 import hdf5_in_memory
 
 CAMPAIGN_FILE = "campaign.yaml"
 
@@ -112,7 +112,7 @@ def _write_columns(
 ) -> None:
     with atomic_path(path) as temporary:
         if path.suffix == ".h5":
-            with h5py.File(temporary, "w", track_order=True) as handle:
+            with hdf5_in_memory(temporary) as handle:
                 handle.attrs["sampling_rate_hz"] = sampling_rate_hz
                 for key, values in columns.items():
                     dataset = handle.create_dataset(key, data=values)

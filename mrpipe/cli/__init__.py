@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import sys
-
-INTERRUPTED = 130
-WRONG_INPUT = 2
-CHECK_FAILED = 1
-_RESUME = "interrupted; the next call resumes at the first unfinished stage"
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -20,34 +14,19 @@ def run(arguments: list[str] | None = None) -> int:
     """Run one command and return the exit status; a user's mistake is one line on standard error."""
     import typer
 
+    from mrpipe.cli import boundary
     from mrpipe.cli.app import app
-    from mrpipe.errors import CheckFailed, MrpipeError
 
+    given = sys.argv[1:] if arguments is None else arguments
+    boundary.prepare_streams()
     try:
         command = typer.main.get_command(app)
-        status = command.main(args=arguments, prog_name="mrpipe", standalone_mode=False)
-    except KeyboardInterrupt:
-        return _say(_RESUME, INTERRUPTED)
-    except CheckFailed as error:
-        return _say(str(error), CHECK_FAILED)
-    except MrpipeError as error:
-        return _say(str(error), WRONG_INPUT)
-    except BrokenPipeError:
-        # the reader of our output has gone (`mrpipe … | head`); nothing is left to be told
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return CHECK_FAILED
-    except typer.Abort:
-        return _say(_RESUME, INTERRUPTED)
-    except Exception as error:
-        message = getattr(error, "format_message", None)
-        if message is None:
+        status = command.main(args=given, prog_name="mrpipe", standalone_mode=False)
+        sys.stdout.flush()
+    except BaseException as error:
+        if isinstance(error, SystemExit | GeneratorExit):
             raise
-        return _say(" ".join(str(message()).split()), WRONG_INPUT)
-    if status == INTERRUPTED:  # what typer makes of Ctrl-C
-        return _say(_RESUME, INTERRUPTED)
+        return boundary.exit_with(error, given)
+    if status == boundary.INTERRUPTED:  # what typer makes of Ctrl-C
+        return boundary.say(boundary.RESUME, boundary.INTERRUPTED)
     return int(status) if isinstance(status, int) else 0
-
-
-def _say(message: str, status: int) -> int:
-    print(f"mrpipe: {message}", file=sys.stderr)
-    return status

@@ -9,10 +9,19 @@ _WIDEST = 8
 
 
 def print_json(content: Any) -> None:
-    """Print one strict JSON document."""
+    """Print one strict JSON document; characters that standard output cannot show are written as JSON escapes."""
+    import sys
+
     from mrpipe.artifacts.plain import to_json
 
-    print(to_json(content))
+    text = to_json(content)
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        import json
+
+        text = json.dumps(json.loads(text), indent=2)
+    print(text)
 
 
 def print_summary(title: str, summary: Mapping[str, Any], warnings: Sequence[str] = ()) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
-from mrpipe.errors import UserError
+from mrpipe.errors import CheckFailed, UserError
 
 if TYPE_CHECKING:
     from mrpipe.pipeline.runner import Pipeline
@@ -29,7 +29,11 @@ def run(
     ] = None,
     until: Annotated[str | None, typer.Option(metavar="STAGE", help="Stop after this stage.")] = None,
 ) -> None:
-    """Run every stage that the configuration lists."""
+    """Run every stage that the configuration lists.
+
+    A stage that fails does not end the run: only stages that need it are left out. The report names what failed, and
+    the exit status is 1.
+    """
     from mrpipe.cli.checking import check_headers
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import session
@@ -40,18 +44,23 @@ def run(
         names = _until(list(pipeline.loaded.config.stages), until)
         if options.force:
             pipeline.force = frozenset(pipeline.stages)
+        pipeline.keep_going = True
         for name in names:
             if name != "report":
                 pipeline.check(name)
         for name in names:
             if name != "report":
                 pipeline.build(name)
+        if pipeline.errors and not any(item.what in {"built", "reused"} for item in pipeline.outcomes.values()):
+            raise pipeline.errors[0]
         report = _write_report(pipeline) if "report" in names else []
     content = _run_summary(pipeline, report, time.monotonic() - started)
     if options.json:
         print_json(content)
     else:
         _print_run(pipeline, content)
+    if content["failed"]:
+        raise CheckFailed(f"{len(content['failed'])} stages failed or lack a part: {', '.join(content['failed'])}")
 
 
 def _until(names: list[str], until: str | None) -> list[str]:
@@ -72,7 +81,8 @@ def _run_summary(pipeline: Pipeline, report: list[Path], seconds: float) -> dict
             "outcome": outcome.what,
             "seconds": outcome.manifest.seconds if outcome.what == "built" else 0.0,
             "reasons": list(outcome.reasons),
-            **({"skipped": outcome.manifest.skipped} if outcome.what == "skipped" else {}),
+            **({"skipped": outcome.manifest.skipped} if outcome.what in {"skipped", "failed"} else {}),
+            **({"failed": outcome.manifest.failed} if outcome.manifest.failed else {}),
             "warnings": outcome.manifest.warnings,
             "summary": outcome.manifest.summary,
         }
@@ -83,6 +93,7 @@ def _run_summary(pipeline: Pipeline, report: list[Path], seconds: float) -> dict
         "seconds": seconds,
         "stages": stages,
         "report": [str(path) for path in report],
+        "failed": [name for name, stage in stages.items() if "failed" in stage],
     }
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.control.laws import law_names
-from mrpipe.errors import UserError
+from mrpipe.errors import CheckFailed, UserError
+
+if TYPE_CHECKING:
+    from mrpipe.pipeline.runner import Outcome, Pipeline
 
 _RIGS = ("bench", "frame", "closed-loop")
 
@@ -52,6 +55,7 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
         }
         merged = _merged(summaries, together)
         print_json(merged if len(merged) > 1 else next(iter(merged.values())))
+        _raise_failures(outcomes, pipeline)
         return
     for outcome in outcomes:
         note = " (up to date)" if outcome.what == "reused" else ""
@@ -61,6 +65,15 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
         else:
             print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
     print(f"in {pipeline.run_directory}")
+    _raise_failures(outcomes, pipeline)
+
+
+def _raise_failures(outcomes: Sequence[Outcome], pipeline: Pipeline) -> None:
+    """Raise CheckFailed where a part of a stage or an optional stage before it failed; the results were printed."""
+    before = [item for item in pipeline.outcomes.values() if item.what == "failed"]
+    failed = [f"{item.stage}: {item.manifest.failed}" for item in (*before, *outcomes) if item.manifest.failed]
+    if failed:
+        raise CheckFailed("; ".join(failed))
 
 
 def _merged(summaries: dict[str, dict[str, Any]], kinds: tuple[str, ...]) -> dict[str, dict[str, Any]]:

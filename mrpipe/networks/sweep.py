@@ -6,8 +6,10 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -324,7 +326,9 @@ def _kept(
     """Return what an earlier run kept, else do the work and keep it."""
     found = _kept_file(cache, name, candidate)
     if found is not None:
-        with np.load(found, allow_pickle=False) as stored:
+        # a damaged file counts as none
+        damaged = (OSError, ValueError, KeyError, EOFError, BadZipFile)
+        with suppress(*damaged), np.load(found, allow_pickle=False) as stored:
             return stored["errors"], stored["parameters"]
     errors, parameters = work()
     if cache is not None:

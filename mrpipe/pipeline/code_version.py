@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -68,7 +69,8 @@ def _source(name: str) -> _Source | None:
         if "/" in entry:
             files.extend(_files(_package().parent / entry))
         else:
-            imports |= {entry, *(f"{entry}.{item.stem}" for item in _folder(entry).glob("*.py"))}
+            found = (item for folder in _folders(entry) for item in folder.glob("*.py"))
+            imports |= {entry, *(f"{entry}.{item.stem}" for item in found)}
     for kind, one in _PARAMETER_SET.findall(text):
         folder = config_directory() / kind
         files.extend(_files(folder / f"{one}.yaml" if one else folder))
@@ -103,14 +105,27 @@ def _package() -> Path:
     return Path(__file__).resolve().parent.parent
 
 
-def _folder(name: str) -> Path:
-    return _package().joinpath(*name.split(".")[1:])
+def _folders(name: str) -> list[Path]:
+    """Return the folders of a package: its own, and those that were appended to its `__path__`."""
+    own = _package().joinpath(*name.split(".")[1:])
+    imported = getattr(sys.modules.get(name), "__path__", ())
+    return [own, *(Path(item) for item in imported if Path(item) != own)]
 
 
 def _path_of(name: str) -> Path | None:
     """Find the source of a module without importing it; None where there is no such module."""
-    if name != "mrpipe" and not name.startswith("mrpipe."):
+    if name == "mrpipe":
+        return _package() / "__init__.py"
+    parent, _, own = name.rpartition(".")
+    if parent.split(".")[0] != "mrpipe":
         return None
-    base = _folder(name)
-    candidates = [base / "__init__.py"] if name == "mrpipe" else [base.with_suffix(".py"), base / "__init__.py"]
+    candidates = (
+        place for folder in _folders(parent) for place in (folder / f"{own}.py", folder / own / "__init__.py")
+    )
     return next((item for item in candidates if item.is_file()), None)
+
+
+def forget() -> None:
+    """Forget the sources that were read, so that the next call reads them again."""
+    _source.cache_clear()
+    _digest.cache_clear()

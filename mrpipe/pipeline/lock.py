@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mrpipe.errors import UserError
+
+_TEMPORARY = re.compile(r"\..+\.\d+(\.old)?\.tmp")
 
 
 @contextmanager
@@ -36,7 +40,23 @@ def run_lock(run_directory: Path) -> Iterator[None]:
         ) from error
     try:
         holder.write_text(f"process {os.getpid()}\n", encoding="utf-8")
+        remove_temporaries(run_directory)
         yield
     finally:
         holder.unlink(missing_ok=True)
         lock.release()
+
+
+def remove_temporaries(run_directory: Path) -> None:
+    """Remove what killed processes left half-written: `.NAME.PID.tmp` and `.NAME.PID.old.tmp`, files and folders.
+
+    Call it with the lock held: nobody else writes here then.
+    """
+    for path in sorted(run_directory.rglob(".*.tmp")):
+        if not _TEMPORARY.fullmatch(path.name):
+            continue
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                path.unlink()

@@ -44,7 +44,9 @@ class Manifest:
     outputs
         File, relative to the run directory -> digest: artifacts, and the stage's part of the report.
     skipped
-        Why the stage had nothing to do; empty where it ran.
+        Why the stage had nothing to do, or what it failed of; empty where it ran.
+    failed
+        What went wrong, in one line: of the whole stage where `skipped` says the same, else of a part of it.
     """
 
     stage: str
@@ -54,6 +56,7 @@ class Manifest:
     warnings: list[str] = field(default_factory=list)
     skipped: str = ""
     seconds: float = 0.0
+    failed: str = ""
 
     def save(self, directory: Path) -> None:
         """Write `<directory>/<stage>.json` atomically."""
@@ -79,6 +82,8 @@ def reasons_stale(manifest: Manifest | None, key: StageKey, run_directory: Path,
     """Return why a stage has to run, in plain words; empty where what is there can be used."""
     if manifest is None:
         return ["never built"]
+    if manifest.failed and manifest.skipped:
+        return [f"the last run of it failed: {manifest.failed}"]
     reasons = []
     for name in sorted({*manifest.key.inputs, *key.inputs}):
         before, now = manifest.key.inputs.get(name), key.inputs.get(name)

@@ -31,6 +31,7 @@ def make_logger(log_file: Path, level: str, quiet: bool) -> logging.Logger:
     to_error = logging.StreamHandler(sys.stderr)
     to_error.setFormatter(logging.Formatter("%(message)s"))
     to_error.setLevel(logging.ERROR if quiet else level.upper())
+    to_error.addFilter(lambda record: not getattr(record, "file_only", False))
     logger.addHandler(to_error)
     return logger
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import logging
 import shutil
@@ -16,7 +17,7 @@ from mrpipe.artifacts import Provenance, atomic_write_text, public_data_director
 from mrpipe.artifacts.plain import plain
 from mrpipe.config.loader import LoadedConfig
 from mrpipe.config.sections.campaigns import LABORATORY
-from mrpipe.errors import StageSkipped
+from mrpipe.errors import MrpipeError, StageFailed, StageSkipped
 from mrpipe.pipeline.code_version import code_version
 from mrpipe.pipeline.fingerprint import FileHashes, plain_settings
 from mrpipe.pipeline.manifest import Manifest, StageKey, reasons_stale
@@ -27,12 +28,13 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 CAMPAIGN_RECORDERS = {"bench": "record-bench", "frame": "record-frame", "closed-loop": "record-closed-loop"}
 ABSENT = "absent"
+LOG = "log.txt"
 PUBLIC_DATA = "public data"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one stage: `built`, `reused` or `skipped`."""
+    """What became of one stage: `built`, `reused`, `skipped` or `failed`."""
 
     stage: str
     what: str
@@ -54,6 +56,8 @@ class Pipeline:
         Where artifacts, manifests, log, figures, tables and report go.
     jobs
         Processes to use.
+    keep_going
+        A stage that fails does not end the run: stages that need it are left out, all others are built.
     campaign_given
         The user named a campaign on the command line: what the virtual laboratory could add is then used only where
         a stage cannot do without it, or where it is there already.
@@ -66,8 +70,10 @@ class Pipeline:
     jobs: int = 1
     quiet: bool = False
     campaign_given: bool = False
+    keep_going: bool = False
     force: frozenset[str] = frozenset()
     outcomes: dict[str, Outcome] = field(default_factory=dict)
+    errors: list[Exception] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._manifests = self.run_directory / "manifests"
@@ -119,22 +125,49 @@ class Pipeline:
 
     # --- building ----------------------------------------------------------------------------------------------------
     def build(self, name: str) -> Outcome:
-        """Bring one stage up to date, and all that it needs before it."""
+        """Bring one stage up to date, and all that it needs before it.
+
+        Raises
+        ------
+        MrpipeError
+            If it fails, unless the run is to keep going: then the outcome says so.
+        """
         if name in self.outcomes:
             return self.outcomes[name]
         stage = self.stages[name]
-        self.check(name)
-        missing = ""
-        for item in stage.inputs:
-            missing = missing or self._provide(item)
-        together = all(self._is_to_be_had(item) for item in stage.optional_inputs)
-        for item in stage.optional_inputs:
-            if self._wanted(item, together):
-                self._provide(item)
-        outcome = self._skip(stage, missing) if missing else self._run_or_reuse(stage)
+        try:
+            outcome = self._build(stage)
+        except Exception as error:
+            if not self.keep_going or _ends_the_run(error):
+                raise
+            outcome = self._failed(stage, error)
         self.outcomes[name] = outcome
         self._hashes.save()
         return outcome
+
+    def _build(self, stage: Stage) -> Outcome:
+        self.check(stage.name)
+        missing = ""
+        for item in stage.inputs:
+            missing = missing or self._provide(item, stage.inputs)
+        together = all(self._is_to_be_had(item) for item in stage.optional_inputs)
+        for item in stage.optional_inputs:
+            if self._wanted(item, together):
+                self._provide_optional(item)
+        return self._skip(stage, missing) if missing else self._run_or_reuse(stage)
+
+    def _failed(self, stage: Stage, error: Exception) -> Outcome:
+        """Record a failure: what lies there of an earlier run stays, and counts as stale."""
+        text = " ".join(str(error).split())
+        if not isinstance(error, MrpipeError | OSError | MemoryError):
+            text = f"{type(error).__name__}: {text} (a fault of the program; {LOG} has the details)"
+            self.logger.error("%s", stage.name, exc_info=error, extra={"file_only": True})
+        said = text if isinstance(error, StageFailed) else f"failed: {text}"
+        self.logger.error("%-20s %s", stage.name, said)
+        self.errors.append(error)
+        manifest = Manifest(stage.name, StageKey({}, {}, {}, self.loaded.config.seed), {}, {}, [], said, failed=text)
+        manifest.save(self._manifests)
+        return Outcome(stage.name, "failed", manifest)
 
     def check(self, name: str) -> None:
         """Let a stage look at its settings, so that a mistake is told before minutes of work and not after.
@@ -175,15 +208,32 @@ class Pipeline:
             return self._is_fresh(provider)
         return True
 
-    def _provide(self, name: str) -> str:
-        """Build an input; return why it cannot be had, or nothing."""
+    def _provide(self, name: str, required: Sequence[str] = ()) -> str:
+        """Build an input; return why it cannot be had, or nothing.
+
+        Raises
+        ------
+        StageFailed
+            If a required input failed in this run.
+        """
         provider = self.provider(name)
         if provider is None:
             if self.input_path(name) is None:
                 rig = name.partition(":")[2]
                 return f"there is no {rig} campaign (give campaigns.{rig.replace('-', '_')}, or --campaign DIR)"
             return ""
-        return self.build(provider).manifest.skipped
+        outcome = self.build(provider)
+        if outcome.what == "failed" and name in required:
+            raise StageFailed(f"not built, because {provider} failed")
+        return outcome.manifest.skipped
+
+    def _provide_optional(self, name: str) -> None:
+        """Build an optional input; where that fails, the stage does without it."""
+        keep_going, self.keep_going = self.keep_going, True
+        try:
+            self._provide(name)
+        finally:
+            self.keep_going = keep_going
 
     def _is_fresh(self, name: str) -> bool:
         stage = self.stages[name]
@@ -217,7 +267,7 @@ class Pipeline:
         if provider is None:
             return True
         if provider in self.outcomes:
-            return not self.outcomes[provider].manifest.skipped
+            return self.outcomes[provider].what in {"built", "reused"}
         return self._is_fresh(provider)
 
     def _key(self, stage: Stage, inputs: Mapping[str, Path]) -> StageKey:
@@ -276,7 +326,10 @@ class Pipeline:
         written = [] if skipped else [*stage.outputs, *part.files]
         outputs = {name: self._hashes.digest(self.run_directory / name) for name in written}
         seconds = time.monotonic() - started
-        manifest = Manifest(stage.name, key, outputs, plain(summary), context.warnings, skipped, round(seconds, 3))
+        failed = "; ".join(context.failures)
+        manifest = Manifest(
+            stage.name, key, outputs, plain(summary), context.warnings, skipped, round(seconds, 3), failed
+        )
         manifest.save(self._manifests)
         self._hashes.save()
         if skipped:
@@ -336,6 +389,11 @@ class Pipeline:
         own = reasons_stale(manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self._hashes)
         found[name] = own if own[:1] == ["never built"] else reasons + own
         return found[name]
+
+
+def _ends_the_run(error: Exception) -> bool:
+    """Return whether no other stage can be built either: the disk is full or cannot be written."""
+    return isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG}
 
 
 def seed_of(seed: int, name: str) -> list[int]:

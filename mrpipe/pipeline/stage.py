@@ -58,6 +58,7 @@ class StageContext:
     log: logging.Logger
     provenance: Provenance
     warnings: list[str] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
 
     def artifact(self, name: str) -> Artifact:
         """Open a declared input artifact."""
@@ -77,6 +78,12 @@ class StageContext:
         """Tell the user something that does not stop the stage; kept with the result and shown in the report."""
         self.warnings.append(message)
         self.log.warning("%s: %s", self.stage, message)
+
+    def fail(self, part: str, error: Exception) -> None:
+        """Record that a part of the stage failed while its other results stand; the exit status is 1 then."""
+        message = f"{part} failed: {' '.join(str(error).split())}"
+        self.failures.append(message)
+        self.warn(message)
 
 
 @dataclass(frozen=True)

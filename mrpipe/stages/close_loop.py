@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mrpipe.errors import MrpipeError
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
@@ -44,12 +45,23 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         tests, library, declared, options, rng=context.rng, jobs=context.jobs, progress=context.progress
     )
     summary = {"campaign": campaign.name, **traced.summary}
-    summary["closed_loop"] = closed_loop(context, traced, tests)
+    summary["closed_loop"] = _closed_loop(context, traced, tests)
     summary["corrections"] = _corrections(context, traced, tests)
     summary["next_tests"] = _next_tests(context, traced, library)
     _write(context, traced, summary)
     section.describe(context.report, section.Traced(traced, summary, settings.named_share, settings.least_share))
     return summary
+
+
+def _closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
+    """Return the part on the closed loop; where it fails, the tracing stands and the reason is kept."""
+    try:
+        return closed_loop(context, traced, tests)
+    except Exception as error:
+        if not isinstance(error, MrpipeError):
+            context.log.error("close-loop", exc_info=error, extra={"file_only": True})
+        context.fail("the closed loop", error)
+        return {"status": f"failed: {error}"}
 
 
 def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:

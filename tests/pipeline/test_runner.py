@@ -254,3 +254,71 @@ def test_a_damaged_artifact_is_built_again(make_pipeline: MakePipeline) -> None:
     assert again.status(["second"])["first"] == ["output first.h5 was changed or damaged after it was written"]
     assert again.build("second").what == "reused"
     assert digest_of_artifact(path) == before
+
+
+def _fails(context: StageContext) -> Mapping[str, Any]:
+    CALLS.append("failing")
+    raise UserError("data.csv", "row 3", "is not a number", "write a number")
+
+
+def test_a_failure_leaves_out_only_what_depends_on_it(make_pipeline: MakePipeline) -> None:
+    broken = replace(STAGES["first"], name="broken", run=_fails, outputs=("broken.h5",))
+    needs = replace(STAGES["second"], name="needs", inputs=("broken",), outputs=("needs.h5",))
+    likes = replace(STAGES["first"], name="likes", optional_inputs=("broken",), outputs=("likes.h5",))
+    stages = {**STAGES, "broken": broken, "needs": needs, "likes": likes}
+    pipeline = make_pipeline(stages)
+    pipeline.keep_going = True
+    what = {name: pipeline.build(name).what for name in ("broken", "needs", "likes", "second")}
+    assert what == {"broken": "failed", "needs": "failed", "likes": "built", "second": "built"}
+    assert CALLS.count("failing") == 1
+    assert pipeline.outcomes["needs"].manifest.skipped == "not built, because broken failed"
+    assert "row 3: is not a number" in pipeline.outcomes["broken"].manifest.skipped
+    # later calls know it, and a stage command still ends with the error
+    again = make_pipeline(stages)
+    assert again.status(["needs"])["broken"][0].startswith("the last run of it failed: data.csv: row 3")
+    with pytest.raises(UserError, match="row 3"):
+        again.build("needs")
+    mended = make_pipeline({**stages, "broken": replace(broken, run=STAGES["first"].run)})
+    assert mended.build("likes").what == "built"
+
+
+def test_an_optional_input_that_fails_is_done_without(make_pipeline: MakePipeline) -> None:
+    stages = with_run("second", _fails)
+    pipeline = make_pipeline({**stages, "third": replace(STAGES["first"], optional_inputs=("second",))})
+    assert pipeline.build("third").what == "built"
+    assert pipeline.outcomes["second"].what == "failed"
+
+
+def test_a_full_disk_ends_the_run(make_pipeline: MakePipeline) -> None:
+    import errno
+
+    def run(context: StageContext) -> Mapping[str, Any]:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    pipeline = make_pipeline(with_run("first", run))
+    pipeline.keep_going = True
+    with pytest.raises(OSError, match="No space left"):
+        pipeline.build("first")
+
+
+def test_a_part_that_fails_leaves_the_other_results(make_pipeline: MakePipeline) -> None:
+    def run(context: StageContext) -> Mapping[str, Any]:
+        context.fail("the closed loop", UserError("simulate", "amplitude", "is not found", "give one"))
+        return STAGES["first"].run(context)
+
+    outcome = make_pipeline(with_run("first", run)).build("first")
+    assert outcome.what == "built"
+    assert outcome.manifest.failed == "the closed loop failed: simulate: amplitude: is not found; give one"
+    assert make_pipeline(with_run("first", run)).build("first").what == "reused"
+
+
+def test_what_a_killed_process_left_is_removed_under_the_lock(tmp_path: Path) -> None:
+    rubbish = [tmp_path / ".prepared.h5.123.tmp", tmp_path / "figures" / ".a.png.7.tmp"]
+    folders = [tmp_path / ".bench.99.tmp", tmp_path / ".bench.99.old.tmp"]
+    kept = [tmp_path / "notes.tmp", tmp_path / ".hidden.tmp", tmp_path / "manifests" / ".hashes.json"]
+    for path in (*rubbish, *kept, *(folder / "data.csv" for folder in folders)):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("x")
+    with run_lock(tmp_path):
+        assert not any(path.exists() for path in (*rubbish, *folders))
+        assert all(path.exists() for path in kept)
