@@ -28,7 +28,12 @@ def _modules(folder: str) -> set[str]:
 @pytest.mark.property
 @pytest.mark.parametrize(
     ("stage", "folder"),
-    [(CLOSE_LOOP, "effects"), (STRUCTURE, "effects"), (STRUCTURE, "effects/structural")],
+    [
+        ("mrpipe.stages.identify_damper", "dampers/forms"),
+        (CLOSE_LOOP, "effects"),
+        (STRUCTURE, "effects"),
+        (STRUCTURE, "effects/structural"),
+    ],
 )
 def test_tracing_depends_on_every_effect(stage: str, folder: str) -> None:
     assert _modules(folder) <= set(code_version(stage))
