@@ -36,6 +36,9 @@ JUMP_RATE_HZ = 500.0
 CUTOFF_MARGIN = 1.5
 """The displacement is cut off so much above the frequency where it sinks into its noise."""
 
+QUANTISED_SHARE = 0.5
+"""A channel with fewer different values than this share of its samples is quantised."""
+
 ACCELERATION_CUTOFF_HZ = 40.0
 """Least cut-off of a measured acceleration."""
 
@@ -313,7 +316,18 @@ def steady_noise(values: FloatArray, rate_hz: float) -> float:
     """
     spectral = noise_level(values, rate_hz)
     typical = float(np.median(np.abs(np.diff(values, 3)))) / (0.6745 * np.sqrt(20.0))
-    return min(spectral, max(typical, 0.2 * spectral))
+    return max(min(spectral, max(typical, 0.2 * spectral)), resolution(values) / np.sqrt(12.0))
+
+
+def resolution(values: FloatArray) -> float:
+    """Return the step of a quantised channel, in its unit; 0 if every sample has a value of its own.
+
+    Rounding to steps of q adds noise of q / sqrt(12) (Widrow and Kollar, Quantization Noise, 2008).
+    """
+    levels = np.unique(values)
+    if len(levels) < 3 or len(levels) > QUANTISED_SHARE * len(values):
+        return 0.0
+    return float(np.median(np.diff(levels)))
 
 
 def displacement_cutoff(test: PreparedTest) -> float:

@@ -16,7 +16,7 @@ from mrpipe.fitting.problem import Base, Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, fit_with_form, polynomial_laws
 from mrpipe.tracing.bench.screen import screen
-from mrpipe.tracing.bench.weights import force_deviation, noise_of_repeats, repeated_pairs, sensor_deviation
+from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, force_deviation, noise_scale, sensor_deviation
 
 FREE_EXPONENT = "bouc-wen-n"
 """Name of the base form whose hysteresis has a free exponent."""
@@ -25,8 +25,6 @@ LISTED = ("bouc-wen", FREE_EXPONENT, "dahl", "yielding-part")
 
 DEFAULT_OF_FAMILY = {"rate-dependent-yield": "yielding-part"}
 """The form that stands for a family where the settings name the family."""
-
-LEAST_PAIR_SAMPLES = 400
 
 
 @dataclass(frozen=True)
@@ -41,8 +39,8 @@ class Baseline:
         Mean square of the weighted residual that noise alone would leave.
     deviation
         Standard deviation of the force that noise explains [N], shape (n,).
-    repeats
-        Number of repeated pairs that told the noise.
+    scale
+        By how much the noise exceeds what the channels show.
     model_error
         Whether weights go by what a model cannot follow: the base form itself is in question, the noise is not.
     """
@@ -50,7 +48,7 @@ class Baseline:
     fit: Fit
     noise: float
     deviation: FloatArray
-    repeats: int
+    scale: NoiseScale
     model_error: bool = False
 
 
@@ -83,12 +81,17 @@ def fit_baseline(
         found = _with_declared(found, effect)
     if declared:
         found = _weighted(found, recordings, model_error_share)
-    noise, repeats = noise_level_of(found)
-    return Baseline(found, noise, force_deviation(found, recordings, model_error_share), repeats)
+    scale = noise_scale(found)
+    if scale != AS_SHOWN:
+        # noise that only repeated motion shows counts in the weights, too
+        found = _weighted(found, recordings, model_error_share, scale)
+        scale = noise_scale(found)
+    deviation = force_deviation(found, recordings, model_error_share, scale)
+    return Baseline(found, noise_level_of(found, scale), deviation, scale)
 
 
-def _weighted(found: Fit, recordings: Recordings, model_error_share: float) -> Fit:
-    deviation = force_deviation(found, recordings, model_error_share)
+def _weighted(found: Fit, recordings: Recordings, model_error_share: float, scale: NoiseScale = AS_SHOWN) -> Fit:
+    deviation = force_deviation(found, recordings, model_error_share, scale)
     problem = replace(found.problem, root_weight=recordings.used / deviation, reference=positive(found))
     return fit(problem, found.theta, iterations=12)
 
@@ -121,16 +124,11 @@ def with_form(before: Fit, effect: Effect, name: str, *, iterations: int = 12) -
     return fit(problem, start, iterations=iterations)
 
 
-def noise_level_of(found: Fit) -> tuple[float, int]:
-    """Return the mean square of the weighted residual that noise leaves, from repeats or else from the sensors."""
-    problem = found.problem
-    pairs = repeated_pairs(problem.recordings)
-    noise, count = noise_of_repeats(found.residual, problem.recordings, pairs)
-    used = problem.root_weight > 0.0
-    sensors = float(np.mean((problem.root_weight[used] * sensor_deviation(found, problem.recordings)[used]) ** 2))
-    if count >= LEAST_PAIR_SAMPLES:
-        return max(noise, 0.25 * sensors), len(pairs)
-    return sensors, 0
+def noise_level_of(found: Fit, scale: NoiseScale) -> float:
+    """Return the mean square of the weighted residual that noise leaves."""
+    root = found.problem.root_weight
+    used = root > 0.0
+    return float(np.mean((root[used] * sensor_deviation(found, found.problem.recordings, scale)[used]) ** 2))
 
 
 def in_form(found: Fit, name: str) -> Fit:

@@ -92,7 +92,7 @@ def structured(
     named: bool,
 ) -> bool:
     """Return whether the residual of the training tests holds more than noise."""
-    if named or not selection.structured or baseline.repeats:
+    if named or not selection.structured or baseline.scale.repeats:
         return selection.structured
     # without repeats coloured noise looks like an excess: it is one only where something can be learnt of it
     base = selection.base

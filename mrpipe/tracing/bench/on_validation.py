@@ -18,7 +18,7 @@ from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, worst
 from mrpipe.tracing.bench.nuisances import RecordGain, record_gains
 from mrpipe.tracing.bench.residual_structure import correlation_p_value
 from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, training_agreements
-from mrpipe.tracing.bench.weights import sensor_deviation
+from mrpipe.tracing.bench.weights import noise_variances
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Comparable, Verdict
 
@@ -37,6 +37,9 @@ class OnValidation:
         Simulated force of the base and of the final model.
     floor
         Standard deviation of the force that noise explains.
+    noise_components
+        NRMSE of the parts of the floor: white noise of the force, noise of the force in the band of the motion, and
+        noise of the displacement passed through the damper.
     own_offsets
         Whether every test has its own offset.
     gains
@@ -48,6 +51,7 @@ class OnValidation:
     before: FloatArray
     after: FloatArray
     floor: FloatArray
+    noise_components: dict[str, float]
     own_offsets: bool
     gains: dict[str, RecordGain]
 
@@ -117,16 +121,18 @@ def on_validation(
         recordings = replace(recordings, used=recordings.used & ~first)
     if own_offsets:
         before = before - (judged.offsets - np.median(judged.offsets))[validation.test]
-    floor = noise_on(chosen, baseline, training, validation)
-    return OnValidation(recordings, judged.measured, before, after, floor, shared is None, gains)
-
-
-def noise_on(found: Fit, baseline: Baseline, training: Recordings, validation: Recordings) -> FloatArray:
-    """Return the deviation that noise leaves on the validation tests [N]: beyond the sensors as much as in training."""
-    root = found.problem.root_weight
-    expected = root * sensor_deviation(found, training)
-    excess = baseline.noise / max(float(np.mean(expected[root > 0.0] ** 2)), 1e-12)
-    return np.asarray(sensor_deviation(found, validation) * np.sqrt(excess))
+    force, motion = noise_variances(chosen, validation)
+    scale = baseline.scale
+    floor = np.sqrt(scale.force * force + scale.motion * motion)
+    used = recordings.used
+    power = max(_rms(judged.measured[used]), 1e-12)
+    parts = {
+        "force_white": min(scale.force, 1.0) * force,
+        "force_in_band": max(scale.force - 1.0, 0.0) * force,
+        "displacement": scale.motion * motion,
+    }
+    components = {name: float(np.sqrt(np.mean(values[used]))) / power for name, values in parts.items()}
+    return OnValidation(recordings, judged.measured, before, after, floor, components, shared is None, gains)
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,7 @@ from mrpipe.tracing.bench.verdict import (
     tied,
     unnamed_reason,
 )
+from mrpipe.tracing.bench.weights import noise_scale
 
 MODEL_ERROR_CHI_SQUARE = 6.0
 """Where the best composite leaves this many times the noise, sensors' noise is no measure: weights by force RMS."""
@@ -277,11 +278,12 @@ def _refined(
 
 
 def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tuple[Baseline, Selection]:
-    """Take the noise from the repeats' residuals of the chosen fit: a poor model's errors do not all cancel in them."""
-    noise = noise_level_of(chosen)[0]
-    if not baseline.repeats or noise >= baseline.noise:
+    """Take the noise from the chosen fit: a poor model's errors do not all cancel between repeats."""
+    scale = noise_scale(chosen)
+    noise = noise_level_of(chosen, scale)
+    if noise >= baseline.noise:
         return baseline, selection
-    return replace(baseline, noise=noise), selection.with_floor(noise)
+    return replace(baseline, noise=noise, scale=scale), selection.with_floor(noise)
 
 
 def _without_nuisances(baseline: Baseline, effects: Mapping[str, Effect], options: TracingOptions) -> Baseline:

@@ -1,14 +1,13 @@
-"""Weights of samples: what the sensors' noise makes of the force, and the floor that repeats show."""
+"""Weights of samples: what noise of the channels makes of the force, and what repeated motion shows of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, optimize
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.plant import build_chain
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.kernel import FORCE_AT, run_recordings
@@ -18,22 +17,64 @@ from mrpipe.signals.filters import butterworth_lowpass
 LEAST_SHARE = 0.002
 """No sample is trusted better than this share of the force RMS: model error below it is of no interest."""
 
+LEAST_PAIR_SAMPLES = 400
+"""So many samples must be repeated before their differences count as noise."""
+
+LEAST_FACTOR = 0.25
+"""Repeats of few samples may agree by chance: no variance is taken below this share of what the channel shows."""
+
+SHORTEST_CYCLE = 8
+"""Cycles of fewer samples cannot be compared sample by sample."""
+
 AVERAGED_S = 0.02
 """Time over which simulated effects of noise are averaged."""
 
 
-def sensor_deviation(found: Fit, recordings: Recordings, *, draws: int = 3, seed: int = 0) -> FloatArray:
-    """Return the standard deviation of the force that the sensors' noise explains [N], shape (n,).
+@dataclass(frozen=True)
+class NoiseScale:
+    """How much larger the variance of the noise is than the channels themselves show.
 
-    sigma^2 = sigma_F^2 + (F(x + noise) - F(x))^2, the latter from simulations and averaged over a short while. At a
-    reversal the force rises by hundreds of newtons for each millimetre, and micrometres of displacement noise become
-    newtons; where the rod rests or creeps they turn the hysteresis back and forth, and what it then makes of the next
-    motion is as uncertain: no formula in the present slope sees that.
+    White noise of a channel is seen at its highest frequencies. Noise that lies in the band of the motion, hum and
+    what a machine does not repeat are not seen there; repeated motion shows them.
+
+    Attributes
+    ----------
+    force, motion
+        Factors on the variance of the force channel's noise and of what displacement noise does to the simulated force.
+    repeats, cycles
+        Number of pairs of repeated tests and of repeated cycles that the factors come from.
+    """
+
+    force: float = 1.0
+    motion: float = 1.0
+    repeats: int = 0
+    cycles: int = 0
+
+    @property
+    def source(self) -> str:
+        """Return in words where the noise comes from."""
+        parts = [f"{self.repeats} repeated pairs of tests"] if self.repeats else []
+        parts += [f"{self.cycles} repeated pairs of cycles"] if self.cycles else []
+        return " and ".join(parts) or "sensor channels"
+
+
+AS_SHOWN = NoiseScale()
+"""Noise as the channels show it."""
+
+
+def noise_variances(
+    found: Fit, recordings: Recordings, *, draws: int = 3, seed: int = 0
+) -> tuple[FloatArray, FloatArray]:
+    """Return the variances of the force that white noise of force and displacement channels explain [N^2], (n,) each.
+
+    That of the displacement is (F(x + noise) - F(x))^2 from simulations, averaged over a short time. At a reversal the
+    force rises by hundreds of newtons for each millimetre, so micrometres of displacement noise become newtons; where
+    the rod rests or creeps, noise turns the hysteresis back and forth, which no formula in the present slope shows.
 
     Parameters
     ----------
     draws, seed
-        Number of noise records simulated, and what they are drawn from.
+        Number of noise records simulated, and the seed they are drawn from.
     """
     chain = build_chain(found.problem.base.steps(found.base_values, *found.laws))
     rng = np.random.default_rng(seed)
@@ -44,7 +85,71 @@ def sensor_deviation(found: Fit, recordings: Recordings, *, draws: int = 3, seed
         noisy = run_recordings(chain, replace(recordings, displacement=displacement, velocity=velocity))[FORCE_AT]
         spread += np.square(noisy - calm)
     averaged = _locally_averaged(spread / draws, recordings)
-    return np.asarray(np.sqrt(recordings.force_noise[recordings.test] ** 2 + averaged), dtype=np.float64)
+    return np.asarray(recordings.force_noise[recordings.test] ** 2), averaged
+
+
+def sensor_deviation(found: Fit, recordings: Recordings, scale: NoiseScale = AS_SHOWN) -> FloatArray:
+    """Return the standard deviation of the force that noise explains [N], shape (n,)."""
+    force, motion = noise_variances(found, recordings)
+    return np.asarray(np.sqrt(scale.force * force + scale.motion * motion), dtype=np.float64)
+
+
+def noise_scale(found: Fit) -> NoiseScale:
+    """Return by how much repeated tests and cycles differ, in units of the noise that the channels show.
+
+    The error of a model is the same function of the motion in both, so it cancels in the difference of their
+    residuals. Squared differences are regressed on the two variances; neither factor is negative.
+    """
+    problem = found.problem
+    recordings, root = problem.recordings, problem.root_weight
+    repeats, cycles = _repeats(recordings), _cycles(recordings)
+    residual = np.divide(found.residual, root, out=np.zeros_like(root), where=root > 0.0)
+    force, motion = noise_variances(found, recordings)
+    rows, targets = [], []
+    for first, second in (*repeats, *cycles):
+        both = (root[first] > 0.0) & (root[second] > 0.0)
+        a, b = first[both], second[both]
+        rows.append(np.stack([force[a] + force[b], motion[a] + motion[b]], axis=1))
+        targets.append(np.square(residual[a] - residual[b]))
+    if not rows or sum(map(len, targets)) < LEAST_PAIR_SAMPLES:
+        return AS_SHOWN
+    columns, target = np.concatenate(rows), np.concatenate(targets)
+    # squared differences scatter as their mean does: weigh by it, once guessed and once found
+    expected = columns.sum(axis=1)
+    factors = np.ones(2)
+    for _ in range(3):
+        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
+        factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
+        expected = np.maximum(columns @ factors, 0.05 * columns.sum(axis=1))
+    force_factor, motion_factor = (max(float(factor), LEAST_FACTOR) for factor in factors)
+    return NoiseScale(force_factor, motion_factor, len(repeats), len(cycles))
+
+
+def _repeats(recordings: Recordings) -> list[tuple[IntArray, IntArray]]:
+    starts = recordings.starts
+    return [
+        (np.arange(starts[first], starts[first + 1]), np.arange(starts[second], starts[second + 1]))
+        for first, second in repeated_pairs(recordings)
+    ]
+
+
+def _cycles(recordings: Recordings) -> list[tuple[IntArray, IntArray]]:
+    """Return the samples of one cycle and of the next, for tests whose motion and drive repeat from cycle to cycle."""
+    found = []
+    largest = max(float(np.max(np.abs(recordings.drive))), 1e-12)
+    for test in np.flatnonzero(recordings.period_s > 0.0):
+        period = round(recordings.period_s[test] / recordings.dt[test])
+        first, end = int(recordings.starts[test]), int(recordings.starts[test + 1])
+        if period < SHORTEST_CYCLE or first + 2 * period > end:
+            continue
+        for begin in range(first, end - 2 * period + 1, 2 * period):
+            a = np.arange(begin, begin + period)
+            b = a + period
+            x, y = recordings.displacement[a], recordings.displacement[b]
+            alike = np.sqrt(np.mean((recordings.drive[a] - recordings.drive[b]) ** 2)) < 0.02 * largest
+            if alike and np.std(x - y) < 0.04 * np.std(x):
+                found.append((a, b))
+    return found
 
 
 def _noisy_motion(recordings: Recordings, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -69,16 +174,18 @@ def _locally_averaged(values: FloatArray, recordings: Recordings) -> FloatArray:
     return result
 
 
-def force_deviation(found: Fit, recordings: Recordings, model_error_share: float = 0.0) -> FloatArray:
-    """Return the deviation that weights go by [N], shape (n,): of the sensors and of what a model cannot follow.
+def force_deviation(
+    found: Fit, recordings: Recordings, model_error_share: float = 0.0, scale: NoiseScale = AS_SHOWN
+) -> FloatArray:
+    """Return the deviation that weights go by [N], shape (n,): of noise and of what a model cannot follow.
 
     Parameters
     ----------
     model_error_share
-        Model error to reckon with, as a share of the force RMS.
+        Expected model error, as a share of the force RMS.
     """
     floor = max(LEAST_SHARE, model_error_share) * recordings.force_rms
-    return np.asarray(np.hypot(sensor_deviation(found, recordings), floor), dtype=np.float64)
+    return np.asarray(np.hypot(sensor_deviation(found, recordings, scale), floor), dtype=np.float64)
 
 
 def repeated_pairs(recordings: Recordings) -> list[tuple[int, int]]:
@@ -97,22 +204,3 @@ def repeated_pairs(recordings: Recordings) -> list[tuple[int, int]]:
             if same and alike and np.std(x) > 0.0:
                 pairs.append((first, second))
     return pairs
-
-
-def noise_of_repeats(
-    residual: FloatArray, recordings: Recordings, pairs: Sequence[tuple[int, int]]
-) -> tuple[float, int]:
-    """Return half the mean square of the difference of the residuals of repeated tests, and how many samples tell it.
-
-    A model's error is the same function of the motion in both, so it cancels; noise does not.
-    """
-    total, count = 0.0, 0
-    starts = recordings.starts
-    for first, second in pairs:
-        a = residual[starts[first] : starts[first + 1]]
-        b = residual[starts[second] : starts[second + 1]]
-        both = (a != 0.0) & (b != 0.0)
-        # a slow difference is what the machine did not repeat, the model follows it: only the rest is noise of sensors
-        total += float(np.sum((a[both] - b[both]) ** 2)) / 2.0
-        count += int(np.count_nonzero(both))
-    return (total / count if count else 0.0), count
