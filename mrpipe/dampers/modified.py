@@ -60,7 +60,12 @@ def inner_increment(
     high = impulse + dt * (yield_force * 0.5 * (1.0 - zeta) - stiffness * w)
     low = low / (total + 0.5 * dt * stiffness)
     high = high / (total + 0.5 * dt * stiffness)
-    change = min(max(increment, low), high)
+    # the tangent at the present state is a guess that is exact where the hysteresis has yielded
+    direction = 1.0 if impulse - dt * (yield_force * zeta + stiffness * w) >= 0.0 else -1.0
+    y = direction * zeta
+    start = (1.0 - y**exponent if y >= 0.0 else 1.0 - (1.0 - 2.0 * gamma_share) * (-y) ** exponent) / yield_displacement
+    slope = total + 0.5 * dt * (yield_force * max(start, 0.0) + stiffness)
+    change = min(max((impulse - dt * (yield_force * zeta + stiffness * w)) / slope, low), high)
     for _ in range(80):
         moved = advance_hysteresis(zeta, change, yield_displacement, gamma_share, exponent)
         residual = total * change - impulse + dt * (yield_force * 0.5 * (zeta + moved) + stiffness * (w + 0.5 * change))
@@ -77,7 +82,7 @@ def inner_increment(
         trial = change - residual / slope
         if trial <= low or trial >= high:
             trial = 0.5 * (low + high)
-        if abs(trial - change) <= 1e-13 * (abs(increment) + yield_displacement):
+        if abs(trial - change) <= 1e-11 * (abs(increment) + yield_displacement):
             return trial
         change = trial
     return change

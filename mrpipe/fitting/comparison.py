@@ -17,7 +17,7 @@ from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import bench_recordings, blocks_of, thinned
 from mrpipe.fitting.scoring import PooledScore, TestScore, pool, score_tests
-from mrpipe.fitting.start import base_of, best_fit, best_starts, distinct_levels, first_problem, polynomial_laws
+from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
 
 WORTHWHILE = 0.01
@@ -232,8 +232,7 @@ def _drafts(
     for place, form in enumerate(forms):
         progress(0.4 * place / len(forms), f"rank {form.name}")
         problem = form_problem(small, base_of(small, form, laws), offsets=options.offsets)
-        points = best_starts(problem, options.method.starts)
-        found = min((fit(problem, point, iterations=12) for point in points), key=lambda item: item.cost)
+        found = best_fit(problem, starts=options.method.starts)
         w = weighting(problem)
         force = centred(problem.recordings.force[w.at][None], w)[0][0]
         errors[form.name] = float(np.sqrt(found.cost / max(float(force @ force), 1e-300)))

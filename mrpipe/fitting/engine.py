@@ -295,7 +295,7 @@ def fit(problem: Problem, start: FloatArray, *, iterations: int = 15, tolerance:
     each = max(3, iterations // 3)
     best = found = _search(problem, start, each, tolerance)
     idle = 0
-    for _ in range(COUPLING_PASSES):
+    for _ in range(max(1, min(COUPLING_PASSES, iterations // 2))):
         before = best.cost
         found = _search(replace(problem, reference=found.laws), found.theta, each, tolerance)
         best = min(best, found, key=lambda item: item.cost)

@@ -18,7 +18,7 @@ from mrpipe.fitting.engine import Fit, centred, finish, fit, regressors, solve, 
 from mrpipe.fitting.problem import Base, Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import blocks_of
-from mrpipe.fitting.start import best_starts, first_problem
+from mrpipe.fitting.start import BEGUN_STEPS, MORE_POINTS, best_starts, first_problem, followed
 
 NELDER_MEAD_ITERATIONS = 1000
 NELDER_MEAD_ERROR = 0.01
@@ -150,7 +150,7 @@ def fit_form(
     DivergedError
         If the model's force is not finite for some trial.
     """
-    begins = [start_of(problem, warm, [])] if warm is not None else best_starts(problem, method.starts)
+    begins = [start_of(problem, warm, [])] if warm is not None else _begins(problem, method)
     ends = []
     for begin in begins:
         if len(begin) and method.method == "nelder-mead":
@@ -159,6 +159,13 @@ def fit_form(
             ends.append(fit(problem, begin, iterations=method.iterations, tolerance=1e-7))
     ends.sort(key=lambda item: item.cost)
     return form_fit(ends[0], method, drive_unit, tuple(_nrmse(end) for end in ends))
+
+
+def _begins(problem: Problem, method: FitMethod) -> list[FloatArray]:
+    if method.method == "nelder-mead":
+        return best_starts(problem, method.starts)
+    points = best_starts(problem, MORE_POINTS * method.starts)
+    return [item.theta for item in followed(problem, points, method.starts, BEGUN_STEPS)]
 
 
 def form_fit(found: Fit, method: FitMethod, drive_unit: str, start_nrmse: tuple[float, ...] = ()) -> FormFit:

@@ -28,6 +28,12 @@ MANY_LEVELS = 99
 MOST_STARTS = 36
 """Of more combinations of the parameters' starts, this many are tried, evenly picked."""
 
+MORE_POINTS = 3
+"""So many times more points than fits are followed for a few steps."""
+
+BEGUN_STEPS = 3
+"""Steps after which the points that promise most are chosen."""
+
 
 def drive_varies(recordings: Recordings) -> bool:
     """Return whether the drive changes within any test."""
@@ -114,10 +120,23 @@ def best_starts(problem: Problem, count: int) -> list[FloatArray]:
     return [points[place] for place in np.argsort(costs, kind="stable")[:count]]
 
 
+def followed(problem: Problem, points: Sequence[FloatArray], starts: int, iterations: int) -> list[Fit]:
+    """Return fits from the points that promise most after a few steps, the best first.
+
+    What a point costs before the first step says little where two parts of a form can take each other's place.
+    """
+    if problem.base.form.coupled:
+        # every step of a coupled form costs several searches
+        points = points[:starts]
+    begun = [fit(problem, point, iterations=BEGUN_STEPS) for point in points]
+    begun.sort(key=lambda item: item.cost)
+    fits = [fit(item.problem, item.theta, iterations=iterations) for item in begun[:starts]]
+    return sorted(fits, key=lambda item: item.cost)
+
+
 def best_fit(problem: Problem, *, starts: int = 2, iterations: int = 12) -> Fit:
     """Fit from the starting points that promise most and return the best."""
-    fits = [fit(problem, point, iterations=iterations) for point in best_starts(problem, starts)]
-    return min(fits, key=lambda item: item.cost)
+    return followed(problem, best_starts(problem, MORE_POINTS * starts), starts, iterations)[0]
 
 
 def with_form(found: Fit, form: BaseForm) -> Problem:
@@ -133,11 +152,10 @@ def with_form(found: Fit, form: BaseForm) -> Problem:
 def fit_with_form(found: Fit, form: BaseForm, *, starts: int = 2, iterations: int = 12) -> Fit:
     """Return the fit with another base form, from its own starts; the terms start where they are."""
     problem = with_form(found, form)
-    own = best_starts(replace(problem, terms=()), starts)
-    fits = []
-    for point in own:
-        values = replace(problem, terms=()).values(point)[0]
-        shared = {name: value for name, value in found.base_values.items() if name in ("eta", "eta_fall")}
-        start = start_of(problem, {**values, **shared}, found.term_values)
-        fits.append(fit(problem, start, iterations=iterations))
-    return min(fits, key=lambda item: item.cost)
+    bare = replace(problem, terms=())
+    shared = {name: value for name, value in found.base_values.items() if name in ("eta", "eta_fall")}
+    points = [
+        start_of(problem, {**bare.values(point)[0], **shared}, found.term_values)
+        for point in best_starts(bare, MORE_POINTS * starts)
+    ]
+    return followed(problem, points, starts, iterations)[0]

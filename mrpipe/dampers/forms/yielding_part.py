@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numba import njit
 
@@ -34,9 +36,10 @@ FORM = BaseForm(
     summary="Bouc-Wen hysteresis parallel to F_p(u) p, p' = q (v - v0 atanh p)",
     source="Eyring 1936 (saturating dashpot); plug that slips parallel to a layer that shears, as in Phillips 1969",
     parameters=(
-        YIELD_DISPLACEMENT,
+        # which of the two parts takes the elastic path of a reversal makes two optima far apart
+        replace(YIELD_DISPLACEMENT, starts=(0.05, 0.003)),
         GAMMA_SHARE,
-        shape("spring_rate", "1/m", "stiffness over the part's force", "one/stroke", 2.0, 1500.0, (60.0, 250.0, 900.0)),
+        shape("spring_rate", "1/m", "stiffness over the part's force", "one/stroke", 2.0, 1500.0, (40.0, 200.0, 900.0)),
         shape("velocity_scale", "m/s", "speed of the part's dashpot", "speed", 5e-3, 1.0, (0.12, 0.04)),
     ),
     steps=_steps,
