@@ -12,6 +12,8 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.judging import Row, parameter_errors
+from benchmarks.rigs.bases import SOURCES
+from benchmarks.rigs.effects import LAWS
 
 HEAD = """# How often planted effects are found
 
@@ -161,6 +163,12 @@ def parameters(rows: Sequence[Row]) -> str:
     )
 
 
+def planted_laws() -> str:
+    """Return the tables of base forms and of the laws that are planted."""
+    forms = table(("base form", "source"), SOURCES.items())
+    return forms + "\n\n" + table(("planted", "law"), LAWS.items())
+
+
 def every_case(rows: Sequence[Row]) -> str:
     """Return one line for each case."""
     order = {"clean": 0, "single": 1, "pair": 2, "outside": 3}
@@ -196,6 +204,7 @@ def document(all_rows: Sequence[Row]) -> str:
         ("By excitation", by_group(rows, lambda r: f"{r['training']} / {r['validation']}", "training / validation")),
         ("By strength", by_group(rows, lambda r: f"{r['share']:g} of force RMS", "strength asked for")),
         ("Parameters", parameters(rows)),
+        ("What the rigs are made of", planted_laws()),
         ("Every case", every_case(rows)),
     ]
     if failed:

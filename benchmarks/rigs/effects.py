@@ -163,6 +163,31 @@ EFFECTS = (
     "offset", "accumulator", "inertia", "asymmetry", "stribeck", "quadratic-drag", "migration", "remanence", "heating",
     "backlash", "delay", "saturation", "pinching", "channel-skew", "end-stop",
 )  # fmt: skip
+LAWS = {
+    "offset": "shift of zero from test to test; with drive to the power 1.3 to 1.7; warming 1 - exp(-t/T)",
+    "accumulator": "cubic spring; isothermal gas",
+    "inertia": "mass behind a lag of 1 to 3 ms; mass that grows with the square of the displacement",
+    "asymmetry": "yield force times 1 + s tanh(v/v_t); force times 1 + s F/sqrt(F^2 + F_0^2)",
+    "stribeck": "yield force times 1 + s sech(v/v_s); 1 + s/(1 + |v|/v_s)",
+    "quadratic-drag": "|v|^1.7 to |v|^1.9 after Blasius; square above an onset speed",
+    "migration": "yield force times 1 - s/(1 + slip/L)^2; 1 - s (1 - tanh(t/T)) since the reversal",
+    "remanence": "peak that the motion wipes out, joined by a power; two domains that forget with slip and with time",
+    "heating": "temperature from dissipated work and loss; yield force falls linearly or to a limit, viscosity squared",
+    "backlash": "play whose edge carries the damper gradually, soft or hard",
+    "delay": "three lags in series; dead time and an amplifier's lag",
+    "saturation": "driver with a soft knee, before the lag",
+    "pinching": "dip of the yield force: squared cosine; squared hyperbolic secant",
+    "channel-skew": "late force: pure shift; amplifier of second order",
+    "end-stop": "Hertz contact; rubber that stiffens without bound",
+    "bump": "outside the library: drive times a bump over the displacement",
+    "fractional-memory": "outside the library: derivative of order one half of the displacement, times drive",
+    "ripple": "outside the library: sine of the displacement",
+    "shaker": "outside the library: sine of the time, growing with speed",
+    "lobes": "outside the library: sine of three or four times the angle in the phase plane",
+    "stick-events": "outside the library: sudden short rises of the yield force",
+}
+"""What is planted under each name; two laws are drawn with equal odds where two are named."""
+
 OUTSIDE = ("bump", "fractional-memory", "ripple", "shaker", "lobes", "stick-events")
 
 

@@ -78,3 +78,7 @@ def test_memory_of_order_one_half_grows_with_the_root_of_the_frequency():
         gains.append(np.sqrt(np.mean(force[half:] ** 2)))
     # four times the frequency: twice the force
     assert gains[1] / gains[0] == pytest.approx(2.0, rel=0.15)
+
+
+def test_every_planted_law_is_described():
+    assert set(fx.LAWS) == set(EFFECTS + OUTSIDE)
