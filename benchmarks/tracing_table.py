@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from statistics import median
+from typing import TypeVar
 
 from benchmarks.judging import Row, parameter_errors
 from benchmarks.rigs.bases import SOURCES
@@ -30,13 +32,28 @@ cases are clean rigs.
 This table holds {count} cases, seeds {first} to {last}.
 """
 
-Test = Callable[[Row], bool]
+_Item = TypeVar("_Item")
 
 
-def percent(rows: Iterable[Row], test: Test) -> str:
+def percent(rows: Iterable[_Item], test: Callable[[_Item], bool]) -> str:
     """Return `hits of all (percent)`."""
     found = [bool(test(row)) for row in rows]
     return f"{sum(found)} of {len(found)} ({100 * sum(found) / len(found):.0f} %)" if found else "-"
+
+
+def interval(hits: int, count: int) -> str:
+    """Return Wilson's interval of 95 % for a rate, in percent."""
+    z2 = 1.96**2
+    middle = (hits + 0.5 * z2) / (count + z2)
+    half = 1.96 / (count + z2) * math.sqrt(hits * (count - hits) / count + 0.25 * z2)
+    return f"{100 * max(middle - half, 0.0):.0f} to {100 * min(middle + half, 1.0):.0f} %"
+
+
+def rate(found: Sequence[bool]) -> tuple[str, str]:
+    """Return `hits of all (percent)` and its interval."""
+    if not found:
+        return "-", "-"
+    return percent(found, bool), interval(sum(found), len(found))
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -73,34 +90,35 @@ def floor_is_right(row: Row) -> bool:
 def rates(rows: Sequence[Row]) -> str:
     """Return the table of acceptance figures."""
     clean, single, pair, outside = (of_kind(rows, kind) for kind in ("clean", "single", "pair", "outside"))
-    sure = [there for confidence, there in confidences(rows) if confidence >= 0.9]
-    wrong = f"{sum(not there for there in sure)} of {len(sure)}" if sure else "-"
-    if sure:
-        wrong += f" ({100 * sum(not there for there in sure) / len(sure):.0f} %)"
-    errors = [abs(error) for row in single for _, _, error in parameter_errors(row)]
-    within = f"{sum(e <= 0.15 for e in errors)} of {len(errors)}" if errors else "-"
-    if errors:
-        within += f" ({100 * sum(e <= 0.15 for e in errors) / len(errors):.0f} %)"
     first = [row for row in single if row["right"]]
-    lines: list[tuple[str, str, str]] = [
-        ("clean rig: no effect named", percent(clean, lambda r: r["right"]), "98 %"),
-        ("one effect: named first", percent(single, lambda r: r["right"]), "95 %"),
-        ("one effect: named alone", percent(single, lambda r: r["alone"]), "90 %"),
-        ("pair: both named", percent(pair, lambda r: r["right"]), "70 %"),
-        ("pair: no name that is not there", percent(pair, lambda r: not r["spurious"]), ""),
-        ("shape outside the library: unknown", percent(outside, lambda r: r["right"]), "80 %"),
-        ("effects named with confidence 0.9 or more that are wrong", wrong, "at most 5 %"),
-        ("clean rig: error after at most 1.25 noise floors", percent(clean, at_floor), "90 %"),
-        ("effect named first: error after at most 1.25 noise floors", percent(first, at_floor), "90 %"),
-        ("clean rig: error after at most 1.25 times the true model's error",
-         percent(clean, lambda r: r["after"] <= 1.25 * r["truth"]["true_model_nrmse"]), ""),
-        ("clean rig: noise floor within 25 % of the true model's error", percent(clean, floor_is_right), "100 %"),
-        ("one effect: parameters that can be compared within 15 %", within, "90 %"),
-    ]  # fmt: skip
+    errors = [abs(error) for row in single for _, _, error in parameter_errors(row)]
+    figures: list[tuple[str, list[bool], str]] = [
+        ("clean rig: no effect named", [r["right"] for r in clean], "98 %"),
+        ("one effect: named first", [r["right"] for r in single], "95 %"),
+        ("one effect: named alone", [r["alone"] for r in single], "90 %"),
+        ("pair: both named", [r["right"] for r in pair], "70 %"),
+        ("pair: no name that is not there", [not r["spurious"] for r in pair], ""),
+        ("shape outside the library: unknown", [r["right"] for r in outside], "80 %"),
+        (
+            "effects named with confidence 0.9 or more that are wrong",
+            [not there for confidence, there in confidences(rows) if confidence >= 0.9],
+            "at most 5 %",
+        ),
+        ("clean rig: error after at most 1.25 noise floors", [at_floor(r) for r in clean], "90 %"),
+        ("effect named first: error after at most 1.25 noise floors", [at_floor(r) for r in first], "90 %"),
+        (
+            "clean rig: error after at most 1.25 times the true model's error",
+            [r["after"] <= 1.25 * r["truth"]["true_model_nrmse"] for r in clean],
+            "",
+        ),
+        ("clean rig: noise floor within 25 % of the true model's error", [floor_is_right(r) for r in clean], "100 %"),
+        ("one effect: parameters that can be compared within 15 %", [e <= 0.15 for e in errors], "90 %"),
+    ]
+    lines = [(what, *rate(found), aim) for what, found, aim in figures]
     if rows:
-        lines.append(("time of a case, median", f"{median(r['seconds'] for r in rows):.0f} s", ""))
-        lines.append(("time of a case, largest", f"{max(r['seconds'] for r in rows):.0f} s", ""))
-    return table(("what", "rate", "aim"), lines)
+        lines.append(("time of a case, median", f"{median(r['seconds'] for r in rows):.0f} s", "", ""))
+        lines.append(("time of a case, largest", f"{max(r['seconds'] for r in rows):.0f} s", "", ""))
+    return table(("what", "rate", "95 % interval", "aim"), lines)
 
 
 def reliability(rows: Sequence[Row]) -> str:

@@ -43,7 +43,7 @@ def draw_sensors(kind: str, rng: np.random.Generator, *, stroke: float, force_rm
         hum, share = np.array([0.5 * x, 1.2 * f, 1.5 * i]), 0.5
     elif kind == "quantised":
         # the step of a converter of 12 bits whose range is larger than what is measured
-        steps, share = np.array([2.0 * x, 3.0 * f, 3.0 * i]), 0.3
+        steps, share = np.array([2.0 * x, 1.5 * f, 3.0 * i]), 0.3
     return Sensors(
         *(
             Channel(share * deviation, float(hum[k]), float(steps[k]), float(offsets[k]))

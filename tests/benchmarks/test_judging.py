@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.judging import judged, parameter_errors, verdict_row
-from benchmarks.tracing_table import document, percent, reliability
+from benchmarks.tracing_table import document, interval, percent, reliability
 
 pytestmark = pytest.mark.property
 
@@ -75,7 +75,14 @@ def test_the_document_holds_all_cases_and_the_failed_ones():
     rows = [row_of("clean", []), row_of("single", ["inertia"]), row_of("pair", ["inertia", "delay"])]
     failed = {**rows[0], "seed": 9, "error": "RuntimeError: exit status 1"}
     text = document([*rows, failed])
-    assert "clean rig: no effect named | 0 of 1 (0 %)" in text
-    assert "one effect: named alone | 1 of 1 (100 %)" in text
+    assert "clean rig: no effect named | 0 of 1 (0 %) | 0 to 79 % |" in text
+    assert "one effect: named alone | 1 of 1 (100 %) | 21 to 100 % |" in text
     assert "| 9 | none | dahl | RuntimeError: exit status 1 |" in text
     assert percent([], lambda row: True) == "-"
+
+
+@pytest.mark.literature
+def test_interval_of_a_rate_is_wilsons():
+    # Brown, Cai and DasGupta 2001: for 0 of 10 the upper limit is z^2/(n + z^2)
+    assert interval(0, 10) == "0 to 28 %"
+    assert interval(5, 10) == "24 to 76 %"
