@@ -1,4 +1,4 @@
-"""Least-squares complex frequency estimator with transient terms: poles without a first guess."""
+"""Least-squares complex frequency estimator (LSCF) with transient terms, for several inputs and outputs together."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.spectra import ComplexArray, RecordSpectrum
+from mrpipe.modal.records import Place, Sensor
+from mrpipe.modal.spectra import ComplexArray, RecordSpectrum, all_inputs, all_sensors
 
 
 @dataclass(frozen=True)
@@ -35,31 +36,36 @@ def _stack(matrix: ComplexArray) -> FloatArray:
     return np.concatenate([matrix.real, matrix.imag], axis=0)
 
 
-def _triangle(spectra: Sequence[RecordSpectrum], order: int, step: float, output: int) -> FloatArray:
-    """Return R of A(z) Y = B(z) U + T(z) for one output at the highest order: columns of B, of T a test, of A.
+def _triangle(
+    spectra: Sequence[RecordSpectrum], order: int, step: float, sensor: Sensor, inputs: Sequence[Place]
+) -> FloatArray:
+    """Return R of A(z) Y = sum B_k(z) U_k + T(z) for one output at the highest order: columns of B, of T, of A.
 
-    T(z) takes up what the record holds of its beginning and end (no window, no leakage error); each test has its own.
+    T(z) represents the initial and final state of each record, so that no window is needed and no leakage remains.
     """
     powers = np.arange(order + 1)
     rows, left = [], []
-    width = (order + 1) * (1 + len(spectra))
-    for index, item in enumerate(spectra):
+    own = [item for item in spectra if sensor in item.sensors]
+    width = (order + 1) * (len(inputs) + len(own))
+    for index, item in enumerate(own):
         z = np.exp(-1j * np.outer(item.omega * step, powers))
-        scale = np.linalg.norm(item.responses[:, output]) or 1.0
+        response = item.responses[:, item.sensors.index(sensor)]
         block = np.zeros((item.omega.size, width), dtype=np.complex128)
-        block[:, : order + 1] = z * (item.excitation / (np.linalg.norm(item.excitation) or 1.0))[:, None]
-        start = (order + 1) * (1 + index)
+        for number, excitation in enumerate(item.input_columns(inputs).T):
+            part = slice(number * (order + 1), (number + 1) * (order + 1))
+            block[:, part] = z * (excitation / (np.linalg.norm(excitation) or 1.0))[:, None]
+        start = (order + 1) * (len(inputs) + index)
         block[:, start : start + order + 1] = z / np.sqrt(item.omega.size)
         left.append(_stack(block))
-        rows.append(_stack(z * (item.responses[:, output] / scale)[:, None]))
+        rows.append(_stack(z * (response / (np.linalg.norm(response) or 1.0))[:, None]))
     return np.asarray(np.linalg.qr(np.hstack([np.vstack(left), np.vstack(rows)]), mode="r"), dtype=np.float64)
 
 
 def _reduced(triangle: FloatArray, highest: int, order: int) -> FloatArray:
     """Return the part that the denominator of a lower order alone must explain.
 
-    Lower orders take some columns of the highest one, and R of some columns of a matrix is R of those columns of its R:
-    the data are factored once for all orders.
+    A lower order uses a subset of the columns of the highest order. The R factor of a subset of columns follows from
+    the R factor of all columns, so the data are factored once for all orders.
     """
     blocks = triangle.shape[1] // (highest + 1)
     columns = np.concatenate([block * (highest + 1) + np.arange(order + 1) for block in range(blocks)])
@@ -84,7 +90,8 @@ def lscf_poles(
     """
     step = 0.95 * np.pi / high_rad_s
     highest = max(orders)
-    triangles = [_triangle(spectra, highest, step, output) for output in range(spectra[0].responses.shape[1])]
+    inputs, sensors = all_inputs(spectra), all_sensors(spectra)
+    triangles = [_triangle(spectra, highest, step, sensor, inputs) for sensor in sensors]
     found = []
     for order in orders:
         stacked = np.vstack([_reduced(triangle, highest, order) for triangle in triangles])

@@ -8,14 +8,15 @@ a test lasts, so T is as large as H U at the peaks; averaging with windows would
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.modal.projection import DIRECT_POWERS, Problem, State, evaluate, stack
-from mrpipe.modal.spectra import ComplexArray, RecordSpectrum
+from mrpipe.modal.records import Place, Sensor
+from mrpipe.modal.spectra import ComplexArray, RecordSpectrum, all_inputs, all_sensors
 
 
 @dataclass(frozen=True)
@@ -29,21 +30,35 @@ class MultiModeFit:
     covariance
         Shape (2r, 2r) of (ln omega, ln zeta), robust to residuals that are not white.
     residues
-        Shape (n, r) complex: amplitude of mode r on floor i in acceleration over excitation, its phase referred to
-        that of a proportionally damped frame (0 or pi).
+        Shape (n, r) complex: amplitude of mode r at sensor i in acceleration over the first input, its phase referred
+        to that of a proportionally damped frame (0 or pi). With several inputs: the mode's shape times its
+        participation in the first input that excites it most.
     residue_errors
-        Shape (n, r): standard error of the residues by the responses' noise; noise of the excitation scales a mode's
-        residues alike and leaves its shape.
+        Shape (n, r): standard error of the residues due to noise of the responses. Noise of the excitation scales all
+        residues of a mode alike and does not change its shape.
     coherence
-        Shape (n, r): share of the response near the peak that the excitation and the record's ends explain.
+        Shape (n, r): share of the response near the peak that the excitation and the ends of the record explain.
     steady, measured
-        One entry a test, shape (m, n): H U of the fit, and the measured response without its transient part.
+        One entry a test, shape (m, s): H U of the fit, and the measured response without its transient part. Columns
+        are the sensors of the test.
     omega
         One entry a test, shape (m,) [rad/s].
     excitation
-        One entry a test, shape (m,).
+        One entry a test, shape (m,): the first input of the test.
     noise_variance
         Shape (n,): variance of a spectral line far from the peaks.
+    sensors
+        Place and kind of each row of `residues`.
+    inputs
+        Places of the inputs.
+    participations
+        Shape (k, r) complex: what an input contributes to a mode, relative to the input of `residues`.
+    input_residues
+        Shape (n, k, r) complex: the residues of each input; nan where no test has this sensor and this input.
+    spectra
+        The spectra that were fitted.
+    transients
+        One entry a test, shape (m, s): contribution of the ends of the record.
     """
 
     angular_frequencies: FloatArray
@@ -57,6 +72,12 @@ class MultiModeFit:
     omega: tuple[FloatArray, ...]
     excitation: tuple[ComplexArray, ...]
     noise_variance: FloatArray
+    sensors: tuple[Sensor, ...] = ()
+    inputs: tuple[Place, ...] = ()
+    participations: ComplexArray = field(default_factory=lambda: np.ones((1, 1), dtype=np.complex128))
+    input_residues: ComplexArray = field(default_factory=lambda: np.ones((1, 1, 1), dtype=np.complex128))
+    spectra: tuple[RecordSpectrum, ...] = ()
+    transients: tuple[ComplexArray, ...] = ()
 
     def mode_coherence(self) -> FloatArray:
         """Coherence at each peak, shape (r,): mean over floors, weighted by the squared shape."""
@@ -76,43 +97,68 @@ class MultiModeFit:
             residues=self.residues[:, index],
             residue_errors=self.residue_errors[:, index],
             coherence=self.coherence[:, index],
+            participations=self.participations[:, index],
+            input_residues=self.input_residues[:, :, index],
         )
 
     def residual(self) -> ComplexArray:
-        """What neither excitation nor transients explain, all tests after one another, shape (sum m, n)."""
-        return np.vstack([m - s for m, s in zip(self.measured, self.steady, strict=True)])
+        """Part that neither excitation nor transients explain, all tests in one column, shape (sum m, n).
+
+        Zero where a test does not have a sensor.
+        """
+        parts = []
+        for item, measured, steady in zip(self.spectra, self.measured, self.steady, strict=True):
+            part = np.zeros((item.omega.size, len(self.sensors)), dtype=np.complex128)
+            part[:, [self.sensors.index(sensor) for sensor in item.sensors]] = measured - steady
+            parts.append(part)
+        return np.vstack(parts)
 
 
-def _group_target(spectra: Sequence[RecordSpectrum], outputs: Sequence[int]) -> ComplexArray:
-    return np.vstack([item.responses[:, outputs] for item in spectra])
+@dataclass
+class _Group:
+    """Sensors of one kind that the same tests have: they share one linear basis."""
+
+    problem: Problem
+    sensors: list[Sensor]
+    tests: list[int]
+    target: ComplexArray
+    smooth: ComplexArray
+    sigma: FloatArray
+    weight: FloatArray
+    input_noise: float = 0.0
+
+
+def _groups(spectra: Sequence[RecordSpectrum], modes: int) -> list[_Group]:
+    members: dict[tuple[bool, tuple[int, ...]], list[Sensor]] = {}
+    for sensor in all_sensors(spectra):
+        tests = tuple(index for index, item in enumerate(spectra) if sensor in item.sensors)
+        members.setdefault((sensor.is_displacement, tests), []).append(sensor)
+    groups = []
+    for (is_displacement, tests), sensors in members.items():
+        own = [spectra[index] for index in tests]
+        problem = Problem(own, modes, is_displacement)
+        target = np.vstack([item.responses[:, [item.sensors.index(sensor) for sensor in sensors]] for item in own])
+        sigma = np.maximum(np.std(target, axis=0), 1e-300)
+        ones = np.ones(problem.total)
+        groups.append(_Group(problem, sensors, list(tests), target, problem.smooth_columns(), sigma, ones))
+    return groups
 
 
 class _Fit:
-    """Variable projection over the outputs of both kinds, with weights renewed from the residuals."""
+    """Variable projection over all groups of sensors, with weights renewed from the residuals."""
 
     def __init__(self, spectra: Sequence[RecordSpectrum], modes: int) -> None:
-        kinds = spectra[0].is_displacement
-        self.groups = [
-            (Problem(spectra, modes, flag), [i for i, d in enumerate(kinds) if d is flag])
-            for flag in (False, True)
-            if flag in kinds
-        ]
-        self.smooth = [problem.smooth_columns() for problem, _ in self.groups]
-        self.targets = [_group_target(spectra, outputs) for _, outputs in self.groups]
-        self.sigma = [np.std(target, axis=0) for target in self.targets]
-        self.weight = [np.ones(problem.total) for problem, _ in self.groups]
-        self.input_noise = [0.0 for _ in self.groups]
+        self.groups = _groups(spectra, modes)
         self._cache: tuple[bytes, list[State]] | None = None
 
     def states(self, theta: FloatArray) -> list[State]:
         key = theta.tobytes()
         if self._cache is None or self._cache[0] != key:
             states = []
-            for (problem, _), smooth, target, sigma, weight in zip(
-                self.groups, self.smooth, self.targets, self.sigma, self.weight, strict=True
-            ):
-                both = np.concatenate([weight, weight])
-                states.append(evaluate(problem, smooth, theta, stack(target / sigma) * both[:, None], both))
+            for group in self.groups:
+                both = np.concatenate([group.weight, group.weight])
+                target = stack(group.target / group.sigma) * both[:, None]
+                states.append(evaluate(group.problem, group.smooth, theta, target, both))
             self._cache = (key, states)
         return self._cache[1]
 
@@ -135,71 +181,80 @@ class _Fit:
 
     def renew_weights(self, theta: FloatArray) -> None:
         """Noise of the excitation is amplified at the peaks: variance = s_y2 + |H|2 s_u2, estimated from residuals."""
-        states = self.states(theta)
-        for index, ((problem, outputs), state) in enumerate(zip(self.groups, states, strict=True)):
-            unweighted = self.complex_residual(index, state)
-            direct = self.steady(index, state)
-            response = (
-                np.abs(direct) ** 2 / np.abs(np.concatenate([s.excitation for s in problem.spectra]))[:, None] ** 2
-            )
-            total = np.zeros(problem.total)
+        for group, state in zip(self.groups, self.states(theta), strict=True):
+            unweighted = self.complex_residual(group, state)
+            response = np.abs(self.steady(group, state)) ** 2 / self.input_power(group)[:, None]
+            total = np.zeros(group.problem.total)
             noise = []
-            for column in range(len(outputs)):
+            for column in range(len(group.sensors)):
                 power = np.abs(unweighted[:, column]) ** 2
                 quiet = response[:, column] <= np.median(response[:, column])
                 floor = max(float(np.mean(power[quiet])), 1e-300)
                 loud = response[:, column] >= np.quantile(response[:, column], 0.97)
-                amplified = max(float(np.mean(power[loud]) - floor), 0.0) / float(np.mean(response[loud, column]))
-                self.sigma[index][column] = np.sqrt(floor / 2.0)
+                gain = max(float(np.mean(response[loud, column])), 1e-300)
+                amplified = max(float(np.mean(power[loud]) - floor), 0.0) / gain
+                group.sigma[column] = np.sqrt(floor / 2.0)
                 noise.append(amplified)
                 total = np.maximum(total, amplified * response[:, column] / floor)
-            self.weight[index] = 1.0 / np.sqrt(1.0 + total)
-            self.input_noise[index] = float(np.sqrt(np.median(noise)))
+            group.weight = 1.0 / np.sqrt(1.0 + total)
+            group.input_noise = float(np.sqrt(np.median(noise)))
         self._cache = None
 
-    def complex_residual(self, index: int, state: State) -> ComplexArray:
-        """Residual of a group in the unit of its spectra."""
-        return self.targets[index] - state.basis @ (state.coefficients * self.sigma[index])
+    @staticmethod
+    def input_power(group: _Group) -> FloatArray:
+        """Squared magnitude of the inputs, each relative to its own scale, in the unit of the first, shape (rows,)."""
+        scale = group.problem.scale
+        power = np.sum(np.abs(np.concatenate(group.problem.excitations) / scale) ** 2, axis=1) * scale[0] ** 2
+        return np.asarray(np.maximum(power, 1e-300))
 
-    def coefficient_errors(self, index: int, state: State) -> FloatArray:
-        """Standard errors of a group's coefficients for responses of unit noise, shape (columns,)."""
-        weight = np.concatenate([self.weight[index], self.weight[index]])
+    @staticmethod
+    def complex_residual(group: _Group, state: State) -> ComplexArray:
+        """Residual of a group in the unit of its spectra."""
+        return group.target - state.basis @ (state.coefficients * group.sigma)
+
+    @staticmethod
+    def coefficient_errors(group: _Group, state: State) -> FloatArray:
+        """Standard errors of the coefficients of a group for responses of unit noise, shape (columns,)."""
+        weight = np.concatenate([group.weight, group.weight])
         weighted = stack(state.basis) * weight[:, None]
-        norms = np.linalg.norm(weighted, axis=0)
+        norms = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
         inverse = np.linalg.pinv(np.linalg.qr(weighted / norms, mode="r"))
         return np.asarray(np.linalg.norm(inverse, axis=1) / norms)
 
-    def steady(self, index: int, state: State) -> ComplexArray:
+    @staticmethod
+    def steady(group: _Group, state: State) -> ComplexArray:
         """H U of a group."""
-        problem = self.groups[index][0]
-        width = 2 + 2 * problem.tests
-        columns = [m * width + k for m in range(problem.modes) for k in (0, 1)]
-        columns += list(range(problem.modes * width, problem.modes * width + DIRECT_POWERS))
-        return state.basis[:, columns] @ (state.coefficients[columns] * self.sigma[index])
+        problem = group.problem
+        inputs = len(problem.inputs)
+        columns = [mode * problem.width + k for mode in range(problem.modes) for k in range(2 * inputs)]
+        end = problem.modes * problem.width
+        columns += list(range(end, end + DIRECT_POWERS * inputs))
+        return np.asarray(state.basis[:, columns] @ (state.coefficients[columns] * group.sigma))
 
 
 def _covariance(fit: _Fit, theta: FloatArray) -> FloatArray:
-    """Covariance of theta that allows for noise of the excitation, which reaches all outputs alike through H.
+    """Covariance of theta that allows for noise of the excitation, which reaches all outputs through H.
 
-    A lightly damped peak holds only a few lines, too few to tell their own scatter; so the variance of what the model
-    predicts from the noise found over the whole band is taken where it is the larger one.
+    A lightly damped peak has too few lines to estimate their scatter. The variance predicted from the noise of the
+    whole band is taken where it is the larger one.
     """
     jacobian, residual = fit.jacobian(theta), fit.residual(theta)
     inverse = np.linalg.pinv(jacobian.T @ jacobian)
     parameters = theta.size
     predicted, observed = np.zeros_like(inverse), np.zeros_like(inverse)
     start = 0
-    for index, ((problem, outputs), state) in enumerate(zip(fit.groups, fit.states(theta), strict=True)):
+    for group, state in zip(fit.groups, fit.states(theta), strict=True):
+        total, outputs = group.problem.total, len(group.sensors)
         part = slice(start, start + state.residual.size)
         start = part.stop
-        own = jacobian[part].reshape(2, problem.total, len(outputs), parameters)
-        error = residual[part].reshape(2, problem.total, len(outputs))
+        own = jacobian[part].reshape(2, total, outputs, parameters)
+        error = residual[part].reshape(2, total, outputs)
         scores = np.einsum("clop,clo->lp", own, error)
         observed += scores.T @ scores
-        line = fit.weight[index] ** 2
+        line = group.weight**2
         predicted += np.einsum("clop,cloq,l->pq", own, own, line, optimize=True)
-        response = fit.steady(index, state) / np.concatenate([s.excitation for s in problem.spectra])[:, None]
-        common = (fit.weight[index] * fit.input_noise[index])[:, None] * response / fit.sigma[index]
+        response = fit.steady(group, state) / np.sqrt(fit.input_power(group))[:, None]
+        common = (group.weight * group.input_noise)[:, None] * response / group.sigma
         carried = np.einsum("lop,lo->lp", own[0] - 1j * own[1], common)
         predicted += 0.5 * (carried.real.T @ carried.real + carried.imag.T @ carried.imag)
     both = np.stack([inverse @ predicted @ inverse, inverse @ observed @ inverse])
@@ -209,16 +264,23 @@ def _covariance(fit: _Fit, theta: FloatArray) -> FloatArray:
 
 
 def _coherence(
-    omega: FloatArray, steady: ComplexArray, measured: ComplexArray, peaks: FloatArray, zeta: FloatArray
+    spectra: Sequence[RecordSpectrum],
+    sensors: Sequence[Sensor],
+    steady: Sequence[ComplexArray],
+    measured: Sequence[ComplexArray],
+    poles: tuple[FloatArray, FloatArray],
 ) -> FloatArray:
-    result = np.empty((measured.shape[1], peaks.size))
-    for index, (peak, ratio) in enumerate(zip(peaks, zeta, strict=True)):
-        half = max(4.0 * ratio * peak, 6.0 * float(np.median(np.diff(omega))))
-        near = np.abs(omega - peak) <= half
-        error = np.sum(np.abs(measured[near] - steady[near]) ** 2, axis=0)
-        power = np.maximum(np.sum(np.abs(measured[near]) ** 2, axis=0), 1e-300)
-        result[:, index] = np.clip(1.0 - error / power, 0.0, 1.0)
-    return result
+    """Return the share of each sensor's response near each peak that the excitation explains, shape (n, r)."""
+    error, power = np.zeros((2, len(sensors), poles[0].size))
+    omega = np.concatenate([item.omega for item in spectra])
+    step = 6.0 * float(np.median(np.diff(omega)))
+    for item, explained, seen in zip(spectra, steady, measured, strict=True):
+        rows = [sensors.index(sensor) for sensor in item.sensors]
+        for index, (peak, ratio) in enumerate(zip(*poles, strict=True)):
+            near = np.abs(item.omega - peak) <= max(4.0 * ratio * peak, step)
+            error[rows, index] += np.sum(np.abs(seen[near] - explained[near]) ** 2, axis=0)
+            power[rows, index] += np.sum(np.abs(seen[near]) ** 2, axis=0)
+    return np.asarray(np.clip(1.0 - error / np.maximum(power, 1e-300), 0.0, 1.0))
 
 
 def fit_modes(
@@ -269,36 +331,83 @@ def fit_modes(
 def _collect(fit: _Fit, spectra: Sequence[RecordSpectrum], theta: FloatArray) -> MultiModeFit:
     modes = theta.size // 2
     omega, zeta = np.exp(theta[:modes]), np.exp(theta[modes:])
-    outputs = spectra[0].responses.shape[1]
-    total = sum(item.omega.size for item in spectra)
-    residues = np.empty((outputs, modes), dtype=np.complex128)
-    steady, measured = (np.empty((total, outputs), dtype=np.complex128) for _ in range(2))
-    noise = np.empty(outputs)
-    errors = np.empty((outputs, modes))
-    for index, ((problem, own), state) in enumerate(zip(fit.groups, fit.states(theta), strict=True)):
-        width = 2 + 2 * problem.tests
-        raw = state.coefficients * fit.sigma[index]
-        for mode in range(modes):
-            # at the peak i omega/omega_r is i: the second coefficient turns the phase
-            residues[own, mode] = raw[mode * width] + 1j * raw[mode * width + 1]
-        unit = fit.coefficient_errors(index, state)[[mode * width for mode in range(modes)]]
-        errors[own] = np.outer(fit.sigma[index], unit)
-        steady[:, own] = fit.steady(index, state)
-        measured[:, own] = steady[:, own] + fit.complex_residual(index, state)
-        noise[own] = 2.0 * fit.sigma[index] ** 2
-    edges = np.cumsum([item.omega.size for item in spectra])[:-1]
-    line = np.concatenate([item.omega for item in spectra])
-    both = np.concatenate([order := np.argsort(omega), modes + order])
+    sensors, inputs = all_sensors(spectra), all_inputs(spectra)
+    residues = np.full((len(sensors), len(inputs), modes), np.nan, dtype=np.complex128)
+    steady, measured, transients = ([np.zeros_like(item.responses) for item in spectra] for _ in range(3))
+    noise = np.empty(len(sensors))
+    errors = np.full((len(sensors), len(inputs), modes), np.inf)
+    for group, state in zip(fit.groups, fit.states(theta), strict=True):
+        problem = group.problem
+        own = [sensors.index(sensor) for sensor in group.sensors]
+        raw = state.coefficients * group.sigma
+        unit = fit.coefficient_errors(group, state)
+        for number, place in enumerate(problem.inputs):
+            column = inputs.index(place)
+            for mode in range(modes):
+                first = mode * problem.width + 2 * number
+                # at the peak i omega/omega_r is i: the second coefficient turns the phase
+                residues[own, column, mode] = raw[first] + 1j * raw[first + 1]
+                errors[own, column, mode] = group.sigma * unit[first]
+        noise[own] = 2.0 * group.sigma**2
+        explained, rest = fit.steady(group, state), fit.complex_residual(group, state)
+        start = 0
+        for test in group.tests:
+            part = slice(start, start + spectra[test].omega.size)
+            columns = [spectra[test].sensors.index(sensor) for sensor in group.sensors]
+            steady[test][:, columns] = explained[part]
+            measured[test][:, columns] = explained[part] + rest[part]
+            transients[test][:, columns] = group.target[part] - measured[test][:, columns]
+            start = part.stop
+    order = np.argsort(omega)
+    both = np.concatenate([order, modes + order])
+    residues, errors = residues[:, :, order], errors[:, :, order]
+    shapes, shape_errors, participations = _rank_one(residues, errors)
     return MultiModeFit(
         angular_frequencies=omega[order],
         damping_ratios=zeta[order],
         covariance=_covariance(fit, theta)[np.ix_(both, both)],
-        residues=residues[:, order],
-        residue_errors=errors[:, order],
-        coherence=_coherence(line, steady, measured, omega[order], zeta[order]),
-        steady=tuple(np.split(steady, edges)),
-        measured=tuple(np.split(measured, edges)),
+        residues=shapes,
+        residue_errors=shape_errors,
+        coherence=_coherence(spectra, sensors, steady, measured, (omega[order], zeta[order])),
+        steady=tuple(steady),
+        measured=tuple(measured),
         omega=tuple(item.omega for item in spectra),
         excitation=tuple(item.excitation for item in spectra),
         noise_variance=noise,
+        sensors=sensors,
+        inputs=inputs,
+        participations=participations,
+        input_residues=residues,
+        spectra=tuple(spectra),
+        transients=tuple(transients),
     )
+
+
+def _rank_one(residues: ComplexArray, errors: FloatArray) -> tuple[ComplexArray, FloatArray, ComplexArray]:
+    """Return shapes (n, r), their errors, and participations (k, r): residues = shape x participation.
+
+    The residue matrix of a mode has rank one. It is approximated by weighted least squares, sensors and inputs in
+    turn. A shape is scaled by the participation of the input that excites the mode most.
+    """
+    if residues.shape[1] == 1:
+        return residues[:, 0], errors[:, 0], np.ones((1, residues.shape[2]), dtype=np.complex128)
+    known = np.isfinite(residues.real)
+    weight = np.where(known, 1.0 / np.maximum(errors, 1e-300) ** 2, 0.0)
+    values = np.where(known, residues, 0.0)
+    shapes = np.zeros((residues.shape[0], residues.shape[2]), dtype=np.complex128)
+    shape_errors = np.zeros(shapes.shape)
+    participations = np.zeros((residues.shape[1], residues.shape[2]), dtype=np.complex128)
+    for mode in range(residues.shape[2]):
+        own, certain = values[:, :, mode], weight[:, :, mode]
+        main = int(np.argmax(np.sum(np.abs(own) ** 2 * certain, axis=0)))
+        share = np.zeros(own.shape[1], dtype=np.complex128)
+        share[main] = 1.0
+        for _ in range(30):
+            power = np.maximum(certain @ np.abs(share) ** 2, 1e-300)
+            shape = (certain * own) @ share.conj() / power
+            power_of_input = np.maximum(np.abs(shape) ** 2 @ certain, 1e-300)
+            share = (shape.conj() @ (certain * own)) / power_of_input
+            share = share / share[main] if abs(share[main]) > 0.0 else share
+        shapes[:, mode], participations[:, mode] = shape, share
+        shape_errors[:, mode] = 1.0 / np.sqrt(np.maximum(certain @ np.abs(share) ** 2, 1e-300))
+    return shapes, shape_errors, participations

@@ -1,4 +1,4 @@
-"""Linear part of the multi-mode fit: what responses to given poles look like, and the projection on it."""
+"""Linear part of the multi-mode fit: the responses that given poles can produce, and the projection on them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from scipy.linalg import cho_solve
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.spectra import ComplexArray, RecordSpectrum
+from mrpipe.modal.records import Place
+from mrpipe.modal.spectra import ComplexArray, RecordSpectrum, all_inputs
 
 _TRANSIENT_POWERS = 5
 DIRECT_POWERS = 4
@@ -26,49 +27,60 @@ def stack(matrix: ComplexArray) -> FloatArray:
 class Problem:
     """Linear basis of the fit for given poles, for outputs of one kind (accelerations or displacements)."""
 
-    def __init__(self, spectra: Sequence[RecordSpectrum], modes: int, displacement: bool) -> None:
+    def __init__(
+        self, spectra: Sequence[RecordSpectrum], modes: int, displacement: bool, inputs: Sequence[Place] = ()
+    ) -> None:
         self.spectra = spectra
         self.modes = modes
         self.displacement = displacement
+        self.inputs = tuple(inputs) or all_inputs(spectra)
         self.rows = [item.omega.size for item in spectra]
         self.total = sum(self.rows)
         self.high = max(float(item.omega[-1]) for item in spectra)
-        # one scale for all tests: what stands for the modes above the band is a property of the frame, not of a test
-        power = sum(float(np.linalg.norm(item.excitation)) ** 2 for item in spectra)
-        self.scale = float(np.sqrt(power / self.total))
+        self.excitations = [item.input_columns(self.inputs) for item in spectra]
+        # one scale for all tests: the contribution of modes above the band belongs to the frame, not to a test
+        power = np.sum([np.linalg.norm(item, axis=0) ** 2 for item in self.excitations], axis=0)
+        self.scale = np.sqrt(np.where(power > 0.0, power, 1.0) / self.total)
         self.tests = len(spectra)
+        self.width = 2 * len(self.inputs) + 2 * self.tests
         self.turns = [np.exp(-1j * item.omega * item.dt) for item in spectra]
 
     def mode_columns(self, omega_r: float, zeta: float) -> ComplexArray:
-        """Columns of one mode, shape (rows, 2 + 2 tests): two of H U, and a complex transient a test."""
-        columns = np.zeros((self.total, 2 + 2 * self.tests), dtype=np.complex128)
+        """Columns of one mode, shape (rows, 2 inputs + 2 tests): two of H U an input, a complex transient a test."""
+        columns = np.zeros((self.total, self.width), dtype=np.complex128)
         start = 0
+        count = 2 * len(self.inputs)
         pole = complex(-zeta * omega_r, omega_r * np.sqrt(max(1.0 - zeta**2, 1e-12)))
+        ground = np.array([place.floor == 0 for place in self.inputs])
+        signs = np.where(ground, 1.0, -1.0) * (-1.0 if self.displacement else 1.0)
         for index, item in enumerate(self.spectra):
             part = slice(start, start + item.omega.size)
             jw = 1j * item.omega
             resonance = 1.0 / (omega_r**2 - item.omega**2 + 2.0 * zeta * omega_r * jw)
-            sign = -1.0 if item.shaker_floor else 1.0
-            amplitude = sign * (-1.0 if self.displacement else 1.0) * (1.0 if self.displacement else item.omega**2)
-            columns[part, 0] = amplitude * resonance * item.excitation
-            columns[part, 1] = columns[part, 0] * jw / omega_r
+            amplitude = resonance * (1.0 if self.displacement else item.omega**2)
+            driven = signs * amplitude[:, None] * self.excitations[index]
+            columns[part, 0:count:2] = driven
+            columns[part, 1:count:2] = driven * (jw / omega_r)[:, None]
             first = 1.0 / (1.0 - np.exp(pole * item.dt) * self.turns[index])
             second = 1.0 / (1.0 - np.exp(pole.conjugate() * item.dt) * self.turns[index])
-            columns[part, 2 + 2 * index] = first + second
-            columns[part, 3 + 2 * index] = 1j * (first - second)
+            columns[part, count + 2 * index] = first + second
+            columns[part, count + 1 + 2 * index] = 1j * (first - second)
             start += item.omega.size
         return columns
 
     def smooth_columns(self) -> ComplexArray:
-        """What modes above the band, sensor offsets and drift leave inside it: powers of i omega."""
-        columns = np.zeros((self.total, DIRECT_POWERS + self.tests * (_TRANSIENT_POWERS + 1)), dtype=np.complex128)
+        """Contributions of modes above the band, sensor offsets and drift inside the band: powers of i omega."""
+        direct_columns = DIRECT_POWERS * len(self.inputs)
+        columns = np.zeros((self.total, direct_columns + self.tests * (_TRANSIENT_POWERS + 1)), dtype=np.complex128)
         start = 0
         for index, item in enumerate(self.spectra):
             part = slice(start, start + item.omega.size)
             ratio = 1j * item.omega / self.high
             direct = ratio[:, None] ** np.arange(DIRECT_POWERS)
-            columns[part, :DIRECT_POWERS] = direct * item.excitation[:, None] / self.scale
-            first = DIRECT_POWERS + index * (_TRANSIENT_POWERS + 1)
+            for number, excitation in enumerate((self.excitations[index] / self.scale).T):
+                place = number * DIRECT_POWERS
+                columns[part, place : place + DIRECT_POWERS] = direct * excitation[:, None]
+            first = direct_columns + index * (_TRANSIENT_POWERS + 1)
             columns[part, first : first + _TRANSIENT_POWERS + 1] = ratio[:, None] ** np.arange(-1, _TRANSIENT_POWERS)
             start += item.omega.size
         return columns
@@ -120,6 +132,7 @@ def evaluate(
     basis = np.hstack([*blocks, smooth])
     weighted = stack(basis) * weight[:, None]
     norms = np.linalg.norm(weighted, axis=0)
+    norms = np.where(norms > 0.0, norms, 1.0)
     weighted /= norms
     coefficients, project = _projection(weighted, target)
     residual = target - weighted @ coefficients

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,21 @@ from mrpipe.errors import UserError
 
 ACCELERATION = "floor_acceleration"
 DISPLACEMENT = "floor_displacement"
+
+
+class Place(NamedTuple):
+    """A floor (0 is the ground) and a direction (empty where the campaign has one direction only)."""
+
+    floor: int
+    direction: str = ""
+
+
+class Sensor(NamedTuple):
+    """What a sensor measures and where."""
+
+    floor: int
+    direction: str
+    is_displacement: bool
 
 
 @dataclass(frozen=True)
@@ -29,10 +45,10 @@ class FrameTest:
         Ground acceleration [m/s2], or shaker force [N] where `shaker_floor` is not 0; shape (m,). None where a decay
         test recorded none.
     responses
-        Shape (m, n): absolute acceleration [m/s2] of each floor, or its displacement relative to the ground [m] where
-        `is_displacement` says so.
+        Shape (m, s): absolute acceleration [m/s2] of each measured floor, or its displacement relative to the ground
+        [m] where `is_displacement` is true.
     is_displacement
-        Shape (n,).
+        Shape (s,).
     shaker_floor
         0 for excitation by the base.
     mode
@@ -41,6 +57,12 @@ class FrameTest:
         Floor (from 1) -> displacement [m], shape (m,), where lasers were there beside accelerometers.
     role
         training, validation or repeat; validation tests are kept for verification where there are others.
+    places
+        Place of each column of `responses`; empty where column i is floor i + 1.
+    further_inputs
+        Place and values of the excitations beside the first one.
+    direction
+        Direction of the first excitation; empty where the campaign has one direction only.
     """
 
     name: str
@@ -53,11 +75,26 @@ class FrameTest:
     mode: int = 0
     displacements: tuple[tuple[int, FloatArray], ...] = ()
     role: str = "training"
+    places: tuple[Place, ...] = ()
+    further_inputs: tuple[tuple[Place, FloatArray], ...] = ()
+    direction: str = ""
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Place and kind of each column of `responses`."""
+        places = self.places or tuple(Place(floor) for floor in range(1, self.responses.shape[1] + 1))
+        return tuple(Sensor(*place, flag) for place, flag in zip(places, self.is_displacement, strict=True))
+
+    @property
+    def inputs(self) -> dict[Place, FloatArray]:
+        """Measured excitations, each of shape (m,), and where they act."""
+        first = {} if self.excitation is None else {Place(self.shaker_floor, self.direction): self.excitation}
+        return {**first, **dict(self.further_inputs)}
 
     @property
     def floors(self) -> int:
-        """Number of floors n."""
-        return int(self.responses.shape[1])
+        """Highest floor with a sensor."""
+        return max(sensor.floor for sensor in self.sensors)
 
     @property
     def duration_s(self) -> float:

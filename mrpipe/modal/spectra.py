@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.records import FrameTest
+from mrpipe.modal.records import FrameTest, Place, Sensor
 
 ComplexArray = NDArray[np.complex128]
 
@@ -41,30 +42,43 @@ class RecordSpectrum:
     ----------
     omega
         Shape (m,) [rad/s].
-    excitation
-        Shape (m,).
+    excitations
+        Shape (m, k), a column an input.
+    inputs
+        Where each input acts; floor 0 is the ground.
     responses
-        Shape (m, n).
-    is_displacement
-        Shape (n,).
-    shaker_floor
-        0 for excitation by the base.
+        Shape (m, s), a column a sensor.
+    sensors
+        Place and kind of each sensor.
     dt
         Sampling interval [s].
     """
 
     omega: FloatArray
-    excitation: ComplexArray
+    excitations: ComplexArray
+    inputs: tuple[Place, ...]
     responses: ComplexArray
-    is_displacement: tuple[bool, ...]
-    shaker_floor: int
+    sensors: tuple[Sensor, ...]
     dt: float
+
+    @property
+    def excitation(self) -> ComplexArray:
+        """The first input, shape (m,)."""
+        return np.asarray(self.excitations[:, 0])
+
+    def input_columns(self, inputs: Sequence[Place]) -> ComplexArray:
+        """Return the spectra of `inputs`, shape (m, len(inputs)); zero where the test has no such input."""
+        columns = np.zeros((self.omega.size, len(inputs)), dtype=np.complex128)
+        for index, place in enumerate(inputs):
+            if place in self.inputs:
+                columns[:, index] = self.excitations[:, self.inputs.index(place)]
+        return columns
 
     def below(self, omega: float) -> RecordSpectrum:
         """Return the lines up to `omega` [rad/s]."""
         inside = self.omega <= omega
         return replace(
-            self, omega=self.omega[inside], excitation=self.excitation[inside], responses=self.responses[inside]
+            self, omega=self.omega[inside], excitations=self.excitations[inside], responses=self.responses[inside]
         )
 
 
@@ -102,14 +116,15 @@ def record_spectrum(test: FrameTest, band_hz: tuple[float, float]) -> RecordSpec
     frequency = np.fft.rfftfreq(samples, 1.0 / test.sampling_rate_hz)
     frequency = np.asarray(frequency, dtype=np.float64)
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1]) & (frequency > 0.0)
-    excitation = np.fft.rfft(test.excitation - test.excitation.mean())[inside]
+    values = np.column_stack(list(test.inputs.values()))
+    excitations = np.fft.rfft(values - values.mean(axis=0), axis=0)[inside]
     responses = np.fft.rfft(test.responses - test.responses.mean(axis=0), axis=0)[inside]
     return RecordSpectrum(
         omega=np.asarray(2.0 * np.pi * frequency[inside], dtype=np.float64),
-        excitation=excitation,
+        excitations=excitations,
+        inputs=tuple(test.inputs),
         responses=responses,
-        is_displacement=test.is_displacement,
-        shaker_floor=test.shaker_floor,
+        sensors=test.sensors,
         dt=1.0 / test.sampling_rate_hz,
     )
 
@@ -127,7 +142,7 @@ def excited_band(tests: tuple[FrameTest, ...], share: float = 0.03) -> tuple[flo
         rate = test.sampling_rate_hz
         length = int(min(8.0, 0.25 * test.duration_s) * rate)
         frequency, power = signal.welch(test.excitation, fs=rate, nperseg=length, detrend="constant")
-        # the first lines hold the sensor's drift
+        # the first lines contain the drift of the sensor
         power[:2] = 0.0
         falling = np.sort(power)[::-1]
         usual = falling[int(np.searchsorted(np.cumsum(falling), 0.5 * falling.sum()))]
@@ -136,3 +151,13 @@ def excited_band(tests: tuple[FrameTest, ...], share: float = 0.03) -> tuple[flo
         lows.append(float(frequency[inside[0]]))
         highs.append(float(frequency[inside[-1]]))
     return max(min(lows), 1e-3), max(highs)
+
+
+def all_inputs(spectra: Sequence[RecordSpectrum]) -> tuple[Place, ...]:
+    """Return the inputs of all tests; in the order of the tests."""
+    return tuple(dict.fromkeys(place for item in spectra for place in item.inputs))
+
+
+def all_sensors(spectra: Sequence[RecordSpectrum]) -> tuple[Sensor, ...]:
+    """Return the sensors of all tests, lowest floor first."""
+    return tuple(sorted(dict.fromkeys(sensor for item in spectra for sensor in item.sensors)))
