@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.optimize import least_squares, lsq_linear
+from scipy.optimize import lsq_linear
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.updating import MeasuredModes, UpdatedModel, storey_model, update_model
 from mrpipe.structures import shear_stiffness
 
-_NORMAL_95 = 1.959964
+_MOST_ASSIGNMENTS = 80
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class TridiagonalFit:
         Model over measured, minus one, shape (r,) [1].
     at_bound
         Storeys (from 1) that ended at a bound: the shear frame does not suit them.
+    undetermined
+        Storeys (from 1) whose interval is wider than half of their value.
     """
 
     storey_stiffnesses: FloatArray
@@ -36,6 +40,7 @@ class TridiagonalFit:
     stiffness: FloatArray
     frequency_error: FloatArray
     at_bound: tuple[int, ...]
+    undetermined: tuple[int, ...] = ()
 
 
 def _drift_matrix(shape: FloatArray) -> FloatArray:
@@ -79,34 +84,86 @@ def fit_tridiagonal(
     bounds
         Of each storey [N/m].
     """
-    root = np.sqrt(np.diag(mass))[:, None]
-    measured = root * mode_shapes
-    measured = measured / np.linalg.norm(measured, axis=0)
-    modes = angular_frequencies.size
+    masses = np.diag(mass)
+    modes = MeasuredModes(
+        angular_frequencies,
+        mode_shapes,
+        tuple(range(masses.size)),
+        tuple(range(1, angular_frequencies.size + 1)),
+        frequency_error=frequency_error,
+        shape_error=shape_error,
+    )
+    start = np.clip(first_storeys(mass, mode_shapes, angular_frequencies, bounds), *bounds)
+    return storeys_of(update_model(storey_model(masses.size), masses, modes, start, bounds=bounds), bounds)
 
-    def residual(theta: FloatArray) -> FloatArray:
-        squared, shapes = eigh(shear_stiffness(np.exp(theta)), mass)
-        model = (root * shapes)[:, :modes]
-        turned = model * np.sign(np.sum(model * measured, axis=0))
-        frequency = 0.5 * np.log(np.maximum(squared[:modes], 1e-30)) - np.log(angular_frequencies)
-        return np.concatenate([frequency / frequency_error, ((turned - measured) / shape_error).ravel()])
 
+def storeys_of(updated: UpdatedModel, bounds: tuple[float, float] = (1.0, 1e12)) -> TridiagonalFit:
+    """Return an updated storey model as a fit of storeys."""
+    storeys = updated.parameters
     low, high = (np.log(value) for value in bounds)
-    start = np.log(np.clip(first_storeys(mass, mode_shapes, angular_frequencies, bounds), *bounds))
-    margin = 1e-9 * (high - low)
-    result = least_squares(residual, np.clip(start, low + margin, high - margin), bounds=(low, high))
-    storeys = np.exp(result.x)
-    covariance = np.linalg.pinv(result.jac.T @ result.jac)
-    freedom = max(1, result.fun.size - storeys.size)
-    spread = _NORMAL_95 * np.sqrt(np.diag(covariance) * 2.0 * result.cost / freedom)
-    stiffness = shear_stiffness(storeys)
-    omega = np.sqrt(np.maximum(eigh(stiffness, mass, eigvals_only=True)[:modes], 0.0))
-    stuck = np.flatnonzero((result.x - low < 1e-6) | (high - result.x < 1e-6)) + 1
+    stuck = np.flatnonzero((np.log(storeys) - low < 1e-6) | (high - np.log(storeys) < 1e-6)) + 1
     return TridiagonalFit(
         storey_stiffnesses=storeys,
-        low=storeys * np.exp(-spread),
-        high=storeys * np.exp(spread),
-        stiffness=stiffness,
-        frequency_error=omega / angular_frequencies - 1.0,
+        low=updated.low,
+        high=updated.high,
+        stiffness=updated.stiffness,
+        frequency_error=updated.frequency_error,
         at_bound=tuple(int(item) for item in stuck),
+        undetermined=tuple(i + 1 for i, name in enumerate(f"storey {k + 1}" for k in range(storeys.size))
+                           if name in updated.undetermined),
     )
+
+
+def fit_partial(
+    masses: FloatArray, modes: MeasuredModes, possible_numbers: Sequence[tuple[int, int]] = ()
+) -> UpdatedModel:
+    """Fit the storeys to fewer modes than floors, or to modes that are not measured at all floors.
+
+    Where the mode numbers are left open, each assignment that the possible numbers allow is fitted and the best taken.
+
+    Parameters
+    ----------
+    masses
+        Shape (n,) [kg]; nan where unknown.
+    modes
+        The data; its `numbers` count where they are given.
+    possible_numbers
+        Lowest and highest number (from 1) of each mode.
+    """
+    floors = masses.size
+    known = masses[np.isfinite(masses)]
+    typical = float(known.mean()) if known.size else _typical_mass(modes)
+    assignments = [modes.numbers] if modes.numbers else _assignments(possible_numbers, floors)
+    best: UpdatedModel | None = None
+    for numbers in assignments:
+        # a uniform chain with the mean mass and the lowest measured frequency
+        uniform = eigh(shear_stiffness(np.ones(floors)), eigvals_only=True)
+        scales = modes.angular_frequencies**2 * typical / uniform[np.asarray(numbers) - 1]
+        start = np.full(floors, float(np.exp(np.mean(np.log(scales)))))
+        found = update_model(
+            storey_model(floors), masses, replace(modes, numbers=tuple(numbers)), start, start_mass=typical
+        )
+        if best is None or found.cost < best.cost:
+            best = found
+    if best is None:
+        raise ValueError("no assignment of mode numbers is possible")
+    return best
+
+
+def _typical_mass(modes: MeasuredModes) -> float:
+    """Return a first guess of a floor's mass [kg] from the response to a measured force."""
+    if modes.scaled_residues is None or not np.isfinite(modes.scaled_residues).any():
+        return 1.0
+    # the squared mass-normalised shapes of a floor sum to one over its mass
+    return 1.0 / max(float(np.nansum(np.maximum(modes.scaled_residues, 0.0))), 1e-300)
+
+
+def _assignments(possible: Sequence[tuple[int, int]], floors: int) -> list[tuple[int, ...]]:
+    found: list[tuple[int, ...]] = [()]
+    for low, high in possible:
+        found = [
+            (*numbers, number)
+            for numbers in found
+            for number in range(max(low, numbers[-1] + 1 if numbers else 1), min(high, floors) + 1)
+        ]
+    return found[:_MOST_ASSIGNMENTS]
