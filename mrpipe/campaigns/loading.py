@@ -92,7 +92,7 @@ def load_campaign(path: Path) -> Campaign:
         drive_unit=next(iter(reader.drive_units.values()), ""),
         drive_is_set_point=bool(reader.set_points) and all(reader.set_points),
         declared_effects=entry.declared_effects,
-        floor_masses_kg=entry.frame.floor_masses_kg,
+        floor_masses_kg=tuple(np.nan if mass is None else mass for mass in entry.frame.floor_masses_kg),
         declared=_declared(source.content),
     )
     require_roles(campaign, str(file))
@@ -158,7 +158,7 @@ def _merge(shared: ChannelEntry | None, own: ChannelEntry) -> ChannelEntry:
     """Complete a test's channel by what the campaign says of it, as far as the test leaves it open."""
     if shared is None:
         return own
-    inherited = {key: getattr(shared, key) for key in ("unit", "floor")}
+    inherited = {key: getattr(shared, key) for key in ("unit", "floor", "direction", "mass_kg")}
     if own.value is None:
         inherited |= {key: getattr(shared, key) for key in ("column", "value", "scale", "offset", "set_point")}
         if own.column is not None:
@@ -198,7 +198,8 @@ def _test_entry(reader: _Reader, shared: dict[str, ChannelEntry], index: int) ->
     elif entry.kind is None:
         guess = "closed-loop" if entry.law else "free-decay" if entry.mode else None
         if guess is None:
-            raise source.error((*place, "kind"), "is missing", "write kind: sweep, free-decay, closed-loop or random")
+            remedy = "write kind: sweep, free-decay, closed-loop, random or ambient"
+            raise source.error((*place, "kind"), "is missing", remedy)
         entry = entry.model_copy(update={"kind": guess})
     return entry, merged
 
@@ -235,8 +236,10 @@ def _read_test(reader: _Reader, shared: dict[str, ChannelEntry], index: int) -> 
     if "drive" in channels:
         reader.set_points.append(channels["drive"].value is not None or channels["drive"].set_point)
     details = entry.details()
-    if channels.get("input_force") and channels["input_force"].floor:
-        details["input_force_floor"] = channels["input_force"].floor
+    for name, channel in channels.items():
+        if name.startswith("input_force") and channel.floor:
+            details[f"{name}_floor"] = channel.floor
+            details |= {f"{name}_direction": channel.direction} if channel.direction else {}
     return Recording(
         name=entry.name,
         role=entry.role or "training",
@@ -271,6 +274,8 @@ def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tu
         if known != units.SI_UNITS[kind]:
             raise reader.source.error((*place, name), "is in A in one test and in V in another", "use one of the two")
         quantity = kind
+    if channel.mass_kg is not None:
+        quantity = "acceleration"
     units.conversion(channel.unit, where=where, quantity=quantity)
     return channel.unit, quantity
 
@@ -282,7 +287,8 @@ def _read_channel(
     if channel.column is None:
         raise reader.source.error((*place, "channels", name), "has neither column nor value", "write column: ...")
     values = file.column(channel.column, f"{where}, {name}")
-    return np.asarray(units.to_si(channel.scale * values + channel.offset, unit, quantity=quantity))
+    values = np.asarray(units.to_si(channel.scale * values + channel.offset, unit, quantity=quantity))
+    return values if channel.mass_kg is None else -channel.mass_kg * values
 
 
 def _constant(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> float:
@@ -340,19 +346,15 @@ def _require_unique_names(source: YamlSource, recordings: list[Recording]) -> No
 
 
 def _require_floors(source: YamlSource, campaign: Campaign) -> None:
+    """Raise where the channels number floors without a sensor and the masses do not say how many floors there are."""
     if campaign.rig != "shear-frame":
         return
     masses = campaign.floor_masses_kg
     for test in campaign.recordings:
-        floors = sorted(floor_of(name) or 0 for name in test.channels if name.startswith("floor_acceleration_"))
-        if floors and floors != list(range(1, floors[-1] + 1)):
-            absent = next(floor for floor in range(1, floors[-1]) if floor not in floors)
+        floors = sorted({floor_of(name) or 0 for name in test.channels if name.startswith("floor_")})
+        if floors and masses and len(masses) < floors[-1]:
             raise source.error(
-                ("channels",), f"floor_acceleration_{absent} is missing", "number the floors 1, 2, 3, ..."
-            )
-        if masses and floors and len(masses) != len(floors):
-            raise source.error(
-                ("frame", "floor_masses_kg"), f"has {len(masses)} masses", f"{len(floors)} floors are measured"
+                ("frame", "floor_masses_kg"), f"has {len(masses)} masses", f"{floors[-1]} floors are measured"
             )
 
 

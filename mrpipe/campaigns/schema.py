@@ -33,13 +33,16 @@ FRAME_QUANTITIES = {
 }
 """Channel of a frame test -> physical quantity, besides the numbered floor channels."""
 
-_FLOOR = re.compile(r"^floor_(acceleration|displacement|velocity)_([1-9][0-9]*)$")
+_FLOOR = re.compile(r"^floor_(acceleration|displacement|velocity)_([1-9][0-9]*)(?:_[a-z][a-z0-9]*)?$")
+_FURTHER_INPUT = re.compile(r"^(?:(ground_acceleration)|(input_force))_[a-z0-9]+$")
 
 
 def quantity_of(channel: str, rig: str) -> str | None:
     """Return the physical quantity of a channel, None where the rig has no such channel."""
     if rig == "shear-frame":
-        match = _FLOOR.match(channel)
+        match, further = _FLOOR.match(channel), _FURTHER_INPUT.match(channel)
+        if further:
+            return "acceleration" if further.group(1) else "force"
         return match.group(1) if match else FRAME_QUANTITIES.get(channel)
     return BENCH_QUANTITIES.get(channel)
 
@@ -66,7 +69,9 @@ class Entry(BaseModel):
 class ChannelEntry(Entry):
     """Where a quantity is in the files: value = scale * column + offset, in `unit`; or a constant `value`.
 
-    `set_point` tells that a recorded drive is the command and not a measurement; `floor` is where an input force acts.
+    `set_point` says that a recorded drive is the command and not a measurement. `floor` and `direction` say where an
+    input force acts. `mass_kg` belongs to an input force that is recorded as the absolute acceleration of a moving
+    mass: the force on the floor is its reaction.
     """
 
     column: str | int | None = None
@@ -75,6 +80,8 @@ class ChannelEntry(Entry):
     scale: float = 1.0
     offset: float = 0.0
     floor: int | None = Field(default=None, ge=1)
+    direction: str | None = None
+    mass_kg: float | None = Field(default=None, gt=0.0)
     set_point: bool = False
 
     @field_validator("unit", mode="before")
@@ -115,14 +122,14 @@ class TextEntry(Entry):
 class FrameEntry(Entry):
     """What is known of a frame."""
 
-    floor_masses_kg: tuple[float, ...] = ()
+    floor_masses_kg: tuple[float | None, ...] = ()
     about: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("floor_masses_kg")
     @classmethod
-    def _positive(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        if any(not mass > 0.0 for mass in value):
-            raise ValueError("masses above zero expected")
+    def _positive(cls, value: tuple[float | None, ...]) -> tuple[float | None, ...]:
+        if any(mass is not None and not mass > 0.0 for mass in value):
+            raise ValueError("masses above zero expected (null where a mass is unknown)")
         return value
 
 
@@ -140,7 +147,7 @@ class TestEntry(Entry):
     name: str
     file: str
     role: Literal["training", "validation", "repeat"] | None = None
-    kind: Literal["sweep", "free-decay", "closed-loop", "random"] | None = None
+    kind: Literal["sweep", "free-decay", "closed-loop", "random", "ambient"] | None = None
     channels: dict[str, Any] = Field(default_factory=dict)
     segments_s: tuple[tuple[float, float], ...] | None = None
     part: int | None = Field(default=None, ge=1)

@@ -39,7 +39,9 @@ class HiddenPole:
     gain: float
 
 
-def _between(item: RecordSpectrum, residual: ComplexArray, low: float, high: float) -> tuple[RecordSpectrum, ComplexArray]:
+def _between(
+    item: RecordSpectrum, residual: ComplexArray, low: float, high: float
+) -> tuple[RecordSpectrum, ComplexArray]:
     first, last = np.searchsorted(item.omega, [low, high])
     part = slice(int(first), int(last))
     cut = RecordSpectrum(
@@ -73,7 +75,6 @@ def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, ze
     smooth = np.concatenate([item.input_columns(problem.inputs) for item, _ in pairs])
     own = problem.mode_columns(omega, zeta)
     basis = _unit(stack(np.hstack([*known, smooth])))
-    # the pole itself may adapt: its derivatives are two more columns
     width = own.shape[1]
     if target.shape[0] < basis.shape[1] + 3 * width:
         return -np.inf
@@ -109,7 +110,8 @@ def hidden_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: int
                 tried.append(HiddenPole(float(omega), zeta, _gain(fit, residuals, float(omega), zeta)))
     chosen: list[HiddenPole] = []
     for pole in sorted(tried, key=lambda item: -item.gain):
-        apart = all(abs(pole.angular_frequency - other.angular_frequency) > 0.03 * other.angular_frequency for other in chosen)
+        omega = pole.angular_frequency
+        apart = all(abs(omega - other.angular_frequency) > 0.03 * other.angular_frequency for other in chosen)
         if pole.gain > 0.0 and apart:
             chosen.append(pole)
         if len(chosen) == number:

@@ -1,7 +1,9 @@
-"""Frame tests as arrays: what excites, what answers, on which floor."""
+"""Frame tests as arrays: excitations and responses, and the floor of each."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -38,12 +40,12 @@ class FrameTest:
     Attributes
     ----------
     name, kind
-        As in campaign.yaml; kind is sweep, random or free-decay.
+        As in campaign.yaml; kind is sweep, random, ambient or free-decay.
     sampling_rate_hz
         Rate of all channels.
     excitation
-        Ground acceleration [m/s2], or shaker force [N] where `shaker_floor` is not 0; shape (m,). None where a decay
-        test recorded none.
+        Ground acceleration [m/s2], or shaker force [N] where `shaker_floor` is not 0; shape (m,). None where it was
+        not measured.
     responses
         Shape (m, s): absolute acceleration [m/s2] of each measured floor, or its displacement relative to the ground
         [m] where `is_displacement` is true.
@@ -52,9 +54,9 @@ class FrameTest:
     shaker_floor
         0 for excitation by the base.
     mode
-        Mode that a decay test is for, from 1; 0 where it was not told.
+        Mode of a decay test, from 1; 0 where the campaign does not name it.
     displacements
-        Floor (from 1) -> displacement [m], shape (m,), where lasers were there beside accelerometers.
+        Floor (from 1) and displacement [m], shape (m,), where lasers measured beside accelerometers.
     role
         training, validation or repeat; validation tests are kept for verification where there are others.
     places
@@ -102,26 +104,53 @@ class FrameTest:
         return self.responses.shape[0] / self.sampling_rate_hz
 
 
-def _floor_numbers(recording: Recording, quantity: str) -> set[int]:
-    prefix = f"{quantity}_"
-    return {int(key[len(prefix) :]) for key in recording.channels if key.startswith(prefix)}
+_FLOOR_CHANNEL = re.compile(r"^(floor_acceleration|floor_displacement)_([1-9][0-9]*)(?:_([a-z][a-z0-9]*))?$")
+_GROUND_CHANNEL = re.compile(r"^ground_acceleration(?:_([a-z][a-z0-9]*))?$")
+_FORCE_CHANNEL = re.compile(r"^input_force(?:_([a-z0-9]+))?$")
 
 
-def _shaker_floor(recording: Recording, source: Path, floors: int) -> int:
+def _sensors(recording: Recording) -> dict[Sensor, str]:
+    """Return the sensors of a recording and their channels; a displacement only where no accelerometer is."""
+    found: dict[Sensor, str] = {}
+    for name in recording.channels:
+        match = _FLOOR_CHANNEL.match(name)
+        if match:
+            found[Sensor(int(match.group(2)), match.group(3) or "", match.group(1) == DISPLACEMENT)] = name
+    return {
+        sensor: name
+        for sensor, name in sorted(found.items())
+        if not (sensor.is_displacement and sensor._replace(is_displacement=False) in found)
+    }
+
+
+def _shaker_floor(recording: Recording, channel: str, source: Path, floors: int) -> int:
     details = recording.details
-    named = details.get("floor", details.get("input_force_floor", details.get("shaker_floor")))
+    own = details.get(f"{channel}_floor")
+    named = own if own is not None else details.get("floor", details.get("shaker_floor"))
+    place = f"tests.{recording.name}.channels.{channel}"
     if named is None:
-        place = f"tests.{recording.name}.channels.input_force"
         raise UserError(source, place, "does not say on which floor the shaker acts", "add floor: 1 (or another)")
     floor = int(named)
     if not 1 <= floor <= floors:
-        place = f"tests.{recording.name}.channels.input_force.floor"
-        raise UserError(source, place, f"is {floor}", f"the frame has floors 1 to {floors}")
+        raise UserError(source, f"{place}.floor", f"is {floor}", f"the frame has floors 1 to {floors}")
     return floor
 
 
+def _inputs(recording: Recording, source: Path, floors: int) -> dict[Place, FloatArray]:
+    """Return the measured excitations: forces first, then ground motion."""
+    forces, ground = {}, {}
+    for name, values in recording.channels.items():
+        force, base = _FORCE_CHANNEL.match(name), _GROUND_CHANNEL.match(name)
+        if force:
+            direction = str(recording.details.get(f"{name}_direction") or "")
+            forces[Place(_shaker_floor(recording, name, source, floors), direction)] = values
+        elif base:
+            ground[Place(0, base.group(1) or "")] = values
+    return {**forces, **ground}
+
+
 def _cut(recording: Recording) -> slice:
-    # tests of a frame are used whole or as one stretch: a modal fit needs an unbroken record
+    # a modal fit needs an unbroken record, so the longest segment of a test is used
     if not recording.segments:
         return slice(None)
     start, stop = max(recording.segments, key=lambda item: item[1] - item[0])
@@ -134,49 +163,55 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
     Parameters
     ----------
     recording
-        With channels floor_acceleration_i or floor_displacement_i and ground_acceleration or input_force.
+        With channels floor_acceleration_i or floor_displacement_i, and ground_acceleration or input_force.
     source
         campaign.yaml, for messages.
     floors
-        Number of floors; 0 takes it from the channels.
+        Number of floors; 0 takes the highest floor with a channel.
 
     Raises
     ------
     UserError
-        If a floor has no channel, or the shaker's floor is not told or is not there.
+        If no floor has a channel, the floor of the shaker is missing or does not exist, or a forced test has no
+        excitation.
     """
-    accelerations = _floor_numbers(recording, ACCELERATION)
-    displacements = _floor_numbers(recording, DISPLACEMENT)
-    seen = accelerations | displacements
-    n = floors or max(seen, default=0)
-    missing = sorted(set(range(1, n + 1)) - seen)
-    if missing or not seen:
-        place = f"tests.{recording.name}.channels"
-        name = f"{ACCELERATION}_{missing[0] if missing else 1}"
-        raise UserError(source, place, f"no {name}", "every floor needs its acceleration (or displacement) channel")
+    sensors = _sensors(recording)
+    place = f"tests.{recording.name}.channels"
+    if not sensors:
+        raise UserError(source, place, f"no {ACCELERATION}_1", "one floor at least needs a channel")
+    n = floors or max(sensor.floor for sensor in sensors)
+    beyond = [name for sensor, name in sensors.items() if sensor.floor > n]
+    if beyond:
+        raise UserError(source, f"{place}.{beyond[0]}", "is above the top floor", f"the frame has floors 1 to {n}")
     part = _cut(recording)
-    is_displacement = tuple(floor not in accelerations for floor in range(1, n + 1))
-    names = [f"{DISPLACEMENT if d else ACCELERATION}_{i}" for i, d in enumerate(is_displacement, start=1)]
-    responses = np.column_stack([recording.channels[name][part] for name in names])
-    shaker = 0
-    excitation = recording.channels.get("ground_acceleration")
-    if "input_force" in recording.channels:
-        shaker = _shaker_floor(recording, source, n)
-        excitation = recording.channels["input_force"]
-    if excitation is None and recording.kind != "free-decay":
-        place = f"tests.{recording.name}.channels"
-        raise UserError(source, place, "no ground_acceleration", "add it, or input_force with its floor")
+    inputs = [(where, values[part]) for where, values in _inputs(recording, source, n).items()]
+    if not inputs and recording.kind in {"sweep", "random"}:
+        raise UserError(
+            source,
+            place,
+            "no ground_acceleration",
+            "add it, or input_force with its floor, or write kind: ambient where the excitation was not measured",
+        )
+    first, values = inputs[0] if inputs else (Place(0), None)
+    lasers = sorted(
+        (int(match.group(2)), name)
+        for name in recording.channels
+        if (match := _FLOOR_CHANNEL.match(name)) and match.group(1) == DISPLACEMENT and not match.group(3)
+    )
     return FrameTest(
         name=recording.name,
         kind=recording.kind,
         sampling_rate_hz=recording.sampling_rate_hz,
-        excitation=None if excitation is None else excitation[part],
-        responses=responses,
-        is_displacement=is_displacement,
-        shaker_floor=shaker,
+        excitation=None if recording.kind == "ambient" else values,
+        responses=np.column_stack([recording.channels[name][part] for name in sensors.values()]),
+        is_displacement=tuple(sensor.is_displacement for sensor in sensors),
+        shaker_floor=first.floor,
         mode=int(recording.details.get("mode") or 0),
         role=recording.role,
-        displacements=tuple((i, recording.channels[f"{DISPLACEMENT}_{i}"][part]) for i in sorted(displacements)),
+        displacements=tuple((floor, recording.channels[name][part]) for floor, name in lasers),
+        places=tuple(Place(sensor.floor, sensor.direction) for sensor in sensors),
+        further_inputs=() if recording.kind == "ambient" else tuple(inputs[1:]),
+        direction=first.direction,
     )
 
 
@@ -191,43 +226,52 @@ class FrameTests:
     decays
         Free-decay tests.
     floor_masses
-        Shape (n,) [kg].
+        Shape (n,) [kg]; nan where unknown.
     source
         campaign.yaml, for messages.
+    ambient
+        Tests whose excitation was not measured.
     """
 
     forced: tuple[FrameTest, ...]
     decays: tuple[FrameTest, ...]
     floor_masses: FloatArray
     source: Path
+    ambient: tuple[FrameTest, ...] = ()
 
 
 def frame_tests(campaign: Campaign) -> FrameTests:
-    """Return the forced and decay tests of a frame campaign.
+    """Return the forced, ambient and decay tests of a frame campaign.
 
     Raises
     ------
     UserError
-        If the rig is no shear-frame, no sweep or random test is there, or the masses are missing, too few or not
-        positive.
+        If the rig is no shear-frame, no forced or ambient test is there, or masses are too few or not positive.
     """
     source = campaign.directory / "campaign.yaml"
     if campaign.rig != "shear-frame":
         raise UserError(source, "rig", f"is {campaign.rig!r}", "identify-frame needs a campaign of a shear-frame")
-    forced_recordings = [item for item in campaign.recordings if item.kind in {"sweep", "random"}]
-    if not forced_recordings:
-        raise UserError(source, "tests", "no test of kind sweep or random", "mode shapes need a forced test")
-    forced = tuple(frame_test(item, source) for item in forced_recordings)
-    floors = max(item.floors for item in forced)
-    forced = tuple(frame_test(item, source, floors) for item in forced_recordings)
-    decays = tuple(frame_test(item, source, floors) for item in campaign.recordings if item.kind == "free-decay")
+    used = [item for item in campaign.recordings if item.kind in {"sweep", "random", "ambient"}]
+    if not used:
+        raise UserError(source, "tests", "no test of kind sweep or random", "mode shapes need a forced or ambient test")
     masses = np.asarray(campaign.floor_masses_kg, dtype=np.float64)
+    floors = masses.size or max(frame_test(item, source).floors for item in used)
+    if masses.size:
+        _check_masses(masses, [frame_test(item, source) for item in used], source)
+    else:
+        masses = np.full(floors, np.nan)
+
+    def of_kind(*kinds: str) -> tuple[FrameTest, ...]:
+        return tuple(frame_test(item, source, floors) for item in campaign.recordings if item.kind in kinds)
+
+    return FrameTests(of_kind("sweep", "random"), of_kind("free-decay"), masses, source, of_kind("ambient"))
+
+
+def _check_masses(masses: FloatArray, tests: Sequence[FrameTest], source: Path) -> None:
     place = "frame.floor_masses_kg"
-    if masses.size == 0:
-        raise UserError(source, place, "is missing", f"give the masses of the {floors} floors in kg")
-    if masses.size != floors:
+    floors = max(test.floors for test in tests)
+    if masses.size < floors:
         raise UserError(source, place, f"has {masses.size} entries", f"the channels are of {floors} floors")
     for floor, mass in enumerate(masses, start=1):
-        if not (np.isfinite(mass) and mass > 0.0):
+        if np.isinf(mass) or mass <= 0.0:
             raise UserError(source, place, f"mass of floor {floor} is {mass:g} kg", "give a positive mass in kg")
-    return FrameTests(forced, decays, masses, source)

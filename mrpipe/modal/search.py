@@ -16,12 +16,14 @@ from mrpipe.modal.multimode import MultiModeFit, fit_modes
 from mrpipe.modal.pursuit import hidden_poles
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.selection import LEAST_COHERENCE, Layout, complete_set, largest_set, sound, strength
-from mrpipe.modal.spectra import RecordSpectrum, excited_band, record_spectrum
+from mrpipe.modal.spectra import RecordSpectrum, excited_band, record_spectrum, thinned
 
 _USUAL_HIGH_HZ = 30.0
 _SURPLUS = 4
 _LAST_BAND = 1.25
-_ROUNDS = 4
+_ROUNDS = 3
+_SEARCH_LINES = 2500
+_FIT_LINES = 6000
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,7 @@ def _look(
 ) -> _Found | None:
     """Fit stable poles; while the set of modes is not complete, fit less stable and hidden poles as well."""
     floors = layout.floors
+    whole, spectra = spectra, thinned(spectra, _SEARCH_LINES)
     band = (2.0 * np.pi * band_hz[0] * 1.05, 2.0 * np.pi * band_hz[1] * 0.99)
     orders = range(2 * floors + 2, 2 * floors + 20, 2)
     candidates = stable_poles(spectra, orders, (0.0, 2.0 * np.pi * band_hz[1]))
@@ -104,7 +107,7 @@ def _look(
         return None
 
     def found(fit: MultiModeFit) -> _Found:
-        return _Found(fit, complete_set(fit, layout), spectra, band_hz, tuple(candidates))
+        return _Found(fit, complete_set(fit, layout), whole, band_hz, tuple(candidates))
 
     doubtful = [item for item in candidates if item not in firm and item.occurrences >= 2 and item.damping_ratio < 0.05]
     best = found(with_decays(_fit_candidates(spectra, firm), decays))
@@ -166,7 +169,8 @@ def find_modes(
     best: _Found | None = None
     bands = bands_to_try(tests, low_hz, high_hz)
     for band in bands:
-        found = _look(tuple(record_spectrum(test, band) for test in tests), layout, band, decays)
+        spectra = tuple(record_spectrum(test, band) for test in tests)
+        found = _look(spectra, layout, band, decays)
         if found is not None and found.keep:
             numbers = tuple(range(1, layout.floors + 1))
             return ModeSearch(_only(found, found.keep, decays), band, numbers, found.candidates)
@@ -197,9 +201,8 @@ def _only(found: _Found, keep: Sequence[int], decays: Sequence[FrameTest]) -> Mu
     others = [i for i in sound(fit) if i not in keep and size[i] > level and fit.damping_ratios[i] < 0.1]
     both = sorted([*keep, *others])
     top = _LAST_BAND * float(fit.angular_frequencies[list(keep)].max())
-    refined = fit_modes(
-        [item.below(top) for item in found.spectra], fit.angular_frequencies[both], fit.damping_ratios[both]
-    )
+    spectra = thinned([item.below(top) for item in found.spectra], _FIT_LINES)
+    refined = fit_modes(spectra, fit.angular_frequencies[both], fit.damping_ratios[both])
     place = [int(np.argmin(np.abs(refined.angular_frequencies - fit.angular_frequencies[i]))) for i in keep]
     return with_decays(refined, decays).only(place)
 

@@ -146,7 +146,8 @@ def complete_set(fit: MultiModeFit, layout: Layout) -> tuple[int, ...]:
         found = extend(())
         if found:
             return found
-    numbered = _numbered(fit, layout, np.flatnonzero(may), _SHAPE_TOLERANCE)
+    poles = _distinct(fit, layout, [i for i in sound(fit) if may[i]])
+    numbered = _numbered(fit, layout, poles, _SHAPE_TOLERANCE)
     return tuple(numbered) if len(numbered) == layout.floors else ()
 
 

@@ -1,4 +1,4 @@
-"""What identification leaves in frame.h5, and its summary."""
+"""Contents of frame.h5 and the summary of an identification."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mrpipe.artifacts import ArtifactWriter
+from mrpipe.artifacts import ArtifactWriter, FloatArray
+from mrpipe.modal.clocks import SensorClock
 from mrpipe.modal.decay import DecayResult, Estimate
 from mrpipe.modal.identify import FrameIdentification
 from mrpipe.structures import complex_modes, natural_modes, write_frame
@@ -32,45 +33,85 @@ def _decay_row(result: DecayResult) -> dict[str, Any]:
 
 
 def summary(result: FrameIdentification) -> dict[str, Any]:
-    """Return what `mrpipe identify-frame --json` prints (contract, section 4, and more), plain numbers in SI.
+    """Return what `mrpipe identify-frame --json` prints, plain numbers in SI.
 
-    `mac` is the diagonal of `mac_matrix`: each measured shape against the same mode of the identified frame.
+    `mac` is the diagonal of `mac_matrix`: each measured shape against the same mode of the identified frame. Matrices
+    are null where the data determine modes only.
     """
-    modes = natural_modes(result.frame)
+    frame, storeys = result.frame, result.tridiagonal
+    modes = None if frame is None else natural_modes(frame)
     return {
         "frequencies_hz": [float(item.value / _TWO_PI) for item in result.frequencies],
         "damping_ratios": [float(item.value) for item in result.damping],
-        "mode_shapes": result.mode_shapes.tolist(),
-        "mass": result.frame.mass.tolist(),
-        "damping": result.frame.damping.tolist(),
-        "stiffness": result.frame.stiffness.tolist(),
+        "mode_shapes": _plain(result.mode_shapes),
+        "mass": None if frame is None else frame.mass.tolist(),
+        "damping": None if frame is None else frame.damping.tolist(),
+        "stiffness": None if frame is None else frame.stiffness.tolist(),
         "mac": np.diag(result.mac).tolist(),
         "mac_matrix": result.mac.tolist(),
+        "mode_numbers": list(result.numbers),
+        "degrees_of_freedom": list(result.degrees_of_freedom),
         "frequency_intervals_hz": [_interval(item, _TWO_PI) for item in result.frequencies],
         "damping_ratio_intervals": [_interval(item) for item in result.damping],
+        "mode_shape_errors": _shape_errors(result),
         "damping_source": list(result.damping_source),
         "second_method_damping_ratios": [float(item.value) for item in result.sweep_damping],
         "second_method_damping_ratio_intervals": [_interval(item) for item in result.sweep_damping],
         "decays": [_decay_row(result.decays[mode]) for mode in sorted(result.decays)],
         "coherence_at_peaks": result.fit.mode_coherence().tolist(),
         "coherence_at_peaks_by_floor": result.fit.coherence.tolist(),
-        "reconstruction_error": result.in_frequency.error.tolist(),
+        "reconstruction_error": [] if result.in_frequency is None else result.in_frequency.error.tolist(),
         "time_fit_percent": {item.test: item.fit_percent.tolist() for item in result.in_time},
-        "model_frequencies_hz": modes.frequencies_hz.tolist(),
-        "model_damping_ratios": complex_modes(result.frame).damping_ratios.tolist(),
-        "storey_stiffnesses_n_m": result.tridiagonal.storey_stiffnesses.tolist(),
-        "storey_stiffness_intervals_n_m": np.column_stack([result.tridiagonal.low, result.tridiagonal.high]).tolist(),
-        "tridiagonal_stiffness": result.tridiagonal.stiffness.tolist(),
-        "off_band_share": off_band_share(result),
+        "model_frequencies_hz": [] if modes is None else modes.frequencies_hz.tolist(),
+        "model_damping_ratios": [] if frame is None else complex_modes(frame).damping_ratios.tolist(),
+        "floor_mass_intervals_kg": _plain(result.mass_intervals),
+        "storey_stiffnesses_n_m": [] if storeys is None else storeys.storey_stiffnesses.tolist(),
+        "storey_stiffness_intervals_n_m": []
+        if storeys is None
+        else np.column_stack([storeys.low, storeys.high]).tolist(),
+        "undetermined_storeys": [] if storeys is None else list(storeys.undetermined),
+        "tridiagonal_stiffness": None if storeys is None else storeys.stiffness.tolist(),
+        "off_band_share": None if frame is None else off_band_share(frame.stiffness),
         "phase_scatter": result.phase_scatter.tolist(),
+        "clocks": [_clock_row(item) for item in result.clocks],
+        "stabilisation": [
+            {
+                "frequency_hz": float(item.angular_frequency / _TWO_PI),
+                "damping_ratio": float(item.damping_ratio),
+                "model_orders": int(item.occurrences),
+            }
+            for item in sorted(result.candidates, key=lambda item: item.angular_frequency)
+        ],
         "band_hz": list(result.band_hz),
         "findings": list(result.findings),
     }
 
 
-def off_band_share(result: FrameIdentification) -> float:
+def _plain(values: FloatArray) -> list[Any]:
+    """Return nested lists with None in place of nan, because JSON has no nan."""
+    return [[float(item) if np.isfinite(item) else None for item in row] for row in np.atleast_2d(values)]
+
+
+def _shape_errors(result: FrameIdentification) -> list[list[float]]:
+    largest = np.abs(result.fit.residues).max(axis=0)
+    return np.asarray(result.fit.residue_errors / largest).tolist()
+
+
+def _clock_row(clock: SensorClock) -> dict[str, Any]:
+    return {
+        "test": clock.test,
+        "floor": clock.sensor.floor,
+        "direction": clock.sensor.direction,
+        "offset_s": float(clock.offset_s),
+        "offset_error_s": float(clock.offset_error_s),
+        "drift": float(clock.drift),
+        "step_s": float(clock.step_s),
+        "step_at_s": float(clock.step_at_s),
+    }
+
+
+def off_band_share(stiffness: FloatArray) -> float:
     """Return the largest element of K outside the tri-diagonal band over the largest of all [1]."""
-    stiffness = result.frame.stiffness
     n = stiffness.shape[0]
     outside = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) > 1
     return float(np.abs(stiffness[outside]).max() / np.abs(stiffness).max()) if outside.any() else 0.0
@@ -78,10 +119,12 @@ def off_band_share(result: FrameIdentification) -> float:
 
 def write_identification(artifact: ArtifactWriter, result: FrameIdentification) -> None:
     """Write matrices, modes, decays, frequency responses and verification."""
-    write_frame(artifact, result.frame)
+    if result.frame is not None:
+        write_frame(artifact, result.frame)
     artifact.put("modes/shapes", result.mode_shapes, unit="1", dims=("floor", "mode"))
     artifact.put("modes/mac", result.mac, unit="1", dims=("measured_mode", "frame_mode"))
-    artifact.put("modes/coherence", result.fit.coherence, unit="1", dims=("floor", "mode"))
+    artifact.put("modes/coherence", result.fit.coherence, unit="1", dims=("sensor", "mode"))
+    artifact.put("modes/number", np.asarray(result.numbers, dtype=np.float64), unit="1", dims=("mode",))
     for name, items, unit in (
         ("angular_frequency", result.frequencies, "rad/s"),
         ("damping_ratio", result.damping, "1"),
@@ -91,8 +134,9 @@ def write_identification(artifact: ArtifactWriter, result: FrameIdentification) 
         bounds = [[item.low, item.high] for item in items]
         artifact.put(f"modes/{name}_interval", bounds, unit=unit, dims=("mode", "bound"))
     storeys = result.tridiagonal
-    artifact.put("tridiagonal/storey_stiffness", storeys.storey_stiffnesses, unit="N/m", dims=("storey",))
-    artifact.put("tridiagonal/stiffness", storeys.stiffness, unit="N/m", dims=("floor", "floor_of_cause"))
+    if storeys is not None:
+        artifact.put("tridiagonal/storey_stiffness", storeys.storey_stiffnesses, unit="N/m", dims=("storey",))
+        artifact.put("tridiagonal/stiffness", storeys.stiffness, unit="N/m", dims=("floor", "floor_of_cause"))
     for mode, decay in sorted(result.decays.items()):
         group = f"decays/mode_{mode}"
         artifact.put(f"{group}/peak_time", decay.peak_time_s, unit="s", dims=("peak",))
@@ -100,9 +144,10 @@ def write_identification(artifact: ArtifactWriter, result: FrameIdentification) 
         artifact.put(f"{group}/point_to_point", decay.point_to_point_series, unit="1", dims=("pair",))
         artifact.attributes(group, test=decay.test)
     responses = result.in_frequency
-    unit = "1/kg" if result.tests[0].shaker_floor else "1"
-    artifact.put("responses/frequency", responses.frequency_hz, unit="Hz", dims=("line",))
-    for name, values in (("measured", responses.measured), ("synthesised", responses.synthesised)):
-        artifact.put(f"responses/{name}_real", values.real, unit=unit, dims=("line", "floor"))
-        artifact.put(f"responses/{name}_imaginary", values.imag, unit=unit, dims=("line", "floor"))
+    if responses is not None:
+        unit = "1/kg" if result.tests[0].shaker_floor else "1"
+        artifact.put("responses/frequency", responses.frequency_hz, unit="Hz", dims=("line",))
+        for name, values in (("measured", responses.measured), ("synthesised", responses.synthesised)):
+            artifact.put(f"responses/{name}_real", values.real, unit=unit, dims=("line", "sensor"))
+            artifact.put(f"responses/{name}_imaginary", values.imag, unit=unit, dims=("line", "sensor"))
     artifact.put_json("summary", summary(result))

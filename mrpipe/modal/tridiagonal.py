@@ -109,8 +109,11 @@ def storeys_of(updated: UpdatedModel, bounds: tuple[float, float] = (1.0, 1e12))
         stiffness=updated.stiffness,
         frequency_error=updated.frequency_error,
         at_bound=tuple(int(item) for item in stuck),
-        undetermined=tuple(i + 1 for i, name in enumerate(f"storey {k + 1}" for k in range(storeys.size))
-                           if name in updated.undetermined),
+        undetermined=tuple(
+            i + 1
+            for i, name in enumerate(f"storey {k + 1}" for k in range(storeys.size))
+            if name in updated.undetermined
+        ),
     )
 
 

@@ -199,7 +199,8 @@ def update_model(
     if bounds is not None:
         low[: start.size], high[: start.size] = np.log(bounds[0]), np.log(bounds[1])
     margin = 1e-9 * (high - low)
-    result = least_squares(problem.residual, np.clip(theta, low + margin, high - margin), bounds=(low, high), x_scale="jac")
+    first = np.clip(theta, low + margin, high - margin)
+    result = least_squares(problem.residual, first, bounds=(low, high), x_scale="jac")
     return _collect(problem, np.asarray(result.x), np.asarray(result.jac), float(2.0 * result.cost))
 
 

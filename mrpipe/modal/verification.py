@@ -1,4 +1,4 @@
-"""How well the identified frame returns what was measured, in time and in frequency (section 3.3.4)."""
+"""How well the identified frame reproduces the measurements, in time and in frequency (section 3.3.4)."""
 
 from __future__ import annotations
 
@@ -28,11 +28,13 @@ class TimeVerification:
     time_s
         Shape (m,).
     measured, simulated
-        Shape (m, n), absolute acceleration [m/s2] (displacement [m] where a floor has no accelerometer).
+        Shape (m, s), absolute acceleration [m/s2] (displacement [m] where a floor has no accelerometer).
     nrmse
-        Shape (n,): RMS error over RMS of the measured response.
+        Shape (s,): RMS error over RMS of the measured response.
     fit_percent
-        Shape (n,): 100 (1 - |y - y_hat|/|y - mean y|).
+        Shape (s,): 100 (1 - |y - y_hat|/|y - mean y|).
+    floors
+        Floor of each column.
     """
 
     test: str
@@ -41,6 +43,7 @@ class TimeVerification:
     simulated: FloatArray
     nrmse: FloatArray
     fit_percent: FloatArray
+    floors: tuple[int, ...] = ()
 
 
 def verify_in_time(frame: Frame, test: FrameTest, band_hz: tuple[float, float]) -> TimeVerification:
@@ -52,10 +55,12 @@ def verify_in_time(frame: Frame, test: FrameTest, band_hz: tuple[float, float]) 
     sections = signal.butter(
         _FILTER_ORDER, [band_hz[0], min(band_hz[1], 0.9 * nyquist)], btype="bandpass", fs=rate, output="sos"
     )
-    excitation = test.excitation - test.excitation.mean()
-    response = linear_response(frame, excitation, 1.0 / rate, shaker_floor=test.shaker_floor)
+    rows = [sensor.floor - 1 for sensor in test.sensors]
     flags = np.asarray(test.is_displacement)
-    simulated = np.where(flags, response.displacement, response.absolute_acceleration)
+    simulated = np.zeros(test.responses.shape)
+    for place, values in test.inputs.items():
+        response = linear_response(frame, values - values.mean(), 1.0 / rate, shaker_floor=place.floor)
+        simulated += np.where(flags, response.displacement[:, rows], response.absolute_acceleration[:, rows])
     measured = test.responses - test.responses.mean(axis=0)
     measured = np.asarray(signal.sosfiltfilt(sections, measured, axis=0))
     simulated = np.asarray(signal.sosfiltfilt(sections, simulated, axis=0))
@@ -69,6 +74,7 @@ def verify_in_time(frame: Frame, test: FrameTest, band_hz: tuple[float, float]) 
         simulated=simulated,
         nrmse=np.sqrt(np.mean(error**2, axis=0)) / size,
         fit_percent=100.0 * (1.0 - np.linalg.norm(error, axis=0) / spread),
+        floors=tuple(sensor.floor for sensor in test.sensors),
     )
 
 
@@ -81,37 +87,47 @@ class FrequencyVerification:
     frequency_hz
         Shape (m,).
     measured, synthesised
-        Shape (m, n): leakage taken out, and of M, C, K.
+        Shape (m, s): leakage taken out, and of M, C, K.
     error
-        Shape (n,): |measured - synthesised|/|measured| over the band, lines weighted by the excitation.
+        Shape (s,): |measured - synthesised|/|measured| over the band, lines weighted by the excitation.
+    floors
+        Floor of each column.
     """
 
     frequency_hz: FloatArray
     measured: ComplexArray
     synthesised: ComplexArray
     error: FloatArray
+    floors: tuple[int, ...] = ()
 
 
-def verify_in_frequency(
-    frame: Frame,
-    fit: MultiModeFit,
-    band_hz: tuple[float, float],
-    is_displacement: tuple[bool, ...],
-    shaker_floor: int,
-) -> FrequencyVerification:
-    """Compare the measured frequency response, its transients taken out, with that of M, C and K."""
+def verify_in_frequency(frame: Frame, fit: MultiModeFit, band_hz: tuple[float, float]) -> FrequencyVerification:
+    """Compare the measured response of the first test, its transients taken out, with that of M, C and K.
+
+    The frequency response is that to the first input. What further inputs contribute is taken from the model.
+    """
+    spectrum = fit.spectra[0]
     inside = (fit.omega[0] >= 2.0 * np.pi * band_hz[0]) & (fit.omega[0] <= 2.0 * np.pi * band_hz[1])
-    omega, excitation, measured = fit.omega[0][inside], fit.excitation[0][inside], fit.measured[0][inside]
-    accelerations = frequency_response(frame, omega, shaker_floor=shaker_floor)
-    displacements = frequency_response(frame, omega, shaker_floor=shaker_floor, absolute_acceleration=False)
-    synthesised = np.where(np.asarray(is_displacement), displacements, accelerations)
-    steady = synthesised * excitation[:, None]
+    omega, excitations, measured = fit.omega[0][inside], spectrum.excitations[inside], fit.measured[0][inside]
+    rows = [sensor.floor - 1 for sensor in spectrum.sensors]
+    flags = np.asarray([sensor.is_displacement for sensor in spectrum.sensors])
+    steady = np.zeros_like(measured)
+    synthesised = np.zeros_like(measured)
+    for index, place in enumerate(spectrum.inputs):
+        accelerations = frequency_response(frame, omega, shaker_floor=place.floor)[:, rows]
+        displacements = frequency_response(frame, omega, shaker_floor=place.floor, absolute_acceleration=False)[:, rows]
+        response = np.where(flags, displacements, accelerations)
+        synthesised = response if index == 0 else synthesised
+        steady += response * excitations[:, index : index + 1]
+    excitation = excitations[:, 0]
     error = np.linalg.norm(measured - steady, axis=0) / np.linalg.norm(measured, axis=0)
     # lines without excitation have no frequency response
     useful = np.abs(excitation) > 0.05 * np.median(np.abs(excitation))
+    others = steady - synthesised * excitation[:, None]
     return FrequencyVerification(
         frequency_hz=omega[useful] / (2.0 * np.pi),
-        measured=measured[useful] / excitation[useful, None],
+        measured=(measured - others)[useful] / excitation[useful, None],
         synthesised=synthesised[useful],
         error=error,
+        floors=tuple(sensor.floor for sensor in spectrum.sensors),
     )

@@ -36,25 +36,36 @@ class IdentifiedFrame:
 def describe(sink: Sink, result: IdentifiedFrame) -> None:
     """Write the section."""
     found, values = result.identification, result.summary
-    floors = found.frame.floors
+    count, frequencies = len(found.numbers), values["frequencies_hz"]
     sink.text(
-        f"{floors} floors, {floors} modes between {values['frequencies_hz'][0]:.3g} and "
-        f"{values['frequencies_hz'][-1]:.3g} Hz. Poles are fitted to all floors at once, including the "
-        "transients at both ends of each record. Damping comes from free decays where there are any, and from the "
-        "sweep as a second, independent method."
+        f"{count} modes between {frequencies[0]:.3g} and {frequencies[-1]:.3g} Hz. Poles are fitted to all sensors of "
+        "all tests at once, including the transients at both ends of each record. Damping comes from free decays where "
+        "there are any, and from the forced tests as a second, independent method."
     )
     sink.table("modes", pd.DataFrame(figures.mode_rows(values)), "Modes with 95 % intervals.")
-    for name in ("mass", "stiffness", "damping"):
-        frame = pd.DataFrame(getattr(found.frame, name), columns=[f"floor {i + 1}" for i in range(floors)])
-        sink.table(name, frame, {"mass": "M [kg].", "stiffness": "K [N/m].", "damping": "C [N s/m]."}[name])
-    averaged = averaged_responses(found.tests[0], result.segment_s)
-    sink.figure(
-        "frequency-responses",
-        figures.frequency_responses(found.in_frequency, averaged, found.band_hz),
-        "Frequency responses: measured (leakage taken out), of M, C and K, and coherence of the averaged spectra.",
-    )
-    sink.figure("mode-shapes", figures.mode_shapes(found.mode_shapes, values["frequencies_hz"]), "Mode shapes.")
+    if found.clocks:
+        sink.table("clocks", pd.DataFrame(values["clocks"]), "Delays of sensors that were corrected.")
+    if found.candidates:
+        sink.figure(
+            "stabilisation",
+            figures.stabilisation(values["stabilisation"], frequencies),
+            "Stabilisation: in how many model orders a pole appears; lines: modes of the structure.",
+        )
+    if found.frame is not None:
+        for name, text in (("mass", "M [kg]."), ("stiffness", "K [N/m]."), ("damping", "C [N s/m].")):
+            columns = [f"floor {i + 1}" for i in range(found.frame.floors)]
+            sink.table(name, pd.DataFrame(getattr(found.frame, name), columns=columns), text)
+    if found.in_frequency is not None:
+        averaged = averaged_responses(found.tests[0], result.segment_s)
+        sink.figure(
+            "frequency-responses",
+            figures.frequency_responses(found.in_frequency, averaged, found.band_hz),
+            "Frequency responses: measured (leakage taken out), of M, C and K, and coherence of the averaged spectra.",
+        )
+    sink.figure("mode-shapes", figures.mode_shapes(found.mode_shapes, frequencies), "Mode shapes.")
     if found.decays:
         decays = [found.decays[mode] for mode in sorted(found.decays)]
         sink.figure("decays", figures.decays(decays), "Free decays, exponential fit and peak-to-peak damping.")
-    sink.figure("verification", figures.verification(found.in_time[0]), "Measured and simulated response of the sweep.")
+    if found.in_time:
+        text = "Measured and simulated response of a forced test."
+        sink.figure("verification", figures.verification(found.in_time[0]), text)

@@ -24,7 +24,7 @@ def mode_rows(values: Mapping[str, Any]) -> list[dict[str, Any]]:
         low, high = values["damping_ratio_intervals"][index]
         rows.append(
             {
-                "mode": index + 1,
+                "mode": values["mode_numbers"][index],
                 "frequency [Hz]": frequency,
                 "± [Hz]": 0.5 * float(np.diff(values["frequency_intervals_hz"][index])[0]),
                 "omega [rad/s]": 2.0 * np.pi * frequency,
@@ -55,7 +55,7 @@ def frequency_responses(
             color=colour,
             linewidth=0.6,
             alpha=0.55,
-            label=f"floor {floor + 1}",
+            label=f"floor {result.floors[floor]}",
         )
         axes[0, 0].semilogy(
             result.frequency_hz[::step], np.abs(result.synthesised[::step, floor]), color=colour, linewidth=1.1
@@ -70,16 +70,35 @@ def frequency_responses(
 
 
 def mode_shapes(shapes: FloatArray, frequencies_hz: Sequence[float]) -> Figure:
-    """Draw the shapes (a row a floor, a column a mode) beside each other."""
+    """Draw the shapes (a row a floor, a column a mode) beside each other; floors without a value are left out."""
     floors, modes = shapes.shape
     figure, axes = figure_with_axes(1, modes, width=1.5 * modes + 0.8, height=3.6)
     height = np.arange(floors + 1)
     for mode in range(modes):
         axis = axes[0, mode]
-        axis.plot(np.concatenate([[0.0], shapes[:, mode]]), height, "o-", color=COLOURS[0], linewidth=1.4, markersize=4)
+        values = np.concatenate([[0.0], shapes[:, mode]])
+        known = np.isfinite(values)
+        axis.plot(values[known], height[known], "o-", color=COLOURS[0], linewidth=1.4, markersize=4)
         axis.axvline(0.0, color=MEASURED, linewidth=0.6)
         axis.set_xlim(-1.15, 1.15)
         label(axis, "", "floor" if mode == 0 else "", f"{mode + 1}: {frequencies_hz[mode]:.3g} Hz")
+    return figure
+
+
+def stabilisation(candidates: Sequence[Mapping[str, Any]], frequencies_hz: Sequence[float]) -> Figure:
+    """Draw in how many model orders each pole appears, and the modes that were taken."""
+    figure, axes = figure_with_axes(1, 1, height=2.4)
+    axis = axes[0, 0]
+    for frequency in frequencies_hz:
+        axis.axvline(frequency, color=MODEL, linewidth=0.8)
+    axis.plot(
+        [item["frequency_hz"] for item in candidates],
+        [item["model_orders"] for item in candidates],
+        "o",
+        color=COLOURS[0],
+        markersize=4,
+    )
+    label(axis, "frequency [Hz]", "model orders", "poles that keep their place")
     return figure
 
 
@@ -110,6 +129,6 @@ def verification(result: TimeVerification) -> Figure:
         part = slice(max(0, centre - half), centre + half)
         axis.plot(result.time_s[part], result.measured[part, floor], color=MEASURED, linewidth=0.9, label="measured")
         axis.plot(result.time_s[part], result.simulated[part, floor], color=MODEL, linewidth=0.9, label="simulated")
-        label(axis, "time [s]", "response", f"floor {floor + 1}: fit {result.fit_percent[floor]:.1f} %")
+        label(axis, "time [s]", "response", f"floor {result.floors[floor]}: fit {result.fit_percent[floor]:.1f} %")
         axis.legend(fontsize=7, frameon=False)
     return figure

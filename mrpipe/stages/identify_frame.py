@@ -1,4 +1,4 @@
-"""`identify-frame`: mass, damping, stiffness and modes of a frame from sweep and decay tests."""
+"""`identify-frame`: mass, damping, stiffness and modes of a frame from forced, ambient and decay tests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.modal.identify import IdentificationOptions
+    from mrpipe.modal.identify import GivenShapes
+    from mrpipe.modal.options import IdentificationOptions
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
@@ -21,7 +22,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     campaign = load_campaign(context.inputs["campaign:frame"])
     for finding in campaign.findings:
         context.warn(finding)
-    result = identify_frame(frame_tests(campaign), _options(context), context.progress)
+    options, shapes = _options(context)
+    result = identify_frame(frame_tests(campaign), options, context.progress, shapes)
     for finding in result.findings:
         context.warn(finding)
     with context.write("frame.h5") as artifact:
@@ -32,29 +34,18 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     return {"campaign": campaign.name, **values}
 
 
-def _options(context: StageContext) -> IdentificationOptions:
+def _options(context: StageContext) -> tuple[IdentificationOptions, GivenShapes | None]:
     from mrpipe.artifacts import load_parameter_set
     from mrpipe.errors import UserError
-    from mrpipe.modal.identify import IdentificationOptions
+    from mrpipe.modal.identify import GivenShapes
 
     settings = context.settings.identify_frame
-    shapes = None
-    if settings.mode_matrix:
-        values = load_parameter_set("frames", settings.mode_matrix).values
-        if "mode_shapes" not in values:
-            raise UserError(
-                f"frame {settings.mode_matrix}", "parameters.mode_shapes", "is missing", "give value and unit"
-            )
-        shapes = values["mode_shapes"]
-    return IdentificationOptions(
-        band_low_hz=settings.band_low_hz,
-        band_high_hz=settings.band_high_hz,
-        damping_from=settings.damping_from,
-        stiffness_form=settings.stiffness_form,
-        orthogonal=settings.orthogonal_shapes,
-        mode_matrix=shapes,
-        mode_matrix_name=settings.mode_matrix,
-    )
+    if not settings.mode_matrix:
+        return settings, None
+    values = load_parameter_set("frames", settings.mode_matrix).values
+    if "mode_shapes" not in values:
+        raise UserError(f"frame {settings.mode_matrix}", "parameters.mode_shapes", "is missing", "give value and unit")
+    return settings, GivenShapes(values["mode_shapes"], settings.mode_matrix)
 
 
 STAGE = Stage(

@@ -11,7 +11,7 @@ from mrpipe.modal.decay import Estimate
 from mrpipe.modal.free_response import free_mode, strongest_frequency, with_decays
 from mrpipe.modal.identify import _pooled
 from mrpipe.modal.multimode import fit_modes
-from mrpipe.modal.search import _usable
+from mrpipe.modal.selection import usable
 from mrpipe.modal.spectra import record_spectrum
 from mrpipe.structures import natural_modes, shear_frame
 from tests.modal.rig import Rig, decay_test, sweep_test
@@ -59,15 +59,15 @@ def test_poles_that_are_no_modes_are_not_taken(frame):
     modes = natural_modes(frame)
     sweep = sweep_test(frame, np.random.default_rng(3), RIG)
     fit = fit_modes([record_spectrum(sweep, (0.5, 14.0))], modes.angular_frequencies, np.full(3, 0.004))
-    assert _usable(fit).tolist() == [True, True, True]
+    assert usable(fit).tolist() == [True, True, True]
     at_bound = replace(fit, damping_ratios=np.array([1e-6, 0.004, 0.2]))
-    assert _usable(at_bound).tolist() == [False, True, False]
+    assert usable(at_bound).tolist() == [False, True, False]
     errors = fit.residue_errors.copy()
     errors[:, 1] = np.abs(fit.residues[:, 1])
-    assert _usable(replace(fit, residue_errors=errors)).tolist() == [True, False, True]
+    assert usable(replace(fit, residue_errors=errors)).tolist() == [True, False, True]
     coherence = fit.coherence.copy()
     coherence[:, 2] = 0.4
-    assert _usable(replace(fit, coherence=coherence)).tolist() == [True, True, False]
+    assert usable(replace(fit, coherence=coherence)).tolist() == [True, True, False]
 
 
 @pytest.mark.property

@@ -97,7 +97,7 @@ def respond(tower, forces, dt):
     acceleration = forces / tower.mass
     result = acceleration.copy()
     modal = forces @ tower.shapes
-    for mode, (f, zeta) in enumerate(zip(tower.frequencies_hz, tower.damping_ratios)):
+    for mode, (f, zeta) in enumerate(zip(tower.frequencies_hz, tower.damping_ratios, strict=True)):
         omega = 2 * np.pi * f
         pole = complex(-zeta * omega, omega * np.sqrt(1 - zeta**2))
         step = np.exp(pole * dt)
@@ -135,7 +135,7 @@ def sample(tower, rng, sensors, responses, excitation, rate):
     mixing = np.eye(tower.floors) + sensors.crosstalk * rng.uniform(-1.0, 1.0, (tower.floors, tower.floors))
     seen = seen @ mixing.T
     seen += sensors.noise * seen.std(axis=0) * rng.standard_normal(seen.shape) + rng.normal(0, 0.01, tower.floors)
-    measured = excitation[:: FINE][:count]
+    measured = excitation[::FINE][:count]
     measured = measured + sensors.input_noise * measured.std() * rng.standard_normal(count)
     return measured, seen
 

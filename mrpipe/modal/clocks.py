@@ -1,0 +1,213 @@
+"""Clocks of sensors: offset and drift of each sensor against the excitation, estimated from a fit and corrected.
+
+A proportionally damped structure has real mode shapes: at a resonance all floors move in phase or in opposite phase. A
+sensor whose clock is late by tau turns its residue at frequency omega by exp(-i omega tau), so one delay explains the
+phases of all its modes. The response of each sensor is therefore fitted with real residues and a delay that is
+constant, changes linearly with time, or steps once. The poles are those of a fit without this restriction. The
+Bayesian information criterion decides among these delays and none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import uniform_filter1d
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.multimode import MultiModeFit
+from mrpipe.modal.projection import Problem, stack
+from mrpipe.modal.records import FrameTest, Sensor
+from mrpipe.modal.spectra import RecordSpectrum
+
+_ITERATIONS = 4
+_STEP_PLACES = 15
+_SMOOTHED_LINES = 41
+_LEAST_PHASE = 0.02
+"""Delays below this phase [rad] at the highest mode are left: filters and damping cause as much."""
+
+
+@dataclass(frozen=True)
+class SensorClock:
+    """Delay of one sensor in one test: offset + drift * time + step after `step_at_s`.
+
+    Attributes
+    ----------
+    test, sensor
+        Where.
+    offset_s, offset_error_s
+        Delay at the start of the test, with its standard error [s].
+    drift
+        Change of the delay per second [1].
+    step_s, step_at_s
+        Sudden change of the delay [s] and its time [s].
+    """
+
+    test: str
+    sensor: Sensor
+    offset_s: float
+    offset_error_s: float
+    drift: float = 0.0
+    step_s: float = 0.0
+    step_at_s: float = 0.0
+
+    def delay(self, time: FloatArray) -> FloatArray:
+        """Return the delay [s] at the times given."""
+        return np.asarray(self.offset_s + self.drift * time + self.step_s * (time >= self.step_at_s))
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether no delay was found."""
+        return self.offset_s == 0.0 and self.drift == 0.0 and self.step_s == 0.0
+
+
+class _SensorFit:
+    """Residual of one sensor in one test as a function of its delay, with real residues and the poles of a fit."""
+
+    def __init__(
+        self, test: FrameTest, spectrum: RecordSpectrum, column: int, basis: FloatArray, line_weight: FloatArray
+    ) -> None:
+        samples = test.responses.shape[0]
+        self.time = np.arange(samples) / test.sampling_rate_hz
+        self.spline = CubicSpline(self.time, test.responses[:, column] - test.responses[:, column].mean())
+        self.lines = np.round(spectrum.omega * samples * spectrum.dt / (2.0 * np.pi)).astype(np.int64)
+        self.weight = np.concatenate([line_weight, line_weight])[:, None]
+        weighted = basis * self.weight
+        norms = np.linalg.norm(weighted, axis=0)
+        self.q = np.linalg.qr(weighted / np.where(norms > 0.0, norms, 1.0))[0]
+
+    def project(self, histories: Sequence[FloatArray]) -> FloatArray:
+        """Return what the basis does not explain of some histories, shape (2 lines, count)."""
+        values = np.column_stack([np.fft.rfft(item)[self.lines] for item in histories])
+        columns = stack(values) * self.weight
+        return np.asarray(columns - self.q @ (self.q.T @ columns))
+
+    def linearised(self, delay: FloatArray, changes: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return the residual at a delay, shape (2 lines,), and its derivative by each change of the delay."""
+        moved = np.clip(self.time + delay, self.time[0], self.time[-1])
+        slope = self.spline(moved, 1)
+        columns = self.project([self.spline(moved), *(slope * change for change in changes)])
+        return columns[:, 0], columns[:, 1:]
+
+
+def _minimise(
+    fit: _SensorFit, changes: Sequence[FloatArray], start: FloatArray
+) -> tuple[FloatArray, float, FloatArray]:
+    """Return coefficients of the changes, the cost at them, and their standard errors (Gauss-Newton)."""
+    value = start.copy()
+    for _ in range(_ITERATIONS):
+        residual, derivative = fit.linearised(np.tensordot(value, np.array(changes), axes=1), changes)
+        value = value - np.linalg.lstsq(derivative, residual, rcond=None)[0]
+    residual, derivative = fit.linearised(np.tensordot(value, np.array(changes), axes=1), changes)
+    cost = float(residual @ residual)
+    variance = cost / max(residual.size - fit.q.shape[1], 1)
+    spread = np.sqrt(np.diag(np.linalg.pinv(derivative.T @ derivative)) * variance)
+    return value, cost, spread
+
+
+def _sensor_clock(fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highest: float) -> SensorClock:
+    ones, time = np.ones(fit.time.size), fit.time
+    residual, _ = fit.linearised(np.zeros(time.size), [ones])
+    freedom = max(residual.size - fit.q.shape[1], 1)
+    price = float(np.log(freedom))
+
+    def criterion(cost: float, parameters: int) -> float:
+        return freedom * float(np.log(max(cost, 1e-300))) + parameters * price
+
+    value, cost, spread = _minimise(fit, [ones], np.zeros(1))
+    best = SensorClock(name, sensor, float(value[0]), float(spread[0]))
+    score = criterion(cost, 1)
+    offset = value
+    value, cost, spread = _minimise(fit, [ones, time], np.array([offset[0], 0.0]))
+    if criterion(cost, 2) < score:
+        best = SensorClock(name, sensor, float(value[0]), float(spread[0]), float(value[1]))
+        score = criterion(cost, 2)
+    if steps:
+        places = np.linspace(time[0], time[-1], _STEP_PLACES + 2)[1:-1]
+        found = min((_step_cost(fit, offset, float(at)), float(at)) for at in places)
+        if criterion(found[0], 3) < score:
+            after = (time >= found[1]).astype(np.float64)
+            value, cost, spread = _minimise(fit, [ones, after], np.array([offset[0], 0.0]))
+            if criterion(cost, 3) < score:
+                best = SensorClock(name, sensor, float(value[0]), float(spread[0]), 0.0, float(value[1]), found[1])
+                score = criterion(cost, 3)
+    small = float(np.abs(best.delay(time)).max()) * highest < _LEAST_PHASE
+    if small or criterion(float(residual @ residual), 0) <= score:
+        return SensorClock(name, sensor, 0.0, best.offset_error_s)
+    return best
+
+
+def _step_cost(fit: _SensorFit, offset: FloatArray, at: float) -> float:
+    """Return the cost that a step at one place would have, from one linear step."""
+    ones, after = np.ones(fit.time.size), (fit.time >= at).astype(np.float64)
+    residual, derivative = fit.linearised(offset[0] * ones, [ones, after])
+    rest = residual - derivative @ np.linalg.lstsq(derivative, residual, rcond=None)[0]
+    return float(rest @ rest)
+
+
+def estimate_clocks(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool = True) -> list[SensorClock]:
+    """Return the delay of each sensor in each test against the excitations of that test.
+
+    Parameters
+    ----------
+    fit
+        A fit of these tests.
+    tests
+        In the order of the fit.
+    steps
+        Whether a delay may step.
+    """
+    found = []
+    modes = list(zip(fit.angular_frequencies, fit.damping_ratios, strict=True))
+    for test, spectrum, measured, steady in zip(tests, fit.spectra, fit.measured, fit.steady, strict=True):
+        variance = uniform_filter1d(np.abs(measured - steady) ** 2, _SMOOTHED_LINES, axis=0, mode="nearest")
+        # lines that hardly any residual was left at must not rule the fit
+        variance = np.maximum(variance, 0.1 * np.median(variance, axis=0))
+        for is_displacement in sorted(set(test.is_displacement)):
+            problem = Problem([spectrum], len(modes), is_displacement)
+            inputs = len(problem.inputs)
+            keep = [*range(0, 2 * inputs, 2), 2 * inputs, 2 * inputs + 1]
+            columns = [problem.mode_columns(float(omega), float(zeta))[:, keep] for omega, zeta in modes]
+            basis = stack(np.hstack([*columns, problem.smooth_columns()]))
+            for column, sensor in enumerate(test.sensors):
+                if sensor.is_displacement == is_displacement:
+                    weight = 1.0 / np.sqrt(np.maximum(variance[:, column], 1e-300))
+                    own = _SensorFit(test, spectrum, column, basis, weight)
+                    highest = float(fit.angular_frequencies[-1])
+                    found.append(_sensor_clock(own, test.name, sensor, steps, highest))
+    return found
+
+
+def corrected(test: FrameTest, clocks: Sequence[SensorClock]) -> FrameTest:
+    """Return a test with the delays of its sensors taken out by interpolation."""
+    time = np.arange(test.responses.shape[0]) / test.sampling_rate_hz
+    responses = test.responses.copy()
+    for clock in clocks:
+        if clock.test == test.name and not clock.is_zero:
+            column = test.sensors.index(clock.sensor)
+            moved = np.clip(time + clock.delay(time), time[0], time[-1])
+            responses[:, column] = CubicSpline(time, test.responses[:, column])(moved)
+    return replace(test, responses=responses)
+
+
+def added(first: Sequence[SensorClock], second: Sequence[SensorClock]) -> list[SensorClock]:
+    """Return the sum of two corrections, of which the second has no steps."""
+    known = {(item.test, item.sensor): item for item in first}
+    result = dict(known)
+    for item in second:
+        before = known.get((item.test, item.sensor))
+        if before is None:
+            result[(item.test, item.sensor)] = item
+            continue
+        result[(item.test, item.sensor)] = SensorClock(
+            item.test,
+            item.sensor,
+            before.offset_s + item.offset_s,
+            item.offset_error_s,
+            before.drift + item.drift,
+            before.step_s,
+            before.step_at_s,
+        )
+    return list(result.values())

@@ -1,0 +1,38 @@
+"""Choices of the identification: the same model is the domain's options and the settings of its stage."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class IdentificationOptions(BaseModel):
+    """How the frame is identified from its forced, ambient and decay tests."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    band_low_hz: float = Field(
+        0.2, gt=0.0, description="Lower end of the band in which modes are looked for (section 3.2.1)."
+    )
+    band_high_hz: float = Field(
+        0.0,
+        ge=0.0,
+        description="Upper end of the band (14 Hz in the thesis); 0 means up to where the excitation ends.",
+    )
+    damping_from: Literal["decay", "sweep"] = Field(
+        "decay",
+        description="Damping ratios that go into C: `decay` (where a mode has such a test, else the sweep) or `sweep`.",
+    )
+    stiffness_form: Literal["modal", "tridiagonal"] = Field(
+        "modal", description="K from the modes, (3.14) to (3.16), or the tri-diagonal shear frame nearest to them."
+    )
+    orthogonal_shapes: bool = Field(
+        True,
+        description="Take the nearest shapes that are orthogonal to the mass, each weighted by its certainty; not done "
+        "where the measured shapes contradict it, or where shapes are given.",
+    )
+    clock_correction: bool = Field(
+        True,
+        description="Estimate the clock offset and drift of each sensor and correct them where the data support it.",
+    )
