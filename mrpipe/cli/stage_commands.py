@@ -120,13 +120,21 @@ def simulate(
     resonance: Annotated[
         bool, typer.Option("--resonance", help="Also find the loop's own resonance and the response over frequency.")
     ] = False,
+    damper: Annotated[
+        str | None,
+        typer.Option(metavar="DAMPER", help="identified, traced (by close-loop), a set of configs/dampers, or a file."),
+    ] = None,
 ) -> None:
     """Run the closed loop under a control law."""
+    from dataclasses import replace
+
     from mrpipe.artifacts.yaml_source import nearest
 
     known = law_names()
     if law != "all" and law not in known:
         raise UserError("--law", law, "is not a control law", nearest(law, [*known, "all"]))
+    if damper is not None:
+        options = replace(options, overrides=[*options.overrides, f"simulate.damper={damper}"])
     laws = known if law == "all" else (law,)
     kinds = ("simulate", "resonance") if resonance else ("simulate",)
     build_and_print([f"{kind}-{item}" for item in laws for kind in kinds], options, together=kinds)

@@ -1,11 +1,12 @@
-"""Dampers with effects, read from an artifact: the library of effects turns names into steps."""
+"""Dampers with effects: read from an artifact, where the library of effects turns names into steps, or named."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from mrpipe.artifacts import Artifact
-from mrpipe.dampers.model import Addition, DamperModel
+from mrpipe.artifacts import Artifact, load_parameter_set
+from mrpipe.dampers.model import Addition, DamperModel, damper_from_parameter_set
 from mrpipe.dampers.model import read_damper as read_plain
 from mrpipe.effects.library import damper_effects, load_effect_file
 from mrpipe.errors import UserError
@@ -30,3 +31,26 @@ def read_damper(artifact: Artifact, group: str = "damper") -> DamperModel:
         return Addition(name, form, {}, units, found.sensor, shape.steps, file)
 
     return read_plain(artifact, group, effect=effect)
+
+
+def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]]) -> DamperModel:
+    """Return the damper that a setting names.
+
+    Parameters
+    ----------
+    name
+        A key of `artifacts` (`identified`, `traced`), an artifact file (`.h5`) such as that of another run, a set of
+        configs/dampers, or its YAML file.
+    artifacts
+        Name -> opens the artifact of this run that holds the damper.
+
+    Raises
+    ------
+    UserError
+        If there is no such damper.
+    """
+    if name in artifacts:
+        return read_damper(artifacts[name]())
+    if name.endswith(".h5"):
+        return read_damper(Artifact(Path(name)))
+    return damper_from_parameter_set(load_parameter_set("dampers", name))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 from mrpipe.dampers.laws import law_names
 from mrpipe.dampers.model import Addition, DamperModel
 from mrpipe.fitting.engine import Fit
@@ -12,7 +15,13 @@ ASSUMED_ETA = 100.0
 
 
 def damper_model(
-    found: Fit, drive_unit: str, *, effects: bool = False, assumed_eta: float = ASSUMED_ETA, form_file: str = ""
+    found: Fit,
+    drive_unit: str,
+    *,
+    effects: bool = False,
+    assumed_eta: float = ASSUMED_ETA,
+    form_file: str = "",
+    effect_files: Mapping[str, str] | None = None,
 ) -> DamperModel:
     """Return the damper of a fit.
 
@@ -23,9 +32,11 @@ def damper_model(
     effects
         Take the effects along; the base form alone where False.
     assumed_eta
-        Rate of the lag [1/s] where the recordings do not determine it.
+        Rate of the lag [1/s] where the recordings do not determine it; infinite: no lag.
     form_file
         The user's own file that defines the base form, if any.
+    effect_files
+        Effect -> the user's own file that defines it.
     """
     base, scales = found.problem.base, found.problem.scales
     numbers: dict[str, float] = {}
@@ -37,10 +48,11 @@ def damper_model(
             kinds[block] = law.kind
     values = {name: value for name, value in found.base_values.items() if name not in numbers}
     numbers |= values
-    if not base.lag_known:
+    if not base.lag_known and math.isfinite(assumed_eta):
         numbers["eta"] = assumed_eta
     added = [
-        addition(term, given, drive_unit) for term, given in zip(found.problem.terms, found.term_values, strict=True)
+        addition(term, given, drive_unit, (effect_files or {}).get(term.effect.name, ""))
+        for term, given in zip(found.problem.terms, found.term_values, strict=True)
     ]
     return DamperModel(
         base.name,
@@ -54,7 +66,7 @@ def damper_model(
     )
 
 
-def addition(term: Term, values: dict[str, float], drive_unit: str) -> Addition:
+def addition(term: Term, values: dict[str, float], drive_unit: str, file: str = "") -> Addition:
     """Return an effect of a fit with its numbers, as a damper holds it."""
     units = {item.name: item.unit.replace("drive", drive_unit) for item in term.form.parameters}
-    return Addition(term.effect.name, term.form.name, values, units, term.effect.sensor, term.form.steps)
+    return Addition(term.effect.name, term.form.name, values, units, term.effect.sensor, term.form.steps, file)

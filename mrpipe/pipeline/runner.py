@@ -76,6 +76,7 @@ class Pipeline:
     errors: list[Exception] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self.stages = {name: stage.for_configuration(self.loaded.config) for name, stage in self.stages.items()}
         self._manifests = self.run_directory / "manifests"
         self._hashes = FileHashes(self.run_directory / "manifests" / ".hashes.json")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,6 +103,9 @@ class Stage:
         Names of stages whose artifact is read, or `campaign:bench`, `campaign:frame`, `campaign:closed-loop`.
     optional_inputs
         The same, used where they are there.
+    conditional_inputs
+        (dotted setting, value, input): a further input where the setting has this value. The order of the stages
+        does not follow from them.
     settings
         Dotted names of the settings read: whole sections (`prepare`) or single ones (`simulate.excitation`).
     outputs
@@ -123,9 +126,21 @@ class Stage:
     run: Callable[[StageContext], Mapping[str, Any]]
     inputs: tuple[str, ...] = ()
     optional_inputs: tuple[str, ...] = ()
+    conditional_inputs: tuple[tuple[str, str, str], ...] = ()
     settings: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
     family: str = ""
     public_data: tuple[str, ...] = ()
     check: Callable[[Any], None] | None = None
+
+    def for_configuration(self, configuration: Any) -> Stage:
+        """Return the stage with the inputs that its settings ask for in this configuration."""
+        more = []
+        for setting, value, name in self.conditional_inputs:
+            found = configuration
+            for part in setting.split("."):
+                found = getattr(found, part)
+            if found == value and name not in self.inputs:
+                more.append(name)
+        return replace(self, inputs=(*self.inputs, *more)) if more else self

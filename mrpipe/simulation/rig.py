@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from mrpipe.artifacts import Artifact, FloatArray, load_parameter_set
+from mrpipe.artifacts import Artifact, FloatArray
 from mrpipe.control.assembly import ControllerFactory, inverse_network
 from mrpipe.control.controller import Controller
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law
 from mrpipe.control.storage import read_calibrated
-from mrpipe.dampers.model import DamperModel, damper_from_parameter_set, read_damper
+from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import Chain
+from mrpipe.effects.damper import damper_named
 from mrpipe.simulation import excitation as kinds
 from mrpipe.simulation.adjustment import adjusted_amplitude
 from mrpipe.simulation.excitation import Excitation
@@ -32,6 +34,9 @@ from mrpipe.simulation.loop import (
 )
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
 from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes, read_frame
+
+DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
+"""Dampers of a run by name, and the stage whose artifact holds each."""
 
 RECORD_RATE_HZ = 1000.0
 """Rate of the histories where the settings give none; with a perfect damper, whose force jumps, every plant step."""
@@ -106,7 +111,8 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact]) ->
     settings
         Of the simulation: which frame, damper and controller.
     artifact
-        Opens the artifact of a stage by its name: `identify-frame`, `identify-damper`, `calibrate`, `train-inverse`.
+        Opens the artifact of a stage by its name: `identify-frame`, `identify-damper`, `calibrate`, `train-inverse`,
+        and `close-loop` for the traced damper.
 
     Raises
     ------
@@ -117,13 +123,12 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact]) ->
         frame = read_frame(artifact("identify-frame"))
     else:
         frame = frame_from_parameter_set(settings.frame)
-    if settings.damper == "identified":
-        damper = read_damper(artifact("identify-damper"))
-    else:
-        damper = damper_from_parameter_set(load_parameter_set("dampers", settings.damper))
+    dampers = {name: partial(artifact, stage) for name, stage in DAMPERS.items()}
+    damper = damper_named(settings.damper, dampers)
     controllers = ControllerFactory(
         frame,
-        damper,
+        # the controller knows the damper that it was designed for, not what the tracing has found since
+        damper_named("identified", dampers) if settings.damper == "traced" else damper,
         read_calibrated(artifact("calibrate")),
         settings.controller,
         inverse_network(settings.controller, lambda: artifact("train-inverse")),

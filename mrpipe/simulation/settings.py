@@ -70,7 +70,12 @@ class SimulateSettings(Section):
     """The closed loop."""
 
     frame: str = Field("identified", description="Frame: `identified`, or a set of configs/frames or its YAML file.")
-    damper: str = Field("identified", description="Damper: `identified`, or a set of configs/dampers or its YAML file.")
+    damper: str = Field(
+        "identified",
+        description="Damper in the loop: `identified`; `traced`, the one with the base form and effects that "
+        "close-loop found, under the controller of the identified one; a damper artifact (.h5) of another run; "
+        "or a set of configs/dampers or its YAML file.",
+    )
     tracking: Literal["damper", "ideal", "continuous", "unclipped"] = Field(
         "damper",
         description="The damper gives the force; `ideal`: the controller has perfect sensors and its clipped force is "

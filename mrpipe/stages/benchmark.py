@@ -68,16 +68,15 @@ def _write_response(artifact: Any, group: str, response: Response) -> None:
 
 
 def _ten_storey(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.artifacts import load_parameter_set
     from mrpipe.case_studies.ten_storey import report
     from mrpipe.case_studies.ten_storey import study as bench
     from mrpipe.case_studies.ten_storey.structure import ten_storey
-    from mrpipe.dampers.model import damper_from_parameter_set
+    from mrpipe.effects.damper import damper_named
 
     settings = context.settings.benchmark.ten_storey
     bench.check_laws(settings.laws)
     device = _bingham(settings.inverse)
-    chain = damper_from_parameter_set(load_parameter_set("dampers", settings.damper)).chain()
+    chain = damper_named(settings.damper, {}).chain()
     # what is wrong with the files is told before a motion is synthesised
     frames = {name: ten_storey(name) for name in settings.structures}
     motion = _motion(context, settings.motion, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
@@ -27,13 +28,13 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
     from mrpipe.control.calibration import calibrate, validity_warnings
     from mrpipe.control.storage import calibration_to_json, write_calibration
-    from mrpipe.dampers.model import read_damper
+    from mrpipe.effects.damper import damper_named
     from mrpipe.reporting import calibrate as report
     from mrpipe.structures import floor_position, read_frame, storey_position
 
     settings = context.settings.calibrate
     frame = read_frame(context.artifact("identify-frame"))
-    damper = read_damper(context.artifact("identify-damper"))
+    damper = damper_named(settings.damper, {"identified": partial(context.artifact, "identify-damper")})
     _check_floor(settings.damper_floor, frame)
     place = storey_position if settings.damper_across_storey else floor_position
     position = place(frame.floors, settings.damper_floor)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 CORRECTIONS = "corrections.yaml"
 NEXT_TESTS = "next-tests.yaml"
+TRACED = "damper-traced.h5"
 _LACKING = {
     "identify-frame": "identified frame",
     "calibrate": "calibrated law",
@@ -168,9 +169,21 @@ def _write_settings(path: Path, settings: Mapping[str, Any], about: str) -> None
 def _write(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -> None:
     from mrpipe.artifacts import atomic_write_text
     from mrpipe.artifacts.plain import to_json
+    from mrpipe.dampers.model import write_damper, write_tested
+    from mrpipe.effects.library import load_effect_file
+    from mrpipe.tracing.loop.augmented import tested_range, traced_damper
 
+    files = {load_effect_file(path).name: str(path) for path in context.settings.close_loop.effect_files}
+    damper = traced_damper(traced.selection.chosen, traced.drive_unit, effect_files=files)
+    tested = tested_range(traced.training)
+    with context.write(TRACED) as artifact:
+        write_damper(artifact, damper)
+        write_tested(artifact, tested)
     validation = traced.validation
     with context.write("close-loop.h5") as artifact:
+        # the same damper once more, so that what reads it depends on it
+        write_damper(artifact, damper)
+        write_tested(artifact, tested)
         artifact.put_json("summary", dict(summary))
         for name, values, unit in (
             ("measured", traced.measured, "N"),
@@ -209,6 +222,6 @@ STAGE = Stage(
         "prepare.corrections",
         "laboratory.bench.tests",
     ),
-    outputs=("close-loop.h5", "close-loop.json", CORRECTIONS, NEXT_TESTS),
+    outputs=("close-loop.h5", "close-loop.json", TRACED, CORRECTIONS, NEXT_TESTS),
     check=_check,
 )

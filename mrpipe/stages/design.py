@@ -82,6 +82,7 @@ STAGE = Stage(
     summary="Find the law and gains with the smallest largest response over frequency and amplitude.",
     run=_run,
     inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+    conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
     after=("simulate", "resonance"),
     settings=("design", "simulate", "resonance", "calibrate.target_mode"),
     outputs=("design.h5",),

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
 
 FOLDER = "controller"
+DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
+"""Dampers of this run by name, and the stage whose artifact holds each."""
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
@@ -15,13 +18,16 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.assembly import ControllerFactory, inverse_network
     from mrpipe.control.export import controller_files
     from mrpipe.control.storage import read_calibrated
-    from mrpipe.dampers.model import read_damper
+    from mrpipe.effects.damper import damper_named
     from mrpipe.reporting import export_controller as section
     from mrpipe.structures import read_frame
 
     settings = context.settings.export
     frame = read_frame(context.artifact("identify-frame"))
-    damper = read_damper(context.artifact("identify-damper"))
+    damper = damper_named(
+        context.settings.simulate.damper,
+        {name: partial(context.artifact, stage) for name, stage in DAMPERS.items()},
+    )
     chosen = context.settings.simulate.controller
     factory = ControllerFactory(
         frame,
@@ -51,7 +57,8 @@ STAGE = Stage(
     summary="Write the calibrated controller as C and JSON.",
     run=_run,
     inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-    settings=("export", "simulate.controller"),
+    conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
+    settings=("export", "simulate.controller", "simulate.damper"),
     after=("reproduce",),
     family="export",
     outputs=(f"{FOLDER}/controller.json", f"{FOLDER}/controller.c", f"{FOLDER}/controller.h", f"{FOLDER}/README.md"),

@@ -16,6 +16,7 @@ def resonance_stage(law: str) -> Stage:
         summary=f"Find the resonance of the closed loop under law {law}.",
         run=lambda context: _run(context, law),
         inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+        conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
         settings=("simulate", "resonance"),
         family="resonance",
         outputs=(f"resonance-{law}.h5",),

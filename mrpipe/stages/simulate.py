@@ -16,6 +16,7 @@ def simulate_stage(law: str) -> Stage:
         summary=f"Run the closed loop under law {law}.",
         run=lambda context: _run(context, law),
         inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+        conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
         settings=("simulate",),
         family="simulate",
         outputs=(f"response-{law}.h5",),
@@ -26,7 +27,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     from mrpipe.dampers.model import read_tested
     from mrpipe.reporting import simulate as report
     from mrpipe.simulation.indices import indices
-    from mrpipe.simulation.rig import excitation_of, read_rig, release_state
+    from mrpipe.simulation.rig import DAMPERS, excitation_of, read_rig, release_state
     from mrpipe.simulation.storage import write_response
     from mrpipe.simulation.training_range import check_ranges, ranges_as_json
     from mrpipe.thesis.printed import PRINTED
@@ -49,7 +50,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     if viscous is not None:
         against = indices(viscous, excitation, **judged)
         values["rms_x_top_over_vd"] = values["rms_x_top_m"] / against["rms_x_top_m"]
-    tested = read_tested(context.artifact("identify-damper")) if settings.damper == "identified" else {}
+    tested = read_tested(context.artifact("identify-damper")) if settings.damper in DAMPERS else {}
     ranges = check_ranges(rig, controller, response, tested)
     for check in ranges:
         if check.warning:

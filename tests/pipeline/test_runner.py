@@ -116,6 +116,15 @@ def test_optional_input_is_used_where_it_is_there(make_pipeline: MakePipeline) -
     assert CALLS == ["first", "second", "third"]
 
 
+@pytest.mark.property
+def test_a_setting_may_ask_for_a_further_input(make_pipeline: MakePipeline) -> None:
+    conditional = replace(STAGES["third"], optional_inputs=(), conditional_inputs=(("seed", 5, "second"),))
+    make_pipeline({**STAGES, "third": conditional}).build("third")
+    assert CALLS == ["third"]
+    make_pipeline({**STAGES, "third": conditional}, seed=5).build("third")
+    assert CALLS == ["third", "first", "second", "third"]
+
+
 def test_optional_inputs_serve_together_so_one_that_lacks_spares_all(make_pipeline: MakePipeline) -> None:
     stages = {**STAGES, "third": replace(STAGES["third"], optional_inputs=("second", "campaign:frame"))}
     assert make_pipeline(stages).build("third").what == "skipped"

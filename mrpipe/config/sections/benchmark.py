@@ -51,7 +51,10 @@ class TenStoreySettings(Section):
         description="Parameter sets in configs/structures (or YAML files); the first one is the result, the others are "
         "shown beside it. errata row 16: the printed mass, and the one that suits a 1000 kN damper.",
     )
-    damper: str = Field("p4-1000kn", description="Parameter set in configs/dampers that stands for the damper.")
+    damper: str = Field(
+        "p4-1000kn",
+        description="Parameter set in configs/dampers that stands for the damper, or a damper artifact (.h5).",
+    )
     inverse: str = Field("bingham-1000kn", description="Bingham parameter set in configs/dampers that is inverted.")
     filter_rate_1_s: float = Field(31.4, ge=0.0, description="Rate lambda of the voltage filter (24) [1/s]; 0: none.")
     time_step_s: float = Field(0.0005, gt=0.0, le=0.005, description="Longest time step [s].")

@@ -43,6 +43,11 @@ class _Fixed(Section):
     """For which mode and damper the laws are calibrated, and the gains they run with."""
 
     target_mode: int = Field(1, ge=1, description="Mode to be damped.")
+    damper: str = Field(
+        "identified",
+        description="Damper whose forces the gains are checked against: `identified`, a damper artifact (.h5) such as "
+        "damper-traced.h5 of another run, or a set of configs/dampers or its YAML file.",
+    )
     damper_floor: int = Field(1, ge=1, description="Floor that the damper acts on.")
     damper_across_storey: bool = Field(
         False, description="The damper spans the storey below its floor; else it sits between floor and ground."

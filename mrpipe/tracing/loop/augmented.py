@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.control.inverse import InverseTable
-from mrpipe.dampers.plant import FORCE, Chain, build_chain, run_chain
+from mrpipe.dampers.model import DamperModel
+from mrpipe.dampers.plant import FORCE, Chain, run_chain
+from mrpipe.fitting.damper import damper_model
 from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.recordings import Recordings
 from mrpipe.networks.assembly import History, join, samples
 from mrpipe.networks.network import Network
 from mrpipe.networks.options import TrainingOptions
@@ -41,12 +45,34 @@ CHANGED = 0.01
 
 def plant_chain(found: Fit) -> Chain:
     """Return the chain for the closed loop; faults of sensors stay out of the plant, a lag unknown is left out."""
-    problem = found.problem
-    steps = problem.base.steps(found.base_values, *found.laws)
-    for term, values in zip(problem.terms, found.term_values, strict=True):
-        if not term.effect.sensor:
-            steps.extend(term.form.steps(values))
-    return build_chain(steps)
+    return traced_damper(found).chain()
+
+
+def traced_damper(
+    found: Fit, drive_unit: str = "A", *, effect_files: Mapping[str, str] | None = None, form_file: str = ""
+) -> DamperModel:
+    """Return the damper of a fit with its effects; a lag that no test determines is left out.
+
+    Parameters
+    ----------
+    drive_unit
+        `A` or `V`.
+    effect_files
+        Effect -> the user's own file that defines it.
+    form_file
+        The user's own file that defines the base form, if any.
+    """
+    return damper_model(
+        found, drive_unit, effects=True, assumed_eta=math.inf, form_file=form_file, effect_files=effect_files
+    )
+
+
+def tested_range(recordings: Recordings) -> dict[str, float]:
+    """Return the largest |displacement| [m] and |velocity| [m/s] of the tests that a damper was fitted to."""
+    return {
+        "displacement": float(np.max(np.abs(recordings.displacement))),
+        "velocity": float(np.max(np.abs(recordings.velocity))),
+    }
 
 
 @dataclass(frozen=True)
