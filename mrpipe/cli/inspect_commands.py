@@ -39,12 +39,9 @@ def show(
         print_description(description)
 
 
-@with_common_options("config", "run", "campaign", "jobs", "seed", "force", "quiet")
+@with_common_options("run", "campaign", "jobs", "seed", "force", "quiet")
 def check(
     options: CommonOptions,
-    config: Annotated[
-        Path | None, typer.Argument(metavar="CONFIG", help="Configuration file. Default: configs/thesis.yaml.")
-    ] = None,
     explain: Annotated[bool, typer.Option("--explain", help="List every setting with its meaning and value.")] = False,
 ) -> None:
     """Check a configuration and its campaigns.
@@ -58,7 +55,7 @@ def check(
     from mrpipe.errors import CheckFailed
     from mrpipe.pipeline.settings_view import setting_named
 
-    loaded = load_config(config or default_config_path(), options.overrides, options.settings)
+    loaded = load_config(options.config or default_config_path(), options.overrides, options.settings)
     checking.check_stages(loaded)
     if explain:
         content = [

@@ -11,6 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
+from mrpipe.errors import UserError
+
 
 @dataclass(frozen=True)
 class CommonOptions:
@@ -32,11 +34,20 @@ _COMMON: dict[str, tuple[Any, Any]] = {
     "config": (
         Annotated[
             Path | None,
-            typer.Option(help="Configuration file or the name of one that comes along. Default: configs/thesis.yaml."),
+            typer.Option(
+                help="Configuration file, or the name of one that comes with the program; also without --config. "
+                "Default: the one in ./configs, else thesis."
+            ),
         ],
         None,
     ),
-    "run": (Annotated[Path | None, typer.Option(help="Run directory. Default: runs/<name of the config>.")], None),
+    "run": (
+        Annotated[
+            Path | None,
+            typer.Option(help="Run directory. Default: runs/<name of the configuration, or of the campaign given>."),
+        ],
+        None,
+    ),
     "overrides": (
         Annotated[
             list[str] | None,
@@ -70,12 +81,41 @@ _COMMON: dict[str, tuple[Any, Any]] = {
 }
 
 
+_POSITIONAL = Annotated[
+    Path | None, typer.Argument(metavar="[CONFIG]", help="Configuration, the same as --config.", show_default=False)
+]
+
+
+def one_config(named: Path | None, positional: Path | None) -> Path | None:
+    """Return the configuration that was given with or without `--config`.
+
+    Raises
+    ------
+    UserError
+        If two different ones were given, or the file is a campaign.
+    """
+    if named is not None and positional is not None and named != positional:
+        raise UserError("--config", str(named), f"and {positional} are two configurations", "give one of them")
+    chosen = named or positional
+    if chosen is not None and chosen.name == "campaign.yaml":
+        raise UserError(chosen, "", "is a campaign and not a configuration", f"use --campaign {chosen.parent}")
+    return chosen
+
+
 def with_common_options(*left_out: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the common options (but those left out); it gets them as one `options` argument."""
+    """Give a command the common options (but those left out); it gets them as one `options` argument.
+
+    The configuration can be given as `--config FILE` and, unless `positional` is left out, as the last argument.
+    """
 
     def decorate(function: Callable[..., None]) -> Callable[..., None]:
         own = inspect.signature(function, eval_str=True)
         parameters = [item for name, item in own.parameters.items() if name != "options"]
+        positional = not {"config", "positional"} & set(left_out)
+        if positional:
+            parameters.append(
+                inspect.Parameter("config_file", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_POSITIONAL)
+            )
         for name, (annotation, default) in _COMMON.items():
             if name not in left_out:
                 parameters.append(
@@ -85,6 +125,8 @@ def with_common_options(*left_out: str) -> Callable[[Callable[..., None]], Calla
         @functools.wraps(function)
         def command(**values: Any) -> None:
             common = {name: values.pop(name) for name in _COMMON if name not in left_out}
+            if "config" in common:
+                common["config"] = one_config(common["config"], values.pop("config_file", None))
             common["overrides"] = common.get("overrides") or []
             common["settings"] = common.get("settings") or []
             function(options=CommonOptions(**common), **values)

@@ -8,25 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mrpipe.cli.options import CommonOptions, with_common_options
+from mrpipe.cli.options import CommonOptions, one_config, with_common_options
 from mrpipe.errors import CheckFailed, UserError
 
 if TYPE_CHECKING:
     from mrpipe.pipeline.runner import Pipeline
 
 
-def _with_config(options: CommonOptions, config: Path | None) -> CommonOptions:
-    from dataclasses import replace
-
-    return options if config is None else replace(options, config=config)
-
-
-@with_common_options("config")
+@with_common_options()
 def run(
     options: CommonOptions,
-    config: Annotated[
-        Path | None, typer.Argument(metavar="CONFIG", help="Configuration file. Default: configs/thesis.yaml.")
-    ] = None,
     until: Annotated[str | None, typer.Option(metavar="STAGE", help="Stop after this stage.")] = None,
 ) -> None:
     """Run every stage that the configuration lists.
@@ -34,12 +25,23 @@ def run(
     A stage that fails does not end the run: only stages that need it are left out. The report names what failed, and
     the exit status is 1.
     """
+    run_stages(options, until)
+
+
+def run_stages(options: CommonOptions, until: str | None = None) -> None:
+    """Run the stages that a configuration lists and print what became of them.
+
+    Raises
+    ------
+    CheckFailed
+        If a stage failed, after all has been printed.
+    """
     from mrpipe.cli.checking import check_headers
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import session
 
     started = time.monotonic()
-    with session(_with_config(options, config)) as pipeline:
+    with session(options) as pipeline:
         check_headers(pipeline.loaded)
         names = _until(list(pipeline.loaded.config.stages), until)
         if options.force:
@@ -110,6 +112,12 @@ def _print_run(pipeline: Pipeline, content: dict[str, Any]) -> None:
     print(f"done in {content['seconds']:.1f} s, in {pipeline.run_directory}")
     for path in content["report"]:
         print(f"report: {path}")
+    if content["failed"]:
+        print(f"next: correct what failed, then the same command again; {pipeline.run_directory}/log.txt has details")
+    elif content["report"]:
+        print(f"next: open {content['report'][0]}, or mrpipe show {pipeline.run_directory}")
+    else:
+        print(f"next: mrpipe report {pipeline.run_directory}")
 
 
 def _write_report(pipeline: Pipeline) -> list[Path]:
@@ -119,7 +127,7 @@ def _write_report(pipeline: Pipeline) -> list[Path]:
     return write_report(run_facts(pipeline), pipeline.loaded.config.report.formats)
 
 
-@with_common_options("campaign", "jobs", "seed", "force")
+@with_common_options("campaign", "jobs", "seed", "force", "positional")
 def report(
     options: CommonOptions,
     directory: Annotated[
@@ -128,14 +136,11 @@ def report(
     summary: Annotated[bool, typer.Option("--summary", help="Also print the first screen of the report.")] = False,
 ) -> None:
     """Write the report of a run (HTML and Markdown)."""
-    from dataclasses import replace
 
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import load, pipeline_of, run_directory
 
-    if directory is not None:
-        options = replace(options, run=directory)
-    options = _config_of_run(options)
+    options = _config_of_run(_run_or_config(options, directory))
     loaded = load(options)
     if not run_directory(options, loaded).is_dir():
         raise UserError(run_directory(options, loaded), "", "no such run directory", "run `mrpipe run` first")
@@ -153,6 +158,17 @@ def report(
             print(f"report: {path}")
 
 
+def _run_or_config(options: CommonOptions, given: Path | None) -> CommonOptions:
+    """Take a positional argument as the run directory, or as the configuration where it is a YAML file."""
+    from dataclasses import replace
+
+    if given is None:
+        return options
+    if given.suffix in {".yaml", ".yml"} and not given.is_dir():
+        return replace(options, config=one_config(options.config, given))
+    return replace(options, run=given)
+
+
 def _config_of_run(options: CommonOptions) -> CommonOptions:
     """Take the configuration that a run directory was made with, where none is named."""
     from dataclasses import replace
@@ -163,7 +179,7 @@ def _config_of_run(options: CommonOptions) -> CommonOptions:
     return options
 
 
-@with_common_options("jobs", "force", "quiet")
+@with_common_options("jobs", "force", "quiet", "positional")
 def status(
     options: CommonOptions,
     directory: Annotated[
@@ -171,16 +187,14 @@ def status(
     ] = None,
 ) -> None:
     """Say which stages are stale, and why."""
-    from dataclasses import replace
 
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import load, pipeline_of
 
-    if directory is not None:
-        if not directory.is_dir():
-            raise UserError(directory, "", "no such run directory", "run `mrpipe run` first")
-        options = replace(options, run=directory)
-    loaded = load(options if options.config else _config_of_run(options))
+    options = _run_or_config(options, directory)
+    if options.run is not None and not options.run.is_dir():
+        raise UserError(options.run, "", "no such run directory", "run `mrpipe run` first")
+    loaded = load(_config_of_run(options))
     pipeline = pipeline_of(options, loaded, to_log=False)
     found = pipeline.status([name for name in loaded.config.stages if name != "report"])
     if options.json:
@@ -193,6 +207,8 @@ def status(
         return
     for name, reasons in found.items():
         print(f"{name:20} {'; '.join(reasons) if reasons else 'up to date'}")
+    if any(reasons and not reasons[0].startswith("skipped") for reasons in found.values()):
+        print(f"next: mrpipe run {loaded.path} --run {pipeline.run_directory}")
 
 
 def register(app: typer.Typer) -> None:

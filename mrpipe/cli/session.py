@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,8 +25,33 @@ def load(options: CommonOptions) -> LoadedConfig:
     if options.seed is not None:
         overrides.append(f"seed={options.seed}")
     if options.campaign is not None:
-        overrides.append(f"campaigns.{rig_key(options.campaign)}={_absolute(options.campaign)!r}")
-    return load_config(options.config or default_config_path(), overrides, options.settings)
+        overrides = [*_of_campaign(options.campaign), *overrides]
+    path = options.config or default_config_path()
+    if options.config is None and options.campaign is None and not options.quiet and not Path("configs").is_dir():
+        print(
+            "mrpipe: there is no project here (no folder configs): the virtual rig of the thesis is used. "
+            "`mrpipe init DIR` makes a project, `mrpipe demo` shows the program in a few minutes.",
+            file=sys.stderr,
+        )
+    return load_config(path, overrides, options.settings)
+
+
+def _of_campaign(path: Path) -> list[str]:
+    """Return the settings that a campaign on the command line stands for: its place, and the run's name and title."""
+    import json
+    import re
+
+    from mrpipe.campaigns.header import read_header
+
+    name = read_header(path).campaign
+    stem = re.sub(r"[^\w.+-]+", "-", name).strip("-.") or "campaign"
+    settings = {
+        f"campaigns.{rig_key(path)}": _absolute(path),
+        "name": stem,
+        "description": f"Measured campaign {name}.",
+        "report.title": name,
+    }
+    return [f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in settings.items()]
 
 
 def _absolute(path: Path) -> str:

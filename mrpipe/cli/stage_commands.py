@@ -64,7 +64,7 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
             print_brief(f"{outcome.stage}{note}", brief, outcome.manifest.warnings)
         else:
             print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
-    print(f"in {pipeline.run_directory}")
+    print(f"in {pipeline.run_directory}; next: mrpipe report {pipeline.run_directory}")
     _raise_failures(outcomes, pipeline)
 
 
@@ -106,11 +106,23 @@ def record(
 ) -> None:
     """Record a campaign in the virtual laboratory."""
     from mrpipe.cli.session import load
+    from mrpipe.config.sections.campaigns import LABORATORY
 
     if rig is not None and rig not in _RIGS:
         raise UserError("--rig", rig, "is no rig", f"one of {', '.join(_RIGS)}")
-    listed = [name for name in load(options).config.stages if name.startswith("record-")]
-    build_and_print([f"record-{rig}"] if rig else listed or ["record-bench"], options)
+    config = load(options).config
+    sources = {key.replace("_", "-"): source for key, source in config.campaigns.model_dump().items()}
+    listed = [name.removeprefix("record-") for name in config.stages if name.startswith("record-")]
+    rigs = [rig] if rig else listed or ["bench"]
+    for name in rigs:
+        if sources[name] not in (None, LABORATORY):
+            raise UserError(
+                "record",
+                name,
+                f"the run has measured data ({sources[name]}): virtual data do not enter it",
+                f"record into another run: mrpipe record --rig {name} --config thesis --run DIR",
+            )
+    build_and_print([f"record-{name}" for name in rigs], options)
 
 
 @with_common_options()

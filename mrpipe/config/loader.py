@@ -32,9 +32,34 @@ class LoadedConfig:
 
 
 def default_config_path() -> Path:
-    """Return configs/thesis.yaml of the working directory, else of the program."""
-    here = Path("configs/thesis.yaml")
-    return here if here.is_file() else config_directory() / "thesis.yaml"
+    """Return the configuration of the project in the working directory, else the one that comes with the program.
+
+    A project has its configurations in `configs/`. `configs/thesis.yaml` is taken where it is there; otherwise the only
+    one is taken.
+
+    Raises
+    ------
+    UserError
+        If the project has several configurations, or none.
+    """
+    folder = Path("configs")
+    here = folder / "thesis.yaml"
+    if here.is_file():
+        return here
+    if not folder.is_dir():
+        return config_directory() / "thesis.yaml"
+    found = sorted(path for path in folder.iterdir() if path.suffix in {".yaml", ".yml"} and path.is_file())
+    if len(found) == 1:
+        return found[0]
+    names = ", ".join(str(path) for path in found)
+    if found:
+        raise UserError(folder, "", f"holds {len(found)} configurations ({names})", "name one with --config")
+    raise UserError(
+        folder,
+        "",
+        "holds no configuration",
+        "`mrpipe init DIR` makes a project, `mrpipe demo` needs none",
+    )
 
 
 def load_config(path: Path, overrides: Sequence[str] = (), overlays: Sequence[Path] = ()) -> LoadedConfig:
