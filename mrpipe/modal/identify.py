@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
+from mrpipe.modal.ambient import find_ambient_modes
 from mrpipe.modal.assembly import Assembly, PartialModes, assemble_partial
 from mrpipe.modal.checks import LARGEST_COUPLING, check_mode_matrix, modal_coupling, orthogonal_shapes
 from mrpipe.modal.clocks import SensorClock, added, corrected, estimate_clocks
@@ -215,6 +216,14 @@ def _with_clocks(
     return _Chosen(again, moved), tuple(clocks)
 
 
+def _ambient_findings(tests: FrameTests) -> list[str]:
+    scale = "given floor masses" if np.isfinite(tests.floor_masses).any() else "nothing"
+    return [
+        "the excitation was not measured: modal masses and participations cannot be known; the scale of M, C and K "
+        f"comes from {scale}"
+    ]
+
+
 def _clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
     findings = []
     for name in dict.fromkeys(item.test for item in clocks):
@@ -294,7 +303,7 @@ def _pooled(first: Estimate, second: Estimate) -> Estimate:
 
 
 def _choose_damping(
-    sweep: tuple[Estimate, ...], decays: dict[int, DecayResult], damping_from: str
+    sweep: tuple[Estimate, ...], decays: dict[int, DecayResult], damping_from: str, other: str
 ) -> tuple[tuple[Estimate, ...], tuple[str, ...], list[str]]:
     chosen: list[Estimate] = []
     sources: list[str] = []
@@ -304,16 +313,16 @@ def _choose_damping(
         first = decay.exponential_fit if decay else None
         if first is None or damping_from != "decay":
             chosen.append(second)
-            sources.append("sweep")
+            sources.append(other)
         elif first.half_width <= _WIDEST_DECAY_INTERVAL * first.value:
             chosen.append(first)
             sources.append("decay")
         else:
             # neither is sure: the mean of two independent methods, each by its certainty
             chosen.append(_pooled(first, second))
-            sources.append("decay and sweep")
+            sources.append(f"decay and {other}")
         if first is None and damping_from == "decay":
-            findings.append(f"mode {mode}: no free decay, damping from the sweep")
+            findings.append(f"mode {mode}: no free decay, damping from the {other}")
         if first is not None:
             apart = abs(first.value - second.value)
             if apart > first.half_width + second.half_width + 0.1 * second.value:
@@ -372,22 +381,26 @@ def _layout(tests: FrameTests) -> Layout:
 def _identify(
     tests: FrameTests, options: IdentificationOptions, progress: Progress, given: GivenShapes | None
 ) -> FrameIdentification:
-    if not tests.forced:
-        problem = "no forced test: ambient tests alone cannot be used yet"
-        raise UserError(tests.source, "tests", problem, "add a test of kind sweep or random")
     layout = _layout(tests)
     forced = _training_first(tests.forced)
     if given is not None:
         _check_given(given, tests.floor_masses)
     progress(0.05, "poles")
-    chosen, findings = _find(forced, tests, layout, options)
     clocks: tuple[SensorClock, ...] = ()
-    if options.clock_correction:
+    if not forced:
+        band = (options.band_low_hz, options.band_high_hz)
+        chosen = _Chosen(find_ambient_modes(tests.ambient, layout, *band, tests.source), ())
+        findings = _ambient_findings(tests)
+    else:
+        chosen, findings = _find(forced, tests, layout, options)
+    if tests.ambient and forced:
+        findings.append("ambient tests were not used, because forced tests determine the modes better")
+    if options.clock_correction and forced:
         progress(0.3, "clocks")
         chosen, clocks = _with_clocks(chosen, tests, layout, options)
         findings += _clock_findings(clocks)
     fit = chosen.search.fit
-    findings += _check_coherence(fit, tests)
+    findings += _check_coherence(fit, tests) if forced else []
     progress(0.5, "decays")
     decays, notes = _decays(tests, fit)
     findings += notes
@@ -395,7 +408,7 @@ def _identify(
     error = np.sqrt(np.diag(fit.covariance))
     frequencies = tuple(Estimate.of(w, w * e) for w, e in zip(fit.angular_frequencies, error[:modes], strict=True))
     sweep = tuple(Estimate.of(z, z * e) for z, e in zip(fit.damping_ratios, error[modes:], strict=True))
-    damping, sources, notes = _choose_damping(sweep, decays, options.damping_from)
+    damping, sources, notes = _choose_damping(sweep, decays, options.damping_from, "sweep" if forced else "ambient")
     findings += notes
     progress(0.6, "matrices")
     zeta = np.array([item.value for item in damping])
@@ -419,8 +432,8 @@ def _identify(
         decays=decays,
         fit=fit,
         tridiagonal=assembly.storeys,
-        in_time=() if frame is None else tuple(verify_in_time(frame, test, inside) for test in shown),
-        in_frequency=None if frame is None else verify_in_frequency(frame, fit, inside),
+        in_time=() if frame is None or not forced else tuple(verify_in_time(frame, test, inside) for test in shown),
+        in_frequency=None if frame is None or not forced else verify_in_frequency(frame, fit, inside),
         phase_scatter=np.abs(fit.residues.imag).max(axis=0) / np.abs(fit.residues).max(axis=0),
         tests=shown,
         band_hz=band,

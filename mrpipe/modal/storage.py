@@ -58,8 +58,9 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
         "second_method_damping_ratios": [float(item.value) for item in result.sweep_damping],
         "second_method_damping_ratio_intervals": [_interval(item) for item in result.sweep_damping],
         "decays": [_decay_row(result.decays[mode]) for mode in sorted(result.decays)],
-        "coherence_at_peaks": result.fit.mode_coherence().tolist(),
-        "coherence_at_peaks_by_floor": result.fit.coherence.tolist(),
+        # without a measured excitation there is no coherence with it
+        "coherence_at_peaks": result.fit.mode_coherence().tolist() if result.fit.spectra else [None] * len(result.mac),
+        "coherence_at_peaks_by_floor": result.fit.coherence.tolist() if result.fit.spectra else [],
         "reconstruction_error": [] if result.in_frequency is None else result.in_frequency.error.tolist(),
         "time_fit_percent": {item.test: item.fit_percent.tolist() for item in result.in_time},
         "model_frequencies_hz": [] if modes is None else modes.frequencies_hz.tolist(),

@@ -1,0 +1,80 @@
+"""Ambient tests: modes without a measured excitation."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrpipe.errors import UserError
+from mrpipe.modal.identify import identify_frame
+from mrpipe.modal.records import FrameTest, FrameTests, Place
+from mrpipe.modal.storage import summary
+from tests.modal.towers import Sensors, ambient_test, random_tower
+
+HERE = Path("planted")
+
+
+@pytest.fixture(scope="module")
+def tower_and_test():
+    rng = np.random.default_rng(11)
+    tower = random_tower(rng, floors=4)
+    seen = ambient_test(tower, rng, Sensors(noise=0.03), duration_s=1800.0)
+    places = tuple(Place(floor) for floor in range(1, 5))
+    return tower, FrameTest("wind", "ambient", 50.0, None, seen, (False,) * 4, places=places)
+
+
+def assurance(first, second):
+    return np.abs(first @ second) ** 2 / (first @ first) / (second @ second)
+
+
+def assert_modes(result, tower):
+    frequency = np.array([item.value for item in result.frequencies]) / (2 * np.pi)
+    ratios = np.array([item.value for item in result.damping])
+    assert frequency == pytest.approx(tower.frequencies_hz, rel=0.01)
+    assert ratios == pytest.approx(tower.damping_ratios, rel=0.25)
+    assert min(assurance(a, b) for a, b in zip(result.mode_shapes.T, tower.shapes.T, strict=True)) > 0.97
+
+
+@pytest.mark.planted
+def test_all_modes_are_found_and_none_invented(tower_and_test):
+    pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
+    tower, test = tower_and_test
+    result = identify_frame(FrameTests((), (), tower.mass, HERE, (test,)))
+    assert_modes(result, tower)
+    inside = [item.low < truth < item.high for item, truth in zip(result.damping, tower.damping_ratios, strict=True)]
+    assert sum(inside) >= 3
+    assert any("modal masses and participations cannot be known" in line for line in result.findings)
+    values = summary(result)
+    assert values["coherence_at_peaks"] == [None] * 4
+    assert np.array(values["stiffness"]) == pytest.approx(tower.stiffness, abs=0.05 * np.abs(tower.stiffness).max())
+
+
+@pytest.mark.planted
+def test_without_masses_only_modes_are_given(tower_and_test):
+    pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
+    tower, test = tower_and_test
+    result = identify_frame(FrameTests((), (), np.full(4, np.nan), HERE, (test,)))
+    assert_modes(result, tower)
+    assert result.frame is None
+    assert summary(result)["mass"] is None
+
+
+@pytest.mark.planted
+def test_set_ups_with_different_sensors_are_refused(tower_and_test):
+    pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
+    tower, test = tower_and_test
+    part = replace(test, responses=test.responses[:, :3], is_displacement=(False,) * 3, places=test.places[:3])
+    with pytest.raises(UserError, match="differ in sensors"):
+        identify_frame(FrameTests((), (), tower.mass, HERE, (test, part)))
+
+
+@pytest.mark.property
+def test_a_missing_library_is_named(tower_and_test, monkeypatch):
+    tower, test = tower_and_test
+    monkeypatch.setitem(sys.modules, "pyoma2", None)
+    with pytest.raises(UserError, match=r"pip install 'mrpipe\[ambient\]'"):
+        identify_frame(FrameTests((), (), tower.mass, HERE, (test,)))
