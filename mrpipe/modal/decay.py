@@ -13,8 +13,10 @@ from mrpipe.modal.records import FrameTest
 
 HALF_BAND_RAD_S = np.pi
 FILTER_ORDER = 5
+_DRIVEN = 0.5
+"""Amplitude over the largest one from which a mode is still driven when its excitation stops."""
 LARGEST_FILTERED_DAMPING = 0.02
-"""Beyond it the band-pass rings longer than the mode (errata section D)."""
+"""Above it the band-pass rings longer than the mode."""
 _NORMAL_95 = 1.959964
 
 
@@ -84,7 +86,7 @@ def damping_from_decrement(decrement: float) -> float:
 
 
 def modal_coordinates(test: FrameTest, mode_shapes: FloatArray, angular_frequencies: FloatArray) -> FloatArray:
-    """Return the relative accelerations of the modes, shape (m, r): the inverse of the mode matrix tells them apart.
+    """Return the relative accelerations of the modes, shape (m, r): the inverse of the mode matrix separates them.
 
     A floor that has only a displacement enters with -omega2 of the mode in question.
     """
@@ -102,15 +104,16 @@ def modal_coordinates(test: FrameTest, mode_shapes: FloatArray, angular_frequenc
 
 
 def decay_start(test: FrameTest, coordinate: FloatArray, omega: float) -> int:
-    """Return the sample at which the free decay begins; 0 where the record holds nothing but the decay.
+    """Return the sample at which the free decay begins; 0 where the record begins with the release.
 
-    The excitation near the mode tells where it stops. A resonance needs so little of it that it may stay below the
-    sensor's noise; but a decay never begins before the largest amplitude, so that counts as well.
+    The excitation near the mode shows where it stops. At a resonance a small excitation is enough and may stay below
+    the noise of its sensor, and a decay never begins before the largest amplitude, so that counts as well. An
+    excitation that goes on while the amplitude has already fallen does not drive the mode: it is noise of the sensor.
     """
     rate = test.sampling_rate_hz
     envelope = np.abs(signal.hilbert(_band_pass(coordinate, omega, rate)))
     largest = int(np.argmax(envelope))
-    # a decay that begins with the record is largest at its beginning, but for the ringing of the filter
+    # a decay that begins with the record is largest at its beginning, apart from the ringing of the filter
     largest = 0 if largest < _edge_s(2.0 * np.pi / omega, coordinate.size / rate, True) * rate else largest
     if test.excitation is None:
         return largest
@@ -121,7 +124,10 @@ def decay_start(test: FrameTest, coordinate: FloatArray, omega: float) -> int:
     if top < 9.0 * quiet:
         return largest
     # filter and average are symmetric, so the power falls through its half where the excitation stops
-    return max(largest, int(np.flatnonzero(power > 0.5 * (quiet + top))[-1]) + 1)
+    stop = int(np.flatnonzero(power > 0.5 * (quiet + top))[-1]) + 1
+    period = max(1, round(2.0 * np.pi / omega * rate))
+    at_stop = float(envelope[max(0, stop - period) : stop + period].max())
+    return max(largest, stop) if at_stop > _DRIVEN * float(envelope.max()) else largest
 
 
 def _band_pass(coordinate: FloatArray, omega: float, rate: float) -> FloatArray:
@@ -250,15 +256,18 @@ def analyse_decay(
     if tail.shape[0] / rate < 6.0 * period:
         return None
     own = coordinates[:, mode] - tail[:, mode].mean()
-    filtered = zeta <= LARGEST_FILTERED_DAMPING
-    shown = _band_pass(own, omega, rate) if filtered else own
-    edge = int(_edge_s(period, tail.shape[0] / rate, filtered) * rate)
-    first, last = start + edge, own.size - (edge if filtered else 0)
-    time, peak = _peaks(shown[first:last], rate, omega)
     high = own[start:] - signal.savgol_filter(own[start:], 2 * max(2, int(0.05 * period * rate)) + 1, 3)
-    share = min(1.0, 2.0 * HALF_BAND_RAD_S / (np.pi * rate)) if filtered else 1.0
-    noise = float(np.std(high)) * np.sqrt(share)
-    if peak.size < 6 or peak[0] < 5.0 * noise:
+    # a short decay fades while the band-pass still rings from the release: then its peaks are taken unfiltered
+    for filtered in (True, False) if zeta <= LARGEST_FILTERED_DAMPING else (False,):
+        shown = _band_pass(own, omega, rate) if filtered else own
+        edge = int(_edge_s(period, tail.shape[0] / rate, filtered) * rate)
+        first, last = start + edge, own.size - (edge if filtered else 0)
+        time, peak = _peaks(shown[first:last], rate, omega)
+        share = min(1.0, 2.0 * HALF_BAND_RAD_S / (np.pi * rate)) if filtered else 1.0
+        noise = float(np.std(high)) * np.sqrt(share)
+        if peak.size >= 6 and peak[0] >= 5.0 * noise:
+            break
+    else:
         return None
     keep = _useful(peak, noise)
     time, peak = time[:keep], peak[:keep]

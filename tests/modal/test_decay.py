@@ -4,6 +4,7 @@ import pytest
 from mrpipe.modal.decay import analyse_decay, damping_from_decrement, decay_start, modal_coordinates
 from mrpipe.modal.records import FrameTest
 from mrpipe.structures import complex_modes, frame_from_parameter_set, natural_modes, shear_frame
+from mrpipe.structures.response import linear_response
 from tests.modal.rig import Rig, decay_test
 
 
@@ -90,3 +91,28 @@ def test_close_modes_are_told_apart_by_their_shapes():
         test = decay_test(frame, np.random.default_rng(mode), rig, mode)
         result = analyse_decay(test, modes.mode_shapes, modes.angular_frequencies, 1.3 * truth)
         assert result.exponential_fit.value == pytest.approx(truth[mode - 1], rel=0.05)
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("zeta", [0.004, 0.01, 0.02, 0.04])
+def test_a_record_that_begins_with_the_release_is_a_decay(zeta):
+    """The ground sensor records nothing but its noise, whose power once decided where the decay begins."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        frame = shear_frame(rng.uniform(20, 40, 3), rng.uniform(3e4, 6e4, 3), zeta)
+        modes, rate, samples = natural_modes(frame), 200.0, 4000
+        for mode, (omega, shape) in enumerate(zip(modes.angular_frequencies, modes.mode_shapes.T, strict=True), 1):
+            start = np.concatenate([2.0 * shape / np.abs(shape).max() / omega**2, np.zeros(3)])
+            response = linear_response(frame, np.zeros(samples), 1 / rate, initial_state=start).absolute_acceleration
+            test = FrameTest(
+                "release",
+                "free-decay",
+                rate,
+                0.01 * rng.standard_normal(samples),
+                response + 0.01 * rng.standard_normal(response.shape),
+                (False,) * 3,
+                mode=mode,
+            )
+            result = analyse_decay(test, modes.mode_shapes, modes.angular_frequencies, np.full(3, 0.7 * zeta))
+            assert result is not None
+            assert result.exponential_fit.value == pytest.approx(zeta, rel=0.02)
