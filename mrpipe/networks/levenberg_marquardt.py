@@ -15,36 +15,9 @@ from scipy.optimize import least_squares
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.networks.problem import Problem
+from mrpipe.networks.stopping import StoppingRules
 
 Method = Literal["least-squares", "mu-identity", "mu-diagonal"]
-
-
-@dataclass(frozen=True)
-class StoppingRules:
-    """When training ends; the defaults are those of trainlm.
-
-    Attributes
-    ----------
-    iterations
-        Accepted steps (epochs).
-    held_out_failures
-        Consecutive steps without a new best on the held-out rows; the best parameters are returned.
-    gradient
-        Largest |gradient| of the mean squared normalised error at which training ends.
-    improvement
-        Relative gain of the last ten steps below which training ends (trainlm has no such rule: 0).
-    mu, mu_increase, mu_decrease, mu_maximum
-        Damping of the loop of our own: first value, factors after a failed and a good step, limit.
-    """
-
-    iterations: int = 1000
-    held_out_failures: int = 6
-    gradient: float = 1e-7
-    improvement: float = 0.0
-    mu: float = 1e-3
-    mu_increase: float = 10.0
-    mu_decrease: float = 0.1
-    mu_maximum: float = 1e10
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 
@@ -228,6 +227,9 @@ def averaged(networks: Sequence[Network]) -> Network:
     networks
         Of the same features, scaling and number of layers.
     """
+    # the configuration needs this module without scipy
+    from scipy.linalg import block_diag
+
     first = networks[0]
     if len(networks) == 1:
         return first

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, NonNegativeInt, PositiveInt
 
 from mrpipe.errors import UserError
-from mrpipe.networks.levenberg_marquardt import StoppingRules
+from mrpipe.networks.stopping import StoppingRules
 from mrpipe.options import Section
 
 State = Literal["displacement", "velocity", "acceleration"]

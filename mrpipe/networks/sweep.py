@@ -18,10 +18,11 @@ from mrpipe.artifacts import FloatArray, IntArray, Progress, atomic_path, no_pro
 from mrpipe.networks.assembly import History, rows_at, window_starts
 from mrpipe.networks.candidates import Candidate
 from mrpipe.networks.held_out import hold_out
-from mrpipe.networks.levenberg_marquardt import StoppingRules, fit
+from mrpipe.networks.levenberg_marquardt import fit
 from mrpipe.networks.options import SweepOptions
 from mrpipe.networks.problem import Problem
 from mrpipe.networks.scaling import NORMALISATION, Normalisation, scaling_of
+from mrpipe.networks.stopping import StoppingRules
 from mrpipe.networks.training import in_parallel, initial_parameters
 
 Crossings = Callable[[Mapping[Candidate, float]], list[Candidate]]

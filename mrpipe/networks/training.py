@@ -15,11 +15,12 @@ from threadpoolctl import threadpool_limits
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.networks.assembly import History
 from mrpipe.networks.held_out import TrainingData, training_data
-from mrpipe.networks.levenberg_marquardt import FitResult, StoppingRules, fit
+from mrpipe.networks.levenberg_marquardt import FitResult, fit
 from mrpipe.networks.network import FeatureSpec, Network, averaged
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.problem import Problem, pack, unpack
 from mrpipe.networks.scaling import NORMALISATION, Normalisation
+from mrpipe.networks.stopping import StoppingRules
 
 HELD_OUT_ROWS = 10000
 """Rows of the held-out records on which early stopping looks while a subsample is fitted."""

@@ -6,11 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import signal
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
-from mrpipe.signals.filters import advance
 
 
 @dataclass(frozen=True)
@@ -42,6 +40,11 @@ class KnownFaults:
 
     def force(self, name: str, force: FloatArray, drive: FloatArray, rate: float) -> FloatArray:
         """Return the force [N] of a test without its faults, shape (n,)."""
+        # the configuration needs this module without scipy
+        from scipy import signal
+
+        from mrpipe.signals.filters import advance
+
         force = advance(force, self.force_late_s, rate) - self.force_offset_n.get(name, 0.0)
         if self.force_per_drive_n or self.force_per_drive_squared_n:
             keep = float(np.exp(-1.0 / (rate * self.drive_lag_s))) if self.drive_lag_s > 0.0 else 0.0

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.options import Section
 from mrpipe.signals.faults import KnownFaults
-from mrpipe.signals.kalman import KalmanGains, kalman_gains
-from mrpipe.signals.spectra import noise_level
+
+if TYPE_CHECKING:
+    from mrpipe.signals.kalman import KalmanGains
 
 _NO_FAULTS = KnownFaults()
 
@@ -111,6 +112,10 @@ class PreparationOptions(Section):
 
     def gains(self, displacement: FloatArray, acceleration: FloatArray, rate: float) -> KalmanGains:
         """Return the gains of the kinematic Kalman filter; noise levels of 0 are estimated from the channels."""
+        # the configuration needs this module without numba
+        from mrpipe.signals.kalman import kalman_gains
+        from mrpipe.signals.spectra import noise_level
+
         return kalman_gains(
             self.kalman_displacement_noise_m or max(noise_level(displacement, rate), 1e-9),
             self.kalman_acceleration_noise_m_s2 or max(noise_level(acceleration, rate), 1e-6),

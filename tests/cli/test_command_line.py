@@ -114,3 +114,14 @@ def test_interrupt_is_130(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
     monkeypatch.setattr(session, "load", interrupted)
     assert run(["calibrate"]) == 130
     assert "resumes at the first unfinished stage" in capsys.readouterr().err
+
+
+def test_status_imports_no_compiler_and_no_numerics(tmp_path: Path) -> None:
+    code = (
+        "import sys\nfrom mrpipe.cli import run\nrun(['status', '--config', 'thesis'])\n"
+        "print(sorted(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    heavy = {"numba", "scipy", "sklearn", "pandas", "matplotlib", "pint", "jinja2", "joblib"}
+    assert heavy & set(eval_list(done.stderr)) == set()
+    assert "prepare" in done.stdout

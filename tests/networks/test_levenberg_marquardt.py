@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from mrpipe.networks.levenberg_marquardt import StoppingRules, fit
+from mrpipe.networks.levenberg_marquardt import fit
 from mrpipe.networks.problem import CHUNK_ROWS, Problem, pack, unpack
+from mrpipe.networks.stopping import StoppingRules
 
 
 def common_problem(rows: int = 300, *, biases: bool = True, layers: tuple[int, ...] = (4, 5, 3, 1)) -> Problem:
