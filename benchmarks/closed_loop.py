@@ -63,7 +63,11 @@ def main() -> None:
         options = LoopOptions(plant_rate_hz=rate, noise=SensorNoise(2e-5, 0.1))
         for law, gains in laws.items():
             controller = build_controller(
-                law, gains, ControllerOptions(drive_limit=4.0), inverse=inverse_network(), reference=reference
+                law,
+                gains,
+                ControllerOptions(drive_limit=4.0, residual_force_n=18.0, friction_rounding_m_s=0.0125),
+                inverse=inverse_network(),
+                reference=reference,
             )
             inner, whole = [], []
             for _ in range(REPEATS):

@@ -149,7 +149,7 @@ def record_loop_case(case: Case, folder: Path) -> dict[str, Any]:
     model = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
     inverse = inverse_table(model, drive_limit=4.0)
     gains = {"vd": Gains(650.0), "vdns": Gains(250.0, -4000.0), "fdns": Gains(alpha_n_m=3000.0)}
-    options = ControllerOptions(drive_limit=4.0)
+    options = ControllerOptions(drive_limit=4.0, residual_force_n=18.0, friction_rounding_m_s=0.0125)
     controllers = {law: build_controller(law, own, options, inverse=inverse) for law, own in gains.items()}
     rig = LoopRig(shaking_s=15.0, decay_s=5.0)
     damper = draw_damper(rng, damper_from_set("set-c"), 0.1)

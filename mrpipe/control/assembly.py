@@ -10,8 +10,10 @@ Simulation, export, the virtual laboratory, the tracing and the design of laws u
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+
+from scipy.optimize import brentq
 
 from mrpipe.artifacts import Artifact
 from mrpipe.control.calibration import Calibration
@@ -20,6 +22,7 @@ from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import InverseTable, inverse_table
 from mrpipe.control.law import Law
 from mrpipe.control.laws import all_laws, law_named
+from mrpipe.control.limits import LimitingModes, optimal_viscosity
 from mrpipe.control.lqg import Weights
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.control.storage import Calibrated
@@ -35,8 +38,8 @@ PERFECT_ROUNDING = 1.5
 """Rounding of friction for a perfect damper over that with a damper, because no yielding rounds its force."""
 
 
-LARGEST_SPEED_M_S = 0.5
-"""Speed at which the largest force of the damper is found."""
+EXTREMUM_NOISE = 5.0
+"""Way back that makes an extremum count, over the noise of the displacement."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +126,12 @@ class ControllerFactory:
             position=known.position,
         )
 
+    @property
+    def switch_force_n(self) -> float:
+        """Desired force below which the drive is 0 [N]."""
+        given = self.settings.residual_force_n
+        return self.calibrated.residual_force_n if given is None else given
+
     def available(self) -> list[str]:
         """Return the laws for which everything is there that they need."""
         known = self.calibrated
@@ -150,11 +159,11 @@ class ControllerFactory:
             acceleration_noise_m_s2=settings.kalman_acceleration_noise_m_s2,
             bias_drift_m_s2=settings.kalman_bias_drift_m_s2,
             inverse_request=settings.inverse_request,
-            residual_force_n=settings.residual_force_n if residual_force_n is None else residual_force_n,
+            residual_force_n=self.switch_force_n if residual_force_n is None else residual_force_n,
             low_pass_hz=settings.low_pass_hz,
             drive_limit=limit,
             dead_band_m_s=settings.dead_band_m_s,
-            extremum_step_m=settings.extremum_step_m,
+            extremum_step_m=settings.extremum_step_m or EXTREMUM_NOISE * settings.kalman_displacement_noise_m,
             friction_rounding_m_s=rounding,
             extremum_share=settings.extremum_share,
             largest_displacement_m=settings.largest_displacement_m,
@@ -168,7 +177,8 @@ class ControllerFactory:
 
     def _largest_force(self, limit: float) -> float | None:
         """Return ten times the force at the limit of the drive [N]: more than the damper can give."""
-        force = 10.0 * float(self.damper.quasi_static_force(LARGEST_SPEED_M_S, limit))
+        speed = self.calibrated.amplitude_m * self.calibrated.omega_0
+        force = 10.0 * float(self.damper.quasi_static_force(speed, limit))
         return force if math.isfinite(force) else None
 
     def _reference(self, law: Law, gains: Gains) -> Network | None:
@@ -197,15 +207,63 @@ def inverse_network(settings: ControllerSettings, trained: Callable[[], Artifact
     return read_network(trained(), "network") if settings.inverse == "network" else None
 
 
+def expected_amplitude(damper: DamperModel, tested: Mapping[str, float], modes: LimitingModes) -> float:
+    """Return the amplitude of the damper for which laws are calibrated [m].
+
+    Half the largest displacement of the bench tests, so that twice the amplitude is still known. Where the tests are
+    not known: the amplitude at which optimal viscous damping needs three times the residual force.
+
+    Parameters
+    ----------
+    damper
+        Model of the damper.
+    tested
+        Largest |displacement| [m] of the bench tests, by `displacement`; empty where it is not known.
+    modes
+        Of the target.
+    """
+    if tested.get("displacement", 0.0) > 0.0:
+        return 0.5 * tested["displacement"]
+    rate = optimal_viscosity(modes) * modes.omega_0
+    return float(brentq(lambda a: rate * a - 3.0 * _residual(damper, a, modes) - 1e-12, 1e-9, 1e6))
+
+
+def _residual(damper: DamperModel, amplitude_m: float, modes: LimitingModes) -> float:
+    return float(damper.quasi_static_force(amplitude_m * modes.omega_0, 0.0))
+
+
 def calibrated_from(
-    calibration: Calibration, weights: Weights, friction_rounding_m_s: float, reference: Network | None = None
+    calibration: Calibration,
+    weights: Weights,
+    damper: DamperModel,
+    *,
+    amplitude_m: float,
+    friction_rounding_share: float = 1.0 / 6.0,
+    reference: Network | None = None,
 ) -> Calibrated:
-    """Return a calibration in the form that the factory takes, without a file."""
+    """Return a calibration in the form that the factory takes, without a file.
+
+    Parameters
+    ----------
+    calibration, weights, damper
+        What was calibrated.
+    amplitude_m
+        Expected amplitude of the damper.
+    friction_rounding_share
+        Speed over which friction changes its sign, over the peak speed at this amplitude.
+    reference
+        Network of laws that need one.
+    """
     return Calibrated(
         position=calibration.position,
         omega_0=calibration.modes.omega_0,
-        friction_rounding_m_s=friction_rounding_m_s,
+        u_0=calibration.modes.u_0,
+        top_0=float(calibration.modes.shape_0[-1]),
+        amplitude_m=amplitude_m,
+        residual_force_n=_residual(damper, amplitude_m, calibration.modes),
+        friction_rounding_m_s=friction_rounding_share * amplitude_m * calibration.modes.omega_0,
         weights=weights,
         gains={law: item.gains for law, item in calibration.laws.items()},
         reference=reference,
+        skipped=calibration.skipped,
     )

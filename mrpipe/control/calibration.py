@@ -1,4 +1,4 @@
-"""Gains of every law, three ways: as the thesis ran them, by closed form, by the exact eigenvalue."""
+"""Gains of every law: by closed form, by the exact eigenvalue, or published ones."""
 
 from __future__ import annotations
 
@@ -14,18 +14,14 @@ from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law, Plant
 from mrpipe.control.laws import all_laws, law_named
 from mrpipe.control.lqg import Weights, regulator_gain
+from mrpipe.errors import UserError
 from mrpipe.structures import Frame
 
-Source = Literal["thesis", "closed-form", "exact"]
+Source = Literal["exact", "closed-form", "published"]
 
-THESIS_GAINS: dict[str, Gains] = {
-    "vd": Gains(c_n_s_m=650.0),
-    "vdps": Gains(c_n_s_m=400.0, k_n_m=2500.0),
-    "vdns": Gains(c_n_s_m=250.0, k_n_m=-4500.0),
-    "fdns": Gains(alpha_n_m=3000.0),
-    "nnc": Gains(alpha_n_m=3000.0),
-}
-"""What the thesis and P2 ran (Table 5.1; errata section B, row 13 for k of vdns)."""
+POSITIVE_SHARE, NEGATIVE_SHARE = 0.5, -0.8
+"""Stiffness of vdps and vdns over the static stiffness at the damper. At -1 the structure becomes unstable; the margin
+covers the error of an identified stiffness."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,7 @@ class LawCalibration:
     gains
         Those to run with.
     candidates
-        Source (`thesis`, `closed-form`, `closed-form-thesis`, `exact`) -> gains.
+        Source (`published`, `closed-form`, `closed-form-thesis`, `exact`) -> gains.
     damping_ratio_estimate, damping_ratio_exact
         At `gains`: closed form P2 (7), and complex eigenvalue of the frame without its own damping; NaN where there is
         none. Friction by its equivalent (4.24).
@@ -77,6 +73,8 @@ class Calibration:
         k of law lqg, shape (2n,).
     position
         Connectivity vector w of the damper, shape (n,).
+    skipped
+        Law that could not be calibrated -> reason.
     """
 
     modes: limits.LimitingModes
@@ -84,6 +82,7 @@ class Calibration:
     laws: Mapping[str, LawCalibration]
     regulator_gain: FloatArray
     position: FloatArray
+    skipped: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -96,20 +95,43 @@ class CalibrationOptions:
         Target, from 1.
     source
         Which gains the laws run with.
+    published
+        Law -> published gains.
     positive_stiffness_n_m, negative_stiffness_n_m
-        k of vdps and vdns where c is calibrated for it.
+        k of vdps and vdns where c is calibrated for it; None: shares of the static stiffness at the damper.
     overrides
-        Gains of the user's own for a law.
+        Law -> gains given by the user, by name; the others are calibrated.
     weights
-        Of lqg.
+        Of laws that are designed by an optimum; None: from the frame.
     """
 
     mode: int = 1
-    source: Source = "thesis"
-    positive_stiffness_n_m: float = 2500.0
-    negative_stiffness_n_m: float = -4500.0
-    overrides: Mapping[str, Gains] = field(default_factory=dict)
-    weights: Weights = field(default_factory=Weights)
+    source: Source = "exact"
+    published: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    positive_stiffness_n_m: float | None = None
+    negative_stiffness_n_m: float | None = None
+    overrides: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    weights: Weights | None = None
+
+
+def balanced_weights(modes: limits.LimitingModes, residual_force_n: float = 0.0, **given: float) -> Weights:
+    """Return weights of energy and force that damp the target mode as viscous damping can at best.
+
+    For an oscillator of unit mass and the cost of its energy plus R u^2, where u acts through u_0, the regulator gives
+    the damping ratio u_0/(2 omega sqrt(2 R)) if it is small. R follows from the attainable damping ratio, P2 (14).
+
+    Parameters
+    ----------
+    modes
+        Limiting modes of the target.
+    residual_force_n
+        Of the damper: the noise of its force.
+    given
+        Weights that are known.
+    """
+    ratio = limits.attainable_damping(modes)
+    force = given.get("energy", 1.0) * modes.u_0**2 / (8.0 * modes.omega_0**2 * ratio**2)
+    return Weights(**{"force": force, "force_noise_n": residual_force_n, **given})
 
 
 def calibrate(
@@ -130,16 +152,22 @@ def calibrate(
         If the frame or the position allows no calibration, or a given gain has the wrong sign.
     """
     plant = plant_of(frame, position, options)
-    found = {}
+    found, skipped = {}, {}
     for law in all_laws().values() if laws is None else laws:
-        if law.calibrated:
+        law.check(Gains(**options.overrides.get(law.name, {})))
+        if not law.calibrated:
+            continue
+        try:
             found[law.name] = calibrate_law(plant, law, options)
+        except UserError as error:
+            skipped[law.name] = str(error)
     return Calibration(
         plant.modes,
         plant.static_stiffness_n_m,
         found,
-        regulator_gain(frame, position, options.weights),
+        regulator_gain(frame, position, plant.weights),
         position,
+        skipped,
     )
 
 
@@ -151,14 +179,19 @@ def plant_of(frame: Frame, position: FloatArray, options: CalibrationOptions) ->
     UserError
         If the frame or the position allows no calibration.
     """
+    modes, static = limits.limiting_modes(frame, position, options.mode), limits.static_stiffness(frame, position)
+    positive, negative = options.positive_stiffness_n_m, options.negative_stiffness_n_m
     return Plant(
         frame=frame,
         bare=exact.undamped(frame),
         position=position,
-        modes=limits.limiting_modes(frame, position, options.mode),
-        static_stiffness_n_m=limits.static_stiffness(frame, position),
-        stiffness_n_m={"vdps": options.positive_stiffness_n_m, "vdns": options.negative_stiffness_n_m},
-        weights=options.weights,
+        modes=modes,
+        static_stiffness_n_m=static,
+        stiffness_n_m={
+            "vdps": POSITIVE_SHARE * static if positive is None else positive,
+            "vdns": NEGATIVE_SHARE * static if negative is None else negative,
+        },
+        weights=balanced_weights(modes) if options.weights is None else options.weights,
     )
 
 
@@ -168,12 +201,13 @@ def calibrate_law(plant: Plant, law: Law, options: CalibrationOptions) -> LawCal
     Raises
     ------
     UserError
-        If a given gain is unknown or has the wrong sign.
+        If a given gain is unknown or has the wrong sign, or the law cannot be calibrated for this plant.
     """
     candidates = dict(law.candidates(plant))
-    if law.name in THESIS_GAINS:
-        candidates = {"thesis": THESIS_GAINS[law.name], **candidates}
-    gains = options.overrides.get(law.name, candidates.get(options.source, Gains()))
+    if law.name in options.published:
+        candidates = {"published": Gains(**options.published[law.name]), **candidates}
+    gains = candidates.get(options.source, candidates.get("exact", Gains()))
+    gains = gains.changed(**options.overrides.get(law.name, {}))
     law.check(gains)
     return LawCalibration(law.name, gains, candidates, **vars(law.assess(plant, gains)))
 

@@ -24,6 +24,7 @@ from mrpipe.control.kalman import kalman_gains
 from mrpipe.control.law import Law
 from mrpipe.control.laws import law_named
 from mrpipe.control.lqg import Observer
+from mrpipe.control.settings import ControllerSettings
 from mrpipe.errors import UserError
 from mrpipe.networks.network import Network
 
@@ -39,6 +40,10 @@ DYNAMIC_RANGE = 1e5
 """Largest reading of a sensor over its noise, where the settings give none: 100 dB, more than 16 bits can hold."""
 
 _LARGEST_FORCE_N = 1e9
+
+
+_SETTINGS = ControllerSettings()
+"""The defaults that the options share with the settings."""
 
 
 @dataclass(frozen=True)
@@ -85,25 +90,25 @@ class ControllerOptions:
     """
 
     rate_hz: float = 200.0
-    velocity: Literal["kalman", "measured", "difference"] = "kalman"
-    displacement_noise_m: float = 20e-6
-    acceleration_noise_m_s2: float = 0.1
-    bias_drift_m_s2: float = 0.0
-    inverse_request: Literal["steady", "history"] = "steady"
-    residual_force_n: float = 18.0
-    low_pass_hz: float | None = 60.0
+    velocity: Literal["kalman", "measured", "difference"] = _SETTINGS.velocity
+    displacement_noise_m: float = _SETTINGS.kalman_displacement_noise_m
+    acceleration_noise_m_s2: float = _SETTINGS.kalman_acceleration_noise_m_s2
+    bias_drift_m_s2: float = _SETTINGS.kalman_bias_drift_m_s2
+    inverse_request: Literal["steady", "history"] = _SETTINGS.inverse_request
+    residual_force_n: float = 0.0
+    low_pass_hz: float | None = _SETTINGS.low_pass_hz
     drive_limit: float | None = None
-    dead_band_m_s: float = 0.0
-    friction_rounding_m_s: float = 0.0125
+    dead_band_m_s: float = _SETTINGS.dead_band_m_s
+    friction_rounding_m_s: float = 0.0
     extremum_step_m: float = 1e-4
-    extremum_share: float = 0.1
+    extremum_share: float = _SETTINGS.extremum_share
     extremum_memory_s: float = 0.6
     largest_displacement_m: float | None = None
     largest_velocity_m_s: float | None = None
     largest_acceleration_m_s2: float | None = None
     largest_force_n: float | None = None
-    fault_hold_s: float = 0.02
-    safe_drive: float = 0.0
+    fault_hold_s: float = _SETTINGS.fault_hold_s
+    safe_drive: float = _SETTINGS.safe_drive
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,10 @@ class ControllerSettings(Section):
         description="Past values for an inverse network: `steady`, the present ones; `history`, as (2.9) has it, what "
         "was desired before: at a reversal a history that no measured force has, and the network answers with spikes.",
     )
-    residual_force_n: float = Field(
-        18.0, ge=0.0, description="Switch: below this desired force the drive is 0 (P2 24)."
+    residual_force_n: float | None = Field(
+        None,
+        ge=0.0,
+        description="Switch: below this desired force the drive is 0 (P2 24); null: the damper's residual force.",
     )
     low_pass_hz: float | None = Field(60.0, gt=0.0, description="Butterworth low-pass on the drive; null: none.")
     drive_limit: float | None = Field(None, gt=0.0, description="Largest drive; null: that of the damper.")
@@ -50,7 +52,11 @@ class ControllerSettings(Section):
     extremum_memory_periods: float = Field(
         0.75, gt=0.0, description="Free periods after which a pending extremum counts though nothing came back from it."
     )
-    extremum_step_m: float = Field(1e-4, gt=0.0, description="Way back that makes an extremum count (X of fdns).")
+    extremum_step_m: float | None = Field(
+        None,
+        gt=0.0,
+        description="Way back that makes an extremum count (X of fdns); null: five times the displacement's noise.",
+    )
     extremum_share: float = Field(0.1, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
     largest_displacement_m: float | None = Field(
         None,

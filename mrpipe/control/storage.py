@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
@@ -46,14 +46,19 @@ def calibration_to_json(calibration: Calibration) -> dict[str, Any]:
         "u_0": modes.u_0,
         "kappa": modes.kappa,
         "static_stiffness_n_m": calibration.static_stiffness_n_m,
-        "attainable_damping_ratio": {
-            "vd": attainable_damping(modes),
-            "vdns": finite(attainable_damping(modes, calibration.laws["vdns"].gains.k_n_m)),
-            "fdns": attainable_damping_friction(modes),
-        },
+        "attainable_damping_ratio": _attainable(calibration),
         "optimal_force_ratio_n_m": optimal_force_ratio(modes),
         "laws": laws,
+        "skipped": dict(calibration.skipped),
     }
+
+
+def _attainable(calibration: Calibration) -> dict[str, float | None]:
+    modes, laws = calibration.modes, calibration.laws
+    found: dict[str, float | None] = {"vd": attainable_damping(modes), "fdns": attainable_damping_friction(modes)}
+    if "vdns" in laws:
+        found["vdns"] = finite(attainable_damping(modes, laws["vdns"].gains.k_n_m))
+    return found
 
 
 def write_calibration(
@@ -63,6 +68,8 @@ def write_calibration(
     weights: Weights,
     reference: ReferenceNetwork | None,
     friction_rounding_m_s: float,
+    amplitude_m: float,
+    residual_force_n: float,
 ) -> None:
     """Write modes, gains, regulator, reference network, and the speed over which friction changes its sign."""
     modes = calibration.modes
@@ -70,6 +77,9 @@ def write_calibration(
         artifact.put(name, getattr(modes, name), unit=unit)
     artifact.put("static_stiffness", calibration.static_stiffness_n_m, unit="N/m")
     artifact.put("friction_rounding", friction_rounding_m_s, unit="m/s")
+    artifact.put("amplitude", amplitude_m, unit="m")
+    artifact.put("residual_force", residual_force_n, unit="N")
+    artifact.put_json("skipped", dict(calibration.skipped))
     artifact.put("position", position, unit="1", dims=("floor",))
     artifact.put("shape_0", modes.shape_0, unit="kg^-1/2", dims=("floor",))
     artifact.put("shape_inf", modes.shape_inf, unit="kg^-1/2", dims=("floor",))
@@ -107,8 +117,12 @@ class Calibrated:
     ----------
     position
         Connectivity vector w of the damper, shape (n,).
-    omega_0
-        Free frequency of the target mode [rad/s].
+    omega_0, u_0
+        Free frequency [rad/s] and amplitude at the damper [1/sqrt(kg)] of the target mode.
+    top_0
+        Amplitude of the target mode at the top floor [1/sqrt(kg)].
+    amplitude_m, residual_force_n
+        Expected amplitude of the damper, and its force without drive at that amplitude.
     friction_rounding_m_s
         Speed over which friction changes its sign.
     weights
@@ -117,16 +131,23 @@ class Calibrated:
         Law -> its calibrated gains.
     reference
         Network of laws that need one; None where it was not trained.
+    skipped
+        Law that could not be calibrated -> reason.
     path
         Of the file, for messages.
     """
 
     position: FloatArray
     omega_0: float
+    u_0: float
+    top_0: float
+    amplitude_m: float
+    residual_force_n: float
     friction_rounding_m_s: float
     weights: Weights
     gains: Mapping[str, Gains]
     reference: Network | None
+    skipped: Mapping[str, str] = field(default_factory=dict)
     path: str = "control.h5"
 
     def gains_of(self, law: str) -> Gains:
@@ -140,6 +161,8 @@ class Calibrated:
         if law in self.gains:
             return self.gains[law]
         if law_named(law).calibrated:
+            if law in self.skipped:
+                raise UserError(self.path, f"laws/{law}", f"was skipped: {self.skipped[law]}", "choose another law")
             known = ", ".join(self.gains) or "none"
             raise UserError(self.path, f"laws/{law}", "this law is not calibrated", f"calibrated: {known}")
         return Gains()
@@ -151,9 +174,14 @@ def read_calibrated(artifact: Artifact) -> Calibrated:
     return Calibrated(
         position=artifact.array("position"),
         omega_0=artifact.scalar("omega_0"),
+        u_0=artifact.scalar("u_0"),
+        top_0=float(artifact.array("shape_0")[-1]),
+        amplitude_m=artifact.scalar("amplitude"),
+        residual_force_n=artifact.scalar("residual_force"),
         friction_rounding_m_s=artifact.scalar("friction_rounding"),
         weights=Weights(**artifact.json("lqg/weights")),
         gains={law: read_gains(artifact, law) for law in artifact.members("laws")},
         reference=read_network(artifact, "nnc/network") if trained else None,
+        skipped=artifact.json("skipped"),
         path=str(artifact.path),
     )

@@ -153,10 +153,22 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
 
 
+def _peak(values: FloatArray) -> float:
+    return float(np.max(np.abs(values))) if len(values) else math.nan
+
+
+def _floors(count: int) -> dict[str, int]:
+    """Return label -> index of the floors that are listed: the first, the fifth where there is one, and the top."""
+    return {"1": 0, **({"5": 4} if count >= 5 else {}), "_top": count - 1}
+
+
 def indices(
-    response: Response, excitation: Excitation, *, residual_force_n: float, drive_limit: float, absolute: bool = False
+    response: Response, excitation: Excitation, *, residual_force_n: float, drive_limit: float
 ) -> dict[str, Any]:
     """Return the indices of a response, keys with units; None where one has no meaning.
+
+    Accelerations are relative to the ground unless the key says `absolute`. The fifth floor is left out where there is
+    none.
 
     Parameters
     ----------
@@ -166,24 +178,20 @@ def indices(
         Of the damper's model at no drive, used where the run never shows it.
     drive_limit
         Of the damper.
-    absolute
-        Accelerations relative to the ground, or absolute. The thesis does not say which; the errata's are relative.
     """
     first, last = excitation.steady_s
     steady = (response.time_s >= first) & (response.time_s < last) if last > first else response.time_s >= 0.0
-    floors = response.displacement.shape[1]
-    fifth = min(5, floors) - 1
-    acceleration = response.absolute_acceleration if absolute else response.acceleration
-    result: dict[str, Any] = {
-        "rms_x1_m": _rms(response.displacement[steady, 0]),
-        "rms_x5_m": _rms(response.displacement[steady, fifth]),
-        "rms_x_top_m": _rms(response.displacement[steady, -1]),
-        "rms_a1_m_s2": _rms(acceleration[steady, 0]),
-        "rms_a5_m_s2": _rms(acceleration[steady, fifth]),
-        "peak_x1_m": float(np.max(np.abs(response.displacement[steady, 0]))),
-        "peak_x5_m": float(np.max(np.abs(response.displacement[steady, fifth]))),
-        "peak_a1_m_s2": float(np.max(np.abs(acceleration[steady, 0]))),
-        "peak_a5_m_s2": float(np.max(np.abs(acceleration[steady, fifth]))),
+    result: dict[str, Any] = {}
+    for label, floor in _floors(response.displacement.shape[1]).items():
+        x, a = response.displacement[steady, floor], response.acceleration[steady, floor]
+        result |= {
+            f"rms_x{label}_m": _rms(x),
+            f"rms_a{label}_m_s2": _rms(a),
+            f"rms_a{label}_absolute_m_s2": _rms(response.absolute_acceleration[steady, floor]),
+            f"peak_x{label}_m": _peak(x),
+            f"peak_a{label}_m_s2": _peak(a),
+        }
+    result |= {
         "rms_damper_displacement_m": _rms(response.damper_displacement[steady]),
         "rms_force_n": _rms(response.force[steady]),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,7 +20,7 @@ from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import Chain
 from mrpipe.effects.damper import damper_named
 from mrpipe.simulation import excitation as kinds
-from mrpipe.simulation.adjustment import adjusted_amplitude
+from mrpipe.simulation.adjustment import SETTLED, adjusted_amplitude
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.ground_record import read_ground_record
 from mrpipe.simulation.loop import (
@@ -37,6 +38,9 @@ from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes, re
 
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 """Dampers of a run by name, and the stage whose artifact holds each."""
+
+SWEEP = (0.4, 2.4)
+"""First and last frequency of a sweep over the free frequency, where the settings give none."""
 
 RECORD_RATE_HZ = 1000.0
 """Rate of the histories where the settings give none; with a perfect damper, whose force jumps, every plant step."""
@@ -65,6 +69,12 @@ class Rig:
     def position(self) -> FloatArray:
         """Connectivity vector w of the damper, shape (n,)."""
         return self.controllers.calibrated.position
+
+    @property
+    def residual_force_n(self) -> float:
+        """Force of the damper without drive at the expected amplitude [N]."""
+        known = self.controllers.calibrated
+        return float(self.damper.quasi_static_force(known.amplitude_m * known.omega_0, 0.0))
 
     @property
     def perfect(self) -> bool:
@@ -160,13 +170,22 @@ def _fault(settings: SensorFaultSettings) -> SensorFault | None:
     return SensorFault(marks[settings.kind], settings.sensor, settings.share, settings.samples)
 
 
-def excitation_of(rig: Rig, settings: ExcitationSettings) -> tuple[Excitation, Response | None]:
+def excitation_of(
+    rig: Rig, settings: ExcitationSettings, warn: Callable[[str], None] | None = None
+) -> tuple[Excitation, Response | None]:
     """Return the excitation and, where its amplitude was adjusted, the response of vd to it.
+
+    Parameters
+    ----------
+    rig, settings
+        What is shaken, and how.
+    warn
+        Told where the adjustment does not reach a response that the settings do not demand.
 
     Raises
     ------
     UserError
-        If a recorded motion cannot be read, or no amplitude gives the wanted response.
+        If a recorded motion cannot be read, or no amplitude gives the demanded response.
     """
     factor = settings.factor
     if settings.kind == "recorded":
@@ -174,7 +193,8 @@ def excitation_of(rig: Rig, settings: ExcitationSettings) -> tuple[Excitation, R
         return kinds.recorded(time_s, acceleration, scale=factor), None
     if settings.kind == "free-decay":
         return kinds.at_rest(settings.decay_s), None
-    omega = settings.frequency_rad_s or rig.controllers.calibrated.omega_0
+    free = rig.controllers.calibrated.omega_0
+    omega = settings.frequency_rad_s or free
 
     def harmonic(amplitude: float) -> Excitation:
         return kinds.harmonic(
@@ -188,31 +208,49 @@ def excitation_of(rig: Rig, settings: ExcitationSettings) -> tuple[Excitation, R
 
     amplitude, viscous = settings.base_amplitude_m_s2, None
     if amplitude is None:
-        amplitude, viscous = _adjusted(rig, settings, harmonic)
+        amplitude, viscous = _adjusted(rig, settings, harmonic, warn)
         viscous = viscous if factor == 1.0 and settings.kind == "harmonic" else None
     if settings.kind == "sweep":
-        return kinds.sweep(factor * amplitude, settings.sweep_first_hz, settings.sweep_last_hz, settings.sweep_s), None
+        first = settings.sweep_first_hz or SWEEP[0] * free / (2.0 * np.pi)
+        last = settings.sweep_last_hz or SWEEP[1] * free / (2.0 * np.pi)
+        return kinds.sweep(factor * amplitude, first, last, settings.sweep_s), None
     return harmonic(factor * amplitude), viscous
 
 
+def expected_top(rig: Rig) -> float:
+    """Return the top displacement in the free mode at which the damper moves with the expected amplitude [m]."""
+    known = rig.controllers.calibrated
+    return known.amplitude_m * abs(known.top_0 / known.u_0)
+
+
 def _adjusted(
-    rig: Rig, settings: ExcitationSettings, harmonic: Callable[[float], Excitation]
+    rig: Rig,
+    settings: ExcitationSettings,
+    harmonic: Callable[[float], Excitation],
+    warn: Callable[[str], None] | None,
 ) -> tuple[float, Response | None]:
     tracking = rig.options.tracking
     if settings.adjust_with == "ideal" and tracking == "damper":
         tracking = "ideal"
     options = replace(rig.options, noise=SensorNoise(), fault=None, tracking=tracking)
-    gains = Gains(c_n_s_m=settings.reference_c_n_s_m)
+    gains = None if settings.reference_c_n_s_m is None else Gains(c_n_s_m=settings.reference_c_n_s_m)
     viscous = rig.controllers.build("vd", gains, perfect=tracking == "ideal")
-    amplitude, response = adjusted_amplitude(
+    demanded = settings.reference_rms_top_m
+    amplitude, response, error = adjusted_amplitude(
         rig.frame,
         rig.damper.chain(),
         viscous,
         harmonic,
         options,
         position=rig.position,
-        rms_top_m=settings.reference_rms_top_m,
+        rms_top_m=expected_top(rig) / math.sqrt(2.0) if demanded is None else demanded,
+        must=demanded is not None,
     )
+    if error > SETTLED and warn is not None:
+        warn(
+            f"under vd no base amplitude gives the expected motion: {amplitude:.3g} m/s^2 misses it by {error:.0%}; "
+            "give simulate.excitation.base_amplitude_m_s2 for another"
+        )
     return amplitude, response if options.tracking == rig.options.tracking else None
 
 
@@ -221,4 +259,5 @@ def release_state(rig: Rig, settings: ExcitationSettings) -> FloatArray | None:
     if settings.kind != "free-decay":
         return None
     shape = natural_modes(rig.frame).mode_shapes[:, 0]
-    return np.concatenate([settings.release_top_m * shape / shape[-1], np.zeros(rig.frame.floors)])
+    top = expected_top(rig) if settings.release_top_m is None else settings.release_top_m
+    return np.concatenate([top * shape / shape[-1], np.zeros(rig.frame.floors)])

@@ -17,7 +17,7 @@ class ExcitationSettings(Section):
         "harmonic", description="Harmonic with a free decay after its stop, sweep, recorded, or release from a shape."
     )
     frequency_rad_s: float | None = Field(
-        8.0, gt=0.0, description="Of the harmonic; null: the free frequency of the calibrated mode."
+        None, gt=0.0, description="Of the harmonic; null: the free frequency of the calibrated mode."
     )
     base_amplitude_m_s2: float | None = Field(
         None, gt=0.0, description="Of harmonic or sweep; null: adjusted so that vd gives `reference_rms_top_m`."
@@ -25,16 +25,32 @@ class ExcitationSettings(Section):
     adjust_with: Literal["damper", "ideal"] = Field(
         "damper", description="Whether the amplitude is adjusted with the damper in the loop or with perfect tracking."
     )
-    reference_rms_top_m: float = Field(0.0243, gt=0.0, description="RMS top displacement of vd (thesis Table 5.1).")
-    reference_c_n_s_m: float = Field(650.0, gt=0.0, description="Viscous gain of vd in the adjustment.")
+    reference_rms_top_m: float | None = Field(
+        None,
+        gt=0.0,
+        description="RMS top displacement of vd in the adjustment; null: that at which the damper would move with the "
+        "expected amplitude of the calibration in the free mode.",
+    )
+    reference_c_n_s_m: float | None = Field(
+        None, gt=0.0, description="Viscous gain of vd in the adjustment; null: as calibrated."
+    )
     factor: float = Field(1.0, gt=0.0, description="Factor on the base acceleration, whatever its kind.")
     cycles: int = Field(40, ge=2, description="Cycles of the harmonic.")
     settling_cycles: int = Field(20, ge=1, description="Cycles left out of the indices.")
     ramp_cycles: float = Field(2.0, ge=0.0, description="Cycles over which the harmonic is eased in.")
     decay_s: float = Field(8.0, ge=0.0, description="Free decay after the harmonic stops.")
-    release_top_m: float = Field(0.035, gt=0.0, description="Top displacement from which kind free-decay is released.")
-    sweep_first_hz: float = Field(0.5, gt=0.0, description="First frequency of the sweep.")
-    sweep_last_hz: float = Field(3.0, gt=0.0, description="Last frequency of the sweep.")
+    release_top_m: float | None = Field(
+        None,
+        gt=0.0,
+        description="Top displacement from which kind free-decay is released; null: the damper starts at the expected "
+        "amplitude of the calibration.",
+    )
+    sweep_first_hz: float | None = Field(
+        None, gt=0.0, description="First frequency of the sweep; null: 0.4 of the free frequency."
+    )
+    sweep_last_hz: float | None = Field(
+        None, gt=0.0, description="Last frequency of the sweep; null: 2.4 times the free frequency."
+    )
     sweep_s: float = Field(60.0, gt=0.0, description="Length of the sweep.")
     file: str = Field(
         "", description="Recorded base acceleration: text or CSV of two columns, time [s] and acceleration."
@@ -96,7 +112,7 @@ class SimulateSettings(Section):
         0.0, ge=0.0, description="Lag of the current driver besides the damper's own."
     )
     accelerations: Literal["relative", "absolute"] = Field(
-        "relative", description="Which accelerations rms_a1 and the like are of; errata section B gives relative ones."
+        "relative", description="Which accelerations `simulate --resonance` and `design` judge."
     )
     excitation: ExcitationSettings = Field(ExcitationSettings(), description="What shakes the base.")
     controller: ControllerSettings = Field(ControllerSettings(), description="The real-time controller.")

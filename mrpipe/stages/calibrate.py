@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
+    from mrpipe.config.sections.calibrate import CalibrateSettings, RegulatorSettings
     from mrpipe.control.calibration import Calibration, CalibrationOptions
+    from mrpipe.control.limits import LimitingModes
     from mrpipe.control.lqg import Weights
     from mrpipe.control.neural import ReferenceNetwork
     from mrpipe.structures import Frame
@@ -26,8 +28,11 @@ INPUT_NOISE = (0.002, 0.04)
 def _run(context: StageContext) -> Mapping[str, Any]:
     import numpy as np
 
+    from mrpipe.control.assembly import expected_amplitude
     from mrpipe.control.calibration import calibrate, validity_warnings
+    from mrpipe.control.limits import limiting_modes
     from mrpipe.control.storage import calibration_to_json, write_calibration
+    from mrpipe.dampers.model import read_tested
     from mrpipe.effects.damper import damper_named
     from mrpipe.reporting import calibrate as report
     from mrpipe.structures import floor_position, read_frame, storey_position
@@ -38,23 +43,33 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     _check_floor(settings.damper_floor, frame)
     place = storey_position if settings.damper_across_storey else floor_position
     position = place(frame.floors, settings.damper_floor)
-    options = _options(settings)
-    calibration = calibrate(frame, position, options)
-    context.progress(0.3, "laws")
+    modes = limiting_modes(frame, position, settings.target_mode)
     amplitude = settings.expected_amplitude_m
-    speed = amplitude * calibration.modes.omega_0
+    if amplitude is None:
+        amplitude = expected_amplitude(damper, read_tested(context.artifact("identify-damper")), modes)
+    speed = amplitude * modes.omega_0
+    weights = _weights(settings.regulator, modes, float(damper.quasi_static_force(speed, 0.0)))
+    calibration = calibrate(frame, position, _options(settings, weights))
+    for law, reason in calibration.skipped.items():
+        context.warn(f"law {law} was skipped: {reason}")
+    context.progress(0.3, "laws")
     forces = damper.quasi_static_force(speed, np.array([0.0, damper.drive_limit]))
     for line in validity_warnings(
         calibration, amplitude_m=amplitude, residual_force_n=float(forces[0]), largest_force_n=float(forces[1])
     ):
         context.warn(line)
     rounding = settings.friction_rounding_share * speed
-    reference = _train_reference(context, calibration, frame, rounding)
+    reference = _train_reference(context, calibration, frame, amplitude, rounding) if _networks(calibration) else None
     with context.write("control.h5") as artifact:
-        write_calibration(artifact, calibration, position, options.weights, reference, rounding)
+        write_calibration(artifact, calibration, position, weights, reference, rounding, amplitude, float(forces[0]))
     summary = calibration_to_json(calibration)
-    summary["laws"]["nnc"] |= _neural_summary(calibration, reference, amplitude)
-    summary |= {"residual_force_n": float(forces[0]), "largest_force_n": float(forces[1])}
+    if reference is not None:
+        summary["laws"]["nnc"] |= _neural_summary(calibration, reference, amplitude)
+    summary |= {
+        "expected_amplitude_m": amplitude,
+        "residual_force_n": float(forces[0]),
+        "largest_force_n": float(forces[1]),
+    }
     report.describe(context.report, frame, calibration, summary, context.warnings, amplitude, settings.map_points)
     return summary
 
@@ -68,42 +83,45 @@ def _check_floor(floor: int, frame: Frame) -> None:
         )
 
 
-def _options(settings: Any) -> CalibrationOptions:
-    from mrpipe.control.calibration import THESIS_GAINS, CalibrationOptions
-    from mrpipe.control.gains import Gains
+def _options(settings: CalibrateSettings, weights: Weights) -> CalibrationOptions:
+    from mrpipe.control.calibration import CalibrationOptions
     from mrpipe.control.laws import law_names
 
-    overrides = {}
-    for law in law_names():
-        given = settings.given(law)
-        if given:
-            overrides[law] = Gains(**{**THESIS_GAINS.get(law, {}), **given})
-    if "fdns" in overrides:
-        overrides.setdefault("nnc", overrides["fdns"])
+    overrides = {law: settings.given(law) for law in law_names()}
+    # nnc imitates fdns, so that it takes over its gains
+    overrides["nnc"] = overrides["nnc"] or overrides["fdns"]
     return CalibrationOptions(
         mode=settings.target_mode,
         source=settings.gains,
+        published=settings.published,
         positive_stiffness_n_m=settings.positive_stiffness_n_m,
         negative_stiffness_n_m=settings.negative_stiffness_n_m,
         overrides=overrides,
-        weights=_weights(settings.regulator),
+        weights=weights,
     )
 
 
-def _weights(regulator: Any) -> Weights:
-    from mrpipe.control.lqg import Weights
+def _weights(regulator: RegulatorSettings, modes: LimitingModes, residual_force_n: float) -> Weights:
+    from mrpipe.control.calibration import balanced_weights
 
-    return Weights(
-        energy=regulator.energy_weight,
-        top_displacement=regulator.top_displacement_weight,
-        force=regulator.force_weight,
-        ground_noise_m_s2=regulator.ground_noise_m_s2,
-        force_noise_n=regulator.force_noise_n,
-    )
+    given = {
+        "energy": regulator.energy_weight,
+        "top_displacement": regulator.top_displacement_weight,
+        "force": regulator.force_weight,
+        "ground_noise_m_s2": regulator.ground_noise_m_s2,
+        "force_noise_n": regulator.force_noise_n,
+    }
+    return balanced_weights(modes, residual_force_n, **{key: item for key, item in given.items() if item is not None})
+
+
+def _networks(calibration: Calibration) -> bool:
+    from mrpipe.control.laws import law_named
+
+    return any("network" in law_named(law).needs for law in calibration.laws)
 
 
 def _train_reference(
-    context: StageContext, calibration: Calibration, frame: Frame, rounding_m_s: float
+    context: StageContext, calibration: Calibration, frame: Frame, amplitude: float, rounding_m_s: float
 ) -> ReferenceNetwork:
     import numpy as np
 
@@ -112,7 +130,7 @@ def _train_reference(
 
     settings = context.settings.calibrate
     neural = settings.neural
-    amplitude, omega = settings.expected_amplitude_m, calibration.modes.omega_0
+    omega = calibration.modes.omega_0
     free = omega / (2.0 * np.pi)
     others = np.delete(natural_modes(frame).angular_frequencies, settings.target_mode - 1)
     options = ReferenceOptions(

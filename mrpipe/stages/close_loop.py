@@ -101,7 +101,6 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
             traced,
             tests,
             settings,
-            context.settings.calibrate.expected_amplitude_m,
             recorded,
             context.rng,
             context.seed,
@@ -217,7 +216,6 @@ STAGE = Stage(
     settings=(
         "close_loop",
         "simulate",
-        "calibrate.expected_amplitude_m",
         "prepare.displacement_late_s",
         "prepare.corrections",
         "laboratory.bench.tests",

@@ -25,6 +25,7 @@ def simulate_stage(law: str) -> Stage:
 
 def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     from mrpipe.dampers.model import read_tested
+    from mrpipe.errors import StageSkipped
     from mrpipe.reporting import simulate as report
     from mrpipe.simulation.indices import indices
     from mrpipe.simulation.rig import DAMPERS, excitation_of, read_rig, release_state
@@ -34,14 +35,15 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
 
     settings = context.settings.simulate
     rig = read_rig(settings, context.artifact)
+    if law in rig.controllers.calibrated.skipped:
+        raise StageSkipped(f"law {law} could not be calibrated: {rig.controllers.calibrated.skipped[law]}")
     controller = rig.controller(law)
-    excitation, viscous = excitation_of(rig, settings.excitation)
+    excitation, viscous = excitation_of(rig, settings.excitation, context.warn)
     context.progress(0.4, f"loop under {law}")
     response = rig.run(controller, excitation, rng=context.rng, initial_state=release_state(rig, settings.excitation))
     judged = {
-        "residual_force_n": float(rig.damper.quasi_static_force(0.05, 0.0)),
+        "residual_force_n": rig.residual_force_n,
         "drive_limit": settings.controller.drive_limit or rig.damper.drive_limit,
-        "absolute": settings.accelerations == "absolute",
     }
     values = indices(response, excitation, **judged)
     if values["energy_balance_error"] > 5e-3:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import Progress, load_parameter_set
-from mrpipe.control.calibration import THESIS_GAINS
 from mrpipe.control.controller import Controller, ControllerOptions, build_controller
 from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
@@ -18,11 +17,14 @@ from mrpipe.simulation.adjustment import adjusted_amplitude
 from mrpipe.simulation.indices import indices
 from mrpipe.structures import Frame, floor_position
 from mrpipe.thesis.claim import Claim, cannot, compare
+from mrpipe.thesis.gains import THESIS_GAINS
 from mrpipe.thesis.printed import PRINTED
 
 OMEGA = 8.0
 RMS_TOP_M = 24.3e-3
 SWITCH_N = 18.0
+ROUNDING_M_S = 0.0125
+"""Speed over which the friction of FDNS changes its sign."""
 LAWS = ("vd", "vdps", "vdns", "fdns")
 _NAMES = ("rms_x5_m", "rms_x1_m", "rms_a5_m_s2", "rms_a1_m_s2")
 _IDEAL_TOLERANCE = {"vd": 0.02, "vdps": 0.02, "vdns": 0.05, "fdns": 0.12}
@@ -41,7 +43,7 @@ def _controller(law: str, gains: Gains, damper: DamperModel | None) -> Controlle
             rate_hz=500.0, velocity="measured", residual_force_n=0.0, low_pass_hz=None, friction_rounding_m_s=0.019
         )
         return build_controller(law, gains, perfect)
-    options = ControllerOptions(residual_force_n=SWITCH_N, low_pass_hz=60.0)
+    options = ControllerOptions(residual_force_n=SWITCH_N, low_pass_hz=60.0, friction_rounding_m_s=ROUNDING_M_S)
     return build_controller(law, gains, options, inverse=inverse_table(damper))
 
 
@@ -162,7 +164,9 @@ def chapter_5(frame: Frame, duration_s: float, progress: Progress) -> list[Claim
 
     viscous = _controller("vd", THESIS_GAINS["vd"], damper)
     loop = LoopOptions()
-    level, _ = adjusted_amplitude(frame, damper.chain(), viscous, excite, loop, position=position, rms_top_m=RMS_TOP_M)
+    level, _, _ = adjusted_amplitude(
+        frame, damper.chain(), viscous, excite, loop, position=position, rms_top_m=RMS_TOP_M
+    )
     bench = _Bench(frame, damper, excite(amplitude), excite(level))
     ideal, real = {}, {}
     for index, law in enumerate(LAWS):

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.control import COMMAND_SIZE, ControllerOptions, Gains, build_controller, controller_step, inverse_table
-from mrpipe.control.calibration import THESIS_GAINS
 from mrpipe.control.kalman import continuous_kalman_gains, kalman_gains
 from mrpipe.control.kernel import (
     COMMAND_AMPLITUDE,
@@ -26,6 +25,7 @@ from mrpipe.control.neural import ReferenceOptions, network_force, train_referen
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
 from mrpipe.networks.network import averaged, lagged
+from mrpipe.thesis.gains import THESIS_GAINS
 from tests.control.conftest import random_network
 
 SET_C = inverse_table(damper_from_parameter_set(load_parameter_set("dampers", "set-c")))
@@ -145,7 +145,7 @@ def test_inverse_table_gives_the_drive_back(speed, drive):
 @pytest.mark.property
 def test_switch_and_low_pass():
     _, x, a, v = motion(200.0, 4.0)
-    plain = {"velocity": "measured", "low_pass_hz": None}
+    plain = {"velocity": "measured", "low_pass_hz": None, "residual_force_n": 18.0}
     with_switch = run(build_controller("vd", Gains(650.0), ControllerOptions(**plain), inverse=SET_C), x, a, v)
     small = np.abs(with_switch[:, COMMAND_FORCE]) < 18.0
     assert small.any() and np.all(with_switch[small, COMMAND_DRIVE] == 0.0)

@@ -22,6 +22,7 @@ from mrpipe.control.linearisation import (
 )
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame, complex_modes, floor_position, shear_frame, storey_position
+from mrpipe.thesis.gains import THESIS_GAINS
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_negative_stiffness_beyond_the_static_limit_folds(bare, thesis_frame, fl
     assert not answer.stable and answer.unstable_pole == pytest.approx(1.29, abs=0.01)
     assert answer.damping_ratio == -1.0
     assert exact.exact_damping(bare, floor_one, modes, 250.0, -4000.0).stable
-    calibration = calibrate(thesis_frame, floor_one, CalibrationOptions())
+    calibration = calibrate(thesis_frame, floor_one, CalibrationOptions(source="published", published=THESIS_GAINS))
     said = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0)
     assert any("vdns" in line and "beyond the static limit of -4123" in line and "+1.29" in line for line in said)
     near = CalibrationOptions(overrides={"vdns": Gains(250.0, -4000.0)})
@@ -98,7 +99,7 @@ def test_negative_stiffness_beyond_the_static_limit_folds(bare, thesis_frame, fl
 
 @pytest.mark.literature
 def test_residual_force_is_the_limit_and_not_saturation(thesis_frame, floor_one):
-    calibration = calibrate(thesis_frame, floor_one, CalibrationOptions())
+    calibration = calibrate(thesis_frame, floor_one, CalibrationOptions(source="published", published=THESIS_GAINS))
     assert needed_force(law_named("vd"), Gains(650.0), 0.0093, 8.0) == pytest.approx(48.0, abs=0.5)
     said = validity_warnings(calibration, amplitude_m=0.0093, residual_force_n=22.0, largest_force_n=300.0)
     assert any(line.startswith("vd: the residual force of 22 N") for line in said)
@@ -166,8 +167,8 @@ def test_bad_input_is_told_in_one_line(thesis_frame, floor_one):
 
 @pytest.mark.golden
 def test_sources_of_gains(thesis_frame, floor_one):
-    for source, c in (("thesis", 650.0), ("closed-form", 811.5), ("exact", 537.9)):
-        calibration = calibrate(thesis_frame, floor_one, CalibrationOptions(source=source))
+    for source, c in (("published", 650.0), ("closed-form", 811.5), ("exact", 537.9)):
+        calibration = calibrate(thesis_frame, floor_one, CalibrationOptions(source=source, published=THESIS_GAINS))
         assert calibration.laws["vd"].gains.c_n_s_m == pytest.approx(c, rel=1e-3)
     gains = calibration.laws["fdns"].gains
     assert law_named("fdns").gains_as_json(gains) == {"alpha_n_m": pytest.approx(3127.6, rel=1e-3)}

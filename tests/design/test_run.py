@@ -45,11 +45,11 @@ def plant() -> Plant:
 def rig(plant: Plant) -> Rig:
     damper = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
     calibration = calibrate(plant.frame, plant.position, CalibrationOptions(), LAWS)
-    calibrated = calibrated_from(calibration, Weights(), 0.0125)
+    calibrated = calibrated_from(calibration, Weights(), damper, amplitude_m=0.0093)
     return Rig(
         plant.frame,
         damper,
-        ControllerFactory(plant.frame, damper, calibrated, ControllerSettings(inverse="model")),
+        ControllerFactory(plant.frame, damper, calibrated, ControllerSettings(inverse="model", residual_force_n=18.0)),
         LoopOptions(),
     )
 

@@ -38,7 +38,12 @@ def structure() -> TrueStructure:
 def controllers() -> dict[str, Controller]:
     inverse = inverse_table(damper_from_parameter_set(load_parameter_set("dampers", "set-c")))
     return {
-        law: build_controller(law, gains, ControllerOptions(drive_limit=4.0), inverse=inverse)
+        law: build_controller(
+            law,
+            gains,
+            ControllerOptions(drive_limit=4.0, residual_force_n=18.0, friction_rounding_m_s=0.0125),
+            inverse=inverse,
+        )
         for law, gains in GAINS.items()
     }
 

@@ -10,7 +10,6 @@ import pytest
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.control import Controller, ControllerOptions, Gains, InverseTable, build_controller, inverse_table
-from mrpipe.control.calibration import THESIS_GAINS
 from mrpipe.control.lqg import Weights, lqg_observer
 from mrpipe.control.neural import ReferenceOptions, train_reference
 from mrpipe.dampers.model import DamperModel, damper_from_parameter_set
@@ -19,6 +18,7 @@ from mrpipe.simulation import Excitation, LoopOptions, Response, harmonic, simul
 from mrpipe.simulation.adjustment import adjusted_amplitude
 from mrpipe.simulation.indices import indices
 from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
+from mrpipe.thesis.gains import THESIS_GAINS
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class Rig:
     def controller(
         self, law: str, gains: Gains | None = None, inverse: Network | None = None, **options: Any
     ) -> Controller:
-        chosen = ControllerOptions(**options)
+        thesis: dict[str, Any] = {"residual_force_n": 18.0, "friction_rounding_m_s": 0.0125}
+        chosen = ControllerOptions(**{**thesis, **options})
         observer = None
         if law == "lqg":
             observer = lqg_observer(self.frame, self.position, Weights(), 1.0 / chosen.rate_hz)
@@ -77,8 +78,8 @@ def rig() -> Rig:
     )
     reference = train_reference(options, np.random.default_rng(1)).network
     inverse = inverse_table(damper)
-    viscous = build_controller("vd", Gains(650.0), ControllerOptions(), inverse=inverse)
-    adjusted, _ = adjusted_amplitude(
+    viscous = build_controller("vd", Gains(650.0), ControllerOptions(residual_force_n=18.0), inverse=inverse)
+    adjusted, _, _ = adjusted_amplitude(
         frame,
         damper.chain(),
         viscous,

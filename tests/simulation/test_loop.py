@@ -8,7 +8,6 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from mrpipe.control import ControllerOptions, Gains, build_controller
-from mrpipe.control.calibration import THESIS_GAINS
 from mrpipe.dampers.drive import driver_lag_apart
 from mrpipe.dampers.plant import Phase, Step, build_chain, idle_step
 from mrpipe.errors import DivergedError, UserError
@@ -17,6 +16,7 @@ from mrpipe.simulation.loop import MISSING, STUCK, ZERO, SensorFault
 from mrpipe.simulation.parts import BOUC_WEN
 from mrpipe.simulation.reference import ReferenceController, reference_loop
 from mrpipe.structures import Frame, frequency_response, natural_modes, state_space
+from mrpipe.thesis.gains import THESIS_GAINS
 from tests.control.conftest import random_network
 
 
@@ -98,7 +98,9 @@ def test_passive_damper_equals_an_integrator_of_scipy(rig):
 @pytest.mark.parametrize("request_form", ["steady", "history"])
 @pytest.mark.parametrize("law", ["vd", "vdns", "fdns"])
 def test_compiled_loop_equals_the_plain_one(rig, law, request_form):
-    options = ControllerOptions(drive_limit=4.0, inverse_request=request_form)
+    options = ControllerOptions(
+        drive_limit=4.0, inverse_request=request_form, residual_force_n=18.0, friction_rounding_m_s=0.0125
+    )
     network = random_network(("velocity", "force"), "drive", 3, True)
     gains = THESIS_GAINS[law]
     excitation = harmonic(0.7, 8.0, cycles=3, settling_cycles=1)

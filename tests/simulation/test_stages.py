@@ -11,18 +11,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
-from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, load_parameter_set, no_progress
+from mrpipe.artifacts import (
+    Artifact,
+    ArtifactWriter,
+    Provenance,
+    config_directory,
+    load_parameter_set,
+    no_progress,
+)
 from mrpipe.config.model import config_model
+from mrpipe.control import laws
 from mrpipe.dampers.model import damper_from_parameter_set, write_damper, write_tested
-from mrpipe.errors import UserError
+from mrpipe.errors import StageSkipped, UserError
 from mrpipe.networks.network import write_network
 from mrpipe.pipeline.runner import plain
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import Stage, StageContext
 from mrpipe.stages import calibrate, export_controller
 from mrpipe.stages.simulate import STAGES
-from mrpipe.structures import frame_from_parameter_set, write_frame
+from mrpipe.structures import frame_from_parameter_set, shear_frame, write_frame
 from tests.control.conftest import random_network
 
 SIMULATE = {stage.name: stage for stage in STAGES}
@@ -52,9 +61,22 @@ class Sink:
 Run = Callable[..., dict]
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    directory: Path = tmp_path_factory.mktemp("run")
+def _laid_over(settings: dict[str, Any], base: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Settings laid over those of the thesis; `neutral: True` leaves the thesis out."""
+    if base is None:
+        if settings.get("neutral"):
+            return {name: value for name, value in settings.items() if name != "neutral"}
+        content = yaml.safe_load((config_directory() / "thesis.yaml").read_text())
+        base = {name: content[name] for name in ("calibrate", "simulate")}
+    result = dict(base)
+    for name, value in settings.items():
+        inner = result.get(name)
+        result[name] = _laid_over(value, inner) if isinstance(value, dict) and isinstance(inner, dict) else value
+    return result
+
+
+def runner(directory: Path) -> Run:
+    """Return a function that runs a stage in a folder with the thesis' frame, set C and a network."""
     files = {
         "identify-frame": "frame.h5",
         "identify-damper": "damper.h5",
@@ -74,7 +96,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     def go(stage: Stage, settings: dict[str, Any] | None = None) -> dict:
         context = StageContext(
             stage=stage.name,
-            settings=SettingsView(config_model().model_validate(settings or {}), stage.settings, stage.name),
+            settings=SettingsView(
+                config_model().model_validate(_laid_over(settings or {})), stage.settings, stage.name
+            ),
             inputs={name: directory / files[name] for name in stage.inputs},
             run_directory=directory,
             rng=np.random.default_rng(1),
@@ -91,6 +115,12 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         told = {"warnings": context.warnings, "directory": directory, "parts": context.report.parts}  # type: ignore[attr-defined]
         return {**summary, **told}
 
+    return go
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    go = runner(tmp_path_factory.mktemp("run"))
     go(calibrate.STAGE, {"calibrate": SMALL})
     return go
 
@@ -166,7 +196,6 @@ def test_other_excitations_and_settings(run, kind, tmp_path):
             "tracking": "ideal" if kind == "harmonic" else "damper",
             "frame": "thesis",
             "damper": "set-c",
-            "accelerations": "absolute",
             "excitation": {
                 "kind": kind,
                 "base_amplitude_m_s2": 0.5,
@@ -216,3 +245,66 @@ def test_export_writes_a_folder(run):
     folder = summary["directory"] / "controller"
     assert {"controller.c", "controller.h", "controller.json", "README.md"} <= {item.name for item in folder.iterdir()}
     assert json.loads((folder / "controller.json").read_text())["gains"]["k_n_m"] == -4500.0
+
+
+def _write_other_rig(path: Path) -> None:
+    """A stiff frame of three floors and a damper thirty times as strong as the thesis', in place of its rig."""
+    frame = shear_frame([900.0, 800.0, 700.0], [2.0e6, 1.6e6, 1.2e6], [0.01, 0.01, 0.01])
+    set_c = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    strong = {
+        name: 30.0 * value if name.startswith(("yield_force", "viscosity")) else value
+        for name, value in set_c.parameters.items()
+    }
+    with ArtifactWriter.create(path / "frame.h5", Provenance("test")) as artifact:
+        write_frame(artifact, frame)
+    with ArtifactWriter.create(path / "damper.h5", Provenance("test")) as artifact:
+        write_damper(artifact, replace(set_c, parameters=strong))
+        write_tested(artifact, {"displacement": 0.02, "velocity": 0.5})
+
+
+@pytest.mark.planted
+def test_defaults_suit_another_rig(tmp_path):
+    """No number of the thesis' rig is left: gains, frequency, amplitude and switch follow from this rig."""
+    run = runner(tmp_path)
+    _write_other_rig(tmp_path)
+    summary = run(calibrate.STAGE, {"neutral": True, "calibrate": SMALL})
+    assert summary["expected_amplitude_m"] == pytest.approx(0.01)
+    limit = summary["static_stiffness_n_m"]
+    assert summary["laws"]["vdns"]["k_n_m"] == pytest.approx(-0.8 * limit)
+    assert summary["laws"]["vdps"]["k_n_m"] == pytest.approx(0.5 * limit)
+    for law, gain in (("vd", "c_n_s_m"), ("vdns", "c_n_s_m"), ("fdns", "alpha_n_m")):
+        entry = summary["laws"][law]
+        assert "published" not in entry["candidates"]
+        assert entry[gain] == entry["candidates"]["exact"][gain] > 0.0
+    # the regulator damps the target mode about as viscous damping can
+    best = summary["attainable_damping_ratio"]["vd"]
+    assert 0.4 * best < summary["laws"]["lqg"]["damping_ratio_exact"] < 2.0 * best
+    settings = {"neutral": True, "simulate": {"controller": {"inverse": "model"}}}
+    simulated = run(SIMULATE["simulate-vd"], settings)
+    assert simulated["excitation"]["frequency_rad_s"] == pytest.approx(summary["omega_0"])
+    moved = simulated["rms_damper_displacement_m"] * np.sqrt(2.0)
+    assert 0.5 * 0.01 < moved < 2.0 * 0.01
+    assert not {"rms_x5_m", "rms_a5_m_s2", "peak_x5_m"} & simulated.keys()
+    assert {"rms_x1_m", "rms_x_top_m", "rms_a_top_m_s2", "peak_x_top_m", "rms_a1_absolute_m_s2"} <= simulated.keys()
+    assert not [line for line in simulated["warnings"] if "base amplitude" in line]
+    decay = {"neutral": True, "simulate": {"controller": {"inverse": "model"}, "excitation": {"kind": "free-decay"}}}
+    assert 0.003 < run(SIMULATE["simulate-fdns"], decay)["peak_x_top_m"] < 0.2
+
+
+@pytest.mark.planted
+def test_a_law_that_cannot_be_calibrated_is_skipped_with_its_reason(run, monkeypatch):
+    def fails(plant):
+        raise UserError("calibrate", "vdps", "has no optimum here", "choose another law")
+
+    broken = replace(laws.law_named("vdps"), candidates=fails)
+    known = laws.law_named
+    monkeypatch.setattr(laws, "law_named", lambda name: broken if name == "vdps" else known(name))
+    try:
+        summary = run(calibrate.STAGE, {"calibrate": SMALL})
+        assert "has no optimum here" in summary["skipped"]["vdps"] and "vdps" not in summary["laws"]
+        assert any("law vdps was skipped" in line for line in summary["warnings"])
+        with pytest.raises(StageSkipped, match=r"law vdps could not be calibrated: .*has no optimum here"):
+            run(SIMULATE["simulate-vdps"])
+    finally:
+        monkeypatch.undo()
+        run(calibrate.STAGE, {"calibrate": SMALL})

@@ -28,14 +28,21 @@ from mrpipe.stages import close_loop
 from mrpipe.stages.close_loop import closed_loop
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
+from mrpipe.thesis.gains import THESIS_GAINS
 from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing, TracingOptions
 from mrpipe.tracing.bench.trace import trace_campaign
 from tests.tracing.bench.rig import campaign
 
 SETTINGS: dict[str, Any] = {
     "simulate": {
-        "controller": {"inverse": "model"},
-        "excitation": {"cycles": 10, "settling_cycles": 5, "decay_s": 1.0, "base_amplitude_m_s2": 0.788},
+        "controller": {"inverse": "model", "residual_force_n": 18.0},
+        "excitation": {
+            "frequency_rad_s": 8.0,
+            "cycles": 10,
+            "settling_cycles": 5,
+            "decay_s": 1.0,
+            "base_amplitude_m_s2": 0.788,
+        },
     }
 }
 
@@ -63,14 +70,14 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("inputs")
     frame = frame_from_parameter_set("thesis")
     position = floor_position(frame.floors, 1)
-    calibration = calibrate(frame, position, CalibrationOptions())
+    calibration = calibrate(frame, position, CalibrationOptions(source="published", published=THESIS_GAINS))
     quick = ReferenceOptions(3000.0, (0.005, 0.01, 0.015), (1.0, 1.3), hidden=(4,), starts=1, iterations=15, rows=1500)
     reference = train_reference(quick, np.random.default_rng(0))
     provenance = Provenance("test", "", {}, 0)
     with ArtifactWriter.create(folder / "frame.h5", provenance) as artifact:
         write_frame(artifact, frame)
     with ArtifactWriter.create(folder / "control.h5", provenance) as artifact:
-        write_calibration(artifact, calibration, position, Weights(), reference, 0.005)
+        write_calibration(artifact, calibration, position, Weights(), reference, 0.005, 0.0093, 22.0)
     return {"identify-frame": folder / "frame.h5", "calibrate": folder / "control.h5"}
 
 

@@ -32,10 +32,17 @@ class RegulatorSettings(Section):
 
     energy_weight: float = Field(1.0, ge=0.0, description="Weight of kinetic and strain energy [1/J].")
     top_displacement_weight: float = Field(0.0, ge=0.0, description="Weight of the top displacement squared [1/m2].")
-    force_weight: float = Field(1e-4, gt=0.0, description="Weight of the damper force squared [1/N2].")
+    force_weight: float | None = Field(
+        None,
+        gt=0.0,
+        description="Weight of the damper force squared [1/N2]; null: such that the regulator damps the target mode as "
+        "viscous damping can at best.",
+    )
     ground_noise_m_s2: float = Field(0.1, gt=0.0, description="Noise of the ground's accelerometer, with model error.")
-    force_noise_n: float = Field(
-        20.0, ge=0.0, description="By how much the damper's force differs from the desired one, as a noise."
+    force_noise_n: float | None = Field(
+        None,
+        ge=0.0,
+        description="Difference of the damper's force from the desired one, as a noise; null: its residual force.",
     )
 
 
@@ -52,13 +59,26 @@ class _Fixed(Section):
     damper_across_storey: bool = Field(
         False, description="The damper spans the storey below its floor; else it sits between floor and ground."
     )
-    gains: Literal["thesis", "closed-form", "exact"] = Field(
-        "thesis", description="Gains the laws run with: the thesis' own, P2's closed forms, or the exact optimum."
+    gains: Literal["exact", "closed-form", "published"] = Field(
+        "exact",
+        description="Gains the laws run with: the exact optimum, the closed forms of P2, or those of `published`; laws "
+        "without published gains take the exact optimum.",
     )
-    positive_stiffness_n_m: float = Field(2500.0, gt=0.0, description="k for which vdps is calibrated.")
-    negative_stiffness_n_m: float = Field(-4500.0, lt=0.0, description="k for which vdns is calibrated.")
-    expected_amplitude_m: float = Field(
-        0.0093, gt=0.0, description="Damper amplitude at which forces are judged and around which nnc learns."
+    published: dict[str, dict[str, float]] = Field({}, description="Gains of a publication: law -> gain -> value.")
+    positive_stiffness_n_m: float | None = Field(
+        None, gt=0.0, description="k for which vdps is calibrated; null: half the static stiffness at the damper."
+    )
+    negative_stiffness_n_m: float | None = Field(
+        None,
+        lt=0.0,
+        description="k for which vdns is calibrated; null: 0.8 of the static stiffness at the damper, because at 1 the "
+        "structure would become unstable.",
+    )
+    expected_amplitude_m: float | None = Field(
+        None,
+        gt=0.0,
+        description="Damper amplitude at which forces are judged and around which nnc learns; null: half the largest "
+        "displacement of the bench tests.",
     )
     friction_rounding_share: float = Field(
         1.0 / 6.0,

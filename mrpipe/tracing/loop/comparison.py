@@ -64,6 +64,12 @@ class LoopRun:
     damper_force: FloatArray
 
     @property
+    def relative_acceleration(self) -> FloatArray:
+        """Accelerations of the floors relative to the ground, shape (m, q) [m/s^2]; empty where not recorded."""
+        absolute = self.absolute_acceleration
+        return absolute - self.ground_acceleration[:, None] if absolute.size else absolute
+
+    @property
     def recorded(self) -> bool:
         """Whether there is a response to compare with."""
         return bool(self.displacement.size)
@@ -195,7 +201,7 @@ def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
     beyond = float(np.max(np.abs(response.damper_displacement))) / bench.tested_stroke_m
     if beyond > FAR_BEYOND:
         raise DivergedError(f"law {run.law}: the damper would move {beyond:.0f} times the stroke it was tested at")
-    found = run_indices(response.time_s, span, response.displacement, response.absolute_acceleration, response.force)
+    found = run_indices(response.time_s, span, response.displacement, response.acceleration, response.force)
     found["peak_over_tested_stroke"] = beyond
     if run.recorded:
         top = np.interp(time, response.time_s, response.displacement[:, -1])
@@ -262,7 +268,7 @@ def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench
                 run.time_s,
                 judged_span(run.time_s, run.ground_acceleration),
                 run.displacement,
-                run.absolute_acceleration,
+                run.relative_acceleration,
                 run.damper_force,
             )
         for when, way in ways.items():

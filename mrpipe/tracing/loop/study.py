@@ -53,8 +53,6 @@ class LoopStudy:
         Prepared bench tests; an inverse network is retrained on their motions.
     settings
         Settings of the simulation.
-    expected_amplitude_m
-        Amplitude at the damper that the laws are calibrated for [m].
     recorded
         Recordings of the closed loop; empty for none.
     rng, seed, jobs, progress
@@ -65,7 +63,6 @@ class LoopStudy:
     traced: Tracing
     tests: Sequence[PreparedTest]
     settings: SimulateSettings
-    expected_amplitude_m: float
     recorded: Sequence[LoopRun]
     rng: np.random.Generator
     seed: int
@@ -147,28 +144,29 @@ def _renewed(study: LoopStudy) -> Renewed:
 
     rig, traced, settings = study.rig, study.traced, study.settings.controller
     calibrated = rig.controllers.calibrated
-    omega, amplitude = calibrated.omega_0, study.expected_amplitude_m
+    omega, amplitude = calibrated.omega_0, calibrated.amplitude_m
     limit = min(settings.drive_limit or rig.damper.drive_limit, rig.damper.drive_limit)
     base, chosen = plant_chain(traced.selection.base), plant_chain(traced.selection.chosen)
     training = [test for test in study.tests if test.role != "validation"]
     share = changed_share(base, chosen, training)
+    viscous_force = calibrated.gains_of("vd").c_n_s_m * amplitude * omega
     before, after = (
         force_in_use(
             chain,
             limit,
             stroke_m=traced.selection.base.problem.scales.stroke,
             omega=omega,
-            working_drive=_working_drive(rig, calibrated.gains_of("vd").c_n_s_m * amplitude * omega, limit),
+            working_drive=_working_drive(rig, viscous_force, limit),
         )
         for chain in (base, chosen)
     )
     speed = amplitude * omega
-    threshold = switch_threshold(settings.residual_force_n, before, after, speed)
+    threshold = switch_threshold(rig.controllers.switch_force_n, before, after, speed)
     summary: dict[str, Any] = {
         "force_change_share": share,
         "residual_force_before_n": before.residual_n(speed),
         "residual_force_after_n": after.residual_n(speed),
-        "switch_force_before_n": settings.residual_force_n,
+        "switch_force_before_n": rig.controllers.switch_force_n,
         "switch_force_after_n": threshold,
     }
     inverse: Network | InverseTable | None = None
