@@ -82,7 +82,8 @@ def structure_of(case: Case, rng: np.random.Generator) -> TrueStructure:
 
 def record_frame_case(case: Case, folder: Path) -> dict[str, Any]:
     """Record sweeps, decays and random motion of a drawn frame; return the truth."""
-    from mrpipe.laboratory.frame_rig import FrameRig, calibrated_structure, floor_masses, record_frame
+    from mrpipe.laboratory.frame_rig import calibrated_structure, floor_masses, record_frame
+    from mrpipe.laboratory.options import FrameRig
 
     rng = np.random.default_rng([case.seed, 7])
     rig = FrameRig(
@@ -132,10 +133,11 @@ def record_loop_case(case: Case, folder: Path) -> dict[str, Any]:
     from mrpipe.control import ControllerOptions, Gains, build_controller
     from mrpipe.control.inverse import inverse_table
     from mrpipe.dampers.model import damper_from_parameter_set
-    from mrpipe.laboratory.closed_loop import LoopRig, record_closed_loop
+    from mrpipe.laboratory.closed_loop import record_closed_loop
     from mrpipe.laboratory.damper import damper_from_set, draw_damper
     from mrpipe.laboratory.effects import Planted
     from mrpipe.laboratory.frame_rig import floor_masses
+    from mrpipe.laboratory.options import LoopRig
     from mrpipe.laboratory.structure import TrueStructure, find_frame_form
     from mrpipe.structures import frame_from_parameter_set
 

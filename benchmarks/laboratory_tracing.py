@@ -66,10 +66,9 @@ def tests_for(excitation: str, duration_s: float) -> list[Any]:
 
 def record(case: Case, folder: Path, duration_s: float) -> Path:
     """Record the campaign of a case."""
-    from mrpipe.laboratory.bench import BenchRig, BenchSensors
     from mrpipe.laboratory.blind import record_blind
     from mrpipe.laboratory.effects import EFFECT_NAMES
-    from mrpipe.laboratory.motion import Servo
+    from mrpipe.laboratory.options import BenchRig, BenchSensors, Servo
 
     names = [part for part in case.planted.split("+") if part != "none"]
     many = len(names)

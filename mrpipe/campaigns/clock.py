@@ -41,6 +41,8 @@ def build_clock(
         Number of samples n.
     where
         Names the test in messages.
+    file
+        Data file, for messages.
 
     Raises
     ------

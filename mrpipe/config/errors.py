@@ -59,6 +59,8 @@ def explain(
         File, or `--set`.
     lines
         Path of keys -> line number in the file.
+    error
+        What pydantic found.
     """
     first, path = _finding(error)
     known_path = path

@@ -118,6 +118,8 @@ def advance_hysteresis(
         gamma/(gamma + beta).
     exponent
         n of (2.2).
+    increment
+        Displacement of the step [m].
     """
     if increment == 0.0:
         return zeta
@@ -209,6 +211,12 @@ def hysteresis_series(
         Shape (n,) [m].
     starts
         Shape (tests + 1,): first sample of each recording, and n; zeta starts at 0 in each.
+    yield_displacement
+        Displacement at which the hysteresis yields [m].
+    gamma_share
+        gamma over gamma + beta [1].
+    exponent
+        n of Bouc-Wen [1].
     """
     result = np.empty(len(displacement))
     _series(

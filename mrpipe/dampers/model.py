@@ -185,6 +185,8 @@ def parameter_unit(name: str, drive_unit: str, form: BaseForm | None = None) -> 
         `A` or `V`.
     form
         Form that the parameter belongs to; forms of the library are searched where it is left out.
+    name
+        Of the result, for messages.
     """
     stem, _, suffix = name.rpartition("_")
     forms = list(base_forms().values()) if form is None else [form]

@@ -313,6 +313,8 @@ def run_chain(
         Shape (n,); m, m/s, m/s^2, A or V.
     dt
         Sampling interval [s].
+    chain
+        Steps of the damper.
 
     Returns
     -------

@@ -72,6 +72,8 @@ def look_ahead(
         First sample of each test, and n; shape (tests + 1,).
     dt
         Sampling interval of each test [s], shape (tests,).
+    time_s
+        Instants, shape (n,) [s].
 
     Returns
     -------

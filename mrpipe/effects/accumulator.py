@@ -52,6 +52,7 @@ EFFECT = Effect(
     summary="a force that goes with displacement, with a preload",
     physics="The rod displaces oil against a gas cushion, which acts as a spring beside the damper.",
     remedy="Measure the force at rest at several positions; check the accumulator's charge, or declare its stiffness.",
+    residual="A straight line over displacement, the same at every drive and speed, with a constant part (preload).",
     source="Spencer et al. 1997 (k1, x0 of the modified Bouc-Wen model); polytropic gas spring",
     acts_on="force",
     forms=(

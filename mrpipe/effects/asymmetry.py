@@ -93,6 +93,7 @@ EFFECT = Effect(
     summary="forces differ between the two directions of motion",
     physics="Piston areas differ between the chambers, a seal drags one way, or the rod leaves on one side.",
     remedy="Test both ways round in the machine; if it turns with the damper it is the damper's, else the machine's.",
+    residual="A step over velocity between the two directions of motion, or a slope on one side only.",
     source="differences of the chambers of a single-rod damper",
     acts_on="force",
     forms=(

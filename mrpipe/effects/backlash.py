@@ -136,6 +136,8 @@ EFFECT = Effect(
     summary="play between rod and damper: the damper stands still while the rod crosses the gap",
     physics="A worn bearing or clevis lets the rod move freely before it takes the damper along.",
     remedy="Fit a new bush or preload the joint; measure slow small triangles about reversal at two currents.",
+    residual="A spike after each reversal: the measured force stays where it was while the model already turns. "
+    "Its width in displacement is the gap.",
     source="play operator (Krasnoselskii and Pokrovskii 1989)",
     acts_on="rod motion",
     forms=(

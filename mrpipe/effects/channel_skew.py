@@ -74,6 +74,8 @@ EFFECT = Effect(
     summary="displacement and force do not belong to the same instant",
     physics="Channels are sampled one after another, or one of them goes through a filter that the other lacks.",
     remedy="Check time stamps with a common step on both inputs; give both channels the same filter.",
+    residual="A loop over velocity that grows with frequency and vanishes where the force is constant; the "
+    "measured loop is turned against the model's.",
     source="multiplexed data loggers",
     acts_on="time base",
     forms=(

@@ -60,8 +60,6 @@ class EffectForm:
         Amplitude -> index in what `steps` returns.
     dissipative
         With parameters within bounds the force it adds or changes never feeds energy over a closed cycle.
-    strength_for_zero
-        Strengths that make the effect vanish (all 0 where empty).
     """
 
     name: str
@@ -109,11 +107,13 @@ class Described:
     Attributes
     ----------
     name, summary
-        As the contract lists them; what it does, in a line.
+        Key of the effect; what it does, in a line.
     physics, remedy
         Sentences for the report: where it comes from, and what to do on the rig.
     source
         Where the law is described.
+    residual
+        What the residual of a model without the effect looks like, for docs/effects.md.
     """
 
     name: str
@@ -121,6 +121,7 @@ class Described:
     physics: str
     remedy: str
     source: str
+    residual: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True)

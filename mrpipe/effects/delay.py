@@ -119,6 +119,8 @@ EFFECT = Effect(
     summary="the drive acts later than the model's lag says",
     physics="Power electronics, eddy currents and the build-up of chains add dead time or a second lag.",
     remedy="Record the coil current itself at the damper, step it up and down at constant velocity, declare the lag.",
+    residual="A residual where the drive changes: the measured force follows steps of the drive later than the "
+    "model. Nothing at constant drive.",
     source="Koo et al. 2006 on response time of MR dampers; eddy currents as a second pole",
     acts_on="effective drive",
     forms=(

@@ -90,6 +90,7 @@ EFFECT = Effect(
     summary="the force shoots up near the end of the stroke",
     physics="The piston touches a bump stop, a seal carrier or the end of the cylinder.",
     remedy="Shorten the stroke or centre the damper; declare free travel and stiffness.",
+    residual="A steep rise beyond one or both ends of the stroke; nothing in the middle.",
     source="unilateral contact (linear and Hertz-like)",
     acts_on="force",
     forms=(

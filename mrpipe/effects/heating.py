@@ -63,6 +63,7 @@ EFFECT = Effect(
     summary="forces fall as work is dissipated within a test",
     physics="The dissipated work stays in the fluid for minutes; a warm carrier is thinner and the chains are weaker.",
     remedy="Measure the temperature, pause between tests, repeat the first test at the end.",
+    residual="Grows with the dissipated work within a test, in proportion to the force, and starts anew after a pause.",
     source="Dogruoz et al. 2003; Wilson and Wereley 2013 on temperature of MR dampers",
     acts_on="yield force",
     forms=(

@@ -39,6 +39,8 @@ EFFECT = Effect(
     summary="a force that goes with acceleration",
     physics="Rod, clevis and fluid between load cell and piston have to be accelerated.",
     remedy="Weigh what moves beyond the load cell and subtract mass times acceleration, or move the cell.",
+    residual="A straight line over acceleration: over displacement it looks like a negative spring that grows with "
+    "the square of the frequency.",
     source="Newton; fluid inertance as in Wang and Wereley",
     acts_on="force",
     forms=(

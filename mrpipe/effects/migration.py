@@ -102,6 +102,7 @@ EFFECT = Effect(
     summary="the force rises slowly after every reversal",
     physics="Particles settle or leave the gap as the flow turns; the field needs a path or a time to bring them back.",
     remedy="Run triangles at several speeds with dwells after reversal; agitate, refill, or declare length or time.",
+    residual="Negative after each reversal and rising back over a travel or a time; largest after long half cycles.",
     source="Sahin et al. 2010 on response after reversal; second hysteretic variable of longer yield displacement",
     acts_on="yield force",
     forms=(

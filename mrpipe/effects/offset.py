@@ -51,7 +51,8 @@ EFFECT = Effect(
     summary="the zero of the load cell moves from test to test or with the drive",
     physics="Current leaks into the bridge of the load cell, or its amplifier is zeroed anew between tests.",
     remedy="Zero the load cell before every test with the coil on, separate the coil's cable from the bridge's.",
-    source="sensor practice; contract section 4",
+    residual="A constant that differs between tests or moves with the drive, without any dependence on motion.",
+    source="sensor practice",
     acts_on="force",
     forms=(
         EffectForm("with-drive", "F + b i", (_RATE,), _with_drive, {"rate": 0}),

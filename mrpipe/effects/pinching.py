@@ -77,6 +77,7 @@ EFFECT = Effect(
     summary="loops are narrow about the middle of the stroke",
     physics="Wear where the piston passes most often widens the gap, or parts slip before they grip.",
     remedy="Move the middle of the stroke on the bench; renew the bore or the pads.",
+    residual="Opposes the force about the middle of the stroke and vanishes towards its ends: loops with a waist.",
     source="Baber and Noori 1985",
     acts_on="yield force",
     forms=(

@@ -43,6 +43,8 @@ EFFECT = Effect(
     summary="a force that goes with the square of speed",
     physics="Fluid is throttled in valve and gap; its kinetic energy is lost behind them.",
     remedy="Test up to the largest speed; widen the bypass, or declare the coefficient.",
+    residual="Proportional to the square of the speed with the sign of the velocity: small at mid speed, steep at "
+    "the highest.",
     source="Bernoulli and Borda; orifice flow",
     acts_on="viscous force",
     forms=(

@@ -138,7 +138,9 @@ EFFECT = Effect(
     summary="the yield force rises with speed, steeply first, then ever less",
     physics="The yielded plug shears in a layer that thickens with speed; the force rounds where a model has a corner.",
     remedy="Take a base form with rounded yield; measure slow triangles at log-spaced speeds.",
-    source="Herschel and Bulkley 1926; shared notes on real recordings: alpha(u) tanh(v/v0), a power of |v|",
+    residual="Over velocity a step with rounded shoulders: steep at low speed, flat at high speed, scaled with the "
+    "drive.",
+    source="Herschel and Bulkley 1926; alpha(u) tanh(v/v0) and a power of |v| fit recordings of real dampers",
     acts_on="yield force",
     forms=(
         EffectForm(

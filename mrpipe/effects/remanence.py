@@ -223,6 +223,8 @@ EFFECT = Effect(
     summary="the damper remembers a larger current: after it the force stays higher",
     physics="Iron core and particle chains keep part of their magnetisation until motion or time breaks it.",
     remedy="Demagnetise with a decaying alternating current, or declare the memory; step the current up and down.",
+    residual="Positive where the drive falls or has been larger before; it fades with motion or time. Nothing when "
+    "the drive only rises from zero.",
     source="An and Kwon 2003 on hysteresis of MR actuators; thesis P2 residual force 22 to 30 N",
     acts_on="effective drive",
     forms=(

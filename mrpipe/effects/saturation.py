@@ -113,6 +113,8 @@ EFFECT = Effect(
     summary="beyond some drive the force rises no more",
     physics="The steel of the flux path saturates, or the driver cannot bring the commanded current.",
     remedy="Record the coil current; measure constant drives up to the largest; lower the limit of the controller.",
+    residual="Negative at the largest drives and positive in between, in proportion to the yield force; no "
+    "dependence on the drive's past.",
     source="B-H curve of the flux path",
     acts_on="effective drive",
     forms=(

@@ -76,6 +76,7 @@ EFFECT = Effect(
     summary="more friction at low speed than at high",
     physics="At low speed seals and guides touch, at high speed they swim on the fluid.",
     remedy="Run slow triangles at log-spaced speeds; change seals or guides, or declare the surplus.",
+    residual="A peak over velocity near zero speed in both directions that decays towards higher speed.",
     source="Stribeck 1902; Armstrong-Helouvry et al. 1994",
     acts_on="yield force",
     forms=(

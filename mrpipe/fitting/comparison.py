@@ -179,6 +179,10 @@ def compare_forms(
         Above 1: cross-validate the fitted forms in so many parts.
     keep
         Names of forms that are fitted to all samples whatever their rank.
+    options
+        How it is traced.
+    progress
+        Called with the share done and a text.
     """
     training = [test for test in tests if test.role == "training"]
     unit = training[0].drive_unit or "A"

@@ -49,6 +49,10 @@ class Fit:
         Weighted residual, shape (n,), 0 where not compared.
     at_bound
         Names of searched parameters and amplitudes of terms at a bound.
+    problem
+        What was fitted.
+    iterations
+        Iterations of the search.
     """
 
     problem: Problem

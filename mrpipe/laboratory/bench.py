@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import signal
@@ -20,7 +20,8 @@ from mrpipe.laboratory.damper import (
     effect_share,
     respond,
 )
-from mrpipe.laboratory.motion import BenchTest, Servo, current_of, displacement_of
+from mrpipe.laboratory.motion import BenchTest, current_of, displacement_of
+from mrpipe.laboratory.options import BenchRig
 
 CHANNELS = {
     "displacement": ("x", "mm"),
@@ -31,48 +32,6 @@ CHANNELS = {
 _KNOCK_FREQUENCY_HZ, _KNOCK_DECAY_S, _KNOCK_SHARE = 145.0, 0.008, 0.25
 _CALIBRATION_TESTS = 24
 _CALIBRATION_SAMPLES = 1_500_000
-
-
-@dataclass(frozen=True)
-class BenchSensors:
-    """Noise (standard deviation) and constant offset (standard deviation of its draw) of each channel, SI.
-
-    Attributes
-    ----------
-    colour
-        `white`, or `coloured`: a first-order spectrum with its corner at 8 Hz, same standard deviation.
-    """
-
-    displacement_noise_m: float = 10e-6
-    acceleration_noise_m_s2: float = 0.1
-    force_noise_n: float = 0.5
-    current_noise_a: float = 5e-3
-    displacement_offset_m: float = 2e-4
-    acceleration_offset_m_s2: float = 0.05
-    force_offset_n: float = 2.0
-    current_offset_a: float = 2e-3
-    colour: Literal["white", "coloured"] = "white"
-
-
-@dataclass(frozen=True)
-class BenchRig:
-    """The machine around the damper.
-
-    Attributes
-    ----------
-    sampling_rate_hz
-        Of the recorder.
-    fine_steps
-        Integration steps a sample.
-    current_phase_spread_rad
-        Half width of the draw of the half-sine current's phase about that of the velocity.
-    """
-
-    servo: Servo = field(default_factory=Servo)
-    sensors: BenchSensors = field(default_factory=BenchSensors)
-    sampling_rate_hz: float = 1000.0
-    fine_steps: int = 4
-    current_phase_spread_rad: float = float(np.pi / 2)
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ import numpy as np
 
 from mrpipe.campaigns import write_campaign
 from mrpipe.errors import UserError
-from mrpipe.laboratory.bench import CHANNELS, BenchRecord, BenchRig, record_bench
+from mrpipe.laboratory.bench import CHANNELS, BenchRecord, record_bench
 from mrpipe.laboratory.damper import damper_from_set, draw_damper
 from mrpipe.laboratory.effects import EFFECT_NAMES, Planted, draw_hidden_effect
 from mrpipe.laboratory.motion import BenchTest
+from mrpipe.laboratory.options import BenchRig
 from mrpipe.laboratory.plans import tests_of
 from mrpipe.laboratory.sealing import campaign_directory, write_sealed
 
@@ -76,6 +77,8 @@ def record_blind(
         Log-normal spread of the damper's numbers about its set.
     declared
         Effects that campaign.yaml names.
+    damper
+        The true damper.
 
     Raises
     ------

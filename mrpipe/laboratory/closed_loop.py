@@ -17,45 +17,8 @@ from mrpipe.laboratory.coefficient_effects import INERTIA_GROWTH, INERTIA_PLAIN
 from mrpipe.laboratory.damper import TrueDamper, packed_for
 from mrpipe.laboratory.frame_rig import ACCELEROMETER_M_S2_PER_V, LASER_M_PER_V, LOAD_CELL_N_PER_V, TableRecord
 from mrpipe.laboratory.motion import smooth_start
+from mrpipe.laboratory.options import LoopRig
 from mrpipe.laboratory.structure import TrueStructure, assemble
-
-
-@dataclass(frozen=True)
-class LoopRig:
-    """Table, sensors and excitation of the closed-loop tests.
-
-    Attributes
-    ----------
-    frequency_rad_s, base_amplitude_m_s2
-        Of the base.
-    rest_s, shaking_s, decay_s
-        Rest before, harmonic motion (eased in over two cycles), free decay after its stop.
-    validation_factor
-        Amplitude of the second test of each law over that of the first.
-    sampling_rate_hz, fine_steps
-        Of the recorder; integration steps a sample.
-    """
-
-    frequency_rad_s: float = 8.0
-    base_amplitude_m_s2: float = 0.788
-    rest_s: float = 1.0
-    shaking_s: float = 32.0
-    decay_s: float = 10.0
-    validation_factor: float = 0.85
-    sampling_rate_hz: float = 500.0
-    fine_steps: int = 16
-    acceleration_noise_m_s2: float = 0.05
-    displacement_noise_m: float = 20e-6
-    force_noise_n: float = 0.5
-    current_noise_a: float = 5e-3
-    acceleration_offset_m_s2: float = 0.01
-    force_offset_n: float = 0.5
-    laser_floors: tuple[int, ...] = (1, 2, 5)
-
-    @property
-    def step_s(self) -> float:
-        """Integration step [s]."""
-        return 1.0 / (self.sampling_rate_hz * self.fine_steps)
 
 
 @dataclass(frozen=True)

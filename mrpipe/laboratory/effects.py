@@ -1,4 +1,4 @@
-"""What can be planted in the virtual damper: names of the contract, their forms, numbers and ranges."""
+"""What can be planted in the virtual damper: names as in docs/effects.md, their forms, parameters and ranges."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ FORMS: tuple[Form, ...] = (
 )
 # fmt: on
 EFFECT_NAMES = tuple(dict.fromkeys(form.effect for form in FORMS if form.effect != "unfamiliar"))
-"""The names of the contract that can be planted in a damper."""
+"""The effects of docs/effects.md that can be planted in a damper."""
 UNFAMILIAR_FORMS = tuple(form.form for form in FORMS if form.effect == "unfamiliar")
 """Shapes that belong to no family."""
 
@@ -252,7 +252,7 @@ class Planted:
 
     @property
     def name(self) -> str:
-        """Name of the contract (`unfamiliar` for shapes of no family)."""
+        """Name as in docs/effects.md (`unfamiliar` for shapes of no family)."""
         return self.form.effect
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from mrpipe.laboratory.damper import solve_strength
 from mrpipe.laboratory.effects import Planted
 from mrpipe.laboratory.kernel import PARAMETERS
 from mrpipe.laboratory.motion import smooth_start
+from mrpipe.laboratory.options import FrameRig
 from mrpipe.laboratory.structure import BRACE, CONTROLLER_DELAY, Assembled, TrueStructure, assemble
 from mrpipe.laboratory.structure_kernel import run_structure
 from mrpipe.structures import natural_modes
@@ -26,54 +27,6 @@ LASER_M_PER_V = 0.0109
 LOAD_CELL_N_PER_V = 50.0
 """Conversion factors of Table 3.2."""
 _CALIBRATION_S = 40.0
-
-
-@dataclass(frozen=True)
-class FrameRig:
-    """Table, sensors and tests.
-
-    Attributes
-    ----------
-    sampling_rate_hz, fine_steps
-        Of the recorder; integration steps a sample.
-    acceleration_noise_m_s2, displacement_noise_m
-        Standard deviations.
-    acceleration_offset_m_s2, displacement_offset_m
-        Standard deviations of the constant offsets.
-    laser_floors
-        Floors whose displacement is measured.
-    sweep_s, sweeps, random_s
-        Duration of a sweep and of the random test [s]; number of sweeps.
-    sweep_acceleration_m_s2, random_acceleration_m_s2
-        Amplitude of the table at the first frequency (rising with its square root), RMS of the random test.
-    decay_acceleration_m_s2
-        Largest floor acceleration when the excitation of a decay test stops.
-    sensitivity_error
-        Standard deviation of the error of each conversion factor [1].
-    support_share
-        Participation of a flexible-support mode above the band [1]; 0 leaves it out.
-    """
-
-    sampling_rate_hz: float = 200.0
-    fine_steps: int = 5
-    acceleration_noise_m_s2: float = 0.01
-    displacement_noise_m: float = 20e-6
-    acceleration_offset_m_s2: float = 0.05
-    displacement_offset_m: float = 5e-4
-    laser_floors: tuple[int, ...] = (1, 2, 5)
-    sweep_s: float = 300.0
-    sweeps: int = 2
-    random_s: float = 240.0
-    sweep_acceleration_m_s2: float = 0.06
-    random_acceleration_m_s2: float = 0.15
-    decay_acceleration_m_s2: float = 1.5
-    sensitivity_error: float = 0.0
-    support_share: float = 0.06
-
-    @property
-    def step_s(self) -> float:
-        """Integration step [s]."""
-        return 1.0 / (self.sampling_rate_hz * self.fine_steps)
 
 
 @dataclass(frozen=True)
@@ -261,7 +214,7 @@ def calibrated_structure(structure: TrueStructure, rig: FrameRig) -> TrueStructu
         If a share is out of reach, or belongs to an effect that shows with a damper only.
     """
     frequencies = natural_modes(structure.frame).frequencies_hz
-    short = replace(rig, sweep_s=_CALIBRATION_S)
+    short = rig.changed(sweep_s=_CALIBRATION_S)
     top = float(frequencies[min(2, len(frequencies) - 1)])
     ground = sweep_ground(short, 0.4 * float(frequencies[0]), 1.2 * top, float(frequencies[0]))
 

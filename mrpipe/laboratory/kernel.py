@@ -100,6 +100,8 @@ def damper_step(
         Coil current that the driver is asked for, at the end of the step [A].
     time
         Time in the test at the end of the step [s].
+    h
+        Time step [s].
     """
     count = codes.shape[0]
     if state[STARTED] < 0.5:

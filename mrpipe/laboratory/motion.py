@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.laboratory.options import Servo
 
 MotionKind = Literal["sine", "triangle", "random", "earthquake", "dwell", "hold"]
 CurrentKind = Literal["constant", "half-sine", "steps", "random"]
@@ -39,6 +40,10 @@ class BenchTest:
         Name of the test that this one repeats: same command, another recording.
     pause_s
         Pause in the middle (hold), or time between steps of current.
+    middle_m
+        Position about which the test moves [m].
+    later
+        The test was made after the others: strengths given as shares are those of the others.
     """
 
     name: str
@@ -53,25 +58,6 @@ class BenchTest:
     pause_s: float = 0.4
     middle_m: float = 0.0
     later: bool = False
-
-
-@dataclass(frozen=True)
-class Servo:
-    """How the testing machine departs from its command.
-
-    Attributes
-    ----------
-    amplitude_error
-        Standard deviation of the amplitude error [1].
-    harmonic_share
-        Standard deviation of second and third harmonic over the amplitude [1].
-    smoothing_s
-        Width of its own smoothing [s].
-    """
-
-    amplitude_error: float = 0.005
-    harmonic_share: float = 0.004
-    smoothing_s: float = 0.004
 
 
 def smooth_start(time: FloatArray, length: float) -> FloatArray:

@@ -84,7 +84,7 @@ def compact(duration_s: float = 5.0) -> list[BenchTest]:
 
 
 def discriminating(duration_s: float = 8.0) -> list[BenchTest]:
-    """Return the tests that tell alike effects apart (tracing notes): speeds, steps, dwells, a long run, repeats."""
+    """Return the tests that separate similar effects: speeds, steps, dwells, a long run, repeats."""
     tests = [
         BenchTest(
             f"speed-{speed * 1e3:.0f}mm_s-{current:g}A",

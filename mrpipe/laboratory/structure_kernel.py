@@ -159,6 +159,10 @@ def run_structure(
         Of :class:`~mrpipe.control.controller.Controller`.
     sensor_noise
         What the controller's sensors add, shape (ticks, 4 + floors), in the order of its measurements.
+    floors
+        Number of floors.
+    h
+        Time step [s].
 
     Returns
     -------

@@ -26,6 +26,8 @@ class TrainingData:
         Their normalisation, from all training records.
     held_out
         Names of the held-out records.
+    spec
+        Features and target.
     """
 
     spec: FeatureSpec

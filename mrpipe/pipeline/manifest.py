@@ -47,6 +47,16 @@ class Manifest:
         Why the stage had nothing to do, or what it failed of; empty where it ran.
     failed
         What went wrong, in one line: of the whole stage where `skipped` says the same, else of a part of it.
+    stage
+        Name of the stage.
+    key
+        What its result depends on.
+    summary
+        What it printed.
+    warnings
+        What it warned of.
+    seconds
+        Wall time.
     """
 
     stage: str

@@ -61,6 +61,14 @@ class Pipeline:
     campaign_given
         The user named a campaign on the command line: what the virtual laboratory could add is then used only where
         a stage cannot do without it, or where it is there already.
+    logger
+        Takes the log lines.
+    quiet
+        Show no progress.
+    force
+        Stages that are built even where nothing changed.
+    outcomes
+        Stage -> what became of it in this call.
     """
 
     loaded: LoadedConfig

@@ -44,6 +44,14 @@ class StageContext:
         The stage's part of the report.
     log
         Log lines of the run.
+    stage
+        Name of the stage.
+    seed
+        Of the run.
+    provenance
+        Written into every artifact.
+    warnings
+        What the stage warned of so far.
     """
 
     stage: str

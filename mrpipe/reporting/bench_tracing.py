@@ -79,6 +79,8 @@ def residual_maps(
         (label of the abscissa, label of the ordinate, values, values), each of shape (n,).
     residual
         Residual force [N], shape (n,).
+    unit
+        Of the residual.
     """
     columns = min(2, len(maps))
     rows = -(-len(maps) // columns)

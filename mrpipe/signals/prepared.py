@@ -35,6 +35,18 @@ class PreparedTest:
     displacement_noise_m, displacement_noise_band_hz
         Standard deviation and band of the displacement's noise where it was put together from several sensors, so that
         the channel itself does not tell; 0 where it does. Not written to the artifact.
+    time_s
+        Clock, shape (n,) [s].
+    displacement_m
+        Filtered, without offset, shape (n,).
+    velocity_m_s
+        Shape (n,).
+    acceleration_m_s2
+        Shape (n,).
+    force_n
+        Filtered, without offset, shape (n,).
+    drive_unit
+        A or V.
     """
 
     name: str

@@ -10,11 +10,11 @@ from mrpipe.pipeline.stage import Stage, StageContext
 if TYPE_CHECKING:
     import numpy as np
 
-    from mrpipe.laboratory.bench import BenchRig
     from mrpipe.laboratory.damper import TrueDamper
     from mrpipe.laboratory.effects import Planted
-    from mrpipe.laboratory.frame_rig import FrameRig, TableRecord
+    from mrpipe.laboratory.frame_rig import TableRecord
     from mrpipe.laboratory.motion import BenchTest
+    from mrpipe.laboratory.options import BenchRig
     from mrpipe.laboratory.structure import TrueStructure
 
 _DAMPER = (
@@ -52,21 +52,13 @@ def _bench_order(context: StageContext) -> tuple[list[BenchTest], BenchRig, np.r
     """Return the tests, the machine and the generator of the bench; the table asks for the same damper."""
     import numpy as np
 
-    from mrpipe.laboratory.bench import BenchRig, BenchSensors
-    from mrpipe.laboratory.motion import BenchTest, Servo
+    from mrpipe.laboratory.motion import BenchTest
     from mrpipe.laboratory.plans import tests_of
 
     bench = context.settings.laboratory.bench
-    rig = BenchRig(
-        servo=Servo(**bench.servo.model_dump()),
-        sensors=BenchSensors(**bench.sensors.model_dump()),
-        sampling_rate_hz=bench.sampling_rate_hz,
-        fine_steps=bench.fine_steps,
-        current_phase_spread_rad=bench.current_phase_spread_rad,
-    )
     listed = [] if bench.plan == "custom" else tests_of(bench.plan, cycles=bench.cycles, duration_s=bench.short_test_s)
     tests = [*listed, *(BenchTest(**item.model_dump()) for item in bench.tests)]
-    return tests, rig, np.random.default_rng([context.seed, 47])
+    return tests, bench, np.random.default_rng([context.seed, 47])
 
 
 def _record_bench(context: StageContext) -> Mapping[str, Any]:
@@ -102,20 +94,13 @@ def _true_structure(context: StageContext) -> TrueStructure:
         for item in items
     ]
     structure = TrueStructure(frame, tuple(effects))
-    return calibrated_structure(structure, _frame_rig(settings))
-
-
-def _frame_rig(settings: Any) -> FrameRig:
-    from mrpipe.laboratory.frame_rig import FrameRig
-
-    own = {"structure", "random_floors", "declared_effects", "hidden_effects"}
-    return FrameRig(**settings.model_dump(exclude=own))
+    return calibrated_structure(structure, settings)
 
 
 def _record_frame(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.laboratory.frame_rig import record_frame
 
-    rig = _frame_rig(context.settings.laboratory.frame)
+    rig = context.settings.laboratory.frame
     structure = _true_structure(context)
     record = record_frame(structure, rig, context.rng, context.progress)
     return _write_table(context, "frame", record, structure, structure.effects, rig.sampling_rate_hz)
@@ -126,11 +111,10 @@ def _record_closed_loop(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.storage import read_calibrated
     from mrpipe.dampers.model import read_damper
     from mrpipe.laboratory.bench import calibrated_on
-    from mrpipe.laboratory.closed_loop import LoopRig, record_closed_loop
+    from mrpipe.laboratory.closed_loop import record_closed_loop
     from mrpipe.structures import read_frame
 
-    settings = context.settings.laboratory.closed_loop
-    rig = LoopRig(**settings.model_dump(exclude={"laws"}))
+    rig = context.settings.laboratory.closed_loop
     damper, structure = calibrated_on(_true_damper(context), *_bench_order(context)), _true_structure(context)
     frame, model = read_frame(context.artifact("identify-frame")), read_damper(context.artifact("identify-damper"))
     chosen = context.settings.simulate.controller
@@ -141,11 +125,11 @@ def _record_closed_loop(context: StageContext) -> Mapping[str, Any]:
         chosen,
         inverse_network(chosen, lambda: context.artifact("train-inverse")),
     )
-    controllers = {law: factory.build(law) for law in settings.laws}
+    controllers = {law: factory.build(law) for law in rig.laws}
     record = record_closed_loop(damper, structure, controllers, rig, context.rng, context.progress)
     effects = (*damper.effects, *structure.effects)
     summary = _write_table(context, "closed-loop", record, structure, effects, rig.sampling_rate_hz)
-    return {**summary, "laws": list(settings.laws)}
+    return {**summary, "laws": list(rig.laws)}
 
 
 def _write_table(

@@ -120,6 +120,10 @@ def shear_frame(
         Shape (n,) [kg], [N/m], lowest first.
     damping_ratios
         Shape (n,) or one number for all modes [1].
+    name
+        Of the frame.
+    source
+        What messages name.
 
     Raises
     ------

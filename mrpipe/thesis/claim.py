@@ -42,7 +42,7 @@ class Claim:
     why: str
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what section 4 of the contract asks for."""
+        """Return the claim as `mrpipe reproduce --json` prints it."""
         return {
             "id": self.id,
             "chapter": self.chapter,

@@ -99,6 +99,8 @@ class Verdict:
         How validation tests differ from training tests.
     comparable
         Errors on the comparable part, where validation tests differ.
+    notes
+        Further keys of `validation` in the JSON.
     """
 
     kind: VerdictClass

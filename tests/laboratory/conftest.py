@@ -2,9 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from mrpipe.laboratory.bench import BenchRig, BenchSensors, fine_motion
+from mrpipe.laboratory.bench import fine_motion
 from mrpipe.laboratory.damper import FineMotion, TrueDamper, damper_from_set
-from mrpipe.laboratory.motion import BenchTest, Servo
+from mrpipe.laboratory.motion import BenchTest
+from mrpipe.laboratory.options import BenchRig, BenchSensors, Servo
 
 QUIET = BenchSensors(
     displacement_noise_m=0.0,
@@ -16,7 +17,7 @@ QUIET = BenchSensors(
     force_offset_n=0.0,
     current_offset_a=0.0,
 )
-EXACT = BenchRig(servo=Servo(0.0, 0.0, 1e-5), sensors=QUIET)
+EXACT = BenchRig(servo=Servo(amplitude_error=0.0, harmonic_share=0.0, smoothing_s=1e-5), sensors=QUIET)
 
 
 @pytest.fixture(scope="session")

@@ -12,10 +12,11 @@ import pytest
 from mrpipe.campaigns import campaign_files, load_campaign
 from mrpipe.errors import UserError
 from mrpipe.laboratory import plans
-from mrpipe.laboratory.bench import BenchRig, BenchSensors, record_bench
+from mrpipe.laboratory.bench import record_bench
 from mrpipe.laboratory.blind import record_blind
 from mrpipe.laboratory.damper import TrueDamper
 from mrpipe.laboratory.effects import Planted, find_form
+from mrpipe.laboratory.options import BenchRig, BenchSensors
 from mrpipe.laboratory.plans import compact, discriminating, table_2_1
 from mrpipe.laboratory.sealing import open_sealed, sealed_path
 from tests.laboratory.conftest import QUIET
@@ -78,7 +79,7 @@ def test_training_and_validation_differ_in_phase_and_noise(damper: TrueDamper) -
 
 @pytest.mark.golden
 def test_sensor_noise_and_offset_are_those_asked_for(damper: TrueDamper) -> None:
-    sensors = replace(QUIET, force_noise_n=0.5, force_offset_n=3.0)
+    sensors = QUIET.changed(force_noise_n=0.5, force_offset_n=3.0)
     loud = record_bench(damper, FEW, BenchRig(sensors=sensors), np.random.default_rng(1))
     quiet = record_bench(damper, FEW, BenchRig(sensors=QUIET), np.random.default_rng(1))
     error = np.concatenate([a.columns["F"] - b.columns["F"] for a, b in zip(loud.tests, quiet.tests, strict=True)])
@@ -90,7 +91,7 @@ def test_sensor_noise_and_offset_are_those_asked_for(damper: TrueDamper) -> None
 @pytest.mark.golden
 def test_coloured_noise_is_slow(damper: TrueDamper) -> None:
     def neighbours(colour: str) -> float:
-        sensors = replace(QUIET, force_noise_n=0.5, colour=colour)
+        sensors = QUIET.changed(force_noise_n=0.5, colour=colour)
         noisy = record_bench(damper, FEW[:1], BenchRig(sensors=sensors), np.random.default_rng(1)).tests[0].columns["F"]
         exact = record_bench(damper, FEW[:1], BenchRig(sensors=QUIET), np.random.default_rng(1)).tests[0].columns["F"]
         error = noisy - exact

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -13,9 +11,10 @@ from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import inverse_table
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
-from mrpipe.laboratory.closed_loop import LoopHistories, LoopRig, base_motion, record_closed_loop, run_loop
+from mrpipe.laboratory.closed_loop import LoopHistories, base_motion, record_closed_loop, run_loop
 from mrpipe.laboratory.damper import TrueDamper
 from mrpipe.laboratory.effects import Planted, find_form
+from mrpipe.laboratory.options import LoopRig
 from mrpipe.laboratory.structure import TrueStructure, find_frame_form
 from mrpipe.structures import frame_from_parameter_set
 
@@ -74,9 +73,9 @@ def test_true_rig_gives_the_row_of_set_c(
 def test_halving_the_step_changes_little(
     damper: TrueDamper, structure: TrueStructure, controllers: dict[str, Controller]
 ) -> None:
-    short = replace(RIG, shaking_s=8.0, decay_s=1.0, displacement_noise_m=0.0, acceleration_noise_m_s2=0.0)
+    short = RIG.changed(shaking_s=8.0, decay_s=1.0, displacement_noise_m=0.0, acceleration_noise_m_s2=0.0)
     coarse, fine = (
-        run(damper, structure, controllers["vd"], replace(short, fine_steps=steps)).displacement[:, -1]
+        run(damper, structure, controllers["vd"], short.changed(fine_steps=steps)).displacement[:, -1]
         for steps in (16, 64)
     )
     assert np.abs(coarse - fine).max() < 2e-3 * np.abs(fine).max()
@@ -106,7 +105,7 @@ def test_remanence_raises_the_residual_force_most_under_positive_stiffness(
 def test_controller_delay_makes_the_drive_late(
     damper: TrueDamper, structure: TrueStructure, controllers: dict[str, Controller]
 ) -> None:
-    short = replace(RIG, shaking_s=10.0, decay_s=1.0)
+    short = RIG.changed(shaking_s=10.0, decay_s=1.0)
     late = structure.with_effects([Planted(find_frame_form("controller-delay"), {"time": 0.03})])
     true = run(damper, late, controllers["vd"], short)
     prompt = run(damper, structure, controllers["vd"], short)
@@ -123,7 +122,7 @@ def test_controller_delay_makes_the_drive_late(
 def test_inertia_slows_the_frame_down_and_its_forms_agree(
     damper: TrueDamper, structure: TrueStructure, controllers: dict[str, Controller]
 ) -> None:
-    short = replace(RIG, shaking_s=8.0, decay_s=1.0, displacement_noise_m=0.0, acceleration_noise_m_s2=0.0)
+    short = RIG.changed(shaking_s=8.0, decay_s=1.0, displacement_noise_m=0.0, acceleration_noise_m_s2=0.0)
     numbers = {"lagged": {"mass": 12.0, "lag": 0.0003}, "plain": {"mass": 12.0, "growth_length": 10.0}}
     tops = {"none": run(damper, structure, controllers["passive-off"], short).displacement[:, -1]}
     for form, values in numbers.items():
@@ -138,7 +137,7 @@ def test_inertia_slows_the_frame_down_and_its_forms_agree(
 def test_campaign_tells_law_and_gains(
     damper: TrueDamper, structure: TrueStructure, controllers: dict[str, Controller]
 ) -> None:
-    short = replace(RIG, shaking_s=6.0, decay_s=1.0)
+    short = RIG.changed(shaking_s=6.0, decay_s=1.0)
     some = {law: controllers[law] for law in ("vdns", "passive-off")}
     record = record_closed_loop(damper, structure, some, short, np.random.default_rng(1))
     assert [(test.name, test.role) for test in record.tests] == [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,8 @@ import pytest
 from mrpipe.campaigns import load_campaign, write_campaign
 from mrpipe.errors import UserError
 from mrpipe.laboratory.effects import Planted
-from mrpipe.laboratory.frame_rig import FrameRig, calibrated_structure, decay_ground, record_frame, shake, sweep_ground
+from mrpipe.laboratory.frame_rig import calibrated_structure, decay_ground, record_frame, shake, sweep_ground
+from mrpipe.laboratory.options import FrameRig
 from mrpipe.laboratory.sealing import write_scales
 from mrpipe.laboratory.structure import (
     FRAME_EFFECT_NAMES,
@@ -26,7 +26,7 @@ from mrpipe.structures import frame_from_parameter_set, natural_modes
 from mrpipe.structures.response import linear_response
 
 RIG = FrameRig(sweep_s=40.0, sweeps=1, random_s=0.0)
-SHORT = replace(RIG, decay_acceleration_m_s2=1.5)
+SHORT = RIG.changed(decay_acceleration_m_s2=1.5)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,7 @@ def test_sensors_speak_volts_and_the_campaign_knows_their_scale(structure: TrueS
 @pytest.mark.parametrize("floors", [3, 8])
 def test_frames_of_any_height_are_recorded(floors: int) -> None:
     structure = TrueStructure(random_frame(np.random.default_rng(floors), floors))
-    record = record_frame(structure, replace(RIG, sweep_s=20.0), np.random.default_rng(1))
+    record = record_frame(structure, RIG.changed(sweep_s=20.0), np.random.default_rng(1))
     assert len(record.tests) == 1 + floors
     assert sum(name.startswith("floor_acceleration") for name in record.channels) == floors
     assert all(np.isfinite(list(test.columns.values())).all() for test in record.tests)
@@ -90,7 +90,7 @@ def test_frames_of_any_height_are_recorded(floors: int) -> None:
 @pytest.mark.planted
 @pytest.mark.parametrize("form", FRAME_FORMS[:-1], ids=lambda form: form.form)
 def test_effects_of_the_structure_change_its_response(structure: TrueStructure, form: object) -> None:
-    rig = replace(RIG, fine_steps=20, sweep_acceleration_m_s2=0.15)
+    rig = RIG.changed(fine_steps=20, sweep_acceleration_m_s2=0.15)
     ground = sweep_ground(rig, 0.5, 5.0, 1.3)
     plain, _ = shake(assemble(structure, rig.step_s), ground, rig)
     hidden = structure.with_effects([Planted(form)])  # type: ignore[arg-type]
@@ -105,7 +105,7 @@ def test_effects_of_the_structure_change_its_response(structure: TrueStructure, 
 
 @pytest.mark.planted
 def test_joint_friction_ends_a_decay_and_cubic_stiffness_raises_the_frequency(structure: TrueStructure) -> None:
-    rig = replace(RIG, fine_steps=10)
+    rig = RIG.changed(fine_steps=10)
     ground = decay_ground(rig, structure, 1, np.random.default_rng(1))
     plain, _ = shake(assemble(structure, rig.step_s), ground, rig)
     for form in ("dahl", "smooth"):
@@ -122,7 +122,7 @@ def test_joint_friction_ends_a_decay_and_cubic_stiffness_raises_the_frequency(st
 
 @pytest.mark.planted
 def test_impact_stops_the_floor_at_its_clearance(structure: TrueStructure) -> None:
-    rig = replace(RIG, fine_steps=20, sweep_acceleration_m_s2=0.15)
+    rig = RIG.changed(fine_steps=20, sweep_acceleration_m_s2=0.15)
     ground = sweep_ground(rig, 0.5, 5.0, 1.3)
     bumper = structure.with_effects([Planted(find_frame_form("impact"), {"clearance": 0.004, "stiffness": 2e7})])
     free, _ = shake(assemble(structure, rig.step_s), ground, rig)
@@ -152,7 +152,7 @@ def test_every_effect_of_a_frame_can_be_drawn() -> None:
 @pytest.mark.planted
 @pytest.mark.parametrize("effect", ["joint-friction", "cubic-stiffness", "impact", "base-rocking"])
 def test_strength_of_a_frame_effect_is_scaled_to_its_share(structure: TrueStructure, effect: str) -> None:
-    rig = replace(RIG, sweep_acceleration_m_s2=0.15)
+    rig = RIG.changed(sweep_acceleration_m_s2=0.15)
     hidden = structure.with_effects([Planted(find_frame_form(effect), {}, 0.10)])
     found = calibrated_structure(hidden, rig)
     frequencies = natural_modes(structure.frame).frequencies_hz

@@ -14,9 +14,8 @@ import pytest
 from mrpipe.artifacts import Provenance, no_progress
 from mrpipe.campaigns import load_campaign
 from mrpipe.config.sections.laboratory import BenchSettings, CustomTest, LaboratorySettings, PlantedEffect
-from mrpipe.laboratory.closed_loop import LoopRig
-from mrpipe.laboratory.frame_rig import FrameRig
-from mrpipe.laboratory.motion import BenchTest, Servo
+from mrpipe.laboratory.motion import BenchTest
+from mrpipe.laboratory.options import BenchRig, FrameRig, LoopRig
 from mrpipe.laboratory.sealing import campaign_directory, open_sealed, sealed_path
 from mrpipe.pipeline.stage import StageContext
 from mrpipe.stages.record import RECORD_BENCH
@@ -103,21 +102,9 @@ def test_the_same_seed_records_the_same_files(tmp_path: Path) -> None:
 
 
 @pytest.mark.property
-@pytest.mark.parametrize(
-    ("section", "target"),
-    [
-        ("frame", FrameRig),
-        ("closed_loop", LoopRig),
-    ],
-)
-def test_settings_and_rigs_have_the_same_defaults(section: str, target: Any) -> None:
-    settings = getattr(LaboratorySettings(), section).model_dump()
-    rig = dataclasses.asdict(target())
-    assert {key: settings[key] for key in rig} == rig
-
-
-@pytest.mark.property
-def test_bench_settings_build_the_same_rig() -> None:
-    bench = BenchSettings()
-    assert Servo(**bench.servo.model_dump()) == Servo()
+def test_settings_are_the_rigs_so_that_a_default_exists_once() -> None:
+    settings = LaboratorySettings()
+    for section, rig in ((settings.bench, BenchRig), (settings.frame, FrameRig), (settings.closed_loop, LoopRig)):
+        assert isinstance(section, rig)
+        assert {name: getattr(section, name) for name in rig.model_fields} == dict(rig())
     assert set(CustomTest.model_fields) == {field.name for field in dataclasses.fields(BenchTest)}

@@ -44,6 +44,8 @@ class TenStoreyGains:
         Of the two-component reduction.
     storey_stiffness_n_m
         k.
+    modal
+        Limiting frequencies and modal flexibility of the target mode.
     """
 
     limits: TwoComponent

@@ -45,6 +45,7 @@ EFFECT = StructuralEffect(
     summary="the base turns: all storeys drift in common, in proportion to the overturning moment",
     physics="The base plate or the ground under it gives to the overturning moment, so floors move with their height.",
     remedy="Bolt or stiffen the base, or measure its rotation; declare rotational stiffness and inertia.",
+    residual="All storeys show a residual in phase with the overturning moment; it grows linearly with height.",
     source="Wolf (1985), sway-rocking model; Housner (1963) for uplift",
     acts_on="base",
     forms=(

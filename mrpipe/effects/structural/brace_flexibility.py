@@ -10,6 +10,8 @@ EFFECT = StructuralEffect(
     summary="the damper's rod lags the floor by the stretch of its brace",
     physics="Brace, rod ends and load cell stretch under the damper's force: its rod moves less than the floor.",
     remedy="Stiffen the brace, or measure the damper's own displacement; declare the brace's stiffness.",
+    residual="The damper's loop is sheared: the floor moves further than the rod, by an amount proportional to the "
+    "damper force.",
     source="Constantinou et al. (1998), damper in series with its brace (Maxwell)",
     acts_on="damper-rod",
     forms=(

@@ -12,6 +12,7 @@ EFFECT = StructuralEffect(
     summary="drive or desired force are late for the motion",
     physics="Acquisition, computation, transmission or the current driver take time: the command answers a past state.",
     remedy="Shorten the loop, predict the state over the delay, or declare it in the controller's design.",
+    residual="The measured force lags the desired force by a constant time; the loop over velocity opens.",
     source="Agrawal and Yang (1997)",
     acts_on="command",
     forms=(

@@ -30,6 +30,7 @@ EFFECT = StructuralEffect(
     summary="the stiffness of a storey changes with the square of its drift",
     physics="Columns clamped at both ends are stretched by large drift and stiffen; soft clamps and gravity soften.",
     remedy="Keep to smaller drift, or declare the cubic coefficient of the storeys named.",
+    residual="Over the drift of one storey a cubic curve; the natural frequency moves with amplitude.",
     source="Duffing (1918)",
     acts_on="storey",
     forms=(

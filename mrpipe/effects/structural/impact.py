@@ -50,6 +50,8 @@ EFFECT = StructuralEffect(
     summary="a force that sets in where a floor has used up a gap",
     physics="A floor strikes a bumper, a stop of the table or a neighbour once its displacement exceeds the free gap.",
     remedy="Widen the gap at the floor named or shake less; declare gap and contact stiffness.",
+    residual="Zero up to a displacement of one floor, a steep rise beyond it, with high-frequency bursts in its "
+    "acceleration.",
     source="Hunt and Crossley (1975), Jankowski (2005)",
     acts_on="floor",
     places="one",

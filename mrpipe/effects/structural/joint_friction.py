@@ -49,6 +49,8 @@ EFFECT = StructuralEffect(
     summary="a force of constant size against the drift's rate",
     physics="Bolted joints and column feet slip: a storey resists with a friction force at any amplitude.",
     remedy="Tighten or weld the joints of the storeys named; declare friction force and slip displacement.",
+    residual="A step over the drift rate of a storey, independent of amplitude: the damping ratio falls as the "
+    "amplitude rises.",
     source="Jenkins (1962), Iwan (1966); Coulomb friction",
     acts_on="storey",
     forms=(

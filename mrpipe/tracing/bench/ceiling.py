@@ -37,6 +37,10 @@ class Ceiling:
         Measured less predicted force [N], shape (n,), of pieces left out.
     piece
         Piece of each sample, shape (n,).
+    recordings
+        Validation tests.
+    measured
+        Measured force without offset [N], shape (n,).
     """
 
     recordings: Recordings
@@ -76,6 +80,12 @@ def cross_fitted(
         Measured less simulated force of the training tests [N], shape (n,), 0 where not compared.
     validation, measured, simulated
         Validation tests, their offset-free force and the simulated one [N], shape (m,).
+    training
+        Training tests.
+    seed
+        Of the trees.
+    iterations
+        Number of trees.
     """
     piece = _pieces(validation)
     states = np.column_stack([lagged_states(found, validation), 1.0 + validation.test])
@@ -161,6 +171,14 @@ def flexible_residual(
         The fit whose residual it is; its simulated states are what the trees see.
     residual
         Residual force of the training tests [N], shape (n,), 0 where not compared.
+    training
+        Training tests.
+    validation
+        Validation tests.
+    seed
+        Of the trees.
+    iterations
+        Number of trees.
 
     Returns
     -------

@@ -59,6 +59,8 @@ def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Correction
     ----------
     tests
         All prepared tests, so that those the tracing left out have their offset too.
+    traced
+        The tracing.
     """
     found = Corrections()
     chosen = traced.selection.chosen

@@ -103,6 +103,18 @@ def on_validation(
         Whether the offsets of the tests are a finding: the base is then judged with one offset for all.
     record_gain
         Whether every record gets a gain, from its first part; the errors are those of the rest.
+    base
+        Fit of the base model.
+    chosen
+        Fit with the named effects.
+    baseline
+        Base model and noise of the training tests.
+    training
+        Training tests.
+    validation
+        Validation tests.
+    rules
+        Decision thresholds.
     """
     before, after = predict(base, validation), predict(chosen, validation)
     first = first_parts(validation, rules.first_part)
@@ -177,6 +189,18 @@ def judge(
         Known faults of validation tests.
     folds
         Of the cross-validation on training tests.
+    found
+        Both models on the validation tests.
+    base
+        Fit of the base model.
+    chosen
+        Fit with the named effects.
+    training
+        Training tests.
+    rules
+        Decision thresholds.
+    jobs
+        Processes; the result does not depend on their number.
     """
     ceilings = ceilings_of(found, base, chosen, training)
     whole = _evidence(found, ceilings, found.recordings.used, structured, bool(names), bool(base_taken))

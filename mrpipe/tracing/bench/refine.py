@@ -37,6 +37,12 @@ def with_richer_forms(
         How many terms the campaign declares: they keep their forms.
     folds, draws
         Of the cross-validation and its bootstrap.
+    selection
+        Named effects with their fit.
+    rng
+        Source of randomness.
+    jobs
+        Processes; the result does not depend on their number.
     """
     chosen = selection.chosen
     unseen: FloatArray | None = None

@@ -106,6 +106,10 @@ def correlation_p_value(residual: FloatArray, recordings: Recordings, lags: int 
     ----------
     residual
         Shape (n,); samples that are not compared are left out.
+    recordings
+        Tests that the residual belongs to.
+    lags
+        Number of lags that are tested.
     """
     best, count = 1.0, 0
     for test in range(recordings.tests):

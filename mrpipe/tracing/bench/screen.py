@@ -32,6 +32,8 @@ class Screened:
         Share of the residual's sum of squares that it takes to first order.
     values
         Start values for a joint fit.
+    term
+        The effect in the form that was tried.
     """
 
     term: Term

@@ -66,6 +66,8 @@ class Candidate:
         Share of the recoverable residual of the base that the whole set recovers.
     forms
         Share of each form that was tried.
+    name
+        Of the effect.
     """
 
     name: str

@@ -88,6 +88,14 @@ def trace_campaign(
         The library: name -> effect.
     declared
         Effects that the campaign declares: part of the baseline.
+    options
+        How it is traced.
+    rng
+        Source of randomness.
+    jobs
+        Processes; the result does not depend on their number.
+    progress
+        Called with the share done and a text.
     """
     rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
     ordered = sort_tests(tests)

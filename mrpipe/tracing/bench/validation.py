@@ -184,6 +184,8 @@ def compare(
         Agreement of the training tests with fits that have not seen them.
     faults
         Known faults of validation tests, by the name of the test.
+    rules
+        Decision thresholds.
     """
     typical = float(np.median([item.error for item in trained])) if trained else 0.0
     high = float(np.quantile([item.error for item in trained], 0.9)) if trained else 0.0

@@ -46,7 +46,7 @@ class Named:
     gain: Gain | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as contract section 4 has it."""
+        """Return it as docs/close-loop-json.md describes it."""
         found: dict[str, Any] = {
             "name": self.effect.name,
             "form": self.form,

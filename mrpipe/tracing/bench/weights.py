@@ -183,6 +183,10 @@ def force_deviation(
     ----------
     model_error_share
         Expected model error, as a share of the force RMS.
+    found
+        Fit whose model is simulated.
+    recordings
+        Tests.
     """
     floor = max(LEAST_SHARE, model_error_share) * recordings.force_rms
     return np.asarray(np.hypot(sensor_deviation(found, recordings, scale), floor), dtype=np.float64)

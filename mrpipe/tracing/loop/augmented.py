@@ -131,6 +131,8 @@ def force_in_use(
         Of the motion to be damped [rad/s]; a drive is held for half a period before the force is taken.
     working_drive
         What the drive has been before, where it comes from above.
+    chain
+        The damper.
     """
     speeds, drives = np.array(SPEEDS_M_S), np.linspace(0.0, drive_limit, DRIVES)
     branches = np.empty((2, len(speeds), len(drives)))
@@ -252,6 +254,14 @@ def retrain_inverse(
         Prepared tests whose motions are used; of validation tests the motions only.
     options
         How it is trained; a few starts on a subsample, seconds in all, where nothing is given.
+    drive_limit
+        Largest drive [A or V].
+    rng
+        Source of randomness.
+    jobs
+        Processes; the result does not depend on their number.
+    progress
+        Called with the share done and a text.
     """
     rate = old.features.sampling_rate_hz
     history = simulated_history(chain, training, drive_limit, rate, rng)

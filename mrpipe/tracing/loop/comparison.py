@@ -235,6 +235,10 @@ def best_ways(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench: B
     ----------
     ways
         Name -> way, the least changed first; a later one must be better by :data:`ALIKE`.
+    runs
+        Laws under their motion.
+    bench
+        Structure and sensors.
     """
     found = {}
     for law in dict.fromkeys(run.law for run in runs):
@@ -259,6 +263,10 @@ def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench
     ways
         `before`: controller as it ran, damper without the effect; `after`: the same with the effect; `recalibrated`:
         controller made for the damper with the effect. The last may be missing.
+    runs
+        Laws under their motion.
+    bench
+        Structure and sensors.
     """
     rows = []
     for run in runs:

@@ -30,6 +30,14 @@ class FrameProblem:
         Of the shear frame fitted first, shape (n,) [N/m].
     frequencies_hz
         Its modes.
+    training
+        Spectra of the training records.
+    validation
+        Spectra of the validation records.
+    masses_kg
+        Floor masses, shape (n,).
+    band
+        Frequencies in use.
     """
 
     training: tuple[Spectra, ...]
@@ -89,6 +97,8 @@ def coupled_stiffness(spectra: Sequence[Spectra], sheared: FloatArray) -> FloatA
     ----------
     sheared
         Of the shear frame, shape (n, n) [N/m].
+    spectra
+        Spectra of the records.
     """
     n = len(sheared)
     found = sheared.copy()

@@ -171,6 +171,16 @@ def search(
     ----------
     before
         Projected columns of the effects chosen before, shape (k, n, 2 b).
+    placed
+        Form of an effect at its place.
+    design
+        The linear frame that the residual is judged against.
+    about
+        Scales of the structure.
+    evaluations
+        Largest number of evaluations.
+    screen_only
+        Return after the coarse grid.
     """
     scales = scales_of(design.spectra, placed)
     bounds = [item.bounds(scales) for item in placed.form.searched]

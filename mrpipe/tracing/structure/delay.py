@@ -57,8 +57,8 @@ class DelayFinding:
         Shift of least error; what sampling and filters are granted of it.
     before, after
         Error on validation tests over the RMS of the signal, without and with the dead time beyond what is granted.
-    floor
-        Error at the best shift on validation tests.
+    interval_s
+        Interval of the delay [s].
     """
 
     part: str
@@ -137,6 +137,10 @@ def law_lag(tests: Sequence[LoopSignals], laws: Mapping[str, str], *, longest_s:
     ----------
     laws
         Test -> law; those of vd, vdps and vdns are linear in velocity and displacement where they are not clipped.
+    tests
+        Closed-loop recordings.
+    longest_s
+        Longest delay that is searched [s].
     """
     linear = [item for item in tests if is_linear(laws.get(item.name, "")) and np.std(item.desired) > 0.0]
     validation = [item for item in linear if item.role == "validation"] or linear

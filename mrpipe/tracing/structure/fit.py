@@ -60,6 +60,16 @@ class Design:
         Weighted residual of each storey, shape (n, 2 b).
     basis
         Orthonormal basis of the weighted regressors of each storey, shape (2 b, p).
+    base
+        The linear frame.
+    spectra
+        Spectra of the records.
+    width
+        Number of equations b of one storey, real and imaginary parts apart.
+    solvers
+        Pseudo-inverse of the regressors of each storey.
+    free
+        Number of fitted numbers.
     """
 
     base: Base
@@ -137,6 +147,8 @@ class Solved:
         Shape (k,), none below nought.
     residual
         Shape (n, 2 b).
+    chi_square
+        Mean square of the weighted residual; 1 is noise.
     """
 
     amplitudes: FloatArray

@@ -24,6 +24,14 @@ class FrameModel:
     linear
         For each storey: displacements (or its drift), velocities of all floors, ground acceleration and its second
         derivative, loads.
+    base
+        The linear frame.
+    chosen
+        Effects with their parameters.
+    amplitudes
+        Of the effects, one after another.
+    about
+        Scales of the structure.
     """
 
     base: Base

@@ -1,4 +1,4 @@
-"""What is judged on a structure's campaign, part by part, each with the keys of contract section 4."""
+"""What is judged on a structure's campaign, part by part, each with the keys of docs/close-loop-json.md."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Part:
     name
         `frame`, `command` or `damper`.
     summary
-        Keys of contract section 4.
+        Keys of docs/close-loop-json.md.
     """
 
     name: str

@@ -58,6 +58,20 @@ class FrameSelection:
         What stands out of the noise under the base.
     chosen
         Effects in the order of choice, amplitudes one after another.
+    design
+        The linear model of all storeys.
+    rounds
+        Candidates of each round of the selection.
+    amplitudes
+        Of the chosen effects, one after another.
+    residual
+        Weighted residual with the chosen effects.
+    gains
+        Cross-validated gain of each chosen effect.
+    declared
+        How many of them the campaign declares.
+    storey_stiffness
+        Of the shear frame, shape (n,) [N/m].
     """
 
     base: Base
@@ -190,6 +204,20 @@ def select(
         The library.
     declared
         Effects that the campaign declares: fitted first, part of the baseline.
+    problem
+        Spectra and what is known of the structure.
+    rules
+        Decision thresholds.
+    most
+        Largest number of effects.
+    rng
+        Source of randomness.
+    draws
+        Of the bootstrap.
+    jobs
+        Processes; the result does not depend on their number.
+    progress
+        Called with the share done and a text.
     """
     storeys = problem.storey_stiffness
     about = Surroundings(storeys)

@@ -98,6 +98,14 @@ class Spectra:
         Inverse of the standard deviation of a line's real or imaginary part, shape (n, b).
     variance
         Mean square of the noise of a line, shape (n, b).
+    record
+        The record.
+    motion
+        Its motion in the time domain.
+    frequencies_hz
+        Of the lines, shape (b,).
+    taper
+        Window in the time domain.
     """
 
     record: FrameRecord
@@ -296,6 +304,14 @@ def spectra_of(
         Shape (n,) [kg].
     stiffness
         Row a storey, column a floor's displacement, shape (n, n) [N/m]: for the weights alone.
+    record
+        The record.
+    band
+        Frequencies in use.
+    noise
+        Of the sensors.
+    motion
+        Motion of the record in the time domain.
     """
     n, dt = record.floors, record.dt
     frequencies = lines_in_band(len(record.ground), dt, band)

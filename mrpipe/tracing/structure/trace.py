@@ -30,7 +30,7 @@ LEAST_STOREY = 0.05
 
 @dataclass(frozen=True)
 class FrameTracing:
-    """What was found of the structure; `summary` is the JSON of contract section 4."""
+    """What was found of the structure; `summary` is the JSON of docs/close-loop-json.md."""
 
     summary: dict[str, Any]
     problem: FrameProblem
@@ -59,6 +59,18 @@ def trace_frame(
         The library, and what the campaign declares of it.
     most
         Most effects that are named together.
+    data
+        Records of the structure.
+    rules
+        Decision thresholds.
+    draws
+        Of the bootstrap.
+    rng
+        Source of randomness.
+    jobs
+        Processes; the result does not depend on their number.
+    progress
+        Called with the share done and a text.
     """
     training = data.with_role("training", "repeat")
     problem = frame_problem(training, data.with_role("validation") or training, data.masses_kg)

@@ -36,13 +36,15 @@ class StructureTracing:
     Attributes
     ----------
     summary
-        The JSON of contract section 4.
+        The JSON of docs/close-loop-json.md.
     histories
         Name in the artifact -> array.
     maps
         (storey, drift [m], rate [m/s], residual shear force [N]) of the training records, before any effect.
     shown
         (test, storey, time [s], measured, before, after) of validation records: residual shear forces [N].
+    findings
+        What the user should know, one line each.
     """
 
     summary: dict[str, Any]
@@ -70,6 +72,14 @@ def trace_structure(
         Of one and the same rig.
     effects, damper_effects
         The libraries.
+    options
+        How it is traced.
+    rng
+        Source of randomness.
+    jobs
+        Processes; the result does not depend on their number.
+    progress
+        Called with the share done and a text.
     """
     data, campaign = joined_data(campaigns), campaigns[0]
     findings = [f"test {name} does not record every floor: it is not judged for the frame" for name in data.left_out]

@@ -12,11 +12,12 @@ from mrpipe.campaigns import load_campaign
 from mrpipe.config.sections.laboratory import CustomTest
 from mrpipe.effects.contract import TESTS_FOR, TestKind
 from mrpipe.effects.library import all_effects, damper_effects
-from mrpipe.laboratory.bench import BenchRig, record_bench
+from mrpipe.laboratory.bench import record_bench
 from mrpipe.laboratory.blind import write_bench
 from mrpipe.laboratory.damper import damper_from_set
 from mrpipe.laboratory.effects import Planted, find_form
 from mrpipe.laboratory.motion import BenchTest
+from mrpipe.laboratory.options import BenchRig
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench import extra_tests
