@@ -33,6 +33,8 @@ def held_force(chain: Chain, speed: float, drive: float, before: float, stroke_m
         Half the largest peak-to-peak displacement [m].
     half_period_s
         Longest time in one direction.
+    chain
+        Steps of the damper.
     """
     half = min(half_period_s, 2.0 * stroke_m / speed)
     dt = min(STEP_S, half / 40.0)

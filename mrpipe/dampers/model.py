@@ -303,6 +303,10 @@ def read_damper(
     ----------
     effect
         (name, form, file) -> the effect without its numbers; see :func:`mrpipe.effects.damper.read_damper`.
+    artifact
+        Artifact that holds it.
+    group
+        Group inside the artifact.
 
     Raises
     ------

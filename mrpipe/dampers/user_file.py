@@ -19,6 +19,8 @@ def module_of_file(path: Path, setting: str, remedy: str) -> ModuleType:
     ----------
     setting, remedy
         Where the file was named and what it has to define, for messages.
+    path
+        File to be loaded.
 
     Raises
     ------

@@ -183,6 +183,10 @@ def compare_forms(
         How it is traced.
     progress
         Called with the share done and a text.
+    forms
+        Forms that are compared.
+    tests
+        Prepared tests.
     """
     training = [test for test in tests if test.role == "training"]
     unit = training[0].drive_unit or "A"

@@ -37,6 +37,8 @@ def damper_model(
         The user's own file that defines the base form, if any.
     effect_files
         Effect -> the user's own file that defines it.
+    found
+        The fit.
     """
     base, scales = found.problem.base, found.problem.scales
     numbers: dict[str, float] = {}

@@ -127,6 +127,10 @@ def form_problem(
         An offset for each test; else one for all.
     weights
         Factor on the error of each sample, shape (n,); 1 where left out.
+    recordings
+        Tests laid end to end.
+    base
+        Base form.
     """
     problem = first_problem(recordings, base)
     root = problem.root_weight if weights is None else problem.root_weight * weights
@@ -144,6 +148,10 @@ def fit_form(
         See :func:`form_problem`.
     warm
         Parameters to start from in place of the form's own starts.
+    method
+        Optimiser.
+    drive_unit
+        A or V.
 
     Raises
     ------

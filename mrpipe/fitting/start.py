@@ -74,6 +74,10 @@ def base_of(
         One for each block of the form; the first one serves further blocks.
     held
         Parameters that are not searched.
+    recordings
+        Tests laid end to end.
+    form
+        Form of the damper.
     """
     shapes = [*laws[: len(form.blocks)], *[laws[0]] * (len(form.blocks) - len(laws))]
     fixed = {**form.constants(recordings.scales()), **(held or {})}

@@ -69,6 +69,8 @@ class Pipeline:
         Stages that are built even where nothing changed.
     outcomes
         Stage -> what became of it in this call.
+    errors
+        Stage -> error that ended it.
     """
 
     loaded: LoadedConfig

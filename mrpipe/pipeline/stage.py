@@ -52,6 +52,8 @@ class StageContext:
         Written into every artifact.
     warnings
         What the stage warned of so far.
+    failures
+        What went wrong in parts of the stage so far.
     """
 
     stage: str

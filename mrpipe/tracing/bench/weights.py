@@ -75,6 +75,10 @@ def noise_variances(
     ----------
     draws, seed
         Number of noise records simulated, and the seed they are drawn from.
+    found
+        The fit.
+    recordings
+        Tests laid end to end.
     """
     chain = build_chain(found.problem.base.steps(found.base_values, *found.laws))
     rng = np.random.default_rng(seed)
@@ -187,6 +191,8 @@ def force_deviation(
         Fit whose model is simulated.
     recordings
         Tests.
+    scale
+        Factor on the sensor noise.
     """
     floor = max(LEAST_SHARE, model_error_share) * recordings.force_rms
     return np.asarray(np.hypot(sensor_deviation(found, recordings, scale), floor), dtype=np.float64)

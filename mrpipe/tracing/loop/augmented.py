@@ -61,6 +61,8 @@ def traced_damper(
         Effect -> the user's own file that defines it.
     form_file
         The user's own file that defines the base form, if any.
+    found
+        The fit.
     """
     return damper_model(
         found, drive_unit, effects=True, assumed_eta=math.inf, form_file=form_file, effect_files=effect_files
