@@ -70,7 +70,7 @@ class Pipeline:
     outcomes
         Stage -> what became of it in this call.
     errors
-        Stage -> error that ended it.
+        Errors that ended stages in this call.
     """
 
     loaded: LoadedConfig

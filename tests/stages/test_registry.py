@@ -37,7 +37,8 @@ def _run(context):
 
 
 STAGE = Stage(
-    "count-tests", "Count the prepared tests of one role.", _run, ("prepare",), (), ("count_tests",), ("count.h5",)
+    "count-tests", "Count the prepared tests of one role.", _run, ("prepare",), settings=("count_tests",),
+    outputs=("count.h5",),
 )
 '''
 SECTION_FILE = '''

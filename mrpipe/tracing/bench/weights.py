@@ -192,7 +192,7 @@ def force_deviation(
     recordings
         Tests.
     scale
-        Factor on the sensor noise.
+        Factors on the force noise and on the motion noise.
     """
     floor = max(LEAST_SHARE, model_error_share) * recordings.force_rms
     return np.asarray(np.hypot(sensor_deviation(found, recordings, scale), floor), dtype=np.float64)
