@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -128,7 +129,7 @@ def record(
 @with_common_options()
 def simulate(
     options: CommonOptions,
-    law: Annotated[str, typer.Option(metavar="LAW", help=f"{', '.join(law_names())}; or all.")],
+    law: Annotated[str | None, typer.Option(metavar="LAW", help=f"{', '.join(law_names())}; or all.")] = None,
     resonance: Annotated[
         bool, typer.Option("--resonance", help="Also find the loop's own resonance and the response over frequency.")
     ] = False,
@@ -143,6 +144,8 @@ def simulate(
     from mrpipe.artifacts.yaml_source import nearest
 
     known = law_names()
+    if law is None:
+        raise UserError("--law", "", "is missing", f"one of {', '.join((*known, 'all'))}")
     if law != "all" and law not in known:
         raise UserError("--law", law, "is not a control law", nearest(law, [*known, "all"]))
     if damper is not None:
@@ -155,12 +158,16 @@ def simulate(
 @with_common_options("campaign")
 def export(
     options: CommonOptions,
-    what: Annotated[str, typer.Argument(metavar="WHAT", help="controller")],
+    what: Annotated[str, typer.Argument(metavar="[WHAT]", help="controller")] = "controller",
+    law: Annotated[
+        str | None, typer.Option(metavar="LAW", help="Control law. Default: the setting export.law.")
+    ] = None,
 ) -> None:
     """Write the calibrated controller as C and JSON."""
     if what != "controller":
         raise UserError("export", what, "cannot be exported", "one of controller")
-    build_and_print(["export-controller"], options)
+    chosen = options if law is None else replace(options, overrides=[*options.overrides, f"export.law={law}"])
+    build_and_print(["export-controller"], chosen)
 
 
 _FAMILIES: dict[str, Callable[..., None]] = {"record": record, "simulate": simulate, "export": export}

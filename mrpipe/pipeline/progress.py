@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from mrpipe.artifacts import Progress
 
 LOGGER_NAME = "mrpipe"
 _LOG_EVERY_S = 10.0
+_LEFT = re.compile(r",? *(about )?[\d.]+ (s|min|h) left")
 
 
 def make_logger(log_file: Path, level: str, quiet: bool) -> logging.Logger:
@@ -63,7 +65,8 @@ def _bar(stage: str) -> Iterator[Progress]:
         task = bar.add_task(stage, total=1.0, note="")
 
         def progress(fraction: float, text: str = "") -> None:
-            bar.update(task, completed=fraction, note=text)
+            # the bar shows the remaining time already
+            bar.update(task, completed=fraction, note=_LEFT.sub("", text))
 
         yield progress
 
@@ -77,7 +80,8 @@ def _lines(stage: str, logger: logging.Logger) -> Progress:
         if now - last >= _LOG_EVERY_S:
             last = now
             left = (now - started) * (1 - fraction) / fraction if fraction > 0.02 else float("nan")
-            remaining = f", about {left:.0f} s left" if left == left else ""
+            # a stage that knows its remaining time says it itself
+            remaining = f", about {left:.0f} s left" if left == left and not _LEFT.search(text) else ""
             logger.info("%s: %.0f %%%s %s", stage, 100 * fraction, remaining, text)
 
     return progress

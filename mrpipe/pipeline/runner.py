@@ -231,7 +231,8 @@ class Pipeline:
         if provider is None:
             if self.input_path(name) is None:
                 rig = name.partition(":")[2]
-                return f"there is no {rig} campaign (give campaigns.{rig.replace('-', '_')}, or --campaign DIR)"
+                given = "the one given with --campaign is of another kind; " if self.campaign_given else ""
+                return f"there is no {rig} campaign ({given}give campaigns.{rig.replace('-', '_')}, or --campaign DIR)"
             return ""
         outcome = self.build(provider)
         if outcome.what == "failed" and name in required:

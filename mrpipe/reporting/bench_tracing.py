@@ -271,6 +271,8 @@ def _effect_in_words(effect: Mapping[str, Any]) -> str:
         f"{effect['name'].capitalize()} in the form {effect['form']} ({numbers}; confidence "
         f"{effect['confidence']:.2f}): {effect['physics']} Remedy on the rig: {effect['remedy']}"
     )
+    if effect.get("source"):
+        text += f" Source of the law: {effect['source']}."
     if effect["tied_with"]:
         tests = "; ".join(f"{k}: {v}" for k, v in effect.get("separating_tests", {}).items())
         text += f" These tests cannot tell it from {_listed(effect['tied_with'])}{f' ({tests})' if tests else ''}."

@@ -85,6 +85,8 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         parts.append(
             f"{effect['name']}{place} ({effect['form']}: {numbers}). {effect['physics']} Remedy: {effect['remedy']}"
         )
+        if effect.get("source"):
+            parts.append(f"Source of the law: {effect['source']}.")
         if effect["tied_with"]:
             tests = "; ".join(f"{k}: {v}" for k, v in effect.get("separating_tests", {}).items())
             parts.append(f"Not to be told apart from {', '.join(effect['tied_with'])} by these tests ({tests}).")

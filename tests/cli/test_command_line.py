@@ -51,7 +51,10 @@ MISTAKES = {
     "unknown effect": (["check", "--set", "close_loop.candidates=[remanance]"], "did you mean remanence?"),
     "settings file missing": (["prepare", "--settings", "no.yaml"], "--settings: no.yaml: no such file"),
     "unknown law": (["simulate", "--law", "vdn"], "did you mean vd"),
-    "law missing": (["simulate"], "Missing option"),
+    "law missing": (["simulate"], "--law: is missing; one of vd, vdps"),
+    "law of the export": (["export", "--law", "vdn"], "no such control law; one of vd"),
+    "run in the working directory": (["prepare", "--run", ""], "is the working directory"),
+    "name of a path": (["prepare", "--set", "name=../x"], "'../x': is not the name of a directory"),
     "until what is not there": (["run", "--until", "prepair"], "did you mean prepare?"),
     "no campaign": (["prepare", "--campaign", "nowhere"], "nowhere"),
     "no file to show": (["show", "nowhere.h5"], "nowhere.h5: no such file or directory"),
@@ -67,7 +70,7 @@ MISTAKES = {
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistake_is_one_line_and_status_2(mistake: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     arguments, expected = MISTAKES[mistake]
-    if arguments[0] in {"prepare", "simulate", "run"}:
+    if arguments[0] in {"prepare", "simulate", "run"} and not {"--run", "name=../x"} & set(arguments):
         arguments = [*arguments, "--run", str(tmp_path / "run")]
     assert run(arguments) == 2
     captured = capsys.readouterr()

@@ -55,6 +55,7 @@ class Named:
             "tied_with": list(self.tied_with),
             "physics": self.effect.physics,
             "remedy": self.effect.remedy,
+            "source": self.effect.source,
             "corrected_in": "prepare" if self.effect.sensor else "plant",
         }
         if self.separating_tests:

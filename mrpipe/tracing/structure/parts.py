@@ -87,6 +87,7 @@ def _command_summary(worst: DelayFinding, found: Sequence[DelayFinding], effect:
                 "tied_with": [],
                 "physics": effect.physics,
                 "remedy": effect.remedy,
+                "source": effect.source,
                 "corrected_in": "controller",
             }
         )  # fmt: skip
@@ -188,6 +189,7 @@ def _with_brace(
             "tied_with": rivals,
             "physics": effect.physics,
             "remedy": effect.remedy,
+            "source": effect.source,
             "corrected_in": "plant",
         }
     ]

@@ -221,6 +221,7 @@ def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[d
             "tied_with": rivals,
             "physics": effect.physics,
             "remedy": effect.remedy,
+            "source": effect.source,
             "corrected_in": "structure",
         }
         tests = {name: effect.separated_by[name].advice for name in rivals if name in effect.separated_by}
