@@ -26,6 +26,9 @@ from mrpipe.fitting.start import LEVEL_SHARE, drive_varies, mean_levels
 SCALE_SHARES = (0.1, 0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.7, 2.5, 5.0)
 """Scales of saturating laws that are tried, as shares of the largest drive."""
 
+FINER = (1.18, 1.09, 1.045, 1.02, 1.01, 1.005, 1.002, 1.001)
+"""Factors by which a scale is then moved either way."""
+
 BINS = 8
 """A drive that varies is sorted into so many levels."""
 
@@ -180,24 +183,40 @@ def fit_laws(
 ) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
     """Fit two laws to the levels kept; return squared errors of all cells, coefficients, and the scales' shares."""
     weight = np.ones(len(cells.drive)) if keep is None else keep
-    best: tuple[float, FloatArray, FloatArray, tuple[float, float]] | None = None
-    for scales in itertools.product(*(SCALE_SHARES if law.saturates else (1.0,) for law in laws)):
-        bases = [law.basis(cells.drive, scale) for law, scale in zip(laws, scales, strict=True)]
-        stacked = np.concatenate(bases)
-        owner = np.repeat([0, 1], [len(basis) for basis in bases])
-        pairs = cells.gram[:, owner][:, :, owner]
-        gram = np.einsum("k,kab,ak,bk->ab", weight, pairs, stacked, stacked)
-        right = np.einsum("k,ka,ak->a", weight, cells.right[:, owner], stacked)
-        low, high = np.zeros(len(right)), np.full(len(right), np.inf)
-        linear = bounded_solution(gram, right, low, high)[0]
-        values = linear[:, None] * stacked
-        error = cells.power - 2.0 * np.einsum("ka,ak->k", cells.right[:, owner], values)
-        error = error + np.einsum("kab,ak,bk->k", pairs, values, values)
-        cost = float(np.sum(weight * error))
-        if best is None or cost < best[0]:
-            best = cost, error, linear, (float(scales[0]), float(scales[1]))
-    assert best is not None
-    return best[1], best[2], best[3]
+    grids = [SCALE_SHARES if law.saturates else (1.0,) for law in laws]
+    best = min(
+        (_at_scales(cells, laws, pair, weight) for pair in itertools.product(*grids)), key=lambda item: item.cost
+    )
+    for width in FINER:
+        for place, law in enumerate(laws):
+            if law.saturates:
+                for factor in (1.0 / width, width):
+                    scales = [*best.scales]
+                    scales[place] *= factor
+                    best = min(best, _at_scales(cells, laws, tuple(scales), weight), key=lambda item: item.cost)
+    return best.errors, best.linear, (best.scales[0], best.scales[1])
+
+
+@dataclass(frozen=True)
+class _Solved:
+    cost: float
+    errors: FloatArray
+    linear: FloatArray
+    scales: tuple[float, ...]
+
+
+def _at_scales(cells: Cells, laws: tuple[LawShape, LawShape], scales: tuple[float, ...], weight: FloatArray) -> _Solved:
+    bases = [law.basis(cells.drive, scale) for law, scale in zip(laws, scales, strict=True)]
+    stacked = np.concatenate(bases)
+    owner = np.repeat([0, 1], [len(basis) for basis in bases])
+    pairs = cells.gram[:, owner][:, :, owner]
+    gram = np.einsum("k,kab,ak,bk->ab", weight, pairs, stacked, stacked)
+    right = np.einsum("k,ka,ak->a", weight, cells.right[:, owner], stacked)
+    linear = bounded_solution(gram, right, np.zeros(len(right)), np.full(len(right), np.inf))[0]
+    values = linear[:, None] * stacked
+    error = cells.power - 2.0 * np.einsum("ka,ak->k", cells.right[:, owner], values)
+    error = error + np.einsum("kab,ak,bk->k", pairs, values, values)
+    return _Solved(float(np.sum(weight * error)), error, linear, scales)
 
 
 def judge(cells: Cells, laws: tuple[LawShape, LawShape]) -> Judged:
@@ -342,6 +361,40 @@ def _alike(judged: Sequence[Judged], chosen: tuple[LawShape, LawShape]) -> list[
         return [item.laws for item in judged]
     limit = float(np.mean(_risk(own))) + 0.5
     return [item.laws for item in judged if item is not own and float(np.mean(_risk(item))) < limit]
+
+
+def adequate_laws(found: Fit) -> tuple[LawShape, ...]:
+    """Return the laws with fewest numbers that cost nothing: what a search for missing effects starts from.
+
+    A law that is too simple leaves a residual that some effect can imitate, so a law must fit the levels as well as the
+    one of the problem, within a twentieth of the noise (the problem is weighted by it) and 2 % of the residual. Among
+    laws with equally many numbers the one that predicts inner levels left out best is taken, and one that does not fall
+    where they are equal: it holds between the levels. Laws that saturate compete where a polynomial has as many numbers
+    as there are levels, because it then fits any levels; elsewhere saturation is left to the effects.
+
+    Parameters
+    ----------
+    found
+        A weighted fit with polynomial laws.
+    """
+    base = found.problem.base
+    cells = cells_of(found)
+    saturating = [law for law in YIELD_LAWS if law.saturates and law.numbers < cells.levels]
+    offered = [
+        [LawShape(kind, order) for order in range(law.order + 1) for kind in ("polynomial", "monotone")]
+        + (saturating if law.count == cells.levels else [])
+        for law in base.laws[:2]
+    ]
+    pairs: list[tuple[LawShape, LawShape]] = list(itertools.product(offered[0], offered[1]))
+    errors = {pair: float(np.sum(fit_laws(cells, pair)[0])) for pair in pairs}
+    least = max(min(errors.values()), 0.0)
+    samples = int(np.count_nonzero(found.problem.root_weight))
+    within = least + min(0.02 * least, 0.05 * samples)
+    able = [pair for pair, error in errors.items() if error <= within]
+    fewest = min(pair[0].numbers + pair[1].numbers for pair in able)
+    simple = [judge(cells, pair) for pair in able if pair[0].numbers + pair[1].numbers == fewest]
+    best = min(simple, key=lambda item: (float(np.mean(_risk(item))), item.laws[0].kind == "polynomial"))
+    return (*best.laws, *[best.laws[0]] * (len(base.laws) - 2))
 
 
 def law_values(choice: LawChoice, laws: Sequence[Law]) -> list[dict[str, float]]:

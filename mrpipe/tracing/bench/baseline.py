@@ -11,6 +11,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.laws import Law, constant_law
 from mrpipe.dampers.library import base_form
 from mrpipe.effects.contract import Effect
+from mrpipe.fitting.drive_laws import adequate_laws
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Base, Term
 from mrpipe.fitting.recordings import Recordings
@@ -77,6 +78,10 @@ def fit_baseline(
     problem = first_problem(recordings, base)
     found = best_fit(problem)
     found = _weighted(found, recordings, model_error_share)
+    laws = adequate_laws(found)
+    if laws != found.problem.base.laws:
+        problem = replace(found.problem, base=replace(base, laws=laws))
+        found = fit(problem, start_of(problem, found.base_values, []), iterations=12)
     for effect in declared:
         found = _with_declared(found, effect)
     if declared:
