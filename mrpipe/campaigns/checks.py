@@ -126,7 +126,10 @@ def _falls_to_zero(values: FloatArray) -> IntArray:
     lost, place = lost[within], place[within]
     near = np.minimum(np.abs(values[known[place - 1]]), np.abs(values[known[place]]))
     same_side = np.sign(values[known[place - 1]]) == np.sign(values[known[place]])
-    return np.asarray(lost[same_side & (near > 0.2 * np.max(np.abs(values)))], dtype=np.int64)
+    # in noise around zero, a sample of exactly 0 is no further from its neighbours than others are
+    usual = 1.48 * float(np.median(np.abs(np.diff(values))))
+    far = near > max(0.2 * float(np.max(np.abs(values))), 4.0 * usual)
+    return np.asarray(lost[same_side & far], dtype=np.int64)
 
 
 def force_sign(recordings: Sequence[Recording]) -> float:

@@ -16,27 +16,35 @@ _NOT_FOR_FILES = ("config", "run", "overrides", "settings", "campaign", "jobs", 
 @with_common_options(*_NOT_FOR_FILES)
 def show(
     options: CommonOptions,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Artifact (.h5), campaign directory or campaign file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Campaign, run directory, artifact (.h5), JSON result or data file.")
+    ],
     plot: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Also draw the channels (or datasets) into this picture.")
     ] = None,
 ) -> None:
-    """Show what an artifact or a campaign holds."""
+    """Show what a campaign, run directory, artifact, JSON result or data file holds."""
     from mrpipe.cli.output import print_json
-    from mrpipe.reporting.contents import describe_file, plot_file, print_description
+    from mrpipe.cli.showing import describe_any, print_any
 
     if not file.exists():
-        raise UserError(file, "", "no such file or directory", "give an artifact (.h5) or a campaign")
+        raise UserError(
+            file, "", "no such file or directory", "give a campaign, a run directory, an artifact or a file"
+        )
     if plot is not None and plot.suffix.lower() not in {".png", ".svg", ".pdf"}:
         raise UserError("--plot", str(plot), "is no picture", "end it in .png, .svg or .pdf")
-    description = describe_file(file)
+    description = describe_any(file)
     if plot is not None:
+        from mrpipe.reporting.contents import plot_file
+
+        if description["kind"] not in {"campaign", "artifact"}:
+            raise UserError("--plot", str(file), "cannot be drawn", "name a campaign or an artifact")
         plot_file(file, plot)
         description["plot"] = str(plot)
     if options.json:
         print_json(description)
     else:
-        print_description(description)
+        print_any(description)
 
 
 @with_common_options("run", "campaign", "jobs", "seed", "force", "quiet")

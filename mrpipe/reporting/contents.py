@@ -1,8 +1,7 @@
-"""What `mrpipe show` says and draws of an artifact or a campaign."""
+"""What `mrpipe show` describes and draws of an artifact or a campaign."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -60,36 +59,6 @@ def _datasets(path: Path) -> list[dict[str, Any]]:
     with h5py.File(path, "r") as handle:
         handle.visititems(visit)
     return rows
-
-
-def print_description(description: Mapping[str, Any]) -> None:
-    """Print what :func:`describe_file` returned, a line a test or dataset."""
-    rows = description.get("datasets") if description["kind"] == "artifact" else description.get("tests")
-    for key, value in description.items():
-        if value is not rows and key not in {"findings", "plausibility"}:
-            print(f"{key}: {_plain(value)}")
-    for row in rows or []:
-        print("  " + _row(row))
-    for finding in description.get("findings") or []:
-        print(f"finding: {finding}")
-
-
-def _row(row: Mapping[str, Any]) -> str:
-    if "shape" in row:
-        shape = " x ".join(str(size) for size in row["shape"]) or "scalar"
-        span = f"  {row['minimum']:.4g} to {row['maximum']:.4g}" if "minimum" in row else ""
-        return f"{row['name']}  [{shape}]{span} {row['unit']}"
-    return ", ".join(f"{key} {_plain(value)}" for key, value in row.items())
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} {_plain(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return " ".join(_plain(item) for item in value)
-    return str(value)
 
 
 def plot_file(path: Path, picture: Path) -> None:
