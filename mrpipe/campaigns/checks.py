@@ -11,24 +11,32 @@ from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
 
+LARGEST_SAMPLE = 1e30
+"""Larger numbers [SI] are no measurements of any quantity."""
+
 
 def require_finite(file: DataFile, values: FloatArray, first: int, channel: str, where: str) -> None:
-    """Refuse NaN and infinite samples; `first` is the index of the first one used.
+    """Refuse NaN, infinite and impossibly large samples; `first` is the index of the first one used.
+
+    Instruments write numbers such as 9.9e37 where a channel was overloaded.
 
     Raises
     ------
     UserError
         Naming the first bad row.
     """
-    bad = np.flatnonzero(~np.isfinite(values))
+    bad = np.flatnonzero(~(np.abs(values) < LARGEST_SAMPLE))
     if bad.size:
         row = file.first_row + first + int(bad[0])
-        kind = "NaN (no number)" if np.isnan(values[bad[0]]) else "infinite"
+        value = values[bad[0]]
+        kind = (
+            "NaN (no number)" if np.isnan(value) else "infinite" if np.isinf(value) else f"{value:.3g}, no measurement"
+        )
         raise UserError(
             file.path,
             f"{where}, {channel}, row {row}",
             f"is {kind}, {bad.size} such samples in all",
-            "cut them off with segments_s or mend the file",
+            "cut them off with segments_s, or correct the file",
         )
 
 

@@ -265,7 +265,10 @@ def _has(file: DataFile, channel: ChannelEntry) -> bool:
 def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tuple[str, str | None]:
     """Return the unit of a channel and its quantity; the drive settles the campaign's drive unit."""
     if channel.unit is None:
-        raise reader.source.error((*place, "channels", name, "unit"), "is missing", "write its unit, such as mm or N")
+        own = next((item for item in ((*place, "channels", name), (*place, name)) if item in reader.source.lines), None)
+        raise reader.source.error(
+            (*(own or ("channels", name)), "unit"), "is missing", "write its unit, such as mm or N"
+        )
     where = f"{reader.source.path}: {reader.source.where(('channels', name))}"
     quantity = quantity_of(name, reader.entry.rig)
     if quantity == "drive":

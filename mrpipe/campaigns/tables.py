@@ -46,18 +46,7 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
     fields = _split(lines[first], delimiter)
     headers = _headers(lines[layout.skip_lines : first], delimiter, comment, fields)
     width = max([len(fields), *(len(row) for row in headers)])
-    frame = pd.read_csv(
-        io.StringIO("\n".join(line for line in lines[first:] if line.strip() and line[0] not in comment)),
-        sep=delimiter or r"\s+",
-        decimal=decimal,
-        header=None,
-        names=list(range(width)),
-        index_col=False,
-        skipinitialspace=True,
-        dtype=None,
-        low_memory=False,
-        na_values=[],
-    )
+    frame = _rows(path, lines, first, comment, delimiter, decimal, width)
     if _labelled(fields):
         frame.iloc[0, 0] = np.nan
     keep = [index for index in range(width) if not (index == width - 1 and frame[index].isna().all())]
@@ -73,6 +62,33 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
         aliases={word: name for word, name in aliases.items() if word not in names},
         headers=tuple(tuple(row) for row in headers),
     )
+
+
+def _rows(
+    path: Path, lines: list[str], first: int, comment: str, delimiter: str | None, decimal: str, width: int
+) -> pd.DataFrame:
+    """Return the rows from the first one on; a row with too many fields is reported with its line."""
+    text = "\n".join(line for line in lines[first:] if line.strip() and line[0] not in comment)
+    try:
+        return pd.read_csv(
+            io.StringIO(text),
+            sep=delimiter or r"\s+",
+            decimal=decimal,
+            header=None,
+            names=list(range(width)),
+            index_col=False,
+            skipinitialspace=True,
+            dtype=None,
+            low_memory=False,
+            na_values=[],
+        )
+    except pd.errors.ParserError:
+        for number, line in enumerate(lines[first:], start=first + 1):
+            fields = _split(line.strip() if delimiter is None else line, delimiter)
+            if line.strip() and line[0] not in comment and len(fields) > width:
+                problem = f"has {len(fields)} fields, the rows above have {width}"
+                raise UserError(path, f"line {number}", problem, "correct the row") from None
+        raise
 
 
 def _headers(lines: list[str], delimiter: str | None, comment: str, fields: list[str]) -> list[list[str]]:

@@ -114,7 +114,11 @@ def _shown(value: Any) -> str | None:
     """Return a single value as text; sections have none of their own."""
     import json
 
-    return None if hasattr(value, "model_dump") else json.dumps(value, default=str)
+    if hasattr(value, "model_dump"):
+        return None
+    return json.dumps(
+        value, default=lambda item: item.model_dump(mode="json") if hasattr(item, "model_dump") else str(item)
+    )
 
 
 @with_common_options(*_NOT_FOR_FILES)

@@ -37,7 +37,7 @@ def spectra_before_and_after(
         if top > 0.0:
             axis.set_ylim(top * 1e-14, top * 10.0)
         label(axis, "frequency [Hz]", f"density [({units.get(name, '')})²/Hz]", name)
-        axis.legend(fontsize=7, frameon=False)
+        axis.legend(loc="upper right", fontsize=7, frameon=False)
     for axis in axes.ravel()[len(spectra) :]:
         axis.set_visible(False)
     return figure
@@ -75,7 +75,7 @@ def prepared_history(
                 axis.axvline(time_s[start], color=COLOURS[0], linewidth=0.5, linestyle=":")
         label(axis, "", f"{name} [{units.get(name, '')}]")
     axes.ravel()[-1].set_xlabel("time [s]", fontsize=8)
-    axes.ravel()[0].legend(fontsize=7, frameon=False, ncols=2)
+    axes.ravel()[0].legend(loc="upper right", fontsize=7, frameon=False, ncols=2)
     return figure
 
 
@@ -103,7 +103,7 @@ def loops(tests: Sequence[tuple[str, FloatArray, FloatArray, FloatArray]]) -> Fi
         axes[0, 1].plot(1e3 * velocity, force, color=colour, linewidth=0.7)
     label(axes[0, 0], "displacement [mm]", "force [N]")
     label(axes[0, 1], "velocity [mm/s]", "force [N]")
-    axes[0, 0].legend(fontsize=7, frameon=False)
+    axes[0, 0].legend(loc="upper right", fontsize=7, frameon=False)
     return figure
 
 

@@ -94,7 +94,7 @@ def test_several_segments_keep_what_lies_between_them_out(tmp_path: Path) -> Non
             {"channels": {**CHANNELS, "force": {"colum": "F", "unit": "N"}}},
             "force.colum: unknown key; did you mean col",
         ),
-        ({"channels": {**CHANNELS, "force": {"column": "F"}}}, "force.unit: is missing"),
+        ({"channels": {**CHANNELS, "force": {"column": "F"}}}, "line 17, channels.force.unit: is missing"),
         ({"channels": {**CHANNELS, "force": {"column": "F", "unit": "Nm"}}}, "unit 'Nm': is no unit of force"),
         ({"channels": {**CHANNELS, "force": {"column": "F", "unit": "newt"}}}, "unit 'newt': is not a unit"),
         (

@@ -126,3 +126,31 @@ def test_a_missing_data_file_is_one_line_in_check_and_run(tmp_path: Path, capsys
         assert run(command) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert "T2.h5: data file not found" in line
+
+
+@pytest.mark.golden
+def test_the_configuration_is_an_argument_or_an_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = project(tmp_path)
+    assert checked(capsys, "--config", str(config)) == checked(capsys, str(config))
+
+
+@pytest.mark.golden
+def test_a_campaign_file_in_place_of_a_configuration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project(tmp_path)
+    status, _, err = checked(capsys, str(tmp_path / "data" / "campaign.yaml"))
+    assert status == 2 and "is a campaign file and no configuration; give it with --campaign" in err
+
+
+@pytest.mark.golden
+def test_explain_prints_no_python_objects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = checked(capsys, str(project(tmp_path)), "--explain")
+    assert status == 0 and "prepare.cutoff_hz = 100.0" in out and "name='" not in out
+
+
+@pytest.mark.planted
+def test_an_overload_value_is_no_measurement(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tests = sound_tests(4)
+    force = tests[1].force_n.copy()
+    force[777] = 9.9e37
+    status, _, err = checked(capsys, str(project(tmp_path, [tests[0], replace(tests[1], force_n=force), *tests[2:]])))
+    assert status == 2 and "test T1, force, row 777: is 9.9e+37, no measurement" in err
