@@ -82,9 +82,6 @@ def load_config(path: Path, overrides: Sequence[str] = (), overlays: Sequence[Pa
     path = _locate(path)
     source = read_yaml(path)
     content = source.content
-    if {"rig", "tests", "channels"} <= content.keys():
-        remedy = "give it with --campaign, or name it under campaigns: in a configuration"
-        raise UserError(path, "", "is a campaign file and no configuration", remedy)
     content.setdefault("name", path.stem)
     laid = [(overlay, _read_overlay(overlay)) for overlay in overlays]
     for _, over in laid:

@@ -135,13 +135,6 @@ def test_the_configuration_is_an_argument_or_an_option(tmp_path: Path, capsys: p
 
 
 @pytest.mark.golden
-def test_a_campaign_file_in_place_of_a_configuration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    project(tmp_path)
-    status, _, err = checked(capsys, str(tmp_path / "data" / "campaign.yaml"))
-    assert status == 2 and "is a campaign file and no configuration; give it with --campaign" in err
-
-
-@pytest.mark.golden
 def test_explain_prints_no_python_objects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = checked(capsys, str(project(tmp_path)), "--explain")
     assert status == 0 and "prepare.cutoff_hz = 100.0" in out and "name='" not in out
