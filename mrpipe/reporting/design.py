@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from mrpipe.design.run import Result
+from mrpipe.law_design.run import Result
 from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, figure_with_axes, label
 

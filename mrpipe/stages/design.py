@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.design.uncertainty import DamperUncertainty, FrameUncertainty
+    from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
     from mrpipe.simulation.rig import Rig
 
 
@@ -16,8 +16,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     import time
 
     from mrpipe.control.calibration import CalibrationOptions, plant_of
-    from mrpipe.design.results import study_as_json, write_design
-    from mrpipe.design.run import load_of, run_design
+    from mrpipe.law_design.results import study_as_json, write_design
+    from mrpipe.law_design.run import load_of, run_design
     from mrpipe.reporting import design as report
     from mrpipe.simulation.resonance import default_band
     from mrpipe.simulation.rig import excitation_of, read_rig
@@ -63,8 +63,8 @@ def _amplitude(details: Mapping[str, Any]) -> float:
 def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, DamperUncertainty]:
     import numpy as np
 
-    from mrpipe.design.run import damper_uncertainty, frame_uncertainty
-    from mrpipe.design.uncertainty import DamperUncertainty, FrameUncertainty
+    from mrpipe.law_design.run import damper_uncertainty, frame_uncertainty
+    from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
 
     simulate = context.settings.simulate
     n = rig.frame.floors

@@ -1,5 +1,5 @@
 """Settings of `mrpipe design`."""
 
-from mrpipe.design.options import DesignSettings
+from mrpipe.law_design.options import DesignSettings
 
 __all__ = ["DesignSettings"]

@@ -12,11 +12,11 @@ from mrpipe.control.gains import Gains
 from mrpipe.control.law import GainRange, Plant
 from mrpipe.control.laws import all_laws
 from mrpipe.dampers.model import DamperModel, parameter_unit
-from mrpipe.design.options import DesignSettings
-from mrpipe.design.search import FreeGain
-from mrpipe.design.study import LawUnderDesign
-from mrpipe.design.uncertainty import Draw
 from mrpipe.errors import UserError
+from mrpipe.law_design.options import DesignSettings
+from mrpipe.law_design.search import FreeGain
+from mrpipe.law_design.study import LawUnderDesign
+from mrpipe.law_design.uncertainty import Draw
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
 from mrpipe.simulation.response_curve import QUANTITIES, Run

@@ -9,9 +9,9 @@ from joblib import Parallel, delayed
 
 from mrpipe.artifacts import Progress
 from mrpipe.control.gains import Gains
-from mrpipe.design.objective import Evaluation, Limits, Load, Objective, RunOf, evaluate
-from mrpipe.design.search import FreeGain, SearchOptions, search
 from mrpipe.errors import DivergedError
+from mrpipe.law_design.objective import Evaluation, Limits, Load, Objective, RunOf, evaluate
+from mrpipe.law_design.search import FreeGain, SearchOptions, search
 from mrpipe.simulation.response_curve import CurveOptions
 
 COARSE = CurveOptions(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrpipe.control.gains import Gains
-from mrpipe.design.search import FreeGain, SearchOptions, search
+from mrpipe.law_design.search import FreeGain, SearchOptions, search
 
 VISCOSITY = FreeGain("c_n_s_m", 10.0, 10000.0)
 STIFFNESS = FreeGain("k_n_m", -20000.0, -200.0)

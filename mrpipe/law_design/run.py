@@ -10,13 +10,13 @@ import numpy as np
 
 from mrpipe.artifacts import Artifact, FloatArray, Progress
 from mrpipe.control.law import Plant
-from mrpipe.design.objective import Evaluation, Limits, Load, Motion, Objective
-from mrpipe.design.options import DesignSettings
-from mrpipe.design.problem import LoopOf, laws_in_the_race
-from mrpipe.design.search import SearchOptions
-from mrpipe.design.study import COARSE, Designed, Study, StudyOptions, design_law, pareto_front, study
-from mrpipe.design.uncertainty import DamperUncertainty, Draw, FrameUncertainty, Ranking, draw, rank
 from mrpipe.errors import UserError
+from mrpipe.law_design.objective import Evaluation, Limits, Load, Motion, Objective
+from mrpipe.law_design.options import DesignSettings
+from mrpipe.law_design.problem import LoopOf, laws_in_the_race
+from mrpipe.law_design.search import SearchOptions
+from mrpipe.law_design.study import COARSE, Designed, Study, StudyOptions, design_law, pareto_front, study
+from mrpipe.law_design.uncertainty import DamperUncertainty, Draw, FrameUncertainty, Ranking, draw, rank
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.ground_record import read_ground_record
 from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, steady_values

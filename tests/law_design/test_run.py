@@ -17,12 +17,12 @@ from mrpipe.control.laws import law_named
 from mrpipe.control.lqg import Weights
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.dampers.model import damper_from_parameter_set
-from mrpipe.design.options import DesignSettings
-from mrpipe.design.problem import LoopOf, laws_in_the_race
-from mrpipe.design.results import study_as_json
-from mrpipe.design.run import Result, load_of, run_design
-from mrpipe.design.uncertainty import DamperUncertainty, FrameUncertainty, draw
 from mrpipe.errors import UserError
+from mrpipe.law_design.options import DesignSettings
+from mrpipe.law_design.problem import LoopOf, laws_in_the_race
+from mrpipe.law_design.results import study_as_json
+from mrpipe.law_design.run import Result, load_of, run_design
+from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty, draw
 from mrpipe.simulation.loop import LoopOptions
 from mrpipe.simulation.response_curve import CurveOptions, response_curve
 from mrpipe.simulation.rig import Rig

@@ -7,9 +7,9 @@ from typing import Any
 
 from mrpipe.artifacts import ArtifactWriter
 from mrpipe.control.laws import law_named
-from mrpipe.design.objective import Evaluation
-from mrpipe.design.study import Designed, Study
-from mrpipe.design.uncertainty import Ranking, test_for
+from mrpipe.law_design.objective import Evaluation
+from mrpipe.law_design.study import Designed, Study
+from mrpipe.law_design.uncertainty import Ranking, test_for
 
 MOST_SENSITIVITIES = 5
 """Uncertain quantities that are listed."""

@@ -1,0 +1,114 @@
+"""A run directory in a notebook: models, responses and the verdict that `mrpipe run` left."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.artifacts import Artifact
+from mrpipe.errors import UserError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from mrpipe.dampers.model import DamperModel
+    from mrpipe.networks.network import Network
+    from mrpipe.structures import Frame
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run directory holds; everything is read when it is asked for.
+
+    Attributes
+    ----------
+    directory
+        The run directory.
+    """
+
+    directory: Path
+
+    def __str__(self) -> str:
+        names = ", ".join(sorted(path.name for path in self.directory.glob("*.h5")))
+        return f"run {self.directory.name}: {names or 'no artifacts'}"
+
+    def artifact(self, name: str) -> Artifact:
+        """Return an artifact by its file name, with or without `.h5`.
+
+        Raises
+        ------
+        UserError
+            If the run has no such artifact.
+        """
+        path = self.directory / (name if name.endswith(".h5") else f"{name}.h5")
+        if not path.is_file():
+            known = ", ".join(sorted(item.stem for item in self.directory.glob("*.h5"))) or "none"
+            raise UserError(self.directory, path.name, "is not in this run", f"artifacts: {known}")
+        return Artifact(path)
+
+    @property
+    def damper(self) -> DamperModel:
+        """The identified damper."""
+        from mrpipe.dampers.model import read_damper
+
+        return read_damper(self.artifact("damper"))
+
+    @property
+    def damper_traced(self) -> DamperModel:
+        """The damper with the effects that close-loop named."""
+        from mrpipe.dampers.model import read_damper
+
+        return read_damper(self.artifact("damper-traced"))
+
+    @property
+    def frame(self) -> Frame:
+        """The identified structure."""
+        from mrpipe.structures import read_frame
+
+        return read_frame(self.artifact("frame"))
+
+    @property
+    def verdict(self) -> dict[str, Any]:
+        """What close-loop found, as `mrpipe close-loop --json` prints it."""
+        path = self.directory / "close-loop.json"
+        if not path.is_file():
+            raise UserError(self.directory, path.name, "is not in this run", "run mrpipe close-loop first")
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return found
+
+    def network(self, kind: str) -> Network:
+        """Return the `forward` or `inverse` network."""
+        from mrpipe.networks.network import read_network
+
+        return read_network(self.artifact(kind), "network")
+
+    def response(self, law: str) -> pd.DataFrame:
+        """Return the histories of a simulated law, a column for each history and floor."""
+        import pandas as pd
+
+        from mrpipe.simulation.storage import read_histories
+
+        columns: dict[str, Any] = {}
+        for name, values in read_histories(self.artifact(f"response-{law}")).items():
+            if values.ndim == 1:
+                columns[name] = values
+            else:
+                columns.update({f"{name}_{floor + 1}": values[:, floor] for floor in range(values.shape[1])})
+        length = len(columns["time_s"])
+        return pd.DataFrame({name: values for name, values in columns.items() if len(values) == length})
+
+
+def open_run(directory: str | Path) -> Run:
+    """Open a run directory.
+
+    Raises
+    ------
+    UserError
+        If there is no such directory.
+    """
+    path = Path(directory)
+    if not path.is_dir():
+        raise UserError(path, "", "is not a run directory", "give the directory that mrpipe run printed")
+    return Run(path)
