@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-WITHOUT_NETWORK = ("nnc",)
-"""Laws that need a trained network, which is built by the stages only."""
+EXPECTED_SHARE = 0.5
+"""Expected amplitude of the damper over the largest stroke of its tests."""
 
 
 @dataclass(frozen=True)
@@ -257,13 +257,10 @@ def _rig(
         if "network" in law.needs:
             raise UserError("law", law.name, "needs a trained network", f"use mrpipe simulate --law {law.name}")
     position = floor_position(frame.floors, floor)
-    limits = CalibrationOptions(source="exact")
-    plant = plant_of(frame, position, limits)
+    plant = plant_of(frame, position, CalibrationOptions())
     known = [law for law in all_laws().values() if law in laws or law.name == "vd"]
-    scale = plant.static_stiffness_n_m
-    scaled = replace(limits, positive_stiffness_n_m=0.5 * scale, negative_stiffness_n_m=-0.9 * scale)
-    calibration = calibrate(frame, position, scaled, known)
-    calibrated = calibrated_from(calibration, Weights(), 0.0)
+    calibration = calibrate(frame, position, CalibrationOptions(), known)
+    calibrated = calibrated_from(calibration, Weights(), damper, amplitude_m=EXPECTED_SHARE * damper.stroke_m)
     factory = ControllerFactory(
         frame,
         damper,
