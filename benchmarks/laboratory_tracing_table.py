@@ -1,6 +1,6 @@
-"""Tables of docs/tracing-benchmark.md from the results of `benchmarks.laboratory_tracing`.
+"""Tables of docs/tracing-benchmark-laboratory.md from the results of `benchmarks.laboratory_tracing`.
 
-`python -m benchmarks.laboratory_tracing_table RESULTS.jsonl > docs/tracing-benchmark.md`
+`python -m benchmarks.laboratory_tracing_table RESULTS.jsonl > docs/tracing-benchmark-laboratory.md`
 """
 
 from __future__ import annotations
@@ -17,17 +17,16 @@ from benchmarks.laboratory_tracing import read_rows
 Row = dict[str, Any]
 _Item = TypeVar("_Item")
 
-HEAD = """# How often planted effects are found
+HEAD = """# Effects planted in the virtual laboratory
 
-Campaigns of the virtual laboratory (44 tests of 4 s, the compact plan) with effects that campaign.yaml does not
-declare: a rig drawn from a seed, its numbers spread by a tenth, prepared and traced as `mrpipe close-loop` does, the
-sealed truth read after the verdict. The laboratory has forms of its own. Seeds are used once: what failed on earlier
-seeds was mended, these were drawn afterwards.
+The virtual laboratory is part of the program and its damper is a Bouc-Wen damper, so this is the easy benchmark;
+[tracing-benchmark.md](tracing-benchmark.md) is the hard one. Each case is a campaign of 44 tests of 4 s (the plan
+`compact`) with effects that `campaign.yaml` does not declare. The truth is read after the verdict. Seeds are used once.
 
     python -m benchmarks.laboratory_tracing --preset core conditions --first-seed {first} --results RESULTS.jsonl
     python -m benchmarks.laboratory_tracing_table RESULTS.jsonl
 
-The cases are run in random order; this table holds the {count} that were run of those that the presets list.
+The cases are run in random order; this table holds {count} of those that the presets list.
 """
 
 
