@@ -23,6 +23,11 @@ def atomic_path(final: Path) -> Iterator[Path]:
         with temporary.open("rb") as handle:
             os.fsync(handle.fileno())
         temporary.replace(final)
+    except OSError as error:
+        # a failed write has no name, and that of the temporary file means nothing to anybody
+        if error.filename is None or str(error.filename) == str(temporary):
+            error.filename, error.filename2 = str(final), None
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -13,6 +13,7 @@ from mrpipe.artifacts import Artifact, atomic_path
 from mrpipe.campaigns import describe, load_campaign
 from mrpipe.campaigns.describe import unit_of
 from mrpipe.campaigns.plausibility import judge
+from mrpipe.errors import UserError
 from mrpipe.reporting.signals import campaign_overview
 from mrpipe.reporting.style import figure_with_axes, label
 
@@ -56,8 +57,12 @@ def _datasets(path: Path) -> list[dict[str, Any]]:
                 row["minimum"], row["maximum"] = float(finite.min()), float(finite.max())
         rows.append(row)
 
-    with h5py.File(path, "r") as handle:
-        handle.visititems(visit)
+    try:
+        with h5py.File(path, "r") as handle:
+            handle.visititems(visit)
+    except (OSError, RuntimeError) as error:
+        said = " ".join(str(error).split())
+        raise UserError(path, "", f"is damaged ({said})", "run the stage that writes it; it is built again") from error
     return rows
 
 

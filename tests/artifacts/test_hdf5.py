@@ -87,3 +87,14 @@ def test_old_text_stays_until_the_new_is_whole(tmp_path: Path) -> None:
     atomic_write_text(path, "new")
     assert path.read_text() == "new"
     assert [item.name for item in path.parent.iterdir()] == ["note.txt"]
+
+
+def test_an_error_of_writing_names_the_file_and_no_temporary_one(tmp_path: Path) -> None:
+    import errno
+
+    from mrpipe.artifacts import atomic_path
+
+    with pytest.raises(OSError, match="No space") as full, atomic_path(tmp_path / "a.csv"):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert full.value.filename == str(tmp_path / "a.csv")
+    assert list(tmp_path.iterdir()) == []
