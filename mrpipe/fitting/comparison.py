@@ -26,6 +26,12 @@ WORTHWHILE = 0.01
 DRAFT_SAMPLES = 12_000
 """Forms are ranked on about so many samples; only those that may win are fitted to all."""
 
+MOST_FITTED = 5
+"""Of the forms near the best so many are fitted to all samples, besides those that are asked for."""
+
+COUPLED_SAMPLES = 20_000
+"""Forms that are solved several times over are fitted on about so many samples of the motion."""
+
 CONTENDER = 1.3
 """Forms that leave more than the best draft by this factor are not fitted to all samples."""
 
@@ -193,16 +199,19 @@ def compare_forms(
     recordings = bench_recordings(
         training, cycles=options.cycles, maximum_samples=options.maximum_samples, raw_force=options.raw_force
     )
-    weights = _equal_weights(recordings) if options.equal_tests else None
     laws, choice = _laws(forms[0], recordings, options)
     drafts, starts = _drafts(forms, recordings, laws, options, progress)
     least = min(drafts.values())
-    chosen = [form for form in forms if drafts[form.name] <= CONTENDER * least or form.name in keep]
+    near = sorted(
+        (form.name for form in forms if drafts[form.name] <= CONTENDER * least), key=lambda name: drafts[name]
+    )
+    chosen = [form for form in forms if form.name in (*near[:MOST_FITTED], *keep)]
     judged = []
     for place, form in enumerate(chosen):
         progress(0.4 + 0.6 * place / len(chosen), f"fit {form.name}")
-        base = base_of(recordings, form, laws)
-        problem = form_problem(recordings, base, offsets=options.offsets, weights=weights)
+        seen = thinned(recordings, COUPLED_SAMPLES) if form.coupled else recordings
+        weights = _equal_weights(seen) if options.equal_tests else None
+        problem = form_problem(seen, base_of(seen, form, laws), offsets=options.offsets, weights=weights)
         warm = starts[form.name] if len(forms) > len(keep) + 1 else None
         found = _settled_shape(fit_form(problem, options.method, drive_unit=unit, warm=warm), options, unit)
         item = judge(found, tests, raw_force=options.raw_force)
