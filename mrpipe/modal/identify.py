@@ -20,7 +20,14 @@ from mrpipe.modal.multimode import MultiModeFit, fit_modes
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests, Place
 from mrpipe.modal.search import ModeSearch, check_channels, find_modes
-from mrpipe.modal.selection import LEAST_COHERENCE, Layout, all_floors_measured, floor_shapes, sign_ranges
+from mrpipe.modal.selection import (
+    LEAST_COHERENCE,
+    Layout,
+    all_floors_measured,
+    floor_shapes,
+    real_modes,
+    sign_ranges,
+)
 from mrpipe.modal.spectra import record_spectrum, thinned
 from mrpipe.modal.tridiagonal import TridiagonalFit, fit_tridiagonal
 from mrpipe.modal.verification import (
@@ -224,6 +231,14 @@ def _ambient_findings(tests: FrameTests) -> list[str]:
     ]
 
 
+def _without_complex(search: ModeSearch) -> ModeSearch:
+    """Return the modes without those whose shape is not real even with correct clocks: they are no modes."""
+    kept = real_modes(search.fit)
+    if not kept or len(kept) == len(search.numbers):
+        return search
+    return replace(search, fit=search.fit.only(kept), numbers=tuple(search.numbers[i] for i in kept))
+
+
 def _clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
     findings = []
     for name in dict.fromkeys(item.test for item in clocks):
@@ -401,6 +416,7 @@ def _identify(
         progress(0.3, "clocks")
         chosen, clocks = _with_clocks(chosen, tests, layout, options)
         findings += _clock_findings(clocks)
+        chosen = _Chosen(_without_complex(chosen.search), chosen.tests)
     fit = chosen.search.fit
     findings += _check_coherence(fit, tests) if forced else []
     progress(0.5, "decays")

@@ -15,7 +15,7 @@ from mrpipe.modal.lscf import PoleCandidate, stable_poles
 from mrpipe.modal.multimode import MultiModeFit, fit_modes
 from mrpipe.modal.pursuit import hidden_poles
 from mrpipe.modal.records import FrameTest
-from mrpipe.modal.selection import LEAST_COHERENCE, Layout, complete_set, largest_set, sound, strength
+from mrpipe.modal.selection import LEAST_COHERENCE, Layout, complete_set, contradicts, largest_set, sound, strength
 from mrpipe.modal.spectra import RecordSpectrum, excited_band, record_spectrum, thinned
 
 _USUAL_HIGH_HZ = 30.0
@@ -172,8 +172,10 @@ def find_modes(
         spectra = tuple(record_spectrum(test, band) for test in tests)
         found = _look(spectra, layout, band, decays)
         if found is not None and found.keep:
-            numbers = tuple(range(1, layout.floors + 1))
-            return ModeSearch(_only(found, found.keep, decays), band, numbers, found.candidates)
+            refined = _only(found, found.keep, decays)
+            if not contradicts(refined, layout):
+                numbers = tuple(range(1, layout.floors + 1))
+                return ModeSearch(refined, band, numbers, found.candidates)
         if found is not None and (
             best is None or len(largest_set(found.fit, layout)) >= len(largest_set(best.fit, layout))
         ):
@@ -184,9 +186,20 @@ def find_modes(
         raise UserError(
             source, "forced tests", f"no mode found {span}", "check the channels, or set identify_frame.band_high_hz"
         )
+    return _incomplete(best, chosen, layout, source, decays)
+
+
+def _incomplete(
+    best: _Found, chosen: dict[int, int], layout: Layout, source: Path, decays: Sequence[FrameTest]
+) -> ModeSearch:
+    """Return the modes of a set that is not complete, without those whose shape the last fit makes doubtful."""
     if len(chosen) < layout.floors:
         check_channels(best.fit.coherence[:, list(chosen)], [item.floor for item in best.fit.sensors], source)
-    return ModeSearch(_only(best, list(chosen), decays), best.band_hz, tuple(chosen.values()), best.candidates)
+    refined = _only(best, list(chosen), decays)
+    if not contradicts(refined, layout):
+        return ModeSearch(refined, best.band_hz, tuple(chosen.values()), best.candidates)
+    kept = largest_set(refined, layout) or {0: 1}
+    return ModeSearch(refined.only(list(kept)), best.band_hz, tuple(kept.values()), best.candidates)
 
 
 def _only(found: _Found, keep: Sequence[int], decays: Sequence[FrameTest]) -> MultiModeFit:

@@ -21,7 +21,8 @@ LEAST_COHERENCE = 0.5
 LARGEST_DAMPING = 0.1
 LEAST_DAMPING = 2e-6
 _DIVERGED_DAMPING = 0.25
-_UNKNOWN_SHAPE = 0.5
+_UNKNOWN_SHAPE = 0.35
+_LARGEST_IMAGINARY = 0.6
 _LARGEST_COUPLING = 0.15
 _SAME_SHAPE = 0.6
 _SAME_SAMPLED_SHAPE = 0.9
@@ -81,6 +82,17 @@ def usable(fit: MultiModeFit) -> BoolArray:
     """Return which poles may be modes: plausible damping, coherent response, known shape."""
     inside = (fit.damping_ratios < LARGEST_DAMPING) & (fit.damping_ratios > LEAST_DAMPING)
     return np.asarray(inside & (fit.mode_coherence() >= LEAST_COHERENCE) & (shape_errors(fit) < _UNKNOWN_SHAPE))
+
+
+def imaginary_share(fit: MultiModeFit) -> FloatArray:
+    """Return the norm of the imaginary part of each shape over the norm of the shape, shape (r,)."""
+    norm = np.maximum(np.linalg.norm(fit.residues, axis=0), 1e-300)
+    return np.asarray(np.linalg.norm(fit.residues.imag, axis=0) / norm)
+
+
+def real_modes(fit: MultiModeFit) -> list[int]:
+    """Return the poles whose shape is real enough for a lightly damped structure; clocks must have been corrected."""
+    return [int(i) for i in np.flatnonzero(imaginary_share(fit) <= _LARGEST_IMAGINARY)]
 
 
 def sound(fit: MultiModeFit) -> list[int]:
@@ -149,6 +161,13 @@ def complete_set(fit: MultiModeFit, layout: Layout) -> tuple[int, ...]:
     poles = _distinct(fit, layout, [i for i in sound(fit) if may[i]])
     numbered = _numbered(fit, layout, poles, _SHAPE_TOLERANCE)
     return tuple(numbered) if len(numbered) == layout.floors else ()
+
+
+def contradicts(fit: MultiModeFit, layout: Layout) -> bool:
+    """Return whether two modes of a final fit have nearly one shape or one has an unknown shape: one is no mode."""
+    coupling, _, same = couplings(fit, layout)
+    equal = np.abs(np.triu(coupling, 1)) >= same
+    return bool(not usable(fit).all() or (equal.any() and all_floors_measured(fit, layout)))
 
 
 def _numbered(fit: MultiModeFit, layout: Layout, poles: Sequence[int], tolerance: float) -> dict[int, int]:

@@ -64,31 +64,32 @@ def random_tower(rng, floors=None, coupling=0.03, damping=(0.006, 0.02)):
     return Tower(mass, stiffness, rng.uniform(*damping, floors))
 
 
-def hidden_modes(tower, shaker_floor):
-    """Modes (from 1) without a visible peak at any floor.
-
-    A peak is visible where the mode's response to the shaker at its own frequency exceeds that of all other modes
-    together by half.
-    """
+def visibility(tower, shaker_floor):
+    """Response of each mode to the shaker at its own frequency over that of all others, largest over floors."""
     omega, shapes = 2 * np.pi * tower.frequencies_hz, tower.shapes
     line = omega[:, None]
     modal = shapes[shaker_floor - 1] / (omega**2 - line**2 + 2j * tower.damping_ratios * omega * line)
-    hidden = []
+    largest = []
     for mode in range(tower.floors):
         parts = shapes * modal[mode]
         own = np.abs(parts[:, mode])
         others = np.abs(parts.sum(axis=1) - parts[:, mode])
-        if np.all(own < 0.5 * others):
-            hidden.append(mode + 1)
-    return hidden
+        largest.append(float((own / others).max()))
+    return np.array(largest)
 
 
-def tower_with_hidden_modes(rng, fewest=1, most=2, weakest=0.0):
-    """Draw towers and shaker floors until one or two modes show no peak."""
+def hidden_modes(tower, shaker_floor):
+    """Modes (from 1) without a visible peak: nowhere is their response half of that of the other modes."""
+    return [int(i) + 1 for i in np.flatnonzero(visibility(tower, shaker_floor) < 0.5)]
+
+
+def tower_with_hidden_modes(rng, fewest=1, most=2, weakest=0.05):
+    """Draw towers and shaker floors until one or two modes show no peak, but contribute `weakest` at some floor."""
     while True:
         tower = random_tower(rng)
         for floor in rng.permutation(np.arange(1, tower.floors + 1)):
-            if fewest <= len(hidden_modes(tower, int(floor))) <= most:
+            hidden = hidden_modes(tower, int(floor))
+            if fewest <= len(hidden) <= most and visibility(tower, int(floor)).min() > weakest:
                 return tower, int(floor)
 
 
