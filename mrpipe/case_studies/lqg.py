@@ -16,26 +16,6 @@ from mrpipe.structures.dynamics import discretise_zero_order
 
 
 @dataclass(frozen=True)
-class LqgWeights:
-    """Weights of an LQG design.
-
-    Attributes
-    ----------
-    displacement, acceleration
-        Weights of the regulated outputs [1/m^2], [s^4/m^2].
-    force_n
-        Force [N] that has weight 1; R is the identity in these units.
-    interval_s
-        Sampling interval of the controller [s].
-    """
-
-    displacement: float = 100.0
-    acceleration: float = 1.0
-    force_n: float = 1e6
-    interval_s: float = 0.001
-
-
-@dataclass(frozen=True)
 class Outputs:
     """y = C x + D u + F w.
 

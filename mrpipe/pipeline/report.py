@@ -29,7 +29,14 @@ def run_facts(pipeline: Pipeline) -> RunFacts:
         items = read_part(directory, name)
         stages.append(
             ReportStage(
-                name, stage.summary, items, manifest.summary, manifest.warnings, manifest.skipped, manifest.seconds
+                name,
+                stage.summary,
+                items,
+                manifest.summary,
+                manifest.warnings,
+                manifest.skipped,
+                manifest.seconds,
+                manifest.failed,
             )
         )
     if not stages:

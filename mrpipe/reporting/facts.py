@@ -31,6 +31,8 @@ class ReportStage:
         Why it was skipped; empty where it ran.
     seconds
         Wall time.
+    failed
+        What went wrong in the stage or in a part of it; empty where nothing did.
     """
 
     name: str
@@ -40,6 +42,7 @@ class ReportStage:
     warnings: Sequence[str]
     skipped: str
     seconds: float
+    failed: str = ""
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,6 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.base_isolated import study as bench
     from mrpipe.case_studies.base_isolated.structure import building_of
     from mrpipe.case_studies.inverse import train_inverse
-    from mrpipe.case_studies.lqg import LqgWeights
     from mrpipe.case_studies.motion import SEVEN_MOTIONS, load_motion
 
     settings = context.settings.benchmark.base_isolated
@@ -128,14 +127,13 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     if settings.neural_inverse:
         context.progress(0.05, "neural inverse of the damper")
         trained = train_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
-    weights = settings.lqg
     study = bench.isolation_study(
         building,
         device=device,
         network=trained.network if trained else None,
         damping_ratio=settings.damping_ratio,
         stiffness_share=settings.stiffness_share,
-        lqg=LqgWeights(weights.displacement, weights.acceleration, weights.force_n, weights.interval_s),
+        lqg=settings.lqg,
         time_step_s=settings.time_step_s,
     )
     context.progress(0.3, f"{len(settings.laws)} laws")
@@ -162,21 +160,11 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
 def _wind_load(context: StageContext, settings: Any) -> WindLoad:
     from pathlib import Path
 
-    from mrpipe.case_studies.wind.load import WindClimate, read_wind, synthetic_wind
+    from mrpipe.case_studies.wind.load import read_wind, synthetic_wind
     from mrpipe.case_studies.wind.structure import FLOORS, HEIGHT_M, WIDTH_M
 
     if settings.file != "synthetic":
         return read_wind(Path(settings.file), FLOORS, unit=settings.unit, interval_s=settings.interval_s)
-    climate = WindClimate(
-        top_speed_m_s=settings.top_speed_m_s,
-        profile_exponent=settings.profile_exponent,
-        lift_coefficient=settings.lift_coefficient,
-        strouhal_number=settings.strouhal_number,
-        bandwidth=settings.bandwidth,
-        lateral_intensity=settings.lateral_intensity,
-        lateral_coefficient=settings.lateral_coefficient,
-        decay=settings.decay,
-    )
     return synthetic_wind(
         context.rng,
         FLOORS,
@@ -184,13 +172,12 @@ def _wind_load(context: StageContext, settings: Any) -> WindLoad:
         WIDTH_M,
         duration_s=settings.duration_s,
         interval_s=settings.synthetic_interval_s,
-        climate=climate,
+        climate=settings,
     )
 
 
 def _wind(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.inverse import train_inverse
-    from mrpipe.case_studies.lqg import LqgWeights
     from mrpipe.case_studies.wind import report
     from mrpipe.case_studies.wind import study as bench
     from mrpipe.case_studies.wind.structure import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of
@@ -212,7 +199,6 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
     if settings.neural_inverse:
         context.progress(0.05, "neural inverse of the damper")
         trained = train_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
-    weights = settings.lqg
     study = bench.wind_study(
         reference,
         tower,
@@ -221,7 +207,7 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
         network=trained.network if trained else None,
         stiffness_share=settings.stiffness_share,
         tuned_mass_kg=settings.tuned_mass_kg,
-        lqg=LqgWeights(weights.displacement, weights.acceleration, weights.force_n, weights.interval_s),
+        lqg=settings.lqg,
         modes=settings.modes,
         time_step_s=settings.time_step_s,
         dampers=settings.dampers or DEFAULT_DAMPERS[settings.position],

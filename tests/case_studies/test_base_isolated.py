@@ -29,13 +29,13 @@ from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
 from mrpipe.case_studies.inverse import inverse_validation, train_inverse
 from mrpipe.case_studies.laws import LAWS
 from mrpipe.case_studies.lqg import (
-    LqgWeights,
     observer_gain,
     output_regulator_gain,
     sampled_loop_radius,
 )
 from mrpipe.case_studies.model import modal_model, natural_periods
 from mrpipe.case_studies.motion import load_motion, spectrum_compatible_motion
+from mrpipe.case_studies.options import LqgWeights
 from mrpipe.case_studies.run import BinghamDevice, Controller, Response
 from mrpipe.errors import UserError
 from mrpipe.structures.records import GroundMotion

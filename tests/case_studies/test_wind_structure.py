@@ -10,9 +10,9 @@ from scipy.signal import csd, welch
 
 from mrpipe.artifacts import public_data_directory
 from mrpipe.case_studies.model import modal_model
+from mrpipe.case_studies.options import WindClimate
 from mrpipe.case_studies.wind.load import (
     AIR_DENSITY,
-    WindClimate,
     lateral_spectrum,
     read_wind,
     shedding_correlation,

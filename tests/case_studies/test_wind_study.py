@@ -9,7 +9,8 @@ import pytest
 
 from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
 from mrpipe.case_studies.laws import LAWS
-from mrpipe.case_studies.lqg import LqgWeights, observer_gain
+from mrpipe.case_studies.lqg import observer_gain
+from mrpipe.case_studies.options import LqgWeights
 from mrpipe.case_studies.run import BinghamDevice, Controller, simulate
 from mrpipe.case_studies.wind.design import CORRELATION_S, SENSOR_DENSITY, wind_outputs
 from mrpipe.case_studies.wind.load import WindLoad, synthetic_wind
@@ -33,7 +34,7 @@ def study_at(tower: Tower, load: WindLoad, position: str, dampers: float) -> Win
     placed = place_device(tower, position, floor=40, arm_m=21.0, mass_kg=500e3, frequency_ratio=0.99)  # type: ignore[arg-type]
     return wind_study(
         tower, placed, load, device=BinghamDevice(), network=None, stiffness_share=0.5, tuned_mass_kg=500e3,
-        lqg=LqgWeights(1000.0, 10.0, 1e6, 0.001), dampers=dampers,
+        lqg=LqgWeights(displacement=1000.0, acceleration=10.0, force_n=1e6, interval_s=0.001), dampers=dampers,
     )  # fmt: skip
 
 

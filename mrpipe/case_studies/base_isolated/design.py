@@ -11,7 +11,6 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.gains import damped_modes, viscous_for_damping
 from mrpipe.case_studies.lqg import (
-    LqgWeights,
     Outputs,
     SampledController,
     observer_gain,
@@ -19,6 +18,7 @@ from mrpipe.case_studies.lqg import (
     sampled_controller,
 )
 from mrpipe.case_studies.model import ModalModel
+from mrpipe.case_studies.options import LqgWeights
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from mrpipe.case_studies.base_isolated.design import IsolationGains, isolation_g
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
 from mrpipe.case_studies.laws import require_known, unknown_law
-from mrpipe.case_studies.lqg import LqgWeights, SampledController
+from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
+from mrpipe.case_studies.options import LqgWeights
 from mrpipe.case_studies.run import BinghamDevice, Controller, Response, simulate
 from mrpipe.networks.network import Network
 from mrpipe.structures.records import GroundMotion

@@ -9,7 +9,6 @@ import numpy as np
 from mrpipe.case_studies.gains import exact_viscous, lowest_damping, two_component
 from mrpipe.case_studies.indices import WIND_FLOORS
 from mrpipe.case_studies.lqg import (
-    LqgWeights,
     Outputs,
     SampledController,
     observer_gain,
@@ -18,6 +17,7 @@ from mrpipe.case_studies.lqg import (
     sampled_loop_radius,
 )
 from mrpipe.case_studies.model import ModalModel
+from mrpipe.case_studies.options import LqgWeights
 from mrpipe.case_studies.wind.load import WindLoad
 from mrpipe.case_studies.wind.structure import Tower
 from mrpipe.errors import UserError

@@ -14,45 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.case_studies.options import WindClimate
 from mrpipe.errors import UserError
 from mrpipe.units import to_si
 
 AIR_DENSITY = 1.2
 """kg/m^3."""
-
-
-@dataclass(frozen=True)
-class WindClimate:
-    """The wind and how the building takes it.
-
-    Attributes
-    ----------
-    top_speed_m_s
-        Mean wind at the top [m/s].
-    profile_exponent
-        Of the power law of the mean wind.
-    lift_coefficient
-        RMS lift coefficient of vortex shedding [1].
-    strouhal_number
-        Shedding frequency times width over wind speed [1].
-    bandwidth
-        Relative width of the shedding peak [1].
-    lateral_intensity
-        RMS lateral turbulence at the top over the mean wind there [1].
-    lateral_coefficient
-        Side force for a wind angle, dC_L/da + C_D [1].
-    decay
-        Davenport's decay constant of lateral turbulence with height [1].
-    """
-
-    top_speed_m_s: float = 47.25
-    profile_exponent: float = 0.365
-    lift_coefficient: float = 0.27
-    strouhal_number: float = 0.1
-    bandwidth: float = 0.25
-    lateral_intensity: float = 0.10
-    lateral_coefficient: float = 1.0
-    decay: float = 10.0
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from joblib import Parallel, delayed
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
 from mrpipe.case_studies.laws import require_known, unknown_law
-from mrpipe.case_studies.lqg import LqgWeights, SampledController
+from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
+from mrpipe.case_studies.options import LqgWeights
 from mrpipe.case_studies.run import BinghamDevice, Controller, Response, simulate
 from mrpipe.case_studies.wind.design import WindGains, wind_gains, wind_lqg
 from mrpipe.case_studies.wind.load import WindLoad
@@ -207,7 +208,7 @@ def wind_study(
     kept = modes + (1 if tower.position == "tuned-mass" else 0)
     modal = modal_model(tower.model, kept)
     optimum = wind_gains(tower, modal, stiffness_share=stiffness_share, tuned_mass_kg=tuned_mass_kg)
-    observer, force_n = wind_lqg(modal, replace(lqg, force_n=lqg.force_n * dampers), load)
+    observer, force_n = wind_lqg(modal, lqg.changed(force_n=lqg.force_n * dampers), load)
     plain = modal_model(reference.model, modes)
     free = run_tower(plain, load, None, time_step_s)
     return WindStudy(

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from mrpipe.case_studies.options import LqgWeights, WindClimate
 from mrpipe.config.section import Section
 
 
@@ -63,15 +64,6 @@ class TenStoreySettings(Section):
     )
 
 
-class RegulatorWeights(Section):
-    """Weights of an LQG design (appendix E)."""
-
-    displacement: float = Field(100.0, ge=0.0, description="Weight of regulated displacements [1/m^2].")
-    acceleration: float = Field(1.0, ge=0.0, description="Weight of regulated absolute accelerations [s^4/m^2].")
-    force_n: float = Field(1e6, gt=0.0, description="A force of this size weighs 1: R is the identity in it [N].")
-    interval_s: float = Field(0.001, gt=0.0, le=0.05, description="Sample of the controller [s].")
-
-
 class BaseIsolatedSettings(Section):
     """The base-isolated building of section 6.2."""
 
@@ -104,14 +96,14 @@ class BaseIsolatedSettings(Section):
     stiffness_share: float = Field(
         0.2, ge=0.0, lt=0.9, description="Share of the isolation's stiffness that vdns takes away."
     )
-    lqg: RegulatorWeights = Field(RegulatorWeights(), description="Weights of LQG.")
+    lqg: LqgWeights = Field(LqgWeights(), description="Weights of LQG.")
     time_step_s: float = Field(0.001, gt=0.0, le=0.005, description="Longest time step [s].")
     dampers: tuple[float, ...] = Field(
         (1.0, 2.0, 5.0, 10.0, 20.0), description="Dampers at each of the two positions, for the sensitivity."
     )
 
 
-class WindLoadSettings(Section):
+class WindLoadSettings(WindClimate):
     """Across-wind forces on the floors."""
 
     file: str = Field(
@@ -123,14 +115,6 @@ class WindLoadSettings(Section):
     interval_s: float | None = Field(None, gt=0.0, description="Sampling interval of a file without a clock [s].")
     duration_s: float = Field(900.0, gt=10.0, description="Length of the synthetic load [s].")
     synthetic_interval_s: float = Field(0.05, gt=0.0, le=0.2, description="Sampling of the synthetic load [s].")
-    top_speed_m_s: float = Field(47.25, gt=0.0, description="Mean wind at the top [m/s].")
-    profile_exponent: float = Field(0.365, ge=0.0, le=1.0, description="Of the power law of the mean wind.")
-    lift_coefficient: float = Field(0.27, ge=0.0, description="RMS lift coefficient of vortex shedding.")
-    strouhal_number: float = Field(0.1, gt=0.0, description="Shedding frequency times width over wind speed.")
-    bandwidth: float = Field(0.25, gt=0.0, description="Relative width of the shedding peak.")
-    lateral_intensity: float = Field(0.1, ge=0.0, description="RMS lateral turbulence at the top over the mean wind.")
-    lateral_coefficient: float = Field(1.0, ge=0.0, description="Side force for a wind angle, dC_L/da + C_D.")
-    decay: float = Field(10.0, ge=0.0, description="Decay constant of lateral turbulence with height.")
 
 
 class WindSettings(Section):
@@ -174,8 +158,8 @@ class WindSettings(Section):
     stiffness_share: float = Field(
         0.5, ge=0.0, lt=0.95, description="Share of the static stiffness at the damper that vdns takes away."
     )
-    lqg: RegulatorWeights = Field(
-        RegulatorWeights(displacement=1000.0, acceleration=10.0, force_n=1e6, interval_s=0.001),
+    lqg: LqgWeights = Field(
+        LqgWeights(displacement=1000.0, acceleration=10.0, force_n=1e6, interval_s=0.001),
         description="Weights of LQG; the force is that of one damper.",
     )
     modes: int = Field(23, ge=5, le=76, description="Modes kept of the tower: twice as many states.")

@@ -205,7 +205,7 @@ def next_tests(facts: RunFacts) -> str:
 
 def doubts(facts: RunFacts) -> list[str]:
     """Return what to distrust, the weightiest first, one sentence each."""
-    found = []
+    found = [f"{stage.name} failed: {stage.failed.rstrip('.')}." for stage in facts.stages if stage.failed]
     loop = facts.summary("close-loop")
     for effect in proper_effects(loop):
         if effect.get("tied_with"):
