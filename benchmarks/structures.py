@@ -18,8 +18,8 @@ from mrpipe.artifacts import load_parameter_set
 from mrpipe.case_studies.base_isolated.structure import surrogate_building
 from mrpipe.case_studies.base_isolated.study import isolation_study
 from mrpipe.case_studies.inverse import train_inverse
-from mrpipe.case_studies.lqg import LqgWeights
 from mrpipe.case_studies.motion import spectrum_compatible_motion
+from mrpipe.case_studies.options import LqgWeights
 from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.case_studies.ten_storey.structure import ten_storey
 from mrpipe.case_studies.ten_storey.study import ten_storey_study
@@ -56,7 +56,7 @@ def main() -> None:
     tower = surrogate_tower()
     wind = wind_study(
         tower, tower, load, device=device, network=network, stiffness_share=0.5, tuned_mass_kg=500e3,
-        lqg=LqgWeights(1000.0, 10.0, 1e6, 0.001),
+        lqg=LqgWeights(displacement=1000.0, acceleration=10.0),
     )  # fmt: skip
     chain = damper_from_parameter_set(load_parameter_set("dampers", "p4-1000kn")).chain()
     storeys = ten_storey_study(ten_storey(), motion, device=device, chain=chain)
