@@ -1,4 +1,4 @@
-"""Ground-motion records: PEER AT2, text of one to three columns, csv and MATLAB files; g, cm/s^2 or m/s^2.
+"""Ground-motion records: PEER AT2, CSMIP and COSMOS V2 (also zipped), text, csv and MATLAB; g, cm/s^2 or m/s^2.
 
 A record is checked before it is used: finite samples, a uniform clock that agrees with what the file says, the number
 of points it promises, and peaks that a ground motion can have in the unit it claims.
@@ -16,6 +16,8 @@ from scipy.io import loadmat
 from scipy.signal import resample_poly
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.readers.cosmos import ENDINGS as V2_ENDINGS
+from mrpipe.campaigns.readers.cosmos import read_strong_motion
 from mrpipe.errors import UserError
 from mrpipe.units import to_si
 
@@ -33,7 +35,7 @@ _UNITS = (
 _UNIT_COLUMN = re.compile(r"[\[(]\s*([^\[\]()]*/\s*s(?:ec)?(?![a-z])[^\[\]()]*)[\])]", re.IGNORECASE)
 """A bracketed unit per second or per second squared: of a column that is not time."""
 _OTHER_QUANTITY = re.compile(r"\b(velocity|displacement)\b[^\n]*\bunits?\s+of\b", re.IGNORECASE)
-_FOREIGN = (".json", ".xlsx", ".xls", ".h5", ".hdf5", ".zip", ".pdf", ".png", ".jpg", ".npz", ".npy")
+_FOREIGN = (".json", ".xlsx", ".xls", ".h5", ".hdf5", ".pdf", ".png", ".jpg", ".npz", ".npy")
 _CLOCK_NAME = re.compile(r"^\W*(t|time|zeit)\b", re.IGNORECASE)
 _ADVICE = "give its unit, as --set benchmark.base_isolated.motion.unit=g (or ten_storey)"
 _POINTS = re.compile(r"NPTS\s*[=:]\s*(\d+)", re.IGNORECASE)
@@ -157,6 +159,8 @@ def read_motion(
         raw = _read_at2(path)
     elif path.suffix.lower() == ".mat":
         raw = _read_mat(path)
+    elif path.suffix.lower() in {*V2_ENDINGS, ".zip"}:
+        raw = _read_v2(path)
     elif path.suffix.lower() in _FOREIGN:
         raise UserError(path, "", f"a {path.suffix} file is no ground-motion record", "use .at2, .txt, .csv or .mat")
     else:
@@ -207,6 +211,19 @@ def _read_at2(path: Path) -> _Raw:
             path, "NPTS", f"promises {count} points, the file holds {len(samples)}", "mend the header or the file"
         )
     return _Raw(np.array(samples)[:, None], step, header)
+
+
+def _read_v2(path: Path) -> _Raw:
+    """Return the first two horizontal channels of a CSMIP or COSMOS V2 file, or of a zip that contains some."""
+    channels = [item for item in read_strong_motion(path) if not item.vertical][:2]
+    if not channels:
+        raise UserError(path, "", "holds no horizontal channel", "give a record with a horizontal channel")
+    if any(abs(item.interval_s / channels[0].interval_s - 1.0) > 1e-6 for item in channels):
+        channels = channels[:1]
+    length = min(item.acceleration_m_s2.size for item in channels)
+    values = np.stack([item.acceleration_m_s2[:length] for item in channels], axis=1)
+    names = " and ".join(item.name for item in channels)
+    return _Raw(values, channels[0].interval_s, "in m/s^2", (f"channels {names}",))
 
 
 def _read_mat(path: Path) -> _Raw:

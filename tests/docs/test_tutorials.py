@@ -1,0 +1,65 @@
+"""The commands of the tutorials run as printed, on smaller data of the same kind."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from mrpipe.cli import run
+from tests.campaigns.proposal.rigs import bench_folder, frame_folder
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def commands(page: str) -> list[list[str]]:
+    """Return the commands of a page, split into words."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return [shlex.split(line) for line in re.findall(r"^\$ (.*)$", text, re.MULTILINE)]
+
+
+def _follow(page: str, monkeypatch: pytest.MonkeyPatch, until: str) -> list[str]:
+    """Run the commands of a page in the working directory; `run` goes on to the stage `until` only."""
+    names = []
+    for words in commands(page):
+        if words[0] == "cd":
+            monkeypatch.chdir(words[1])
+            continue
+        assert words[0] == "mrpipe"
+        arguments = [*words[1:], *(["--until", until, "--quiet"] if words[1] == "run" else [])]
+        assert run(arguments) == 0, words
+        names.append(words[1])
+    return names
+
+
+@pytest.mark.golden
+def test_own_damper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    bench_folder(tmp_path / "measurements", 5, samples=1500)
+    assert _follow("tutorial-own-damper.md", monkeypatch, "prepare") == ["init", "show", "check", "run"]
+    assert len(commands("tutorial-own-damper.md")) <= 6
+    assert (tmp_path / "my-damper" / "runs" / "my-damper" / "prepared.h5").is_file()
+    assert "error:" not in capsys.readouterr().out
+
+
+@pytest.mark.golden
+def test_own_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    frame_folder(tmp_path / "tower", sweep_s=20.0)
+    steps = commands("tutorial-own-frame.md")
+    assert len(steps) <= 6
+    assert run(steps[0][1:]) == 0
+    # the step of the page that is done in an editor
+    file = tmp_path / "my-tower" / "data" / "tower" / "campaign.yaml"
+    said = re.search(r"^frame: \{.*$", (DOCS / "tutorial-own-frame.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert said is not None
+    file.write_text(re.sub(r"^# frame: .*$", said[0], file.read_text(encoding="utf-8"), flags=re.MULTILINE))
+    monkeypatch.chdir(tmp_path / "my-tower")
+    capsys.readouterr()
+    for words in steps[2:4]:
+        assert run(words[1:]) == 0, words
+    out = capsys.readouterr().out
+    assert "floor masses: 200, 200, 180 kg" in out and "valid, 2 stages" in out
+    assert steps[4] == ["mrpipe", "run", "configs/my-tower.yaml"]
