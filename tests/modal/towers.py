@@ -57,9 +57,10 @@ def random_tower(rng, floors=None, coupling=0.03, damping=(0.006, 0.02)):
     diagonal = np.sqrt(np.diag(stiffness))
     extra = coupling * np.triu(rng.uniform(-1.0, 1.0, (floors, floors)), 2)
     stiffness = stiffness + (extra + extra.T) * np.outer(diagonal, diagonal) * (1.0 if floors > 2 else 0.0)
-    first = np.sqrt(eigh(stiffness, np.diag(mass), eigvals_only=True)[0]) / (2 * np.pi)
-    if not first > 0:
+    squared = eigh(stiffness, np.diag(mass), eigvals_only=True)[0]
+    if squared <= 0.0:
         return random_tower(rng, floors, coupling, damping)
+    first = np.sqrt(squared) / (2 * np.pi)
     stiffness = stiffness * (rng.uniform(0.7, 1.3) / first) ** 2
     return Tower(mass, stiffness, rng.uniform(*damping, floors))
 
