@@ -28,6 +28,8 @@ from mrpipe.source_scan import imported_modules
 VARIABLE = "NUMBA_CACHE_DIR"
 _PREFIX = "mrpipe-"
 _KEPT_FOR_S = 30 * 86400.0
+_KEPT_FOLDERS = 10
+_SPARED_FOR_S = 86400.0
 _COMPILED = re.compile(rb"^\s*(?:from|import)\s+numba\b", re.MULTILINE)
 
 
@@ -94,7 +96,7 @@ def cache_folder() -> Path | None:
     """Return the folder of the present sources, made if missing; None where no folder can be written.
 
     A folder that the user names in `NUMBA_CACHE_DIR` is the parent; otherwise it is the user's cache directory, or a
-    private temporary directory where that cannot be written. Folders that nobody used for 30 days are removed.
+    private temporary directory where that cannot be written. Folders of other sources are removed after a while.
     """
     name = _PREFIX + key_of(Path(__file__).resolve().parent)
     for parent in _parents():
@@ -137,12 +139,16 @@ def _parents() -> Iterator[Path]:
 
 
 def _remove_old(parent: Path, present: Path) -> None:
-    """Remove the folders of sources that no process has used for a while."""
-    oldest = time.time() - _KEPT_FOR_S
+    """Remove the folders that no process has used for a month, and all but the latest that nobody used for a day."""
+    used: dict[Path, float] = {}
     for folder in parent.glob(f"{_PREFIX}*"):
         with suppress(OSError):
-            if folder != present and folder.is_dir() and folder.stat().st_mtime < oldest:
-                shutil.rmtree(folder, ignore_errors=True)
+            if folder != present and folder.is_dir():
+                used[folder] = folder.stat().st_mtime
+    now = time.time()
+    for place, folder in enumerate(sorted(used, key=lambda item: -used[item])):
+        if now - used[folder] > (_KEPT_FOR_S if place < _KEPT_FOLDERS else _SPARED_FOR_S):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _point_numba_to(folder: Path | None) -> None:

@@ -140,3 +140,18 @@ def test_a_users_effect_file_is_compiled_again_after_an_edit_that_keeps_size_and
     os.utime(effect, ns=(times.st_atime_ns, times.st_mtime_ns))
     shown.append(_run(code, PACKAGE.parent))
     assert shown == ["1.0", "2.0"]
+
+
+@pytest.mark.property
+def test_of_many_folders_only_the_latest_outlive_a_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for days in range(30):
+        folder = tmp_path / f"mrpipe-{days:02d}"
+        folder.mkdir()
+        os.utime(folder, (time.time() - (0.1 + 0.1 * days) * 86400,) * 2)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    present = cache_folder()
+    assert present is not None
+    # the ten latest, all of the last day
+    assert sorted(item.name for item in tmp_path.iterdir() if item != present) == [
+        f"mrpipe-{days:02d}" for days in range(10)
+    ]
