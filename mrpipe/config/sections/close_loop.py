@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
+from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.config.section import Section
+from mrpipe.dampers.forms import form_names
 
 
 class CloseLoopSettings(Section):
     """From the residual of a model to the effect that it lacks."""
 
-    model: Literal["bouc-wen", "dahl", "rate-dependent-yield"] = Field(
-        "bouc-wen", description="Declared base model; the ladder of base forms is judged beside it."
+    model: str = Field(
+        "bouc-wen",
+        description="Declared base form, any of mrpipe/dampers/forms; rate-dependent-yield stands for yielding-part, "
+        "the form of this family that suits most recordings. Other base forms are compared with it.",
     )
     yield_order: int = Field(3, ge=0, le=3, description="Degree of the yield force in the drive.")
     viscosity_order: int = Field(1, ge=0, le=3, description="Degree of the viscosity in the drive.")
@@ -49,3 +52,11 @@ class CloseLoopSettings(Section):
         "noise, as on real dampers; 0 finds out by a first pass, for twice the time.",
     )
     unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")
+
+    @field_validator("model")
+    @classmethod
+    def _model_is_known(cls, value: str) -> str:
+        known = (*form_names(), "rate-dependent-yield")
+        if value not in known:
+            raise ValueError(f"no base form {value!r}; {nearest(value, known)}")
+        return value

@@ -59,6 +59,12 @@ def declared_base(recordings: Recordings, name: str, yield_order: int, viscosity
     return base_of(recordings, form, polynomial_laws(form, distinct_levels(recordings), yield_order, viscosity_order))
 
 
+def family_of(model: str) -> str:
+    """Return the family of a declared model: that of its base form, or the form's own name."""
+    form = base_form(DEFAULT_OF_FAMILY.get(model, model))
+    return form.family or form.name
+
+
 def fit_baseline(
     recordings: Recordings, base: Base, declared: Sequence[Effect] = (), *, model_error_share: float = 0.0
 ) -> Baseline:

@@ -25,6 +25,7 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import (
     Baseline,
     declared_base,
+    family_of,
     fit_baseline,
     noise_level_of,
     with_form,
@@ -105,7 +106,9 @@ def trace_campaign(
     validation = record_tests(unseen, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
-    first = _first_baseline(training, declared, able, options)
+    # a base form that is declared is no effect that could be missing
+    able = {name: item for name, item in able.items() if name != family_of(options.model)}
+    first = _first_baseline(training, declared, options)
     found = validated(first.fit, first.fit, first, training, validation, options)
     refusal = ""
     if never_yields(first.fit, options.validation):
@@ -154,21 +157,9 @@ def trace_campaign(
     return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared])
 
 
-def _first_baseline(
-    training: Recordings, declared: Sequence[Effect], effects: Mapping[str, Effect], options: TracingOptions
-) -> Baseline:
+def _first_baseline(training: Recordings, declared: Sequence[Effect], options: TracingOptions) -> Baseline:
     base = declared_base(training, options.model, options.yield_order, options.viscosity_order)
-    return fit_baseline(
-        training, base, _of_the_base(declared, effects, options), model_error_share=options.model_error_share
-    )
-
-
-def _of_the_base(declared: Sequence[Effect], effects: Mapping[str, Effect], options: TracingOptions) -> list[Effect]:
-    """Return the effects that belong to the base: the declared ones, and the declared base form where it is one."""
-    own = list(declared)
-    if options.model == "rate-dependent-yield":
-        own.append(effects["rate-dependent-yield"])
-    return own
+    return fit_baseline(training, base, declared, model_error_share=options.model_error_share)
 
 
 def _nothing_traced(
@@ -204,7 +195,7 @@ def _select(
 ) -> tuple[Baseline, Selection]:
     """Fit the baseline and select effects; with weights by force RMS where no composite comes near the noise."""
     base = first.fit.problem.base
-    own = _of_the_base(declared, effects, options)
+    own = list(declared)
     floor = options.model_error_share
     baseline = first
     while True:

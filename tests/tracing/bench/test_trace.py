@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from mrpipe.effects.library import damper_effects
+from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.baseline import declared_base, family_of
 from mrpipe.tracing.bench.summary import Tracing, TracingOptions
 from mrpipe.tracing.bench.trace import trace_campaign
 from tests.tracing.bench.rig import campaign
@@ -122,3 +124,14 @@ def test_the_summary_has_what_the_contract_promises() -> None:
     assert {"pre_yield", "post_yield", "reversal"} == set(summary["residual"]["where"])
     assert sum(summary["residual"]["where"].values()) == pytest.approx(1.0)
     assert {"gain", "channel_skew_s", "observation_filter_s"} <= set(summary["nuisances"])
+
+
+@pytest.mark.property
+def test_a_declared_base_form_is_no_effect() -> None:
+    training = record_tests(campaign("none")[:4], rate_hz=125.0)
+    base = declared_base(training, "rate-dependent-yield", 3, 1)
+    assert base.name == "yielding-part"
+    # the effect of this name is then no candidate, and a library without it is no fault
+    assert family_of("rate-dependent-yield") == "rate-dependent-yield"
+    assert family_of("rounded-yield") == "rate-dependent-yield"
+    assert family_of("bouc-wen") == "bouc-wen"
