@@ -106,6 +106,8 @@ def check(
                 print(f"    {item.severity}: {item.line}")
         for stage, campaign in without.items():
             print(f"  {stage}: will be skipped, because there is no {campaign} campaign")
+        if not result.errors:
+            print(f"next: mrpipe run {options.config or loaded.path}")
     if result.errors:
         raise CheckFailed(f"{loaded.path}: {result.errors} errors in the measured data (listed above)")
 

@@ -219,14 +219,8 @@ def test_an_hdf5_file_that_declares_37_gib(tmp_path: Path) -> None:
 
 @pytest.mark.property
 def test_a_gzip_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
-    import zlib
-
-    packer = zlib.compressobj(6, zlib.DEFLATED, 31)
-    zeros = b"0,0\n" * (2**22)
-    with (tmp_path / "a.csv.gz").open("wb") as handle:
-        for _ in range(18):
-            handle.write(packer.compress(zeros))
-        handle.write(packer.flush())
+    member = gzip.compress(b"0,0\n" * (2**22))
+    (tmp_path / "a.csv.gz").write_bytes(18 * member)
     with pytest.raises(UserError, match=r"claims .* GiB of data"):
         open_data_file(tmp_path / "a.csv.gz")
 
