@@ -29,7 +29,7 @@ cases are clean rigs.
     python -m benchmarks.tracing --first-seed {first} --cases {count}
     python -m benchmarks.tracing_table benchmarks/results/tracing.jsonl
 
-This table holds {count} cases, seeds {first} to {last}.
+Number of cases in this table: {count}, seeds {first} to {last}.
 """
 
 _Item = TypeVar("_Item")
@@ -59,7 +59,8 @@ def rate(found: Sequence[bool]) -> tuple[str, str]:
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a Markdown table."""
     lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header)]
-    return "\n".join(lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows])
+    cells = ([str(cell).replace("|", "\\|") for cell in row] for row in rows)
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in cells])
 
 
 def of_kind(rows: Sequence[Row], kind: str) -> list[Row]:

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.judging import judged, parameter_errors, verdict_row
-from benchmarks.tracing_table import document, interval, percent, reliability
+from benchmarks.tracing_table import document, interval, percent, reliability, table
 
 pytestmark = pytest.mark.property
 
@@ -86,3 +86,7 @@ def test_interval_of_a_rate_is_wilsons():
     # Brown, Cai and DasGupta 2001: for 0 of 10 the upper limit is z^2/(n + z^2)
     assert interval(0, 10) == "0 to 28 %"
     assert interval(5, 10) == "24 to 76 %"
+
+
+def test_a_bar_within_a_cell_does_not_split_it():
+    assert table(("law",), [("|v| v",)]).splitlines()[-1] == r"| \|v\| v |"
