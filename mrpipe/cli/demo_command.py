@@ -19,7 +19,7 @@ def demo(options: CommonOptions) -> None:
     directory = options.run or Path("runs") / "demo"
     run_stages(replace(options, config=config_directory() / "demo.yaml", run=directory))
     if not options.json:
-        print(f"what this damper hides is written in {directory / 'bench.truth'}")
+        print(f"what this damper hides is written in {directory / 'campaigns' / 'bench.truth'}")
         print(f"every further command works in this run, such as: mrpipe status {directory}")
 
 
