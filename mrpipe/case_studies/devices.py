@@ -156,7 +156,7 @@ def update_amplitude(memory: FloatArray, displacement: float, velocity: float) -
 
 @njit(float64(float64, float64[::1], float64, float64, float64), cache=True)
 def desired_force(law: float, gains: FloatArray, displacement: float, velocity: float, amplitude: float) -> float:
-    """Return the force that a collocated law asks for: (4.14), or (4.18) with k = -alpha (4.20); clipped later."""
+    """Return the desired force of a collocated law: (4.14), or (4.18) with k = -alpha (4.20); clipped later."""
     if law == KELVIN:
         return gains[VISCOUS] * velocity + gains[STIFFNESS] * displacement
     if law == FRICTION:

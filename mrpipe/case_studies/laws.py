@@ -11,8 +11,8 @@ LAWS = ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on")
 
 
 def unknown_law(law: str, structure: str) -> UserError:
-    """Return the error that tells of a law that is not in :data:`LAWS`; `structure` as in "the tower"."""
-    return UserError("--law", law, f"is no law of {structure}", f"known: {', '.join(LAWS)}")
+    """Return the error for a law that is not in :data:`LAWS`; `structure` as in "the tower"."""
+    return UserError("--law", law, f"is not a law of {structure}", f"known: {', '.join(LAWS)}")
 
 
 def require_known(laws: Sequence[str], structure: str) -> None:

@@ -1,4 +1,4 @@
-"""LQG of appendix E with its signs mended (errata row 18): Riccati gains, Kalman-Bucy observer, and its sampled form.
+"""LQG of appendix E with corrected signs (errata row 18): Riccati gains, Kalman-Bucy observer, and its sampled form.
 
 The thesis writes u = -K x with K = -R^-1 (B'P + S'), a double negative that makes the loop unstable; B for B-bar in
 (E.7); and leaves a transpose out of (E.10). Here u = -K x with K = R^-1 (B'P + S').

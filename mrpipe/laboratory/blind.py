@@ -24,7 +24,7 @@ _DRAWS = 12
 def write_bench(
     final: Path, record: BenchRecord, rig: BenchRig, *, plan: str = "", data_format: Literal["h5", "csv"] = "h5"
 ) -> Path:
-    """Write a recorded bench campaign atomically with its sealed truth beside it, and return its directory."""
+    """Write a recorded bench campaign atomically, with its sealed truth next to it, and return its directory."""
     declared = [item.name for item in record.damper.effects if item.declared]
     with campaign_directory(final) as folder:
         write_campaign(

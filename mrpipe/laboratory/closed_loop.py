@@ -116,7 +116,7 @@ def run_loop(
 
 
 def gains_of(controller: Controller) -> dict[str, float]:
-    """Return the gains that campaign.yaml tells of a test; those that are nought are left out."""
+    """Return the gains of a test for campaign.yaml; gains of 0 are left out."""
     return {key: value for key, value in controller.gains.items() if value != 0.0}
 
 

@@ -121,7 +121,7 @@ def parallel_force(
     time: float,
     h: float,
 ) -> float:
-    """Return the damper force: the core and what acts beside it [N]."""
+    """Return the damper force: the core and the forces in parallel with it [N]."""
     force = core
     for k in range(codes.shape[0]):
         code = codes[k]

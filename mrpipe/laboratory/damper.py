@@ -75,7 +75,7 @@ def damper_from_set(name: str) -> TrueDamper:
     Raises
     ------
     UserError
-        If the set is missing or is no simplified Bouc-Wen set.
+        If the set is missing or is not a simplified Bouc-Wen set.
     """
     values = load_parameter_set("dampers", name)
     missing = [key for key in BASE if key not in values.values]
@@ -197,7 +197,7 @@ def calibrate_strength(
             f"effect {effect.name} ({effect.form.form})",
             "strength_share",
             f"{wanted:g} is out of reach on these tests",
-            "ask for less, or for tests that excite it",
+            "choose a smaller share, or tests that excite the effect",
         )
     return damper.with_effects([*others[:index], effect.with_strength(strength), *others[index + 1 :]])
 

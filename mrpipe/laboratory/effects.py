@@ -271,7 +271,7 @@ class Planted:
         return Planted(self.form, values, self.strength_share, self.declared)
 
     def described(self) -> dict[str, Any]:
-        """Return what the sealed file tells."""
+        """Return the effect as the sealed file holds it."""
         return {
             "name": self.name,
             "form": self.form.form,

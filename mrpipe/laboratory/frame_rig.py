@@ -238,7 +238,7 @@ def calibrated_structure(structure: TrueStructure, rig: FrameRig) -> TrueStructu
 
         strength = solve_strength(share_of, wanted, effect.strength, effect.form.strongest, 0.02)
         if strength is None:
-            raise UserError(where, "strength_share", f"{wanted:g} is out of reach", "ask for less")
+            raise UserError(where, "strength_share", f"{wanted:g} cannot be reached", "choose a smaller share")
         effects[index] = effect.with_strength(strength)
     return structure.with_effects(effects)
 

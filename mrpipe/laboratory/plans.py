@@ -129,7 +129,7 @@ def tests_of(plan: str, *, cycles: int = 10, duration_s: float = 5.0) -> list[Be
     Raises
     ------
     UserError
-        If there is no such plan.
+        If the plan does not exist.
     """
     tests: list[BenchTest] = []
     for name in plan.split("+"):

@@ -20,7 +20,7 @@ SEALED = "sealed.json"
 
 @contextmanager
 def campaign_directory(final: Path) -> Iterator[Path]:
-    """Yield an empty directory beside `final` that takes its place when the block ends without an exception."""
+    """Yield an empty directory next to `final` that replaces it when the block ends without an exception."""
     final = Path(final)
     final.parent.mkdir(parents=True, exist_ok=True)
     for left in final.parent.glob(f".{final.name}.*.tmp"):
@@ -52,7 +52,7 @@ def write_scales(folder: Path, scales: Mapping[str, float]) -> None:
 
 
 def sealed_path(campaign: Path) -> Path:
-    """Return where the truth of a campaign lies: beside the campaign, never within it."""
+    """Return where the truth of a campaign lies: next to the campaign, never inside it."""
     campaign = Path(campaign)
     return campaign.with_name(f"{campaign.name}.truth") / SEALED
 

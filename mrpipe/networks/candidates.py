@@ -104,7 +104,7 @@ class Grid:
     def crossings(self, scores: Mapping[Candidate, float]) -> list[Candidate]:
         """Return what a star leaves out: the best of each axis put together, two axes at a time and more.
 
-        A star tells what helps by itself; the best network most often takes several of these steps at once.
+        A star shows which single change helps. The best network usually combines several of them.
 
         Parameters
         ----------

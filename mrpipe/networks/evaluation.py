@@ -1,4 +1,4 @@
-"""How good a network is: errors pooled, per test and per regime, beside a linear baseline."""
+"""Errors of a network: pooled, for each test and for each regime, compared with a linear baseline."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sweep says: the choice of an architecture, and the thesis' findings with a verdict each (thesis 2.3.2)."""
+"""Results of a sweep: the chosen architecture, and the statements of thesis 2.3.2 with a verdict each."""
 
 from __future__ import annotations
 
@@ -96,14 +96,14 @@ def findings(outcomes: Sequence[Outcome], centre: Candidate) -> list[Finding]:
     width = centre.hidden[0] if centre.hidden else 0
     statements = (
         ("velocity", "velocity is mandatory", "worse"),
-        ("displacement", "displacement besides velocity is no gain", "no gain"),
-        ("acceleration", "acceleration besides velocity is no gain", "no gain"),
-        ("both", "displacement and acceleration are no gain", "no gain"),
-        ("past", f"more than {past} past values are no gain", "no gain"),
+        ("displacement", "adding displacement to velocity does not help", "no gain"),
+        ("acceleration", "adding acceleration to velocity does not help", "no gain"),
+        ("both", "adding displacement and acceleration does not help", "no gain"),
+        ("past", f"more than {past} past values do not help", "no gain"),
         ("fewer-past", f"fewer than {past} past values are worse", "worse"),
-        ("layers", f"more than {depth} hidden layers are no gain", "no gain"),
+        ("layers", f"more than {depth} hidden layers do not help", "no gain"),
         ("fewer-layers", f"fewer than {depth} hidden layers are worse", "worse"),
-        ("neurons", f"more than {width} neurons a layer are no gain", "no gain"),
+        ("neurons", f"more than {width} neurons per layer do not help", "no gain"),
     )
     others = _alternatives(outcomes, centre)
     reference = next((outcome for outcome in outcomes if outcome.candidate == centre), None)

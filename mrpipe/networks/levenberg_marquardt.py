@@ -126,7 +126,7 @@ def _scipy_loop(problem: Problem, start: FloatArray, watch: _Watch) -> str:
         return latest[key]
 
     def jacobian(parameters: FloatArray) -> FloatArray:
-        # least_squares asks for the Jacobian once a step, after accepting it
+        # least_squares evaluates the Jacobian once per step, after accepting the step
         residual, matrix = compressed(parameters)
         reason = watch.accepted(parameters, float(residual @ residual), 2.0 * matrix.T @ residual)
         if reason:

@@ -220,7 +220,7 @@ class Network:
 def averaged(networks: Sequence[Network]) -> Network:
     """Return one network whose output is the mean of several: their layers stand side by side.
 
-    What single trainings got wrong by chance cancels in part; what the data do not tell stays.
+    Random errors of single trainings cancel in part; errors that all share remain.
 
     Parameters
     ----------

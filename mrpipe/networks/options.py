@@ -126,7 +126,7 @@ class TrainingOptions(Section):
     weight_decay: float = Field(
         0.0,
         ge=0.0,
-        description="Penalty on the squared weights beside the mean squared normalised error; 1e-6 to 1e-4 smooths a "
+        description="Penalty on the squared weights, added to the mean squared normalised error; 1e-6 to 1e-4 smooths a "
         "network between the few drive levels of a campaign, the thesis has none.",
     )
     held_out_failures: int = Field(

@@ -67,8 +67,8 @@ class Problem:
     biases
         Whether biases are parameters.
     weight_decay
-        Penalty lambda |parameters|^2 beside the mean squared error (0 in the thesis): it keeps a network smooth between
-        the few levels of the drive that a campaign may have.
+        Penalty lambda |parameters|^2, added to the mean squared error (0 in the thesis). It keeps a network smooth
+        between the few levels of the drive that a campaign may have.
     """
 
     inputs: FloatArray

@@ -104,7 +104,7 @@ def sweep(
         Names further candidates once the first are screened (see :meth:`mrpipe.networks.candidates.Grid.crossings`),
         and how many they can be.
     progress, tell
-        Told how far it is; told the predicted cost before it starts.
+        Called with the share done and a text; called with the predicted cost before the sweep starts.
     """
     began = time.perf_counter()
     data = _places(history, candidates, options, seed, normalisation)
@@ -177,7 +177,7 @@ def readable(seconds: float) -> str:
 def _pass(
     work: Callable[[int], _Fits], count: int, jobs: int, progress: Progress, text: str, known: int = 0
 ) -> list[_Fits]:
-    """Do the work for 0 .. count - 1; what is `known` from an earlier run tells nothing of how long the rest takes."""
+    """Do the work for 0 .. count - 1; what is `known` from an earlier run does not count for the remaining time."""
     began = time.perf_counter()
 
     def timed(fraction: float, message: str = "") -> None:

@@ -1,4 +1,4 @@
-"""What an inverse network is for: the round trip force to current to force, and viscous damping emulated (2.4.3)."""
+"""Uses of an inverse network: the round trip force to drive to force, and emulated viscous damping (thesis 2.4.3)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mrpipe.networks.options import ViscousEmulationOptions
 
 @dataclass(frozen=True)
 class Tracking:
-    """A desired force, the drive that the inverse network asks for and the force that comes of it.
+    """A desired force, the drive that the inverse network computes, and the force that results.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class ViscousEmulation:
     figures, fast
         Error of the force, over all and at more than half the peak velocity.
     negative_share
-        Share of time in which the inverse network asks for a negative drive.
+        Share of time in which the inverse network computes a negative drive.
     outside_training_range
         Share of its inputs beyond the training range.
     """

@@ -28,7 +28,7 @@ HELD_OUT_ROWS = 10000
 
 @dataclass(frozen=True)
 class Start:
-    """How one start fared.
+    """Result of one start.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Trained:
-    """A trained network and how it came about.
+    """A trained network and its training.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ def train(
     jobs
         Threads.
     progress
-        Told how far it is.
+        Called with the share done and a text.
     """
     began = time.perf_counter()
     data = training_data(

@@ -275,7 +275,7 @@ def _effect_in_words(effect: Mapping[str, Any]) -> str:
         text += f" Source of the law: {effect['source']}."
     if effect["tied_with"]:
         tests = "; ".join(f"{k}: {v}" for k, v in effect.get("separating_tests", {}).items())
-        text += f" These tests cannot tell it from {_listed(effect['tied_with'])}{f' ({tests})' if tests else ''}."
+        text += f" These tests do not separate it from {_listed(effect['tied_with'])}{f' ({tests})' if tests else ''}."
     if effect.get("corrected_in") == "prepare":
         text += " It is a fault of sensors: corrections.yaml takes it out in prepare, it does not go into the damper."
     return text

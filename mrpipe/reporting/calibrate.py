@@ -101,7 +101,7 @@ def _maps(sink: Sink, frame: Frame, calibration: Calibration, points: int) -> No
             {law: (item.gains.c_n_s_m, item.gains.k_n_m) for law, item in laws.items() if law_named(law).linear},
             calibration.static_stiffness_n_m,
         ),
-        "Exact damping over viscosity and stiffness of an unclipped device; white: the structure folds.",
+        "Exact damping over viscosity and stiffness of an unclipped device; white: statically unstable.",
     )
 
 

@@ -1,4 +1,4 @@
-"""The closed loop before and after in plain words, from the summary alone."""
+"""The closed loop before and after an effect is added, in sentences made from the summary."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ WHEN = ("before", "after", "recalibrated")
 """How a law was simulated."""
 
 WORTH_SAYING = 0.01
-"""Change of a law's response below which it is not spoken of."""
+"""Relative change of a law's response below which it is not mentioned."""
 
 
 def in_words(found: Mapping[str, Any]) -> str:
@@ -97,8 +97,8 @@ def controller_in_words(found: Mapping[str, Any]) -> str:
         f"A controller that knows the effect has its inverse {new['inverse']}, a switch at "
         f"{new['switch_force_after_n']:.1f} N in place of {new['switch_force_before_n']:.1f} N (the residual force is "
         f"{new['residual_force_after_n']:.1f} N, without the effect {new['residual_force_before_n']:.1f} N) and "
-        f"{'gains ' + gains if gains else 'the gains it had'}. Of these each law takes what lowers its simulated "
-        f"response: {taken or 'none takes any'}."
+        f"{'gains ' + gains if gains else 'the gains it had'}. Each law uses the changes that lower its simulated "
+        f"response: {taken or 'no law uses any'}."
     )
     return f"{text} {gain_in_words(found['laws'])}"
 
@@ -110,13 +110,13 @@ def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
         for row in laws
         if "rms_x_top_m" in row.get("recalibrated", {}) and "rms_x_top_m" in row.get("after", {})
     }
-    told = {law: change for law, change in changes.items() if abs(change) > WORTH_SAYING}
-    if not told:
+    changed = {law: change for law, change in changes.items() if abs(change) > WORTH_SAYING}
+    if not changed:
         return (
-            "It changes the RMS top displacement of no law by more than 1 %: knowing the effect corrects the "
-            "prediction, and little is to be gained in control."
+            "Retuning for the effect changes the RMS top displacement of no law by more than 1 %: the effect "
+            "matters for prediction, not for control."
         )
-    listed = ", ".join(f"{law} {100.0 * change:+.0f} %" for law, change in told.items())
+    listed = ", ".join(f"{law} {100.0 * change:+.0f} %" for law, change in changed.items())
     return (
         f"On the damper with the effect it changes the RMS top displacement: {listed}; the other laws stay within 1 %."
     )

@@ -47,11 +47,11 @@ def damping_over_gains(
     c, k
         Shapes (m,), (l,) [N s/m], [N/m].
     damping_ratio
-        Shape (l, m), NaN where the structure folds.
+        Shape (l, m), NaN where the structure is statically unstable.
     marks
         Law -> (c, k).
     limit_n_m
-        Static stiffness at the damper; below minus this the structure folds.
+        Static stiffness at the damper; below minus this the structure is statically unstable.
     """
     figure, axes = figure_with_axes(height=4.2)
     axis = axes[0, 0]

@@ -1,4 +1,4 @@
-"""What a run directory holds for the report: the summaries of its stages and the artifacts beside them."""
+"""What a run directory holds for the report: the summaries of its stages and the artifacts."""
 
 from __future__ import annotations
 

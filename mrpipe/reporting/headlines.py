@@ -90,7 +90,7 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
             f"{name.replace('_', ' ')} {_number(value['value'])} {value['unit']}".removesuffix(" 1")
             for name, value in effect["parameters"].items()
         )
-        rivals = f", not told apart from {' and '.join(effect['tied_with'])}" if effect["tied_with"] else ""
+        rivals = f", not separated from {' and '.join(effect['tied_with'])}" if effect["tied_with"] else ""
         confidence = f", confidence {effect['confidence']:.2f}" if effect["name"] != "unattributed" else ""
         shown = f": {numbers}" if numbers else ""
         place = f" at {effect['place']}" if effect.get("place") else ""

@@ -70,7 +70,7 @@ def frequency_responses(
 
 
 def mode_shapes(shapes: FloatArray, frequencies_hz: Sequence[float]) -> Figure:
-    """Draw the shapes (a row a floor, a column a mode) beside each other; floors without a value are left out."""
+    """Draw the shapes (floors by modes) next to each other; floors without a value are left out."""
     floors, modes = shapes.shape
     figure, axes = figure_with_axes(1, modes, width=1.5 * modes + 0.8, height=3.6)
     height = np.arange(floors + 1)

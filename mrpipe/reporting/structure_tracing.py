@@ -89,7 +89,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
             parts.append(f"Source of the law: {effect['source']}.")
         if effect["tied_with"]:
             tests = "; ".join(f"{k}: {v}" for k, v in effect.get("separating_tests", {}).items())
-            parts.append(f"Not to be told apart from {', '.join(effect['tied_with'])} by these tests ({tests}).")
+            parts.append(f"Not separated from {', '.join(effect['tied_with'])} by these tests ({tests}).")
     end = f"With it the error is {100 * after:.2g} %."
     if summary["unexplained"]["structured"]:
         end += " Something is still unexplained."

@@ -77,7 +77,7 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
     bench.check_laws(settings.laws)
     device = _bingham(settings.inverse)
     chain = damper_named(settings.damper, {}).chain()
-    # what is wrong with the files is told before a motion is synthesised
+    # read all files first, so that a mistake in one is reported before a motion is synthesised
     frames = {name: ten_storey(name) for name in settings.structures}
     motion = _motion(context, settings.motion, 1)
     studies = {}

@@ -49,7 +49,7 @@ def _true_damper(context: StageContext) -> TrueDamper:
 
 
 def _bench_order(context: StageContext) -> tuple[list[BenchTest], BenchRig, np.random.Generator]:
-    """Return the tests, the machine and the generator of the bench; the table asks for the same damper."""
+    """Return the tests, the machine and the generator of the bench; the shaking table uses the same damper."""
     import numpy as np
 
     from mrpipe.laboratory.motion import BenchTest
@@ -140,7 +140,7 @@ def _write_table(
     effects: Sequence[Planted],
     rate_hz: float,
 ) -> dict[str, Any]:
-    """Write what was recorded on the shaking table as a campaign, its truth beside it; return what is said of it."""
+    """Write a recording of the shaking table as a campaign, and its truth next to it; return the summary."""
     from mrpipe.campaigns import write_campaign
     from mrpipe.laboratory.frame_rig import floor_masses
     from mrpipe.laboratory.sealing import campaign_directory, write_scales, write_sealed
@@ -165,7 +165,7 @@ def _write_table(
 def _summary(
     context: StageContext, campaign: str, tests: list[Any], declared: list[str], rate: float
 ) -> dict[str, Any]:
-    """Return what is said of a recorded campaign; never its truth."""
+    """Return the summary of a recorded campaign; it never contains the truth."""
     from mrpipe.reporting import record as section
 
     rows = [(test.name, test.role, len(next(iter(test.columns.values())))) for test in tests]

@@ -1,4 +1,4 @@
-"""`reproduce`: every printed figure of the thesis beside ours."""
+"""`reproduce`: the printed figures of the thesis, recomputed and compared."""
 
 from __future__ import annotations
 

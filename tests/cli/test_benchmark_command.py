@@ -71,7 +71,7 @@ def test_bad_records_end_with_status_2_and_one_line(
 @pytest.mark.planted
 def test_unknown_law_ends_with_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(short(tmp_path, "base-isolated", "--law", "vdd")) == 2
-    assert "is no law of the base-isolated building" in capsys.readouterr().err
+    assert "is not a law of the base-isolated building" in capsys.readouterr().err
 
 
 @pytest.mark.golden

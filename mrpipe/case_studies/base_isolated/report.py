@@ -106,9 +106,11 @@ def describe(sink: Sink, result: IsolationResult) -> None:
     )
     laws = {case.law: case.indices for case in result.cases}
     sink.table(
-        "indices", figures.beside_thesis(laws, THESIS, origin), f"Table 6.2 (El Centro) beside ours ({origin}, {name})."
+        "indices",
+        figures.beside_thesis(laws, THESIS, origin),
+        f"Table 6.2 (El Centro) compared with ours ({origin}, {name}).",
     )
-    sink.figure("indices", figures.index_bars(laws, THESIS), f"Indices under {name} beside Table 6.2.")
+    sink.figure("indices", figures.index_bars(laws, THESIS), f"Indices under {name}, compared with Table 6.2.")
     if result.motions:
         rows = [
             {"motion": motion, "law": law, "model": origin, **values}

@@ -41,7 +41,7 @@ class IsolatedBuilding:
     isolation_stiffness, isolation_damping
         Of all bearings about the centre of mass, shape (3, 3).
     bearings_m
-        Positions about the centre of mass, shape (92, 2); the corners of the plan where the file does not tell.
+        Positions about the centre of mass, shape (92, 2); the corners of the plan where the file does not give them.
     """
 
     model: BenchmarkModel
@@ -170,7 +170,7 @@ def published_building(
     Raises
     ------
     UserError
-        If the file is not there, is no such model, or its matrices do not fit.
+        If the file is not there, is not such a model, or its matrices do not fit.
     """
     if not path.is_file():
         raise UserError(path, "", "no such model", "give the STRUC.mat of the benchmark")

@@ -1,4 +1,4 @@
-"""The control laws beside each other and beside the structure without a damper."""
+"""Comparison of the control laws with each other and with the structure without a damper."""
 
 from __future__ import annotations
 
