@@ -126,8 +126,8 @@ class TrainingOptions(Section):
     weight_decay: float = Field(
         0.0,
         ge=0.0,
-        description="Penalty on the squared weights, added to the mean squared normalised error; 1e-6 to 1e-4 smooths a "
-        "network between the few drive levels of a campaign, the thesis has none.",
+        description="Penalty on the squared weights, added to the mean squared normalised error; 1e-6 to 1e-4 smooths "
+        "a network between the few drive levels of a campaign; the thesis has none.",
     )
     held_out_failures: int = Field(
         _TRAINLM.held_out_failures,
