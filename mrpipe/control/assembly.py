@@ -38,6 +38,9 @@ PERFECT_ROUNDING = 1.5
 """Rounding of friction for a perfect damper over that with a damper, because no yielding rounds its force."""
 
 
+FORCE_MARGIN = 10.0
+"""Largest plausible reading of the damper force over the largest force of the model."""
+
 EXTREMUM_NOISE = 5.0
 """Way back that makes an extremum count, over the noise of the displacement."""
 
@@ -152,6 +155,7 @@ class ControllerFactory:
             given = self.ideal_rounding_m_s
             rounding = PERFECT_ROUNDING * rounding if given is None else given
         limit = settings.drive_limit or self.damper.drive_limit
+        saturation = self._largest_force(limit)
         return ControllerOptions(
             rate_hz=settings.rate_hz or RATES_HZ[perfect],
             velocity="measured" if perfect else settings.velocity,
@@ -169,17 +173,18 @@ class ControllerFactory:
             largest_displacement_m=settings.largest_displacement_m,
             largest_velocity_m_s=settings.largest_velocity_m_s,
             largest_acceleration_m_s2=settings.largest_acceleration_m_s2,
-            largest_force_n=settings.largest_force_n or self._largest_force(limit),
+            largest_force_n=settings.largest_force_n or (FORCE_MARGIN * saturation if saturation else None),
+            saturation_force_n=saturation,
             fault_hold_s=settings.fault_hold_s,
             safe_drive=min(settings.safe_drive, limit),
             extremum_memory_s=settings.extremum_memory_periods * 2.0 * math.pi / self.calibrated.omega_0,
         )
 
     def _largest_force(self, limit: float) -> float | None:
-        """Return ten times the force at the limit of the drive [N]: more than the damper can give."""
+        """Return the damper's force at the limit of the drive and the expected amplitude [N]; None where infinite."""
         speed = self.calibrated.amplitude_m * self.calibrated.omega_0
-        force = 10.0 * float(self.damper.quasi_static_force(speed, limit))
-        return force if math.isfinite(force) else None
+        force = float(self.damper.quasi_static_force(speed, limit))
+        return force if math.isfinite(force) and force > 0.0 else None
 
     def _reference(self, law: Law, gains: Gains) -> Network | None:
         """Return the reference network for these gains: its force is proportional to the tuned gain of the law."""

@@ -83,6 +83,8 @@ class ControllerOptions:
     largest_displacement_m, largest_velocity_m_s, largest_acceleration_m_s2, largest_force_n
         Largest plausible readings; larger ones and those that are not finite are refused. None: what a sensor of
         :data:`DYNAMIC_RANGE` can read.
+    saturation_force_n
+        Largest force of the damper; None: not known.
     fault_hold_s
         How long a refused reading is replaced by the last good one before the drive goes to `safe_drive`.
     safe_drive
@@ -107,6 +109,7 @@ class ControllerOptions:
     largest_velocity_m_s: float | None = None
     largest_acceleration_m_s2: float | None = None
     largest_force_n: float | None = None
+    saturation_force_n: float | None = None
     fault_hold_s: float = _SETTINGS.fault_hold_s
     safe_drive: float = _SETTINGS.safe_drive
 
@@ -274,6 +277,7 @@ class _Pack:
         self.layout[kernel.VELOCITY_SOURCE] = _SOURCES[options.velocity]
         self.networks: list[IntArray] = []
         head[kernel.SAFE_DRIVE] = options.safe_drive
+        head[kernel.LARGEST_FORCE] = 1e300 if options.saturation_force_n is None else options.saturation_force_n
         # a time that is a whole number of samples must not lose one to rounding
         self.layout[kernel.HOLD] = math.floor(options.fault_hold_s * options.rate_hz + 1e-6)
 
@@ -326,7 +330,6 @@ class _Pack:
         if abs(observer.sample_time_s * self.options.rate_hz - 1.0) > 1e-9:
             raise UserError("control law", "observer", "was made for another rate", "calibrate at this rate")
         self.layout[kernel.AT_OBSERVER] = self.at
-        self.layout[kernel.FLOORS] = observer.floors
         for part in (observer.transition, observer.force_input, observer.innovation, observer.gain):
             self.numbers.append(np.ravel(part))
         return observer.floors
@@ -338,6 +341,7 @@ class _Pack:
         layout = self.layout
         layout[kernel.AT_LIMITS], layout[kernel.CHANNELS] = self.at, len(limits)
         self.numbers.append(limits)
+        layout[kernel.FLOORS] = floors
         layout[kernel.STATE_HISTORY] = kernel.S_HEAD
         layout[kernel.HISTORY] = history
         layout[kernel.STATE_OBSERVER] = kernel.S_HEAD + 4 * history

@@ -91,6 +91,7 @@ TABLE_DRIVE = 21  # largest drive of the inverse table
 ROUNDING = 22  # speed over which the friction of fdns changes its sign [m/s]; 0: a jump
 MEMORY = 23  # how long an extremum counts [s]
 SAFE_DRIVE = 24  # drive while the readings cannot be used
+LARGEST_FORCE = 25  # of the damper [N]; 1e300 where it is not known
 HEAD = 32
 # a network in `numbers`: input scale, input shift, output scale, output shift, then weights by row and biases a layer
 
