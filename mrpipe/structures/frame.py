@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
+from mrpipe.errors import UserError
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,16 @@ def write_frame(artifact: ArtifactWriter, frame: Frame, group: str = "frame") ->
 
 
 def read_frame(artifact: Artifact, group: str = "frame") -> Frame:
-    """Read what :func:`write_frame` wrote."""
+    """Read what :func:`write_frame` wrote.
+
+    Raises
+    ------
+    UserError
+        If the artifact holds modes but no matrices.
+    """
+    if f"{group}/mass" not in artifact:
+        remedy = "give frame.floor_masses_kg in campaign.yaml and run mrpipe identify-frame again"
+        raise UserError(artifact.path, group, "is missing: the data determine modes but no matrices", remedy)
     members = set(artifact.members(group))
     names = artifact.json(f"{group}/degrees_of_freedom") if "degrees_of_freedom" in members else []
     return Frame(

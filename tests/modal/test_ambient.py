@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.errors import UserError
 from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.records import FrameTest, FrameTests, Place
-from mrpipe.modal.storage import summary
+from mrpipe.modal.storage import summary, write_identification
+from mrpipe.structures import read_frame
 from tests.modal.towers import Sensors, ambient_test, random_tower
 
 HERE = Path("planted")
@@ -54,13 +56,18 @@ def test_all_modes_are_found_and_none_invented(tower_and_test):
 
 
 @pytest.mark.planted
-def test_without_masses_only_modes_are_given(tower_and_test):
+def test_without_masses_only_modes_are_given(tower_and_test, tmp_path):
     pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
     tower, test = tower_and_test
     result = identify_frame(FrameTests((), (), np.full(4, np.nan), HERE, (test,)))
     assert_modes(result, tower)
     assert result.frame is None
     assert summary(result)["mass"] is None
+    path = tmp_path / "frame.h5"
+    with ArtifactWriter.create(path, Provenance("identify-frame")) as artifact:
+        write_identification(artifact, result)
+    with pytest.raises(UserError, match="modes but no matrices"):
+        read_frame(Artifact(path))
 
 
 @pytest.mark.planted
