@@ -9,6 +9,7 @@ from pydantic import Field, field_validator
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.config.section import Section
 from mrpipe.dampers.forms import form_names
+from mrpipe.tracing.rules import TracingRules
 
 
 class CloseLoopSettings(Section):
@@ -51,6 +52,7 @@ class CloseLoopSettings(Section):
         description="Model error to weigh by, as a share of the force RMS, where it is known to outweigh the sensors' "
         "noise, as on real dampers; 0 finds out by a first pass, for twice the time.",
     )
+    rules: TracingRules = Field(TracingRules(), description="Thresholds of the decisions.")
     unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")
 
     @field_validator("model")

@@ -25,5 +25,6 @@ def tracing_options(settings: Any, drive_unit: str) -> TracingOptions:
         observation_filter=settings.observation_filter,
         model_error_share=settings.model_error_share,
         unattributed=settings.unattributed,
+        validation=settings.rules.validation,
         drive_unit=drive_unit or "A",
     )
