@@ -8,10 +8,11 @@ SEED ?= 50000
 CASES ?= 48
 RUN_STAMP := $(VENV)/.installed
 TEST_STAMP := $(VENV)/.installed-test
+DOCS_STAMP := $(VENV)/.installed-docs
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint bench bench-tracing reproduce train-inverse identify-frame simulate close-loop clean
+.PHONY: help run test lint docs bench bench-tracing reproduce train-inverse identify-frame simulate close-loop clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -25,6 +26,10 @@ $(RUN_STAMP): pyproject.toml constraints.txt | $(BIN)/python
 
 $(TEST_STAMP): pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) -e '.[test]'
+	@touch $@ $(RUN_STAMP) $(DOCS_STAMP)
+
+$(DOCS_STAMP): pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) -e '.[docs]'
 	@touch $@ $(RUN_STAMP)
 
 run: $(RUN_STAMP)  ## the whole main job on the virtual laboratory; prints where the report is
@@ -38,6 +43,9 @@ lint: $(TEST_STAMP)  ## style, types and import rules
 
 test: lint  ## linters and the whole test suite
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadscope
+
+docs: $(DOCS_STAMP)  ## the documentation site, in build/site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 bench: $(RUN_STAMP)  ## timings: optimiser, closed loop
 	$(BIN)/python -m benchmarks.levenberg_marquardt

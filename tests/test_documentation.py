@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
 from mrpipe.control.laws import law_names
 from mrpipe.stages.registry import all_stages
 
 pytestmark = pytest.mark.property
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
 CLASSES = ("noise", "explained", "partly explained", "unknown", "base form", "validation differs")
 
 
@@ -30,13 +36,40 @@ def test_page_on_the_json_names_every_key_of_the_example() -> None:
     assert [key for key in keys if f"`{key}" not in table] == []
 
 
-def test_no_link_between_pages_is_dead() -> None:
-    dead = []
-    for page in DOCS.glob("*.md"):
-        for target in re.findall(r"\]\((?!https?:)([^)#\s]+)", page.read_text(encoding="utf-8")):
-            if not (page.parent / target).exists():
-                dead.append(f"{page.name}: {target}")
-    assert dead == []
+@pytest.mark.parametrize("page", [*sorted(DOCS.glob("*.md")), *sorted(ROOT.glob("*.md"))], ids=lambda page: page.name)
+def test_no_relative_link_is_dead(page: Path) -> None:
+    links = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", page.read_text(encoding="utf-8"))
+    assert [link for link in links if not (page.parent / link).exists()] == []
+
+
+def test_navigation_of_the_site_lists_every_page_once() -> None:
+    site = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    assert sorted(_pages(site["nav"])) == sorted(page.name for page in DOCS.glob("*.md"))
+
+
+def _pages(entry: Any) -> list[str]:
+    """Return the pages of an entry of the navigation: a page, a list of entries, or a mapping of titles to entries."""
+    if isinstance(entry, str):
+        return [entry]
+    return [page for item in (entry.values() if isinstance(entry, dict) else entry) for page in _pages(item)]
+
+
+def test_site_builds_without_warnings(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs", reason="needs the extra docs")
+    pytest.importorskip("material", reason="needs the extra docs")
+    build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", str(ROOT / "mkdocs.yml")]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(
+        [*build, "--site-dir", str(tmp_path / "site")], capture_output=True, text=True, env=environment
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "site" / "tutorial-own-damper" / "index.html").is_file()
+
+
+def test_readme_links_every_page_of_the_documentation() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    pages = {page.name for page in DOCS.glob("*.md")} - {"index.md"}  # the start page repeats the README
+    assert sorted(page for page in pages if f"](docs/{page})" not in text) == []
 
 
 def test_packages_and_files_that_the_architecture_names_exist() -> None:

@@ -6,6 +6,8 @@ import json
 import sys
 from typing import Any
 
+from pydantic_core import PydanticUndefined
+
 from mrpipe.config.model import options
 
 _HEAD = """\
@@ -25,7 +27,7 @@ def as_markdown() -> str:
             lines.append(f"\n{depth} {name}\n{text}\n\n| setting | default | meaning |\n| --- | --- | --- |\n")
         elif "." not in name:
             if name == "name":
-                lines.append("\n## Of the whole run\n| setting | default | meaning |\n| --- | --- | --- |\n")
+                lines.append("\n## Settings of the whole run\n| setting | default | meaning |\n| --- | --- | --- |\n")
             lines.append(_row(name, default, text))
         else:
             lines.append(_row(name, default, text))
@@ -33,8 +35,9 @@ def as_markdown() -> str:
 
 
 def _row(name: str, default: Any, text: str) -> str:
-    shown = json.dumps(default, default=_plain, ensure_ascii=False)
-    return f"| `{name}` | `{shown.replace('|', chr(92) + '|')}` | {text.replace('|', chr(92) + '|')} |\n"
+    shown = json.dumps(default, default=_plain, ensure_ascii=False).replace("|", chr(92) + "|")
+    cell = "required" if default is PydanticUndefined else f"`{shown}`"
+    return f"| `{name}` | {cell} | {text.replace('|', chr(92) + '|')} |\n"
 
 
 def _plain(value: Any) -> Any:

@@ -65,5 +65,11 @@ def test_documentation_lists_every_option() -> None:
     assert (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8") == as_markdown()
 
 
+def test_documentation_says_which_settings_are_required() -> None:
+    text = (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8")
+    assert "| `design.motions[].file` | required |" in text
+    assert "Undefined" not in text
+
+
 def test_default_stages_exist() -> None:
     assert set(config_model()().stages) - {"report"} <= set(all_stages())
