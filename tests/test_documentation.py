@@ -12,6 +12,16 @@ from typing import Any
 import pytest
 import yaml
 
+from mrpipe.campaigns.schema import (
+    BENCH_QUANTITIES,
+    FRAME_QUANTITIES,
+    CampaignEntry,
+    ChannelEntry,
+    FrameEntry,
+    TestEntry,
+    TextEntry,
+    quantity_of,
+)
 from mrpipe.control.laws import law_names
 from mrpipe.stages.registry import all_stages
 
@@ -64,6 +74,26 @@ def test_site_builds_without_warnings(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site" / "tutorial-own-damper" / "index.html").is_file()
+
+
+@pytest.mark.parametrize("page", ["campaigns.md", "frame-identification.md"])
+def test_example_campaigns_use_keys_that_exist(page: str) -> None:
+    blocks = re.findall(r"^```yaml\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert blocks
+    for content in map(yaml.safe_load, blocks):
+        entry = CampaignEntry(**{"campaign": "example", "rig": "shear-frame", **content})
+        tests = [TestEntry(**test) for test in entry.tests]
+        named = [*entry.channels.items(), *(item for test in tests for item in test.channels.items())]
+        assert [name for name, _ in named if quantity_of(name, entry.rig) is None] == []
+        assert all(ChannelEntry(**channel) for _, channel in named)
+
+
+def test_page_on_campaigns_names_every_key() -> None:
+    text = (DOCS / "campaigns.md").read_text(encoding="utf-8")
+    models = (ChannelEntry, FrameEntry, TextEntry, TestEntry, CampaignEntry)
+    keys = {key for model in models for key in model.model_fields}
+    channels = {*BENCH_QUANTITIES, *FRAME_QUANTITIES}
+    assert sorted(key for key in keys | channels if not re.search(rf"\b{key}\b", text)) == []
 
 
 def test_readme_links_every_page_of_the_documentation() -> None:
