@@ -7,7 +7,15 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from mrpipe.cli import benchmark_command, demo_command, effect_command, inspect_commands, run_commands, stage_commands
+from mrpipe.cli import (
+    benchmark_command,
+    compare_command,
+    demo_command,
+    effect_command,
+    inspect_commands,
+    run_commands,
+    stage_commands,
+)
 from mrpipe.errors import UserError
 
 GROUPS = {
@@ -24,6 +32,7 @@ EXAMPLES = (
     ("mrpipe run", "all stages of the project in this folder"),
     ("mrpipe close-loop --campaign DIR", "which effect the model of this damper lacks"),
     ("mrpipe status runs/my-rig", "what is out of date, and why"),
+    ("mrpipe compare runs/before runs/after", "settings, data and results that differ"),
 )
 
 
@@ -97,6 +106,7 @@ def help_of(
 
 
 run_commands.register(app)
+compare_command.register(app)
 stage_commands.register(app)
 benchmark_command.register(app)
 inspect_commands.register(app)

@@ -14,7 +14,7 @@ from mrpipe.cli import run
 COMMANDS = [
     "run", "record", "prepare", "assemble", "sweep", "train-forward", "train-inverse", "identify-damper",
     "identify-frame", "calibrate", "simulate", "close-loop", "benchmark", "reproduce", "report", "export", "init",
-    "status", "show", "check",
+    "status", "show", "check", "compare",
 ]  # fmt: skip
 
 
