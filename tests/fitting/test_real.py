@@ -33,7 +33,8 @@ def test_held_out_errors_are_those_of_the_prototype_and_yield_rounds_with_speed(
     assert found == pytest.approx(bouc_wen, rel=0.08)
     # the lack that every real recording shows: yield that rounds with velocity
     assert judged["rounded-yield"].validation.nrmse < 0.9 * found
-    assert judged["bingham"].validation.nrmse > 1.4 * found
+    # without hysteresis the error is larger, although this form rounds its yield with speed, too
+    assert judged["bingham"].validation.nrmse > 1.25 * found
 
 
 @pytest.mark.real

@@ -56,7 +56,7 @@ def test_what_the_stage_leaves(tmp_path: Path) -> None:
     kinds = [item["kind"] for item in read_part(tmp_path / "run", "prepare")]
     assert kinds.count("figure") == 3 and kinds.count("table") == 1
     assert all(
-        (tmp_path / "run" / item).is_file() for item in ("figures/prepare-loops.png", "tables/prepare-tests.csv")
+        (tmp_path / "run" / item).is_file() for item in ("figures/prepare-loops.svg", "tables/prepare-tests.csv")
     )
 
 
@@ -64,7 +64,7 @@ def test_what_the_stage_leaves(tmp_path: Path) -> None:
 def test_a_faulty_campaign_leaves_nothing(tmp_path: Path) -> None:
     source = campaign(tmp_path / "c")
     (source / "two.csv").unlink()
-    with pytest.raises(UserError, match=r"two\.csv: no such file"):
+    with pytest.raises(UserError, match=r"two\.csv: data file not found"):
         run(tmp_path / "run", source)
     assert not (tmp_path / "run" / "prepared.h5").exists()
 

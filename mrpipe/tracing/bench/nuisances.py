@@ -123,7 +123,7 @@ def session_gain(
     Parameters
     ----------
     recordings, measured, simulated
-        Validation tests as in :func:`record_gains`.
+        Validation tests as in :func:`record_gains`, with the first parts of the records.
     training
         Gains of the training tests, by the same model.
     levels

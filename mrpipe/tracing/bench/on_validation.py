@@ -31,6 +31,8 @@ class OnValidation:
     ----------
     recordings
         The validation tests; the samples compared are those that nothing was fitted to.
+    recorded
+        The same with all samples: gains of a session are estimated from the first parts, which are not compared.
     measured
         Offset-free measured force.
     before, after
@@ -47,6 +49,7 @@ class OnValidation:
     """
 
     recordings: Recordings
+    recorded: Recordings
     measured: FloatArray
     before: FloatArray
     after: FloatArray
@@ -144,7 +147,9 @@ def on_validation(
         "displacement": scale.motion * motion,
     }
     components = {name: float(np.sqrt(np.mean(values[used]))) / power for name, values in parts.items()}
-    return OnValidation(recordings, judged.measured, before, after, floor, components, shared is None, gains)
+    return OnValidation(
+        recordings, validation, judged.measured, before, after, floor, components, shared is None, gains
+    )
 
 
 @dataclass(frozen=True)

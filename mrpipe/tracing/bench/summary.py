@@ -169,7 +169,7 @@ class Summary:
     def _nuisances(self, named: Sequence[Named], window: float) -> dict[str, Any]:
         found, training = self.found, self.training
         session = session_gain(
-            found.recordings, found.measured, found.after, self._training_gains(), mean_drives(training)
+            found.recorded, found.measured, found.after, self._training_gains(), mean_drives(training)
         )
         offsets = zip(training.names, self.selection.chosen.test_offsets, strict=True)
         return {

@@ -40,9 +40,7 @@ def test_a_yield_in_parts_fits_labcontrol_and_leaves_the_gain_of_its_held_out_se
 
     trained = predict(rounded, training)
     own = judged_part(training, trained, None, first_parts(training, 1 / 3))
-    session = session_gain(
-        judged.recordings, judged.measured, simulated, record_gains(own.recordings, own.measured, trained)
-    )
+    session = session_gain(validation, judged.measured, simulated, record_gains(own.recordings, own.measured, trained))
     assert session is not None
     # seven of the nine are 9 to 11 % weaker
     assert {f"ensaio.vali.{k}" for k in range(3, 10)} <= set(session.tests)
