@@ -187,7 +187,7 @@ def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
     """
     if not drives:
         raise UserError(source, "drive", "is not recorded in any training test", "an inverse model needs a drive")
-    # the mean over a twentieth of each record tells a level from the noise on it
+    # the mean over a twentieth of each record separates a level from the noise on it
     levels = np.concatenate(
         [[block.mean() for block in np.array_split(item, 20) if block.size] for item in drives.values()]
     )

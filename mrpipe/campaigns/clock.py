@@ -47,7 +47,7 @@ def build_clock(
     Raises
     ------
     UserError
-        If the clock stands still or runs backwards, holds NaN, disagrees with the stated rate, or is nowhere told.
+        If the clock stands still or runs backwards, holds NaN, disagrees with the stated rate, or is not given anywhere.
     """
     if time is None:
         time = file.time_s
@@ -68,7 +68,7 @@ def build_clock(
                 file.path,
                 where,
                 f"the clock runs at {rate:.6g} Hz, but sampling_rate_hz says {stated_rate_hz:.6g}",
-                "mend sampling_rate_hz or the unit of time",
+                "correct sampling_rate_hz or the unit of time",
             )
         rate = stated_rate_hz
     time = _unrounded(time)
@@ -111,7 +111,7 @@ def _measured_rate(file: DataFile, time: FloatArray) -> float:
 def _lost_samples(time: FloatArray, rate: float) -> IntArray:
     """Return how many samples are missing after each sample, shape (n - 1,).
 
-    A jittering clock also has long intervals, but the short ones beside them make up for it. After lost samples the
+    A jittering clock also has long intervals, but short ones next to them make up for it. After lost samples the
     clock stays late, so the medians of a few samples before and after an interval are compared.
     """
     steps = np.diff(time) * rate

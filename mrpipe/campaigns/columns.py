@@ -26,7 +26,7 @@ class DataFile:
     path
         The file.
     names
-        Names that can be asked for.
+        Names of the columns that can be read.
     fetch
         Name -> array of numbers (any shape); called only for columns that are used.
     table
@@ -62,7 +62,7 @@ class DataFile:
         Raises
         ------
         UserError
-            If there is no such column, or it is no vector of numbers.
+            If there is no such column, or if it is not a vector of numbers.
         """
         name, index = self._resolve(column, where)
         try:

@@ -33,7 +33,7 @@ def ending_of(path: Path) -> str:
 
 
 def open_data_file(path: Path, layout: TextEntry | None = None) -> DataFile:
-    """Open a data file; only the columns asked for are turned into numbers.
+    """Open a data file; only requested columns are converted to numbers.
 
     Nothing in a file is ever executed: no pickles are loaded, and MATLAB objects are not built.
 

@@ -65,7 +65,7 @@ def load_campaign(path: Path) -> Campaign:
     ----------
     path
         Directory with campaign.yaml, or a campaign file such as configs/campaigns/utfsm.yaml, whose `directory:` key
-        tells where the files lie (`{public_data: NAME}`: the folder of the public measurements).
+        names the folder of the files (`{public_data: NAME}`: the folder of the public measurements).
 
     Raises
     ------
@@ -305,8 +305,8 @@ def _constant(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -
 def _one_length(file: DataFile, columns: dict[str, FloatArray], where: str) -> int:
     lengths = {name: values.size for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} {size}" for name, size in lengths.items())
-        raise UserError(file.path, where, f"channels differ in length ({told})", "pick columns of one length")
+        sizes = ", ".join(f"{name} {size}" for name, size in lengths.items())
+        raise UserError(file.path, where, f"channels differ in length ({sizes})", "pick columns of one length")
     return next(iter(lengths.values()))
 
 
@@ -344,7 +344,7 @@ def _require_unique_names(source: YamlSource, recordings: list[Recording]) -> No
     seen: set[str] = set()
     for index, test in enumerate(recordings):
         if test.name in seen:
-            raise source.error(("tests", index, "name"), f"{test.name!r} stands twice", "give each test its own name")
+            raise source.error(("tests", index, "name"), f"{test.name!r} is used twice", "give each test its own name")
         seen.add(test.name)
 
 
@@ -362,14 +362,14 @@ def _require_floors(source: YamlSource, campaign: Campaign) -> None:
 
 
 def _with_force_sign(campaign: Campaign, findings: list[str]) -> Campaign:
-    """Turn the force round where compression was taken as positive; the work done on the rod tells."""
+    """Reverse the force where compression was taken as positive. The sign of the work done on the rod shows this."""
     sign = force_sign(campaign.recordings)
     if sign >= -0.1:
         if sign < 0.1:
-            findings.append("force and velocity are hardly related: the sign of the force cannot be told")
+            findings.append("force and velocity are hardly related: the sign of the force cannot be determined")
         return campaign
     findings.append(
-        f"force is positive in compression (correlation with velocity {sign:.2f}): its sign was turned round"
+        f"force is positive in compression (correlation with velocity {sign:.2f}): its sign was reversed"
     )
     turned = [
         replace(test, channels={**test.channels, "force": -test.channels["force"]}) for test in campaign.recordings

@@ -111,7 +111,7 @@ class ChannelEntry(Entry):
 
 
 class TextEntry(Entry):
-    """How delimited text is laid out, where it does not tell by itself."""
+    """How delimited text is laid out, where this cannot be found from the file."""
 
     skip_lines: int = Field(default=0, ge=0)
     delimiter: str | None = None
@@ -217,7 +217,7 @@ class TestEntry(Entry):
 
 
 class CampaignEntry(Entry):
-    """The whole of campaign.yaml; tests are validated one by one so that a fault tells its line."""
+    """The whole of campaign.yaml; tests are validated one by one so that an error names its line."""
 
     campaign: str
     rig: Literal["damper-bench", "shear-frame"]

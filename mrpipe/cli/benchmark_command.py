@@ -50,7 +50,7 @@ def overrides_of(
 
 
 def table_of(name: str, summary: Mapping[str, Any]) -> list[str]:
-    """Return the lines that a person reads: the structure, and the indices beside the thesis' in brackets."""
+    """Return the lines that a person reads: the structure, and the indices with those of the thesis in brackets."""
     periods = ", ".join(f"{value:.4g}" for value in summary["periods_s"][:5])
     lines = [
         f"{name}: {summary['model']} model, {summary['total_mass_kg'] / 1e3:.6g} t, periods {periods} .. s",
@@ -103,7 +103,7 @@ def _more_facts(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _file(option: str, value: str, needs_file: bool = False) -> str:
-    """Return an absolute path where the value is a file, else the value: the name of something that comes along."""
+    """Return an absolute path where the value is a file, else the value: the name of a bundled file."""
     path = Path(value)
     if path.is_file():
         return str(path.resolve())
@@ -126,7 +126,7 @@ def benchmark(
     law: Annotated[list[str] | None, typer.Option(metavar="LAW", help="Control law; may be repeated.")] = None,
     everything: Annotated[bool, typer.Option("--all", help="All seven motions, all laws (base-isolated).")] = False,
 ) -> None:
-    """Run a benchmark structure and print its indices beside the thesis' figures."""
+    """Run a benchmark structure and compare its indices with those of the thesis."""
     extra = overrides_of(name, model, motion, law, everything)
     chosen = replace(options, overrides=[*extra, *options.overrides])
     if options.json:

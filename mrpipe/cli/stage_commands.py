@@ -34,7 +34,7 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
     Raises
     ------
     UserError
-        If a stage that was asked for has no data to work on.
+        If a requested stage has no data.
     """
     from mrpipe.cli.output import print_brief, print_json, print_summary
     from mrpipe.cli.session import session
@@ -47,7 +47,7 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
     for outcome in outcomes:
         if outcome.what == "skipped":
             raise UserError(
-                outcome.stage, "", f"nothing to work on: {outcome.manifest.skipped}", "name the data it needs"
+                outcome.stage, "", f"cannot run: {outcome.manifest.skipped}", "name the data that it needs"
             )
     if options.json:
         # a caller that reads standard output alone sees them too
@@ -171,7 +171,7 @@ def export(
 
 
 _FAMILIES: dict[str, Callable[..., None]] = {"record": record, "simulate": simulate, "export": export}
-"""Commands that run one stage of a family, chosen by an option (`benchmark` has a module of its own)."""
+"""Commands that run one stage of a family, chosen by an option (`benchmark` has its own module)."""
 
 
 def register(app: typer.Typer) -> None:

@@ -74,5 +74,5 @@ def explain(
         known = list(section.model_fields) if section is not None else []
         return UserError(source, where, "unknown key", nearest(str(path[-1]), known))
     given = first.get("input")
-    shown = f"is {given!r}" if not isinstance(given, Mapping) else "is a section of its own"
+    shown = f"is {given!r}" if not isinstance(given, Mapping) else "is a section with settings"
     return UserError(source, where, shown, first["msg"][0].lower() + first["msg"][1:])

@@ -132,7 +132,7 @@ def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: d
         ({"channels": {"force": {"scale": 0}}}, "a finite number other than 0 expected"),
         ({"channels": {"force": {"column": True}}}, "write the name of a column in quotes, or its number"),
         ({"segments_s": [[30, 40]]}, "[30, 40] holds no sample; the clock of one.csv runs from 0 to 3.999 s"),
-        ({"name": "two"}, "tests[1].name: 'two' stands twice"),
+        ({"name": "two"}, "tests[1].name: 'two' is used twice"),
         ({"part": 2}, "part: is 2, the file has 1"),
         ({"file": "one.xls"}, "one.xls: data file not found"),
         ({"drive": {"value": 1.0, "unit": "V"}}, "is in A in one test and in V in another"),

@@ -85,12 +85,12 @@ def _against_the_work(tests: Sequence[Slow]) -> list[Finding]:
         work = float(np.median(others)) if others else 0.0
         if work < 0.2 or works[index] > 0.1:
             continue
-        told = f"correlation of force and velocity {test.work:.2f}, in the other tests {work:.2f}"
+        evidence = f"correlation of force and velocity {test.work:.2f}, in the other tests {work:.2f}"
         numbers = {"correlation_with_velocity": test.work, "correlation_of_others": work}
         found = _why_no_work(test, index, tests)
         if found is not None:
             name, channel, sentence, remedy = found
-            findings.append(Finding(name, "error", f"{sentence} ({told})", remedy, test.name, channel, numbers))
+            findings.append(Finding(name, "error", f"{sentence} ({evidence})", remedy, test.name, channel, numbers))
     return findings
 
 
@@ -231,7 +231,7 @@ def _unit_finding(test: Slow, channel: str, factor: float, evidence: str, number
         severity="error",
         test=test.name,
         channel=channel,
-        sentence=f"{channel} looks 1000 times too {wrong} beside the other tests ({evidence})",
+        sentence=f"{channel} looks 1000 times too {wrong} compared with the other tests ({evidence})",
         remedy=f"correct the unit of {channel} in this test",
         numbers={**numbers, "factor_to_correct": factor},
     )
@@ -256,9 +256,9 @@ def _decades(tests: Sequence[Slow]) -> list[Finding]:
             # a drive near zero is noise, so ratios alone say nothing
             suspect = channel != "drive" or size > LARGE_DRIVE
             if suspect and (ratio > decades or ratio < 1.0 / decades):
-                told = f"its RMS is {ratio:.3g} times that of any other test"
+                evidence = f"its RMS is {ratio:.3g} times that of any other test"
                 factor = 1e-3 if ratio > 1.0 else 1e3
-                findings.append(_unit_finding(tests[index], channel, factor, told, {"ratio": ratio}))
+                findings.append(_unit_finding(tests[index], channel, factor, evidence, {"ratio": ratio}))
     return findings
 
 

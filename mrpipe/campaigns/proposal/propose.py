@@ -68,7 +68,7 @@ class _File:
 
     @property
     def rate(self) -> float:
-        """Sampling rate as far as it can be told [Hz], else 1000."""
+        """Sampling rate as far as it is known [Hz], else 1000."""
         time = self.layout.channels.get("time")
         if time is not None:
             steps = np.diff(self.samples(time.column)) * units.conversion(time.unit)
@@ -97,7 +97,7 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
     Raises
     ------
     UserError
-        If the folder holds no readable data file, or none of the rig that is asked for.
+        If the folder holds no readable data file, or none that fits the requested rig.
     """
     paths, skipped = _data_files(folder), []
     files: list[_File] = []

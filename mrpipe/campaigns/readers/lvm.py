@@ -17,7 +17,7 @@ FIRST_WORDS = "LabVIEW Measurement"
 def read_lvm(path: Path, text: str) -> DataFile:
     """Return the channels of all segments of a LabVIEW measurement file, one after the other.
 
-    The text is handed to the library, because reading by name would also load a pickle that lies beside the file.
+    The text is handed to the library, because reading by name would also load a pickle in the same folder.
     """
     lvm_read = optional("lvm_read", "lvm-read", "labview", path)
     content = lvm_read.read_str(text)

@@ -20,7 +20,7 @@ class MotionSettings(Section):
         "elcentro-ns.",
     )
     second_file: str | None = Field(
-        None, description="Record of the second horizontal component, where each has a file of its own (AT2)."
+        None, description="Record of the second horizontal component, where each component has its own file (AT2)."
     )
     unit: str | None = Field(
         None, description="Unit of the samples (g, cm/s^2, m/s^2); null: as the header says or the peak shows."
@@ -50,7 +50,7 @@ class TenStoreySettings(Section):
         ("ten-storey", "ten-storey-heavy"),
         min_length=1,
         description="Parameter sets in configs/structures (or YAML files); the first one is the result, the others are "
-        "shown beside it. errata row 16: the printed mass, and the one that suits a 1000 kN damper.",
+        "shown for comparison. They have the printed mass, and the mass that suits a 1000 kN damper (docs/errata.md, row 16).",
     )
     damper: str = Field(
         "p4-1000kn",

@@ -25,7 +25,7 @@ class PlantedEffect(Section):
 
 
 class CustomTest(Section):
-    """One test of a plan of one's own."""
+    """One test of a custom plan."""
 
     name: str = Field(description="Name of the test.")
     role: Literal["training", "validation", "repeat"] = Field("training", description="What it is for.")
@@ -50,8 +50,8 @@ class BenchSettings(BenchRig):
 
     plan: str = Field(
         "table-2.1",
-        description="`table-2.1`, `compact` (44 short tests of unlike motions), `discriminating` (tests that tell "
-        "alike effects apart), several joined by +, or `custom` (the tests listed alone).",
+        description="`table-2.1`, `compact` (44 short tests with different motions), `discriminating` (tests that "
+        "separate similar effects), several joined by +, or `custom` (the tests listed alone).",
     )
     tests: tuple[CustomTest, ...] = Field((), description="Tests in addition to the plan.")
     cycles: int = Field(10, ge=2, description="Steady cycles of each test of Table 2.1.")
@@ -103,7 +103,7 @@ class LaboratorySettings(Section):
                 parameters={"share": 0.9, "saturation": 3.0, "fade_time": 0.4, "fade_slip": 0.04},
             ),
         ),
-        description="Effects of the true damper that campaign.yaml keeps back; the truth lies sealed beside it.",
+        description="Effects of the true damper that campaign.yaml does not declare; they are stored in a separate file that no estimator reads.",
     )
     draw_hidden_share: float | None = Field(
         None, gt=0.0, lt=1.0, description="Draw one more hidden effect from the seed, of this share of the force RMS."
