@@ -1,4 +1,4 @@
-"""An effect of one's own: a lip seal that is squeezed onto the rod by the oil pressure."""
+"""A lip seal that the oil pressure squeezes onto the rod."""
 
 import numpy as np
 from numba import njit

@@ -47,7 +47,7 @@ def build_clock(
     Raises
     ------
     UserError
-        If the clock stands still or runs backwards, holds NaN, disagrees with the stated rate, or is not given anywhere.
+        If the clock stands still or runs backwards, holds NaN, disagrees with the stated rate, or is not given.
     """
     if time is None:
         time = file.time_s

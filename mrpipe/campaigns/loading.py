@@ -368,9 +368,7 @@ def _with_force_sign(campaign: Campaign, findings: list[str]) -> Campaign:
         if sign < 0.1:
             findings.append("force and velocity are hardly related: the sign of the force cannot be determined")
         return campaign
-    findings.append(
-        f"force is positive in compression (correlation with velocity {sign:.2f}): its sign was reversed"
-    )
+    findings.append(f"force is positive in compression (correlation with velocity {sign:.2f}): its sign was reversed")
     turned = [
         replace(test, channels={**test.channels, "force": -test.channels["force"]}) for test in campaign.recordings
     ]

@@ -70,7 +70,7 @@ app = typer.Typer(
 @app.callback(invoke_without_command=True)
 def version(
     context: typer.Context,
-    show: Annotated[bool, typer.Option("--version", help="Print the version and leave.", is_eager=True)] = False,
+    show: Annotated[bool, typer.Option("--version", help="Print the version and exit.", is_eager=True)] = False,
 ) -> None:
     """From measured magnetorheological dampers to a closed-loop run, and back to the effect that a model lacks.
 

@@ -16,7 +16,7 @@ def check_effect(
     options: CommonOptions,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Python file that defines EFFECT.")],
 ) -> None:
-    """Check your own effect file: all that is demanded of the effects of the program."""
+    """Check your own effect file against the rules for all effects."""
     from mrpipe.cli.output import print_json
     from mrpipe.effects.contract import Effect
     from mrpipe.effects.file_checks import check_file

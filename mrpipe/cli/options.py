@@ -76,7 +76,7 @@ _COMMON: dict[str, tuple[Any, Any]] = {
     "jobs": (Annotated[int | None, typer.Option(min=1, help="Processes to use. Default: one a core.")], None),
     "seed": (Annotated[int | None, typer.Option(min=0, help="Seed of all randomness.")], None),
     "force": (Annotated[bool, typer.Option("--force", help="Build again even where nothing changed.")], False),
-    "quiet": (Annotated[bool, typer.Option("--quiet", help="Say nothing but errors and the result.")], False),
+    "quiet": (Annotated[bool, typer.Option("--quiet", help="Print only errors and the result.")], False),
     "json": (Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")], False),
 }
 

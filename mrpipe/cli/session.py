@@ -71,7 +71,7 @@ def rig_key(path: Path) -> str:
 def run_directory(options: CommonOptions, loaded: LoadedConfig) -> Path:
     """Return the run directory."""
     if options.run is not None and str(options.run) in {"", "."}:
-        raise UserError("--run", repr(str(options.run)), "is the working directory", "name another directory for the run")
+        raise UserError("--run", repr(str(options.run)), "is the working directory", "name another directory")
     name = loaded.config.name
     if options.run is None and (not name or name != Path(name).name or name in {".", ".."}):
         raise UserError(loaded.path, f"name: {name!r}", "is not the name of a directory", "leave out / and ..")

@@ -252,7 +252,8 @@ def validity_warnings(
         if residual_force_n > 0.3 * needed:
             said.append(
                 f"{law}: the residual force of {residual_force_n:.0f} N is {residual_force_n / needed:.0%} of the "
-                f"{needed:.0f} N needed at {1e3 * amplitude_m:.1f} mm: it limits the law, not saturation"
+                f"{needed:.0f} N needed at {1e3 * amplitude_m:.1f} mm: the residual force limits the law, "
+                "not the largest force"
             )
     return said
 

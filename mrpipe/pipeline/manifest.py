@@ -126,7 +126,7 @@ def reasons_stale(manifest: Manifest | None, key: StageKey, run_directory: Path,
 
 def _change(before: str | None, now: str | None) -> str:
     if now is None or now == "absent":
-        return "is gone"
+        return "is missing"
     if before is None or before == "absent":
         return "is new"
     return "changed"

@@ -396,7 +396,7 @@ class Pipeline:
                         found[name] = before
                         return before
                 else:
-                    reasons.append(f"{provider} before it is stale")
+                    reasons.append(f"{provider}, which it reads, is stale")
         manifest = Manifest.load(self._manifests, name)
         own = reasons_stale(manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self._hashes)
         found[name] = own if own[:1] == ["never built"] else reasons + own

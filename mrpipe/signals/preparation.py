@@ -205,7 +205,7 @@ def _filter(work: _Work, options: PreparationOptions) -> None:
         work.filtered[name] = np.clip(smooth, values.min(), values.max()) if name == "drive" else smooth
     if not work.by_criterion and usable_cutoff(options.cutoff_hz, work.rate) is None:
         work.findings.append(
-            f"no low-pass at {options.cutoff_hz:g} Hz: a rate of {work.rate:g} Hz leaves next to nothing above it"
+            f"no low-pass at {options.cutoff_hz:g} Hz, because data at {work.rate:g} Hz hold almost nothing above it"
         )
     work.cycles = find_steady_cycles(work.filtered["displacement"], work.rate)
 
@@ -223,7 +223,7 @@ def _check_acceleration(works: Sequence[_Work]) -> list[str]:
     findings = []
     if gain < -0.2:
         findings.append(
-            "acceleration has the opposite sign of the displacement's second derivative: it was turned round"
+            "acceleration has the opposite sign of the displacement's second derivative: its sign was reversed"
         )
         for work in works:
             if "acceleration" in work.channels:

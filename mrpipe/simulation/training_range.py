@@ -86,10 +86,7 @@ class RangeCheck:
         if self.outside_share < WORTH_A_WARNING:
             return ""
         left = [item.words(name) for name, item in self.inputs.items() if item.outside_share >= WORTH_A_WARNING / 10.0]
-        return (
-            f"the {self.what} is asked outside the range it knows {100.0 * self.outside_share:.2g} % of the time: "
-            + "; ".join(left)
-        )
+        return f"the {self.what} extrapolates {100.0 * self.outside_share:.2g} % of the time: " + "; ".join(left)
 
     def as_json(self) -> dict[str, Any]:
         """Return it as plain values, SI, keys with units."""

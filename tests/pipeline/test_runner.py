@@ -50,7 +50,7 @@ def test_change_is_named_and_built_again(cause: str, make_pipeline: MakePipeline
     make_pipeline().build("second")
     changed = make_pipeline(**changes)
     assert changed.status(["second"])["first"] == [reason]
-    assert changed.status(["second"])["second"][0] == "first before it is stale"
+    assert changed.status(["second"])["second"][0] == "first, which it reads, is stale"
     assert changed.build("second").what == "built"
     assert changed.outcomes["first"].reasons == [reason]
 

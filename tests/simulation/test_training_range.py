@@ -59,7 +59,7 @@ def test_time_outside_is_counted_and_the_input_is_named(rig):
     assert check.inputs["velocity"].outside_share == check.outside_share > 0.05
     assert check.inputs["velocity"].asked[1] == pytest.approx(speed[counts].max())
     assert check.inputs["force"].outside_share == 0.0
-    assert check.warning.startswith("the inverse network is asked outside the range it knows")
+    assert check.warning.startswith("the inverse network extrapolates")
     assert "velocity up to" in check.warning and "(known to 0.04)" in check.warning and "force" not in check.warning
     assert check.as_json()["inputs"]["velocity"]["known_largest_m_s"] == 0.04
 

@@ -88,7 +88,7 @@ def _windows(channels: Mapping[str, FloatArray], steps: Mapping[str, float]) -> 
     moving = np.zeros(size - WINDOW + 1, dtype=bool)
     with np.errstate(over="ignore", invalid="ignore"):
         for name, values in channels.items():
-            # offset by half a step from zero, so that values on round numbers do not lie on the edge between two roundings
+            # offset, so that round numbers do not lie on the edge between two roundings
             rounded = np.floor(np.clip(values / steps[name], -9e17, 9e17) + 0.37).astype(np.int64)
             sample = sample * np.uint64(1_000_003) + _mixed(rounded.astype(np.uint64))
             changes = np.concatenate(([0], np.cumsum(np.diff(rounded) != 0)))

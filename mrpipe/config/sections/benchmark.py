@@ -50,7 +50,7 @@ class TenStoreySettings(Section):
         ("ten-storey", "ten-storey-heavy"),
         min_length=1,
         description="Parameter sets in configs/structures (or YAML files); the first one is the result, the others are "
-        "shown for comparison. They have the printed mass, and the mass that suits a 1000 kN damper (docs/errata.md, row 16).",
+        "shown for comparison. They have the printed mass, and the mass that suits a 1000 kN damper (errata, row 16).",
     )
     damper: str = Field(
         "p4-1000kn",

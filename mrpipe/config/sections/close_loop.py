@@ -24,7 +24,9 @@ class CloseLoopSettings(Section):
     viscosity_order: int = Field(1, ge=0, le=3, description="Degree of the viscosity in the drive.")
     most_effects: int = Field(3, ge=0, le=3, description="Most effects that are named together.")
     candidates: tuple[str, ...] = Field((), description="Effects to consider; empty for all of the library.")
-    effect_files: tuple[Path, ...] = Field((), description="Python files of your own, each of which defines one more effect as EFFECT.")
+    effect_files: tuple[Path, ...] = Field(
+        (), description="Python files of your own, each of which defines one more effect as EFFECT."
+    )
     fit_rate_hz: float = Field(250.0, gt=0.0, description="Rate at which candidates are fitted [Hz].")
     displacement_cutoff_hz: float = Field(
         0.0, ge=0.0, description="Zero-phase low-pass of the displacement [Hz]; 0 chooses it for each test."

@@ -103,7 +103,8 @@ class LaboratorySettings(Section):
                 parameters={"share": 0.9, "saturation": 3.0, "fade_time": 0.4, "fade_slip": 0.04},
             ),
         ),
-        description="Effects of the true damper that campaign.yaml does not declare; they are stored in a separate file that no estimator reads.",
+        description="Effects of the true damper that campaign.yaml does not declare; they are stored in a separate "
+        "file that no estimator reads.",
     )
     draw_hidden_share: float | None = Field(
         None, gt=0.0, lt=1.0, description="Draw one more hidden effect from the seed, of this share of the force RMS."
