@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mrpipe.campaigns import Campaign
-from mrpipe.modal.identify import FrameIdentification
+from mrpipe.modal.identification import FrameIdentification
 from mrpipe.structures import Frame
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from mrpipe.artifacts import ArtifactWriter, FloatArray
 from mrpipe.modal.clocks import SensorClock
 from mrpipe.modal.decay import DecayResult, Estimate
-from mrpipe.modal.identify import FrameIdentification
+from mrpipe.modal.identification import FrameIdentification
 from mrpipe.structures import complex_modes, natural_modes, write_frame
 
 _TWO_PI = 2.0 * np.pi

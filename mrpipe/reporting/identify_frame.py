@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from mrpipe.modal.identify import FrameIdentification
+from mrpipe.modal.identification import FrameIdentification
 from mrpipe.modal.spectra import averaged_responses
 from mrpipe.reporting import modal as figures
 from mrpipe.reporting.sink import Sink

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.modal.identify import GivenShapes
+    from mrpipe.modal.identification import GivenShapes
     from mrpipe.modal.options import IdentificationOptions
 
 
@@ -37,7 +37,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 def _options(context: StageContext) -> tuple[IdentificationOptions, GivenShapes | None]:
     from mrpipe.artifacts import load_parameter_set
     from mrpipe.errors import UserError
-    from mrpipe.modal.identify import GivenShapes
+    from mrpipe.modal.identification import GivenShapes
 
     settings = context.settings.identify_frame
     if not settings.mode_matrix:

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mrpipe.modal.damping_choice import pooled
 from mrpipe.modal.decay import Estimate
 from mrpipe.modal.free_response import free_mode, strongest_frequency, with_decays
-from mrpipe.modal.identify import _pooled
 from mrpipe.modal.multimode import fit_modes
 from mrpipe.modal.selection import usable
 from mrpipe.modal.spectra import record_spectrum
@@ -73,6 +73,6 @@ def test_poles_that_are_no_modes_are_not_taken(frame):
 @pytest.mark.property
 def test_uncertain_damping_is_pooled_of_both_methods():
     first, second = Estimate(0.0016, 0.00148, 0.00172), Estimate(0.0014, 0.00130, 0.00150)
-    pooled = _pooled(first, second)
-    assert second.value < pooled.value < 0.0015
-    assert pooled.half_width < second.half_width
+    both = pooled(first, second)
+    assert second.value < both.value < 0.0015
+    assert both.half_width < second.half_width

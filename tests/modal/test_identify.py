@@ -8,7 +8,8 @@ from scipy.signal import chirp
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.errors import UserError
-from mrpipe.modal.identify import GivenShapes, identify_frame
+from mrpipe.modal.identification import GivenShapes
+from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests, Place, frame_tests
 from mrpipe.structures import complex_modes, frame_from_parameter_set, modal_assurance, natural_modes

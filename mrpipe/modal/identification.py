@@ -1,0 +1,92 @@
+"""Result of the identification of a frame: matrices, modes, intervals and checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.clocks import SensorClock
+from mrpipe.modal.decay import DecayResult, Estimate
+from mrpipe.modal.lscf import PoleCandidate
+from mrpipe.modal.multimode import MultiModeFit
+from mrpipe.modal.records import FrameTest
+from mrpipe.modal.tridiagonal import TridiagonalFit
+from mrpipe.modal.verification import FrequencyVerification, TimeVerification
+from mrpipe.structures import Frame
+
+
+@dataclass(frozen=True)
+class GivenShapes:
+    """Mode shapes to use in place of the measured ones, shape (n, n), and their name for messages."""
+
+    shapes: FloatArray
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class FrameIdentification:
+    """Everything that identification found, n floors and r modes.
+
+    Attributes
+    ----------
+    frame
+        M, C, K; None where the data determine modes only.
+    frequencies
+        Natural angular frequencies with intervals [rad/s].
+    damping
+        Damping ratios that went into C, with intervals.
+    damping_source
+        `decay`, `sweep`, or `decay and sweep` where the decay is uncertain, a mode.
+    sweep_damping
+        Damping ratios of the multi-mode fit of the forced tests: the second method.
+    mode_shapes
+        Shape (n, r), largest element of a mode +1; nan at floors where nothing determines it. With several directions:
+        a row a sensor.
+    mac
+        Shape (r, r): measured shapes against the same modes of the frame (against themselves without a frame).
+    decays
+        One a mode at most (the most certain one); modes without a decay are missing.
+    fit, tridiagonal, in_time, in_frequency
+        Parts, for the artifact and the report; None or empty where there is no frame.
+    phase_scatter
+        Shape (n,): largest imaginary part of a mode's residues over the largest residue.
+    tests
+        The forced tests, those of the fit first; all are simulated for verification.
+    band_hz
+        Band of the fit.
+    findings
+        What the user should know, one line each.
+    numbers
+        Mode number (from 1) of each mode.
+    clocks
+        Delays of the sensors that were corrected.
+    candidates
+        The stabilisation chart: poles that appear at several model orders.
+    degrees_of_freedom
+        Name of each row of `mode_shapes`.
+    masses, mass_intervals
+        Shape (n,) and (n, 2) [kg]; nan where unknown.
+    """
+
+    frame: Frame | None
+    frequencies: tuple[Estimate, ...]
+    damping: tuple[Estimate, ...]
+    damping_source: tuple[str, ...]
+    sweep_damping: tuple[Estimate, ...]
+    mode_shapes: FloatArray
+    mac: FloatArray
+    decays: dict[int, DecayResult]
+    fit: MultiModeFit
+    tridiagonal: TridiagonalFit | None
+    in_time: tuple[TimeVerification, ...]
+    in_frequency: FrequencyVerification | None
+    phase_scatter: FloatArray
+    tests: tuple[FrameTest, ...]
+    band_hz: tuple[float, float]
+    findings: tuple[str, ...]
+    numbers: tuple[int, ...]
+    clocks: tuple[SensorClock, ...]
+    candidates: tuple[PoleCandidate, ...]
+    degrees_of_freedom: tuple[str, ...]
+    masses: FloatArray
+    mass_intervals: FloatArray
