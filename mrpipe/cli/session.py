@@ -101,7 +101,7 @@ def pipeline_of(options: CommonOptions, loaded: LoadedConfig, *, to_log: bool = 
     )
     return Pipeline(
         loaded=loaded,
-        stages=stages_for(loaded.config.campaigns, rig_key(options.campaign) if options.campaign else ""),
+        stages=stages_for(loaded.config, rig_key(options.campaign) if options.campaign else ""),
         run_directory=directory,
         logger=logger,
         jobs=options.jobs or execution.jobs or os.cpu_count() or 1,

@@ -96,7 +96,7 @@ def load_config(path: Path, overrides: Sequence[str] = (), overlays: Sequence[Pa
             raise explain(error, config_model(), "--set", {}) from error
         origin = next((item for item in reversed(laid) if at in item[1].lines), (path, source))
         raise explain(error, config_model(), origin[0], origin[1].lines) from error
-    return LoadedConfig(_with_absolute_campaigns(config, path.resolve().parent), path.resolve(), tuple(overrides))
+    return LoadedConfig(_with_absolute_paths(config, path.resolve().parent), path.resolve(), tuple(overrides))
 
 
 def _read_overlay(path: Path) -> YamlSource:
@@ -115,13 +115,20 @@ def _lay_over(content: dict[str, Any], over: dict[str, Any]) -> None:
             content[key] = value
 
 
-def _with_absolute_campaigns(config: RunSettings, base: Path) -> RunSettings:
-    """Resolve campaign paths against the configuration's folder, so that a kept copy means the same campaigns."""
+def _with_absolute_paths(config: RunSettings, base: Path) -> RunSettings:
+    """Resolve paths of measurements and matrices against the folder of the configuration.
+
+    A copy of the configuration in the run directory then names the same files.
+    """
     resolved = {
         rig: source if source in (None, LABORATORY) else str((base / source).resolve())
         for rig, source in config.campaigns.model_dump().items()
     }
-    return config.model_copy(update={"campaigns": CampaignsSettings(**resolved)})
+    changes: dict[str, Any] = {"campaigns": CampaignsSettings(**resolved)}
+    structure = getattr(config, "structure", None)
+    if structure is not None:
+        changes["structure"] = structure.in_folder(base)
+    return config.model_copy(update=changes)
 
 
 def _locate(path: Path) -> Path:

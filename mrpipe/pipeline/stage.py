@@ -151,6 +151,6 @@ class Stage:
             found = configuration
             for part in setting.split("."):
                 found = getattr(found, part)
-            if found == value and name not in self.inputs:
+            if found == value and name not in (*self.inputs, *more):
                 more.append(name)
         return replace(self, inputs=(*self.inputs, *more)) if more else self

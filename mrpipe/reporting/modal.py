@@ -69,11 +69,14 @@ def frequency_responses(
     return figure
 
 
-def mode_shapes(shapes: FloatArray, frequencies_hz: Sequence[float]) -> Figure:
-    """Draw the shapes (floors by modes) next to each other; floors without a value are left out."""
+def mode_shapes(
+    shapes: FloatArray, frequencies_hz: Sequence[float], heights_m: Sequence[float] | None = None
+) -> Figure:
+    """Draw the shapes (floors by modes) over the floors or their heights; floors without a value are left out."""
     floors, modes = shapes.shape
     figure, axes = figure_with_axes(1, modes, width=1.5 * modes + 0.8, height=3.6)
-    height = np.arange(floors + 1)
+    height = np.arange(floors + 1.0) if heights_m is None else np.concatenate([[0.0], heights_m])
+    vertical = "floor" if heights_m is None else "height [m]"
     for mode in range(modes):
         axis = axes[0, mode]
         values = np.concatenate([[0.0], shapes[:, mode]])
@@ -81,7 +84,7 @@ def mode_shapes(shapes: FloatArray, frequencies_hz: Sequence[float]) -> Figure:
         axis.plot(values[known], height[known], "o-", color=COLOURS[0], linewidth=1.4, markersize=4)
         axis.axvline(0.0, color=MEASURED, linewidth=0.6)
         axis.set_xlim(-1.15, 1.15)
-        label(axis, "", "floor" if mode == 0 else "", f"{mode + 1}: {frequencies_hz[mode]:.3g} Hz")
+        label(axis, "", vertical if mode == 0 else "", f"{mode + 1}: {frequencies_hz[mode]:.3g} Hz")
     return figure
 
 

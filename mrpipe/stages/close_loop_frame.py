@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.config.sections.campaigns import CampaignsSettings
+    from mrpipe.config.model import RunSettings
     from mrpipe.tracing.structure.verdict import StructureTracing
 
 
@@ -74,18 +74,19 @@ def _stage(*inputs: str) -> Stage:
     )
 
 
-def variant(campaigns: CampaignsSettings, given: str = "") -> Stage | None:
+def variant(configuration: RunSettings, given: str = "") -> Stage | None:
     """Return the stage on a structure's campaign where there is one to trace, None where the bench is meant.
 
     Parameters
     ----------
-    campaigns
-        Campaigns of the configuration.
+    configuration
+        The whole configuration.
     given
         Entry of `campaigns` that the user named on the command line, empty for none.
     """
     from mrpipe.config.sections.campaigns import LABORATORY
 
+    campaigns = configuration.campaigns
     if given in ("frame", "closed_loop"):
         return _stage(f"campaign:{given.replace('_', '-')}")
     own = [name for name in ("frame", "closed_loop") if getattr(campaigns, name) not in (None, LABORATORY)]

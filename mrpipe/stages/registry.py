@@ -18,7 +18,7 @@ from mrpipe.errors import UserError
 from mrpipe.pipeline.stage import Stage
 
 if TYPE_CHECKING:
-    from mrpipe.config.sections.campaigns import CampaignsSettings
+    from mrpipe.config.model import RunSettings
 
 RECORDERS = {
     "campaign:bench": "record-bench",
@@ -84,22 +84,27 @@ def _before(stage: Stage, known: Mapping[str, Stage]) -> set[str]:
     return {name for name in names if name in known and name != stage.name}
 
 
-def stages_for(campaigns: CampaignsSettings, given: str = "") -> dict[str, Stage]:
-    """Return the stages that suit the campaigns of a configuration.
+def all_variants() -> tuple[Stage, ...]:
+    """Return the stages that may take the place of another one and declare it in `VARIANTS` of their module."""
+    return tuple(stage for module in _modules() for stage in getattr(module, "VARIANTS", ()))
 
-    A module may define `variant(campaigns, given)`, which returns a stage that takes the place of the one of its name,
-    or None.
+
+def stages_for(configuration: RunSettings, given: str = "") -> dict[str, Stage]:
+    """Return the stages that suit a configuration.
+
+    A module may define `variant(configuration, given)`. It returns a stage that takes the place of the one of its
+    name, or None.
 
     Parameters
     ----------
-    campaigns
-        Campaigns of the configuration.
+    configuration
+        The whole configuration.
     given
         Entry of `campaigns` that the user named on the command line, empty for none.
     """
     stages = dict(all_stages())
     for module in _modules():
-        variant = module.variant(campaigns, given) if hasattr(module, "variant") else None
+        variant = module.variant(configuration, given) if hasattr(module, "variant") else None
         if variant is not None:
             stages[variant.name] = variant
     return stages

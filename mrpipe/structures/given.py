@@ -187,6 +187,13 @@ def _as_many(key: str, values: Sequence[Any], count: int) -> Sequence[Any]:
     return values
 
 
+def floor_heights(settings: StructureSettings) -> list[float] | None:
+    """Return the height of each floor above the ground [m]; None where a storey has no height."""
+    heights = [row.height_m for row in settings.storeys for _ in range(row.repeat)]
+    known = [height for height in heights if height is not None]
+    return np.cumsum(known).tolist() if heights and len(known) == len(heights) else None
+
+
 def degree_of_freedom(frame: Frame, name: str | int, where: str = "structure") -> int:
     """Return the index (from 0) of a degree of freedom given by its name or its number (from 1).
 

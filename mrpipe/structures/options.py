@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from mrpipe.options import Section
 
 
-class GivenSection(BaseModel):
-    """Base of the settings of this module: unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
-
-
-class Storey(GivenSection):
+class Storey(Section):
     """One row of a storey table, lowest storey first."""
 
     mass_kg: float = Field(..., gt=0.0, description="Mass of the floor above the storey.")
     stiffness_n_m: float = Field(..., gt=0.0, description="Lateral stiffness of the storey.")
-    height_m: float | None = Field(None, gt=0.0, description="Height of the storey; only for drawings and P-delta.")
+    height_m: float | None = Field(
+        None, gt=0.0, description="Height of the storey; where all have one, the report draws the mode shapes over it."
+    )
     repeat: int = Field(1, ge=1, description="How many storeys in a row are like this one.")
 
 
-class MatrixEntry(GivenSection):
+class MatrixEntry(Section):
     """Where a matrix is, and its unit."""
 
     file: str = Field("", description="File of the matrix (.mat, .csv, .h5, .json); empty: `structure.file`.")
@@ -30,13 +29,14 @@ class MatrixEntry(GivenSection):
     unit: str = Field("", description="Unit of the entries, such as kg, t, kN/m; empty: SI.")
 
 
-class ReductionSettings(GivenSection):
+class ReductionSettings(Section):
     """Reduction of a large structure to few degrees of freedom."""
 
     method: Literal["none", "guyan", "craig-bampton", "modal", "balanced"] = Field(
         "none",
-        description="Static condensation, fixed-interface modes, lowest modes, or balanced truncation. The physical "
-        "degrees of freedom in `keep` stay in the first two and in the modal one.",
+        description="`guyan`: static condensation; `craig-bampton`: static condensation plus fixed-interface modes; "
+        "`modal`: the lowest modes. The degrees of freedom in `keep` stay. `balanced` is refused by identify-frame, "
+        "because it gives no matrices.",
     )
     keep: tuple[str, ...] = Field((), description="Degrees of freedom that stay, by name or number from 1.")
     modes: int = Field(10, ge=1, description="Modes that stay (craig-bampton: fixed-interface modes; balanced: pairs).")
@@ -45,8 +45,8 @@ class ReductionSettings(GivenSection):
     )
 
 
-class StructureSettings(GivenSection):
-    """A linear structure from a file, a storey table or modes; without any of them the frame is identified."""
+class StructureSettings(Section):
+    """A linear structure from a file, a storey table or modes; without any of them `identify-frame` identifies it."""
 
     file: str = Field("", description="File that holds the matrices (.mat, .csv, .h5, .json).")
     mass: MatrixEntry = Field(MatrixEntry(name="M", unit="kg"), description="Mass matrix.")
@@ -75,3 +75,15 @@ class StructureSettings(GivenSection):
     def given(self) -> bool:
         """Whether a structure is given at all."""
         return bool(self.file or self.storeys or self.mode_shapes or self.mass.file)
+
+    def in_folder(self, folder: Path) -> StructureSettings:
+        """Return the same settings with the paths of all files resolved against a folder."""
+
+        def resolved(file: str) -> str:
+            return str((folder / file).resolve()) if file else ""
+
+        entries = {
+            key: entry.changed(file=resolved(entry.file))
+            for key, entry in (("mass", self.mass), ("stiffness", self.stiffness), ("damping", self.damping))
+        }
+        return self.changed(file=resolved(self.file), **entries)

@@ -18,6 +18,8 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.structures.dynamics import StateSpace, natural_modes, state_space
 from mrpipe.structures.frame import Frame
+from mrpipe.structures.given import degree_of_freedom
+from mrpipe.structures.options import ReductionSettings
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,37 @@ def modal(frame: Frame, modes: int, kept: Sequence[int] = (), band_high_hz: floa
         )
     basis = shapes @ np.linalg.inv(shapes[list(kept)])
     return _projected(frame, basis, list(kept), band_high_hz)
+
+
+def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
+    """Reduce a structure as the settings say; without a reduction its coordinates and its response stay the same.
+
+    Raises
+    ------
+    UserError
+        If a degree of freedom in `keep` does not exist, `keep` is empty, or the method gives no matrices.
+    """
+    high = settings.band_high_hz
+    if settings.method == "none":
+        everything = tuple(range(frame.floors))
+        return Reduced(frame, np.eye(frame.floors), everything, 0.0, high or 0.0)
+    if settings.method == "balanced":
+        raise UserError(
+            "structure.reduction", "method", "balanced truncation gives no M, C and K", "use craig-bampton or modal"
+        )
+    if not settings.keep:
+        raise UserError(
+            "structure.reduction",
+            "keep",
+            "is empty, so the damper would have no place",
+            "name at least the degrees of freedom of the damper and of the sensors",
+        )
+    kept = [degree_of_freedom(frame, name, "structure.reduction.keep") for name in settings.keep]
+    if settings.method == "guyan":
+        return guyan(frame, kept, high)
+    if settings.method == "craig-bampton":
+        return craig_bampton(frame, kept, settings.modes, high)
+    return modal(frame, settings.modes, kept, high)
 
 
 def balanced(space: StateSpace, outputs: FloatArray, order: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mrpipe.config.model import config_model, options
-from mrpipe.stages.registry import all_stages
+from mrpipe.stages.registry import all_stages, all_variants
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "mrpipe"
@@ -34,7 +34,7 @@ SOURCE = _source()
 def _read_by(name: str) -> list[str]:
     return [
         stage.name
-        for stage in all_stages().values()
+        for stage in (*all_stages().values(), *all_variants())
         if any(name == item or name.startswith((f"{item}.", f"{item}[")) for item in stage.settings)
     ]
 

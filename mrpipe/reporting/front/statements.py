@@ -62,7 +62,8 @@ def measured(facts: RunFacts) -> str:
         )
     frame = facts.summary("identify-frame")
     if "frequencies_hz" in frame:
-        parts.append(f"Structure: {len(frame['frequencies_hz'])} floors, campaign {frame['campaign']}.")
+        source = f"campaign {frame['campaign']}" if frame.get("campaign") else "given in the configuration"
+        parts.append(f"Structure: {len(frame['frequencies_hz'])} floors, {source}.")
     loop = facts.summary("close-loop").get("closed_loop") or {}
     recorded = sum(bool(item.get("recorded")) for item in loop.get("tests", []))
     if recorded:

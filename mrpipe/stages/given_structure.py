@@ -1,0 +1,64 @@
+"""`identify-frame` for a structure that the configuration gives: nothing is identified, the matrices are checked.
+
+Takes the place of the stage on a campaign where the section `structure` describes a structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.pipeline.stage import Stage, StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.config.model import RunSettings
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.reporting import given_structure as section
+    from mrpipe.structures.given import floor_heights, structure_from_settings
+    from mrpipe.structures.given_storage import given_summary, read_matrix, write_given
+    from mrpipe.structures.reduction import reduced_structure
+
+    settings = context.settings.structure
+    full = structure_from_settings(settings, read_matrix)
+    reduced = reduced_structure(full, settings.reduction)
+    if settings.reduction.method != "none":
+        context.warn(
+            f"the structure was reduced from {full.floors} to {reduced.frame.floors} degrees of freedom "
+            f"({settings.reduction.method}); the largest error of the response to ground motion up to "
+            f"{reduced.band_high_hz:.3g} Hz is {100.0 * reduced.error:.2g} % of the largest response"
+        )
+    summary = given_summary(full, reduced, floor_heights(settings))
+    with context.write("frame.h5") as artifact:
+        write_given(artifact, reduced, summary)
+    section.describe(context.report, reduced.frame, summary)
+    return summary
+
+
+VARIANTS = (
+    Stage(
+        name="identify-frame",
+        summary="Check the structure that the configuration gives, reduce it, and compute its modes.",
+        run=_run,
+        after=("identify-damper",),
+        settings=("structure",),
+        outputs=("frame.h5",),
+    ),
+)
+
+
+def variant(configuration: RunSettings, given: str = "") -> Stage | None:
+    """Return the stage where the configuration gives a structure, None where a campaign is to be identified.
+
+    Parameters
+    ----------
+    configuration
+        The whole configuration.
+    given
+        Entry of `campaigns` that the user named on the command line, empty for none.
+    """
+    structure = getattr(configuration, "structure", None)
+    if structure is None or not structure.given or given == "frame":
+        return None
+    return VARIANTS[0]
