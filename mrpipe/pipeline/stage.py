@@ -136,7 +136,7 @@ class Stage:
     run: Callable[[StageContext], Mapping[str, Any]]
     inputs: tuple[str, ...] = ()
     optional_inputs: tuple[str, ...] = ()
-    conditional_inputs: tuple[tuple[str, str, str], ...] = ()
+    conditional_inputs: tuple[tuple[str, str | None, str], ...] = ()
     settings: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
@@ -146,7 +146,7 @@ class Stage:
 
     def for_configuration(self, configuration: Any) -> Stage:
         """Return the stage with the inputs that its settings ask for in this configuration."""
-        more = []
+        more: list[str] = []
         for setting, value, name in self.conditional_inputs:
             found = configuration
             for part in setting.split("."):
