@@ -1,29 +1,38 @@
-"""Mass, damping and stiffness of structures."""
+"""Mass, damping and stiffness of structures.
 
-from mrpipe.structures.dynamics import (
-    ComplexModes,
-    NaturalModes,
-    StateSpace,
-    complex_modes,
-    discretise_first_order,
-    discretise_zero_order,
-    floor_position,
-    frequency_response,
-    modal_assurance,
-    natural_modes,
-    normalise_to_largest,
-    state_space,
-    storey_position,
-)
-from mrpipe.structures.frame import Frame, read_frame, write_frame
-from mrpipe.structures.shear_frame import (
-    frame_from_modes,
-    frame_from_parameter_set,
-    mass_matrix,
-    modal_damping_matrix,
-    shear_frame,
-    shear_stiffness,
-)
+The names below are imported at first use, because the configuration needs the settings of a structure without scipy.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mrpipe.structures.dynamics import (
+        ComplexModes,
+        NaturalModes,
+        StateSpace,
+        complex_modes,
+        discretise_first_order,
+        discretise_zero_order,
+        floor_position,
+        frequency_response,
+        modal_assurance,
+        natural_modes,
+        normalise_to_largest,
+        state_space,
+        storey_position,
+    )
+    from mrpipe.structures.frame import Frame, read_frame, write_frame
+    from mrpipe.structures.shear_frame import (
+        frame_from_modes,
+        frame_from_parameter_set,
+        mass_matrix,
+        modal_damping_matrix,
+        shear_frame,
+        shear_stiffness,
+    )
 
 __all__ = [
     "ComplexModes",
@@ -49,3 +58,34 @@ __all__ = [
     "storey_position",
     "write_frame",
 ]
+
+_HOMES = {
+    "ComplexModes": "dynamics",
+    "NaturalModes": "dynamics",
+    "StateSpace": "dynamics",
+    "complex_modes": "dynamics",
+    "discretise_first_order": "dynamics",
+    "discretise_zero_order": "dynamics",
+    "floor_position": "dynamics",
+    "frequency_response": "dynamics",
+    "modal_assurance": "dynamics",
+    "natural_modes": "dynamics",
+    "normalise_to_largest": "dynamics",
+    "state_space": "dynamics",
+    "storey_position": "dynamics",
+    "Frame": "frame",
+    "read_frame": "frame",
+    "write_frame": "frame",
+    "frame_from_modes": "shear_frame",
+    "frame_from_parameter_set": "shear_frame",
+    "mass_matrix": "shear_frame",
+    "modal_damping_matrix": "shear_frame",
+    "shear_frame": "shear_frame",
+    "shear_stiffness": "shear_frame",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
