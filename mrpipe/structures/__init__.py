@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         storey_position,
     )
     from mrpipe.structures.frame import Frame, read_frame, write_frame
-    from mrpipe.structures.shear_frame import (
+    from mrpipe.structures.shear_frames import (
         frame_from_modes,
         frame_from_parameter_set,
         mass_matrix,
@@ -76,12 +76,12 @@ _HOMES = {
     "Frame": "frame",
     "read_frame": "frame",
     "write_frame": "frame",
-    "frame_from_modes": "shear_frame",
-    "frame_from_parameter_set": "shear_frame",
-    "mass_matrix": "shear_frame",
-    "modal_damping_matrix": "shear_frame",
-    "shear_frame": "shear_frame",
-    "shear_stiffness": "shear_frame",
+    "frame_from_modes": "shear_frames",
+    "frame_from_parameter_set": "shear_frames",
+    "mass_matrix": "shear_frames",
+    "modal_damping_matrix": "shear_frames",
+    "shear_frame": "shear_frames",
+    "shear_stiffness": "shear_frames",
 }
 
 

@@ -13,7 +13,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.structures.frame import Frame
 from mrpipe.structures.options import MatrixEntry, StructureSettings
-from mrpipe.structures.shear_frame import frame_from_modes, modal_damping_matrix, shear_frame
+from mrpipe.structures.shear_frames import frame_from_modes, modal_damping_matrix, shear_frame
 from mrpipe.units import conversion, same_unit_dimension
 
 Reader = Callable[[Path, str], Any]

@@ -223,7 +223,7 @@ def bearing_grid(plan_x: FloatArray, plan_y: FloatArray) -> FloatArray:
 
 def _scaled_storeys(masses: FloatArray, period_s: float) -> FloatArray:
     """Return storey stiffnesses that fall with the shear of a uniform acceleration and give the first period."""
-    from mrpipe.structures.shear_frame import shear_stiffness
+    from mrpipe.structures.shear_frames import shear_stiffness
 
     shear = np.cumsum(masses[::-1])[::-1]
     pattern = shear_stiffness(np.sqrt(shear / shear[0]))

@@ -8,7 +8,7 @@ from mrpipe.artifacts import ParameterSet, load_parameter_set
 from mrpipe.case_studies.model import BenchmarkModel
 from mrpipe.errors import UserError
 from mrpipe.structures.dynamics import floor_position
-from mrpipe.structures.shear_frame import shear_stiffness
+from mrpipe.structures.shear_frames import shear_stiffness
 
 
 def lowest_factor(floors: int) -> float:

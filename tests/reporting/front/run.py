@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import ArtifactWriter, Provenance
 from mrpipe.reporting.facts import ReportStage, RunFacts
 from mrpipe.structures import natural_modes, write_frame
-from mrpipe.structures.shear_frame import shear_frame
+from mrpipe.structures.shear_frames import shear_frame
 
 LAWS = {"vd": (0.024, 0.13, 0.0), "passive-off": (0.069, 0.114, 0.4), "passive-on": (0.016, 0.0025, 0.0)}
 EFFECT = {
