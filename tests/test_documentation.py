@@ -24,6 +24,7 @@ from mrpipe.campaigns.schema import (
 )
 from mrpipe.control.laws import law_names
 from mrpipe.stages.registry import all_stages
+from mrpipe.structures.options import StructureSettings
 
 pytestmark = pytest.mark.property
 
@@ -86,6 +87,15 @@ def test_example_campaigns_use_keys_that_exist(page: str) -> None:
         named = [*entry.channels.items(), *(item for test in tests for item in test.channels.items())]
         assert [name for name, _ in named if quantity_of(name, entry.rig) is None] == []
         assert all(ChannelEntry(**channel) for _, channel in named)
+
+
+def test_example_structures_use_settings_that_exist() -> None:
+    text = (DOCS / "structures.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert blocks
+    for content in map(yaml.safe_load, blocks):
+        assert list(content) == ["structure"]
+        assert StructureSettings(**content["structure"]).given
 
 
 def test_page_on_campaigns_names_every_key() -> None:
