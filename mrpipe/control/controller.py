@@ -57,7 +57,7 @@ class ControllerOptions:
     velocity
         `kalman` (5.1 to 5.3), `measured` (a perfect velocity sensor) or `difference` (backward difference).
     displacement_noise_m, acceleration_noise_m_s2
-        RMS noise the Kalman filter reckons with.
+        RMS noise that the Kalman filter assumes.
     bias_drift_m_s2
         Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.
     inverse_request

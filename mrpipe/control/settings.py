@@ -21,8 +21,12 @@ class ControllerSettings(Section):
     velocity: Literal["kalman", "difference", "measured"] = Field(
         "kalman", description="Kinematic Kalman filter, backward difference, or a perfect velocity sensor."
     )
-    kalman_displacement_noise_m: float = Field(20e-6, gt=0.0, description="Displacement noise the filter reckons with.")
-    kalman_acceleration_noise_m_s2: float = Field(0.1, gt=0.0, description="Acceleration noise it reckons with.")
+    kalman_displacement_noise_m: float = Field(
+        20e-6, gt=0.0, description="Displacement noise that the filter assumes [m]."
+    )
+    kalman_acceleration_noise_m_s2: float = Field(
+        0.1, gt=0.0, description="Acceleration noise that it assumes [m/s^2]."
+    )
     kalman_bias_drift_m_s2: float = Field(
         0.0,
         ge=0.0,

@@ -204,9 +204,9 @@ def _next_steps(sink: Sink, summary: Mapping[str, Any]) -> None:
 
     if summary["corrections"]["found"]:
         sink.text(
-            "The faults of sensors named above are taken out by `mrpipe prepare --settings "
-            f"{summary['corrections']['file']}`, and for every later stage by the same option; the file stands in the "
-            "run directory."
+            "To correct the faults of sensors named above, run `mrpipe prepare --settings "
+            f"RUN/{summary['corrections']['file']}` with the same configuration or campaign, where RUN is the run "
+            "directory. Later stages need the same option."
         )
     wanted = summary["next_tests"]
     if wanted["made_already"]:

@@ -107,7 +107,11 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
             f"{', varying with ' + states if states else ''}"
         )
     if summary.get("corrections", {}).get("found"):
-        lines.append(f"fault of sensors: corrections in {summary['corrections']['file']} (mrpipe prepare --settings)")
+        file = summary["corrections"]["file"]
+        lines.append(
+            f"fault of sensors: corrections in {file} of the run directory; apply them with "
+            f"mrpipe prepare --settings RUN/{file}, and the same --config or --campaign"
+        )
     if "closed_loop" in summary:
         lines += _sentences(in_words(summary["closed_loop"]))
     wanted = summary.get("next_tests", {})

@@ -26,7 +26,8 @@ class SensorCorrections(Section):
         description="Time by which the force is recorded later than displacement and drive.",
     )
     force_offset_n: dict[str, float] = Field(
-        default_factory=dict, description="Offset of the load cell in a test (name: N), beside the one of all tests."
+        default_factory=dict,
+        description="Offset of the load cell in a test (name: N), in addition to that of all tests.",
     )
     force_per_drive_n: float = Field(
         _NO_FAULTS.force_per_drive_n, description="Offset of the load cell for each A or V of drive [N]."
