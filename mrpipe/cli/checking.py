@@ -175,10 +175,10 @@ def stages_without_data(loaded: LoadedConfig) -> dict[str, str]:
     UserError
         If no stage has data.
     """
-    from mrpipe.stages.registry import all_stages
+    from mrpipe.stages.registry import stages_for
 
     campaigns = loaded.config.campaigns.model_dump()
-    stages = all_stages()
+    stages = {name: stage.for_configuration(loaded.config) for name, stage in stages_for(loaded.config).items()}
     without: dict[str, str] = {}
 
     def missing(name: str) -> str:

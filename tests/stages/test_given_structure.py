@@ -171,6 +171,13 @@ def test_the_stages_of_the_example_need_no_campaign() -> None:
     assert stages["calibrate"].inputs == ("identify-frame",)
 
 
+def test_the_example_is_valid(capsys: pytest.CaptureFixture[str]) -> None:
+    status = run(["check", "structure-example"])
+    shown = capsys.readouterr()
+    assert status == 0, shown.err
+    assert "will be skipped" not in shown.out
+
+
 def test_a_campaign_on_the_command_line_is_identified() -> None:
     configuration = load_config(Path("structure-example")).config
     assert stages_for(configuration, "frame")["identify-frame"].inputs == ("campaign:frame",)
