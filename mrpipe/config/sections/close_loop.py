@@ -27,6 +27,9 @@ class CloseLoopSettings(Section):
     effect_files: tuple[Path, ...] = Field(
         (), description="Python files of your own, each of which defines one more effect as EFFECT."
     )
+    base_forms: tuple[str, ...] = Field(
+        (), description="Base forms that are tried in addition to the declared one; empty for all of the library."
+    )
     fit_rate_hz: float = Field(250.0, gt=0.0, description="Rate at which candidates are fitted [Hz].")
     displacement_cutoff_hz: float = Field(
         0.0, ge=0.0, description="Zero-phase low-pass of the displacement [Hz]; 0 chooses it for each test."

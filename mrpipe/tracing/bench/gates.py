@@ -11,7 +11,7 @@ from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit, chain_of
 from mrpipe.fitting.kernel import HYSTERESIS_AT, run_recordings
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.tracing.bench.baseline import FREE_EXPONENT, Baseline
+from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, judge, on_validation
@@ -76,10 +76,10 @@ def judged(
     jobs: int,
 ) -> Judgement:
     """Return the verdict on the validation tests by the options of the tracing."""
-    changed = selection.ground is not None
+    taken = selection.ground.problem.base.name if selection.ground is not None else ""
     return judge(
         found, selection.base, selection.chosen, training, options.validation,
-        names=[item.effect.name for item in causes], base_taken=FREE_EXPONENT if changed else "",
+        names=[item.effect.name for item in causes], base_taken=taken,
         structured=missing or bool(causes), reason=reason, faults=ordered.faults, folds=options.folds, jobs=jobs,
     )  # fmt: skip
 

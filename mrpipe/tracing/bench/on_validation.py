@@ -286,7 +286,7 @@ def _evidence(
 
 
 def _sentence(kind: str, evidence: Evidence, names: Sequence[str], base_taken: str, reason: str) -> str:
-    listed = " and ".join(names)
+    listed = " and ".join(names) + (f" with the base form {base_taken}" if base_taken else "")
     verb = "explains" if len(names) == 1 else "explain"
     if kind == "noise":
         return "the residual is noise: nothing is missing"

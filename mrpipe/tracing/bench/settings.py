@@ -25,6 +25,7 @@ def tracing_options(settings: Any, drive_unit: str) -> TracingOptions:
         observation_filter=settings.observation_filter,
         model_error_share=settings.model_error_share,
         unattributed=settings.unattributed,
+        base_forms=tuple(settings.base_forms),
         validation=settings.rules.validation,
         drive_unit=drive_unit or "A",
     )

@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.fitting.engine import predict
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.tracing.bench.baseline import FREE_EXPONENT, Baseline, ladder
+from mrpipe.tracing.bench.baseline import Baseline, ladder
 from mrpipe.tracing.bench.ceiling import flexible_residual
 from mrpipe.tracing.bench.error_measures import Score, score
 from mrpipe.tracing.bench.judgement import recovered
@@ -58,6 +58,7 @@ class TracingOptions:
     model_error_share: float = 0.0
     unattributed: bool = False
     drive_unit: str = "A"
+    base_forms: tuple[str, ...] = ()
     validation: ValidationRules = field(default_factory=ValidationRules)
 
 
@@ -241,8 +242,14 @@ class Summary:
             errors[options.model] = errors[next(iter(fits))]
         # decided on the training tests, reported on the validation tests; a form must earn its parameters
         best = min(fits, key=lambda name: fits[name].chi_square * (1.0 if name == base.problem.base.name else 1.05))
-        taken = options.model if self.selection.ground is None else FREE_EXPONENT
-        return {"name": options.model, "best": best, "taken": taken, "nrmse": errors}
+        ground = self.selection.ground
+        taken = options.model
+        if ground is not None:
+            taken = ground.problem.base.name
+            errors[taken] = score(judged, measured, predict(ground, judged)).nrmse
+            best = taken
+        declared = {"name": options.model, "declared": options.model}
+        return {**declared, "best": best, "taken": taken, "tied_with": [], "nrmse": errors}
 
 
 def _score_json(value: Score) -> dict[str, float]:

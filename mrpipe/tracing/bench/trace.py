@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
+from mrpipe.dampers.library import forms_named
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.yielding_parts import with_yielding_parts
 from mrpipe.fitting.engine import Fit
@@ -29,10 +30,10 @@ from mrpipe.tracing.bench.baseline import (
     fit_baseline,
     noise_level_of,
     with_form,
-    with_free_exponent,
 )
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
+from mrpipe.tracing.bench.forms import alone, cost, grounds
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
@@ -47,7 +48,6 @@ from mrpipe.tracing.bench.verdict import (
     Named,
     clear_lead,
     confidence_of,
-    left_of,
     parameter_table,
     tied,
     unnamed_reason,
@@ -218,7 +218,7 @@ def _select(
         selection = select(baseline.fit)
         if floor > 0.0:
             return baseline, _judged_by_trees(with_play(selection, effects))
-        selection = _in_better_form(selection, select, options)
+        selection = _in_better_form(selection, select, options, jobs)
         if _near_the_noise(selection, baseline.noise, len(own), options, rng, jobs):
             return _with_noise_of(selection.chosen, baseline, selection)
         # what is left on the force's own scale becomes the yardstick of the second pass
@@ -247,25 +247,26 @@ def _drafted(base: Fit, effects: Mapping[str, Effect]) -> Callable[[Fit], list[F
     return partial(rounded_drafts, rate=rate)
 
 
-def _in_better_form(selection: Selection, select: Callable[[Fit], Selection], options: TracingOptions) -> Selection:
-    """Return the selection upon a base with an exponent of its own, where that leaves less than any one effect does.
+def _in_better_form(
+    selection: Selection, select: Callable[[Fit], Selection], options: TracingOptions, jobs: int
+) -> Selection:
+    """Return the selection under another base form, if that leaves less than any effect under the declared form.
 
-    A hysteresis rounded otherwise than the declared one is no missing effect; named as one it would be late rise or
-    friction that is not there.
+    A damper of another published form is no damper with a missing effect: under the declared form it looks like a late
+    rise after reversal, or like friction.
     """
     if not selection.structured or not selection.rounds:
         return selection
-    ground = with_free_exponent(selection.base)
-    best = min(item.fit.chi_square for item in selection.rounds[0])
-    if selection.share(ground) < options.rules.least_share or ground.chi_square > best:
-        return selection
-    again = select(ground)
-    if share_of(ground, again.chosen, again.noise) < options.rules.least_share:
-        again = replace(again, chosen=ground)
-    if left_of(again.chosen, again.noise) > (1.0 + options.rules.lead) * left_of(selection.chosen, selection.noise):
-        return selection
-    rounds = again.rounds if again.chosen is not ground else selection.rounds[:1]
-    return replace(again, base=selection.base, ground=ground, rounds=rounds).with_floor(again.noise)
+    drafts = alone(selection.base, forms_named(options.base_forms), selection.noise, jobs=jobs)
+    best = selection
+    for ground in grounds(selection, drafts, options.rules.lead, options.rules.least_share, jobs=jobs):
+        again = select(ground)
+        if share_of(ground, again.chosen, again.noise) < options.rules.least_share:
+            again = replace(again, chosen=ground)
+        if cost(again.chosen, again.noise) < cost(best.chosen, best.noise):
+            rounds = again.rounds if again.chosen is not ground else selection.rounds[:1]
+            best = replace(again, base=selection.base, ground=ground, rounds=rounds).with_floor(again.noise)
+    return best
 
 
 def _refined(

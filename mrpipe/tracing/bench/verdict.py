@@ -103,7 +103,7 @@ def unnamed_reason(selection: Selection, rules: Rules) -> str:
     if not selection.structured:
         return "the residual is noise: nothing is missing"
     if selection.ground is not None and selection.chosen is selection.ground:
-        return "the base form: a hysteresis with an exponent of its own explains what is missing, and no effect is"
+        return f"no effect is named beside the base form {selection.ground.problem.base.name}"
     if not selection.rounds or selection.chosen is selection.base:
         return "no effect of the library changes the error"
     if min(selection.share(selection.chosen), selection.proven_share) < rules.least_share:

@@ -26,9 +26,13 @@ from tests.tracing.bench.sines import (
     stuck,
 )
 
+FORMS = ("bouc-wen", "dahl")
+
 
 def traced(tests: list[PreparedTest], names: tuple[str, ...] = ("accumulator", "saturation")) -> dict[str, Any]:
-    options = TracingOptions(refits=2, bootstrap_draws=50, yield_order=2, most_effects=1, observation_filter=False)
+    options = TracingOptions(
+        refits=2, bootstrap_draws=50, yield_order=2, most_effects=1, observation_filter=False, base_forms=FORMS
+    )
     library = {name: damper_effects()[name] for name in names}
     return trace_campaign(tests, library, [], options, rng=np.random.default_rng(1)).summary
 
