@@ -9,7 +9,7 @@ from dataclasses import replace
 from mrpipe.dampers.form import BaseForm
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.start import fit_with_form, with_form
-from mrpipe.tracing.bench.select import Selection, draft
+from mrpipe.tracing.bench.select import NOTHING_MISSING, Selection, draft
 from mrpipe.tracing.bench.verdict import left_of
 
 CLAIM_COST = 0.02
@@ -64,7 +64,8 @@ def grounds(
     effects: Sequence[Fit] = [item.fit for item in selection.rounds[0]]
     if selection.share(on_all) >= least_share and cost(on_all, noise) <= min(cost(item, noise) for item in effects):
         names.append(best)
-    if len(chosen.problem.terms) > len(base.problem.terms):
+    # effects that leave no more than noise under the declared form need no other form
+    if len(chosen.problem.terms) > len(base.problem.terms) and chosen.chi_square > (1.0 + NOTHING_MISSING) * noise:
         rivals = with_effects_of(chosen, drafts, jobs=jobs)
         rival = min(rivals, key=lambda item: cost(item, noise))
         own = replace(chosen.problem, recordings=rival.problem.recordings, root_weight=rival.problem.root_weight)
