@@ -15,6 +15,10 @@ from mrpipe.tracing.bench.verdict import left_of
 CLAIM_COST = 0.02
 """Share by which each fitted number, and thrice that by which each effect, counts against a model of like error."""
 
+FORM_LEAD = 0.1
+"""Share by which another base form alone must cost less than the declared form with effects. Without a clear lead the
+declared form is kept, because a form with many numbers can imitate an effect."""
+
 SCREENED = 8
 """Number of base forms, the best ones alone, that are tried with the effects found."""
 
@@ -62,7 +66,8 @@ def grounds(
     best = next(iter(drafts))
     on_all = _on_all(drafts[best], base)
     effects: Sequence[Fit] = [item.fit for item in selection.rounds[0]]
-    if selection.share(on_all) >= least_share and cost(on_all, noise) <= min(cost(item, noise) for item in effects):
+    declared = min(cost(item, noise) for item in (*effects, chosen))
+    if selection.share(on_all) >= least_share and (1.0 + FORM_LEAD) * cost(on_all, noise) <= declared:
         names.append(best)
     # effects that leave no more than noise under the declared form need no other form
     if len(chosen.problem.terms) > len(base.problem.terms) and chosen.chi_square > (1.0 + NOTHING_MISSING) * noise:

@@ -33,6 +33,7 @@ from mrpipe.tracing.bench.baseline import (
 )
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
+from mrpipe.tracing.bench.drive_again import with_laws_again
 from mrpipe.tracing.bench.forms import alone, cost, grounds
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
@@ -218,6 +219,8 @@ def _select(
         selection = select(baseline.fit)
         if floor > 0.0:
             return baseline, _judged_by_trees(with_play(selection, effects))
+        full = declared_base(training, options.model, options.yield_order, options.viscosity_order)
+        selection = with_laws_again(selection, full)
         selection = _in_better_form(selection, select, options, jobs)
         if _near_the_noise(selection, baseline.noise, len(own), options, rng, jobs):
             return _with_noise_of(selection.chosen, baseline, selection)
