@@ -56,8 +56,12 @@ def grounds(
     ----------
     selection
         Effects under the declared base form.
+    drafts
+        Other base forms, fitted to a share of the tests, the best first.
     lead, least_share
         See :class:`mrpipe.tracing.bench.verdict.Rules`.
+    jobs
+        Threads.
     """
     base, chosen, noise = selection.base, selection.chosen, selection.noise
     if not drafts:
