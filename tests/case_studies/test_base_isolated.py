@@ -237,7 +237,7 @@ def test_more_dampers_matter_more(study: IsolationStudy, motion: GroundMotion) -
 
 @pytest.mark.planted
 def test_unknown_law_is_told(study: IsolationStudy) -> None:
-    with pytest.raises(UserError, match="no law of the base-isolated building"):
+    with pytest.raises(UserError, match="not a law of the base-isolated building"):
         study.controller("vdps2")
 
 

@@ -190,7 +190,7 @@ def test_lqg_of_the_tower_agrees_with_python_control(outrigger: WindStudy) -> No
 
 @pytest.mark.planted
 def test_unknown_law_is_told(ground: WindStudy) -> None:
-    with pytest.raises(UserError, match="no law of the tower"):
+    with pytest.raises(UserError, match="not a law of the tower"):
         ground.controller("vdsn")
 
 

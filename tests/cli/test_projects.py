@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -135,8 +136,13 @@ def test_completion_can_be_shown(capfd: pytest.CaptureFixture[str], monkeypatch:
     import subprocess
     import sys
 
+    # the shell is named: there is none above a worker of the test suite that could be detected
     done = subprocess.run(
-        [sys.executable, "-m", "mrpipe", "--show-completion", "bash"], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "mrpipe", "--show-completion", "bash"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"},
     )
     assert "_MRPIPE_COMPLETE" in done.stdout
 
