@@ -16,7 +16,7 @@ from scipy.linalg import cholesky, eigh, solve_continuous_lyapunov, svd
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
-from mrpipe.structures.dynamics import StateSpace, natural_modes, state_space
+from mrpipe.structures.dynamics import StateSpace, natural_modes
 from mrpipe.structures.frame import Frame
 from mrpipe.structures.given import degree_of_freedom
 from mrpipe.structures.options import ReductionSettings
@@ -249,8 +249,3 @@ def _root(gramian: FloatArray) -> FloatArray:
     except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(symmetric)
         return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
-def balanced_frame(frame: Frame, outputs: FloatArray, order: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return the balanced truncation of a structure under ground motion; see :func:`balanced`."""
-    return balanced(state_space(frame), outputs, order)
