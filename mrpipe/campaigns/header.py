@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from mrpipe.artifacts.yaml_source import read_yaml
 from mrpipe.campaigns.schema import CampaignEntry
@@ -13,13 +15,17 @@ from mrpipe.errors import UserError
 
 @dataclass(frozen=True)
 class CampaignHeader:
-    """Path of the file, name, rig, kinds of the tests (empty on a bench), and declared effects."""
+    """Path of the file, name, rig, kinds of the tests (empty on a bench), declared effects, and control laws.
+
+    `laws` maps the index of a test to its control law and the names of its gains, for tests that state a law.
+    """
 
     file: Path
     campaign: str
     rig: str
     kinds: frozenset[str]
     declared_effects: tuple[str, ...] = ()
+    laws: Mapping[int, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
 
 
 def read_header(path: Path) -> CampaignHeader:
@@ -41,4 +47,14 @@ def read_header(path: Path) -> CampaignHeader:
         for test in entry.tests
         if isinstance(test, dict)
     }
-    return CampaignHeader(file, entry.campaign, entry.rig, frozenset(kinds - {""}), entry.declared_effects)
+    laws = {
+        index: (test["law"], tuple(str(name) for name in _gains(test)))
+        for index, test in enumerate(entry.tests)
+        if isinstance(test, dict) and isinstance(test.get("law"), str)
+    }
+    return CampaignHeader(file, entry.campaign, entry.rig, frozenset(kinds - {""}), entry.declared_effects, laws)
+
+
+def _gains(test: Mapping[str, Any]) -> Mapping[str, Any]:
+    given = test.get("gains")
+    return given if isinstance(given, dict) else {}

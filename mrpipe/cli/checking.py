@@ -100,6 +100,7 @@ def check_headers(loaded: LoadedConfig) -> None:
                 f"name it under campaigns.{right}",
             )
         require_known_effects(header, setting_named(loaded.config, "close_loop.effect_files"))
+        require_known_laws(header)
         for file in campaign_files(path):
             if not file.is_file():
                 remedy = "correct `file:` in the campaign file, or put the file there"
@@ -123,6 +124,33 @@ def require_known_effects(header: CampaignHeader, effect_files: tuple[Path, ...]
         if name not in known:
             source = read_yaml(header.file)
             raise source.error(("declared_effects", index), f"unknown effect {name!r}", nearest(name, known))
+
+
+def require_known_laws(header: CampaignHeader) -> None:
+    """Refuse closed-loop tests whose control law, or a gain of it, nobody knows.
+
+    Raises
+    ------
+    UserError
+        Naming the nearest law or gain.
+    """
+    if not header.laws:
+        return
+    from mrpipe.artifacts.yaml_source import nearest, read_yaml
+    from mrpipe.control.laws import law_named, law_names
+
+    source = read_yaml(header.file)
+    for index, (law, gains) in header.laws.items():
+        if law not in law_names():
+            place = ("tests", index, "law")
+            raise source.error(
+                place, f"unknown control law {law!r}", f"{nearest(law, set(law_names()))}; leave out a law of your own"
+            )
+        known = {item.name for item in law_named(law).gains}
+        for name in gains:
+            if name not in known:
+                remedy = nearest(name, known) if known else "the law has no gains"
+                raise source.error(("tests", index, "gains"), f"law {law} has no gain {name!r}", remedy)
 
 
 def known_effects(effect_files: tuple[Path, ...] = ()) -> set[str]:
@@ -154,8 +182,27 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
         campaign = load_campaign(measured[key])
         result.campaigns[key] = f"{campaign.name}: {len(campaign.recordings)} tests"
         result.notes[key] = list(campaign.findings)
-        result.findings[key] = [*judge(campaign), *_too_short(loaded, campaign)]
+        result.findings[key] = [*judge(campaign), *_too_short(loaded, campaign), *_no_validation(loaded, key, campaign)]
     return result
+
+
+def _no_validation(loaded: LoadedConfig, key: str, campaign: Campaign) -> list[Finding]:
+    """Return a finding where close-loop will trace this structure and no test of it validates."""
+    from mrpipe.campaigns.plausibility import Finding
+    from mrpipe.stages.close_loop_frame import variant
+
+    if key == "bench" or "close-loop" not in loaded.config.stages or variant(loaded.config) is None:
+        return []
+    if not campaign.floor_masses_kg or any(test.role == "validation" for test in campaign.recordings):
+        return []
+    return [
+        Finding(
+            name="no-validation",
+            severity="error",
+            sentence="no test has the role validation, so close-loop cannot judge what it finds",
+            remedy="write role: validation for one forced test, or take close-loop out of stages",
+        )
+    ]
 
 
 def _too_short(loaded: LoadedConfig, campaign: Campaign) -> list[Finding]:

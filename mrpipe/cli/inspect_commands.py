@@ -97,7 +97,7 @@ def check(
         )
     else:
         verdict = f"{result.errors} errors in the data" if result.errors else "valid"
-        print(f"{loaded.path}: {verdict}, {len(stages)} stages")
+        print(f"{_shortest(loaded.path)}: {verdict}, {len(stages)} stages")
         for rig, text in result.campaigns.items():
             print(f"  campaign {rig}: {text}")
             for note in result.notes.get(rig, []):
@@ -107,9 +107,15 @@ def check(
         for stage, campaign in without.items():
             print(f"  {stage}: will be skipped, because there is no {campaign} campaign")
         if not result.errors:
-            print(f"next: mrpipe run {options.config or loaded.path}")
+            print(f"next: mrpipe run {options.config or _shortest(loaded.path)}")
     if result.errors:
         raise CheckFailed(f"{loaded.path}: {result.errors} errors in the measured data (listed above)")
+
+
+def _shortest(path: Path) -> Path:
+    """Return a path relative to the working directory where it lies in it."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 def _shown(value: Any) -> str | None:

@@ -48,7 +48,7 @@ tests:                            # kind: sweep, free-decay, random or closed-lo
 """
 STAGES = {
     "bench": "[prepare, assemble, sweep, train-forward, train-inverse, identify-damper, close-loop, report]",
-    "frame": "[identify-frame, report]",
+    "frame": "[identify-frame, close-loop, report]",
     "both": (
         "[prepare, assemble, sweep, train-forward, train-inverse, identify-damper, identify-frame, calibrate,\n"
         "  simulate-passive-off, simulate-passive-on, simulate-vd, simulate-fdns, close-loop, report]"

@@ -50,12 +50,19 @@ def _is_artifact(path: Path) -> bool:
 
 
 def _units_of(path: Path) -> dict[str, str]:
-    """Return channel -> unit that the campaign file gives it."""
+    """Return channel -> unit that the campaign file gives it, for the whole campaign or in the first test that does."""
     from mrpipe.artifacts.yaml_source import read_yaml
 
-    channels = read_yaml(path).content.get("channels")
-    entries = channels.items() if isinstance(channels, Mapping) else ()
-    return {str(name): str(entry["unit"]) for name, entry in entries if isinstance(entry, Mapping) and "unit" in entry}
+    content = read_yaml(path).content
+    tests = content.get("tests")
+    places = [content, *(tests if isinstance(tests, list) else [])]
+    found: dict[str, str] = {}
+    for place in places:
+        channels = place.get("channels") if isinstance(place, Mapping) else None
+        for name, entry in channels.items() if isinstance(channels, Mapping) else ():
+            if isinstance(entry, Mapping) and "unit" in entry:
+                found.setdefault(str(name), str(entry["unit"]))
+    return found
 
 
 def _refuse_folder(path: Path) -> dict[str, Any]:
@@ -193,7 +200,7 @@ def _print_campaign(description: Mapping[str, Any]) -> None:
     }
     rows = []
     for test in tests:
-        row = [test["name"], str(test.get("kind") or "-") if kinds else test["role"]]
+        row = [test["name"], _kind_and_role(test) if kinds else test["role"]]
         row += [_figure(test["sampling_rate_hz"]), _figure(test["duration_s"])]
         for name in shown:
             channel = test["channels"].get(name)
@@ -219,6 +226,11 @@ def _print_campaign(description: Mapping[str, Any]) -> None:
             print(f"note: {line}")
     if "plot" in description:
         print(f"plot: {description['plot']}")
+
+
+def _kind_and_role(test: Mapping[str, Any]) -> str:
+    kind = str(test.get("kind") or "-")
+    return kind if test["role"] == "training" else f"{kind}, {test['role']}"
 
 
 def _short_header(text: str) -> str:

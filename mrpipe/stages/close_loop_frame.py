@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from mrpipe.errors import StageSkipped
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
@@ -29,6 +30,13 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for campaign in campaigns:
         for finding in campaign.findings:
             context.warn(finding)
+    if not any(campaign.floor_masses_kg for campaign in campaigns) and not any(
+        "drive" in test.channels for campaign in campaigns for test in campaign.recordings
+    ):
+        raise StageSkipped(
+            "the masses of the floors are not given, so no storey force can be computed: write frame: "
+            "{floor_masses_kg: [...]} in campaign.yaml"
+        )
     known = {**all_structural_effects(), **damper_effects()}
     for name in campaigns[0].declared_effects:
         if name not in known:

@@ -5,13 +5,18 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from mrpipe.campaigns import TestFile, write_campaign
 from mrpipe.cli import run
+from mrpipe.config.loader import load_config
+from mrpipe.errors import StageSkipped
+from mrpipe.stages import close_loop_frame
 from tests.campaigns.plausibility.rig import sound_tests
 
 CONFIG = """\
@@ -147,3 +152,77 @@ def test_an_overload_value_is_no_measurement(tmp_path: Path, capsys: pytest.Capt
     force[777] = 9.9e37
     status, _, err = checked(capsys, str(project(tmp_path, [tests[0], replace(tests[1], force_n=force), *tests[2:]])))
     assert status == 2 and "test T1, force, row 777: is 9.9e+37, no measurement" in err
+
+
+TOWER = """\
+name: tower
+stages: [identify-frame, close-loop, report]
+campaigns: {bench: null, frame: data, closed_loop: null}
+"""
+
+
+def tower(directory: Path, **changes: Any) -> Path:
+    """Write a frame campaign of two random tests, and a configuration that traces it; return the latter."""
+    rng = np.random.default_rng(7)
+    (directory / "data").mkdir()
+    names = ["t", "ag", "a1", "a2"]
+    for name in ("one", "two"):
+        rows = np.column_stack([np.arange(2000) / 200.0, rng.standard_normal((2000, 3))])
+        np.savetxt(directory / "data" / f"{name}.csv", rows, delimiter=",", header=",".join(names), comments="")
+    quantities = ["time", "ground_acceleration", "floor_acceleration_1", "floor_acceleration_2"]
+    units = ["s", "m/s^2", "m/s^2", "m/s^2"]
+    content: dict[str, Any] = {
+        "campaign": "tower",
+        "rig": "shear-frame",
+        "frame": {"floor_masses_kg": [200, 200]},
+        "channels": {q: {"column": c, "unit": u} for q, c, u in zip(quantities, names, units, strict=True)},
+        "tests": [
+            {"name": "one", "file": "one.csv", "kind": "random"},
+            {"name": "two", "file": "two.csv", "kind": "random", "role": "validation"},
+        ],
+        **changes,
+    }
+    (directory / "data" / "campaign.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    config = directory / "tower.yaml"
+    config.write_text(TOWER, encoding="utf-8")
+    return config
+
+
+def _tests(**second: Any) -> list[dict[str, Any]]:
+    one = {"name": "one", "file": "one.csv", "kind": "random"}
+    return [one, {"name": "two", "file": "two.csv", "kind": "random", **second}]
+
+
+@pytest.mark.golden
+def test_a_structure_that_is_traced_needs_a_validation_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = checked(capsys, str(tower(tmp_path, tests=_tests())))
+    assert status == 1 and "no test has the role validation, so close-loop cannot judge" in out
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(
+    ("test", "expected"),
+    [
+        ({"kind": "closed-loop", "law": "vdd"}, "tests[1].law: unknown control law 'vdd'; did you mean"),
+        ({"kind": "closed-loop", "law": "vd", "gains": {"c": 2}}, "law vd has no gain 'c'; known: c_n_s_m"),
+        ({"kind": "closed-loop", "law": "vd", "gains": {"c_n_s_m": 2.0}}, ""),
+    ],
+)
+def test_laws_and_gains_of_recorded_tests_are_known(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], test: dict[str, Any], expected: str
+) -> None:
+    status, _, err = checked(capsys, str(tower(tmp_path, tests=_tests(role="validation", **test))))
+    assert (status, err) == (0, "") if not expected else status == 2 and expected in err, err
+
+
+@pytest.mark.golden
+def test_a_structure_without_masses_is_not_traced_and_the_rest_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tower(tmp_path, frame={})
+    assert checked(capsys, str(config))[0] == 0
+    context = SimpleNamespace(
+        settings=SimpleNamespace(close_loop=None), inputs={"campaign:frame": tmp_path / "data"}, warn=lambda line: None
+    )
+    with pytest.raises(StageSkipped, match=r"masses of the floors are not given.*write frame: \{floor_masses_kg"):
+        close_loop_frame.variant(load_config(config).config).run(context)  # type: ignore[union-attr, arg-type]

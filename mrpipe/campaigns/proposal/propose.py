@@ -24,7 +24,13 @@ from mrpipe.campaigns.proposal.columns import (
     open_columns,
 )
 from mrpipe.campaigns.proposal.kinds import kind_of, law_of, mode_of
-from mrpipe.campaigns.proposal.roles import Condition, condition_of, drive_in_name, propose_roles
+from mrpipe.campaigns.proposal.roles import (
+    Condition,
+    condition_of,
+    drive_in_name,
+    propose_frame_roles,
+    propose_roles,
+)
 from mrpipe.campaigns.proposal.text import TestText, campaign_text
 from mrpipe.errors import UserError
 
@@ -146,7 +152,13 @@ def _propose(
         unsure += [
             f"channel {key}: not found; write its column and unit"
             for key in ("displacement", "force")
-            if key not in shared
+            if not any(key in item.layout.channels for item in files)
+        ]
+        unsure += [
+            f"test {_test_name(item.path, folder)}: no {key} found in {item.path.name}; write its column and unit"
+            for key in ("displacement", "force")
+            for item in files
+            if key not in item.layout.channels and any(key in other.layout.channels for other in files)
         ]
     tests, why, notes = _bench_tests(files, folder, shared) if bench else _frame_tests(files, folder, shared)
     unsure += notes
@@ -168,16 +180,26 @@ def _propose(
         skipped=skipped,
         columns=[(item.name, item.header.quantity, item.header.unit) for item in files[0].columns],
     )
-    channels = {key: f"{guess.column or guess.value} [{guess.unit}]" for key, guess in shared.items()}
-    listed = tuple((item.name, item.role or item.kind) for item in tests)
+    found: dict[str, Guess] = dict(shared)
+    for item in files:
+        for key, guess in item.layout.channels.items():
+            found.setdefault(key, guess)
+    channels = {key: f"{guess.column or guess.value} [{guess.unit}]" for key, guess in found.items()}
+    listed = tuple((item.name, ", ".join(word for word in (item.kind, item.role) if word)) for item in tests)
     return Proposal("bench" if bench else "frame", text, channels, listed, tuple(unsure), tuple(skipped))
 
 
 def _shared(files: list[_File]) -> dict[str, Guess]:
-    """Return the channels of the campaign: for each the guess that most files share."""
+    """Return the channels of the campaign: those of all files, each with the guess that most files share.
+
+    A channel that some files lack belongs to the tests that have it, because the reader would look for its column in
+    every file.
+    """
     names = list(dict.fromkeys(key for item in files for key in item.layout.channels))
     shared = {}
     for key in names:
+        if any(key not in item.layout.channels for item in files):
+            continue
         guesses = [item.layout.channels[key] for item in files if key in item.layout.channels]
         shared[key] = max(
             guesses, key=lambda guess: sum((g.column, g.unit) == (guess.column, guess.unit) for g in guesses)
@@ -190,7 +212,7 @@ def _own(item: _File, shared: dict[str, Guess]) -> dict[str, Guess]:
     return {
         key: guess
         for key, guess in item.layout.channels.items()
-        if (guess.column, guess.unit) != (shared[key].column, shared[key].unit)
+        if key not in shared or (guess.column, guess.unit) != (shared[key].column, shared[key].unit)
     }
 
 
@@ -253,26 +275,36 @@ def _condition(item: _File, own: dict[str, Guess]) -> Condition:
 
 def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> tuple[list[TestText], str, list[str]]:
     tests, notes = [], []
-    for item in files:
-        channels = {
-            key: np.nan_to_num(item.samples(guess.column))
-            for key, guess in item.layout.channels.items()
-            if guess.column
-        }
-        kind, doubt = kind_of(item.path, channels, item.rate)
+    kinds = [kind_of(item.path, _samples_of(item), item.rate) for item in files]
+    roles = propose_frame_roles([item.path for item in files], [kind for kind, _ in kinds])
+    for item, (kind, doubt), role in zip(files, kinds, roles, strict=True):
         name = _test_name(item.path, folder)
         if doubt:
             notes.append(f"test {name}: kind {kind}, {doubt}")
+        law = law_of(item.path) if kind == "closed-loop" else ""
+        if kind == "closed-loop" and not law:
+            notes.append(f"test {name}: the control law is not known; write law: vd, or another one")
+        elif law:
+            notes.append(f"test {name}: the gains of law {law} are not known; write gains: {{...}}")
         tests.append(
             TestText(
                 name=name,
                 file=item.path.relative_to(folder).as_posix(),
                 channels=_own(item, shared),
+                role="validation" if role == "validation" else "",
                 kind=kind,
-                law=law_of(item.path) if kind == "closed-loop" else "",
+                law=law,
                 mode=mode_of(item.path) if kind == "free-decay" else None,
                 doubt=doubt,
             )
         )
     notes.append("frame: floor_masses_kg is not known; write the masses where they are known")
+    if "validation" not in roles:
+        notes.append("roles: no test repeats another, so none validates; close-loop needs a test with role validation")
     return tests, "kinds from the names of the files where they state them", notes
+
+
+def _samples_of(item: _File) -> dict[str, FloatArray]:
+    """Return channel -> samples of a file, NaN replaced by zero."""
+    guesses = item.layout.channels.items()
+    return {key: np.nan_to_num(item.samples(guess.column)) for key, guess in guesses if guess.column}

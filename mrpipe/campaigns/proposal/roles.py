@@ -61,14 +61,39 @@ class Roles:
     why: str
 
 
+def _named_roles(paths: Sequence[Path]) -> list[str]:
+    """Return the role that each file name states, empty where it states none."""
+    words = [{word for part in (path.stem, path.parent.name) for word in split_words(part)} for path in paths]
+    return ["validation" if item & VALIDATION else "training" if item & TRAINING else "" for item in words]
+
+
+def propose_frame_roles(paths: Sequence[Path], kinds: Sequence[str]) -> list[str]:
+    """Return a role for each test of a frame.
+
+    Names decide where they state roles. Otherwise one test validates: the last of the forced tests of the kind with
+    the most tests, where there are at least two forced tests. The last of several closed-loop tests validates too.
+    """
+    named = _named_roles(paths)
+    if "validation" in named and any(role != "validation" for role in named):
+        return [role or "training" for role in named]
+    roles = ["training"] * len(paths)
+    forced = [index for index, kind in enumerate(kinds) if kind in ("sweep", "random")]
+    if len(forced) > 1:
+        most = max(("sweep", "random"), key=lambda kind: sum(kinds[index] == kind for index in forced))
+        roles[[index for index in forced if kinds[index] == most][-1]] = "validation"
+    loops = [index for index, kind in enumerate(kinds) if kind == "closed-loop"]
+    if len(loops) > 1:
+        roles[loops[-1]] = "validation"
+    return roles
+
+
 def propose_roles(paths: Sequence[Path], conditions: Sequence[Condition]) -> Roles:
     """Return a role for each test.
 
     Names decide where they state roles. Else one of each group of repeated tests validates. Else about a quarter of the
     tests validate, chosen so that their drive lies between those of training tests.
     """
-    words = [{word for part in (path.stem, path.parent.name) for word in split_words(part)} for path in paths]
-    named = ["validation" if item & VALIDATION else "training" if item & TRAINING else "" for item in words]
+    named = _named_roles(paths)
     if "validation" in named and any(role != "validation" for role in named):
         return Roles(tuple(role or "training" for role in named), "by the names of the files")
     if len(paths) == 1:

@@ -120,16 +120,9 @@ def damper(facts: RunFacts) -> Section:
             f"{quantity(summary['drive_limit'], summary['drive_unit'])}."
         )
         section.table("parameters", _parameters(summary["parameters"]), "Parameters with standard errors (SI).")
-    effects = statements.proper_effects(loop)
-    for effect in effects:
-        section.text(f"**{effect['name']}** ({effect.get('form', '')}). {effect.get('physics', '')}")
-    section.table("effects", _effects(effects), "Effects that the model lacks, with 95 % intervals.")
-    if loop.get("candidates"):
-        section.figure(
-            "candidates",
-            figures.candidate_shares(loop["candidates"], [effect["name"] for effect in effects]),
-            "Share of the recoverable residual that each effect recovers alone; named effects in blue.",
-        )
+    if _of_structure(loop):
+        return section
+    _traced_effects(section, loop)
     shown = _shown_tests(facts)
     if shown:
         section.figure(
@@ -147,6 +140,25 @@ def damper(facts: RunFacts) -> Section:
             "Residual of the validation tests over the variables that may explain it: mean and middle 80 %.",
         )
     return section
+
+
+def _of_structure(loop: Mapping[str, Any]) -> bool:
+    """Return whether `close-loop` traced a structure; its result names the parts that it judged."""
+    return bool(loop.get("parts"))
+
+
+def _traced_effects(section: Section, loop: Mapping[str, Any]) -> None:
+    """Add the effects that the model lacks, and how much each candidate recovers."""
+    effects = statements.proper_effects(loop)
+    for effect in effects:
+        section.text(f"**{effect['name']}** ({effect.get('form', '')}). {effect.get('physics', '')}")
+    section.table("effects", _effects(effects), "Effects that the model lacks, with 95 % intervals.")
+    if loop.get("candidates"):
+        section.figure(
+            "candidates",
+            figures.candidate_shares(loop["candidates"], [effect["name"] for effect in effects]),
+            "Share of the recoverable residual that each effect recovers alone; named effects in blue.",
+        )
 
 
 def _parameters(parameters: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
@@ -203,7 +215,7 @@ def _residual(artifact: Artifact, drive_unit: str) -> tuple[list[tuple[str, Any]
 def _shown_tests(facts: RunFacts) -> list[TestRun]:
     """Return the validation tests to draw: gains most, middling error, largest error after; about two cycles each."""
     artifact, loop = facts.artifact("close-loop.h5"), facts.summary("close-loop")
-    if artifact is None or not loop.get("tests") or "validation" not in artifact.members("/"):
+    if artifact is None or not loop.get("tests") or "names" not in artifact.members("validation"):
         return []
     names, starts = artifact.json("validation/names"), artifact.array("validation/starts").astype(int)
     rows = {row["name"]: row for row in loop["tests"] if row["name"] in names}
@@ -284,6 +296,8 @@ def structure(facts: RunFacts) -> Section:
             figures.frequency_response(frequency[step], curves[0], curves[1], shapes.shape[0]),
             "Frequency response of the top floor.",
         )
+    if _of_structure(facts.summary("close-loop")):
+        _traced_effects(section, facts.summary("close-loop"))
     return section
 
 

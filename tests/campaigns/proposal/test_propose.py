@@ -11,6 +11,7 @@ import yaml
 from mrpipe.campaigns import load_campaign
 from mrpipe.campaigns.plausibility import judge
 from mrpipe.campaigns.proposal import Proposal, propose_campaigns
+from mrpipe.campaigns.proposal.roles import propose_frame_roles
 from mrpipe.campaigns.proposal.words import read_header
 from mrpipe.errors import UserError
 from tests.campaigns.plausibility.rig import sound_tests
@@ -95,6 +96,33 @@ def test_a_folder_with_bench_and_frame_becomes_two_campaigns(tmp_path: Path) -> 
     frame_folder(tmp_path / "all" / "tower", sweep_s=5.0)
     found = propose_campaigns(tmp_path / "all", "own", "both", tmp_path / "p" / "data" / "own")
     assert [(item.rig, len(item.tests)) for item in found] == [("bench", 4), ("frame", 5)]
+
+
+@pytest.mark.planted
+def test_channels_that_some_files_lack_belong_to_the_tests_that_have_them(tmp_path: Path) -> None:
+    folder = frame_folder(tmp_path / "Turm", sweep_s=20.0)
+    header, *rows = (folder / "gleitsinus1.csv").read_text(encoding="utf-8").splitlines()
+    for index in (1, 2):
+        lines = [f"{header};Weg Etage 1 (mm);Kraft Dämpfer (N);Strom (A)"]
+        lines += [f"{row};{index}{number % 7},5;1{number % 5},0;0,5" for number, row in enumerate(rows)]
+        (folder / f"geregelt_vd_{index}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    proposal, beside = _proposed(folder, tmp_path / "p" / "data" / "own")
+    tests = {test.name: test for test in load_campaign(beside).recordings}
+    assert "floor_displacement_1" not in tests["gleitsinus1"].channels
+    assert {"floor_displacement_1", "damper_force", "drive"} <= set(tests["geregelt_vd_1"].channels)
+    assert (tests["geregelt_vd_1"].kind, tests["geregelt_vd_1"].details["law"]) == ("closed-loop", "vd")
+    assert [name for name, test in tests.items() if test.role == "validation"] == ["geregelt_vd_2", "gleitsinus2"]
+    assert any("gains of law vd are not known" in line for line in proposal.unsure)
+
+
+@pytest.mark.golden
+def test_roles_of_a_frame_follow_names_and_repeated_kinds() -> None:
+    paths = [Path(name) for name in ("sweep1.csv", "sweep2.csv", "noise.csv", "decay.csv")]
+    kinds = ["sweep", "sweep", "random", "free-decay"]
+    assert propose_frame_roles(paths, kinds) == ["training", "validation", "training", "training"]
+    assert propose_frame_roles(paths[:1], kinds[:1]) == ["training"]
+    named = [Path("sweep_valid.csv"), Path("sweep2.csv")]
+    assert propose_frame_roles(named, ["sweep", "sweep"]) == ["validation", "training"]
 
 
 @pytest.mark.planted

@@ -7,11 +7,13 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mrpipe.artifacts import ArtifactWriter, Provenance
 from mrpipe.reporting.front.sections import sections
 from mrpipe.reporting.page import first_screen, write_report
-from tests.reporting.front.run import run_in
+from tests.reporting.front.run import run_in, tracing
 
 pytestmark = pytest.mark.property
 
@@ -86,3 +88,17 @@ def _browse(path: Path, *options: str) -> subprocess.CompletedProcess[str]:
     assert BROWSER is not None
     command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", *options, path.as_uri()]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_report_of_a_structure_alone_lists_its_effects_with_the_structure(tmp_path: Path) -> None:
+    facts = run_in(tmp_path, tracing(parts={"frame": {}}, model="linear-frame"))
+    (tmp_path / "close-loop.h5").unlink()
+    for path in tmp_path.glob("response-*.h5"):
+        path.unlink()
+    # the histories of a structure lie in a group for each validation test
+    with ArtifactWriter.create(tmp_path / "close-loop.h5", Provenance("close-loop")) as artifact:
+        artifact.put("validation/sweep2/drift", np.zeros((50, 3)), unit="m", dims=("sample", "storey"))
+    frame = [stage for stage in facts.stages if stage.name in ("identify-frame", "close-loop")]
+    found = {section.anchor: section for section in sections(type(facts)(tmp_path, "tower", "", frame))}
+    assert "damper" not in found
+    assert {item["name"] for item in found["structure"].items if item["kind"] == "table"} >= {"modes", "effects"}
