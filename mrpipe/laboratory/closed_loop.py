@@ -232,6 +232,8 @@ def _test(
         "decay_from_s": round(stop, 4),
         "controller_rate_hz": controller.options.rate_hz,
     }
+    if controller.options.low_pass_hz is not None:
+        about["command_filter_hz"] = controller.options.low_pass_hz
     details: dict[str, Any] = {"kind": "closed-loop", "law": controller.law, "about": about}
     gains = gains_of(controller)
     if gains:

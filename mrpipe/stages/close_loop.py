@@ -106,6 +106,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
             context.seed,
             context.jobs,
             lambda fraction, text="": context.progress(0.92 + 0.06 * fraction, text),
+            context.settings.close_loop.rules.loop,
         )
     )
     return {**found, "statement": in_words(found)}

@@ -49,6 +49,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         structural_effects(settings.candidates, settings.effect_files),
         damper_effects(),
         options,
+        settings.rules,
         rng=context.rng,
         jobs=context.jobs,
         progress=context.progress,

@@ -1,4 +1,4 @@
-"""The damper with its effects as a plant: what force it gives in use, the inverse that follows, its residual force."""
+"""The damper with its effects as a plant: its force in use, its inverse, and its residual force."""
 
 from __future__ import annotations
 
@@ -21,30 +21,36 @@ from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
 from mrpipe.signals.prepared import PreparedTest
 
-SPEEDS_M_S = (0.01, 0.03, 0.08, 0.2, 0.4)
-"""Speeds at which the force in use is tabulated."""
+SPEEDS = (0.025, 0.075, 0.2, 0.5, 1.0)
+"""Numerical technique: speeds at which the force in use is tabulated, in shares of the highest speed."""
 
 DRIVES = 11
-"""Drives at which it is tabulated, from 0 to the limit."""
+"""Numerical technique: number of drives at which it is tabulated, from 0 to the limit."""
 
-STEP_S = 2e-3
-"""Longest step of these simulations."""
+STEPS = (80.0, 40.0)
+"""Numerical technique: least number of time steps in half a period of the motion and in half a cycle of a triangle."""
 
 SETTLING_SHARE = 0.2
-"""Share of a half period after a change of drive that is left out."""
+"""Numerical technique: share of a half period after a change of drive that is left out, so that its lag has decayed."""
+
+MIDDLE = 0.3
+"""Numerical technique: the force is averaged over this share of the stroke either side of its middle."""
 
 MOST_MOTIONS = 40
-"""Of campaigns with more training tests, so many motions are simulated for the inverse."""
+"""Numerical technique: most motions that are simulated for the inverse."""
 
 CYCLES = 4
-"""Steady cycles of each."""
+"""Numerical technique: steady cycles of each motion."""
 
-CHANGED = 0.01
-"""RMS change of the force over its RMS at which an effect counts as changing the inverse."""
+RAMPS = (0.1, 0.8)
+"""Numerical technique: shortest and longest ramp between two drives, in mean periods of the motion."""
+
+OFF = 0.33
+"""Numerical technique: share of the levels of the drive that are 0, as under a controller that switches."""
 
 
 def plant_chain(found: Fit) -> Chain:
-    """Return the chain for the closed loop; faults of sensors stay out of the plant, a lag unknown is left out."""
+    """Return the chain for the closed loop, without faults of sensors and without a lag that no test determines."""
     return traced_damper(found).chain()
 
 
@@ -79,17 +85,18 @@ def tested_range(recordings: Recordings) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class ForceInUse:
-    """The force that a damper gives while a controller works it.
+    """The force of a damper under a controller.
 
     Attributes
     ----------
     speeds_m_s, drives
         Shape (s,) and (d,).
     force_n
-        Post-yield force at constant speed, shape (s, d) [N]: the mean of both directions, and of the drive come to
-        from nothing and from the working drive, so that a memory of the drive counts as it does in the loop.
+        Post-yield force at constant speed, shape (s, d) [N]. It is the mean over both directions of motion and over
+        two histories of the drive, from 0 and from the working drive, so that a memory of the drive counts as in the
+        loop.
     from_above_n
-        The same, come to from the working drive alone.
+        The same for the drive that comes from the working drive.
     """
 
     speeds_m_s: FloatArray
@@ -98,7 +105,7 @@ class ForceInUse:
     from_above_n: FloatArray
 
     def residual_n(self, speed_m_s: float) -> float:
-        """Return the force [N] that is left at no drive after the damper has worked."""
+        """Return the force [N] at drive 0 after the damper has worked."""
         return float(np.interp(speed_m_s, self.speeds_m_s, self.from_above_n[:, 0]))
 
     def smallest_n(self, speed_m_s: FloatArray) -> FloatArray:
@@ -110,7 +117,7 @@ class ForceInUse:
         return np.interp(speed_m_s, self.speeds_m_s, self.force_n[:, -1])
 
     def table(self, speeds: int = 101, drives: int = 81) -> InverseTable:
-        """Return the inverse of it for controllers that invert the model."""
+        """Return the inverse of the force for controllers that invert the model."""
         speed = np.linspace(0.0, float(self.speeds_m_s[-1]), speeds)
         drive = np.linspace(0.0, float(self.drives[-1]), drives)
         over_drive = np.array([np.interp(drive, self.drives, row) for row in self.force_n])
@@ -119,24 +126,25 @@ class ForceInUse:
 
 
 def force_in_use(
-    chain: Chain, drive_limit: float, *, stroke_m: float, omega: float, working_drive: float
+    chain: Chain, drive_limit: float, *, stroke_m: float, speed_m_s: float, omega: float, working_drive: float
 ) -> ForceInUse:
-    """Tabulate what a chain gives at constant speeds and drives, as a controller meets it.
+    """Tabulate the force of a chain at constant speeds and drives, as in a closed loop.
 
     Parameters
     ----------
     drive_limit
         Largest drive.
-    stroke_m
-        Largest displacement of the motions [m]: that of the campaign.
+    stroke_m, speed_m_s
+        Largest displacement [m] of the motions, and highest speed [m/s]: those of the campaign.
     omega
-        Of the motion to be damped [rad/s]; a drive is held for half a period before the force is taken.
+        Angular frequency of the motion to be damped [rad/s]; a drive is held for half a period before the force is
+        taken.
     working_drive
-        What the drive has been before, where it comes from above.
+        Earlier drive, for the table that comes from above.
     chain
         The damper.
     """
-    speeds, drives = np.array(SPEEDS_M_S), np.linspace(0.0, drive_limit, DRIVES)
+    speeds, drives = speed_m_s * np.array(SPEEDS), np.linspace(0.0, drive_limit, DRIVES)
     branches = np.empty((2, len(speeds), len(drives)))
     for row, speed in enumerate(speeds):
         for column, drive in enumerate(drives):
@@ -149,8 +157,8 @@ def _held(chain: Chain, speed: float, drive: float, before: float, stroke: float
     """Return the mean post-yield force over two half periods at constant speed, after the drive has changed."""
     whole = np.pi / omega
     half = min(whole, 2.0 * stroke / speed)
-    dt = min(STEP_S, half / 40.0)
-    # the drive changes at a reversal, when a memory of it has had two half periods to build up
+    dt = min(whole / STEPS[0], half / STEPS[1])
+    # the drive changes at a reversal, after two half periods in which a memory of it can build up
     change = 2.0 * np.ceil(whole / half) * half
     time = np.arange(0.0, change + 2.0 * whole + half, dt)
     turns = time / half
@@ -158,14 +166,14 @@ def _held(chain: Chain, speed: float, drive: float, before: float, stroke: float
     out = np.mod(turns, 2.0) < 1.0
     x, v = speed * half * (0.5 - ramp), np.where(out, speed, -speed)
     force = run_chain(chain, x, v, np.zeros_like(x), np.where(time < change, before, drive), dt)[:, FORCE]
-    # about the middle of the stroke, so that springs drop out; the lag of the drive has died out by then
-    part = (time > change + SETTLING_SHARE * whole) & (time < change + 2.0 * whole) & (np.abs(ramp - 0.5) < 0.3)
+    # about the middle of the stroke springs cancel, and the lag of the drive has decayed
+    part = (time > change + SETTLING_SHARE * whole) & (time < change + 2.0 * whole) & (np.abs(ramp - 0.5) < MIDDLE)
     moved = force * np.sign(v)
     return 0.5 * float(np.mean(moved[part & out]) + np.mean(moved[part & ~out]))
 
 
 def changed_share(base: Chain, augmented: Chain, tests: Sequence[PreparedTest]) -> float:
-    """Return by how much the force over the motions of tests differs (RMS over RMS)."""
+    """Return the change of the force over the motions of tests (RMS of the change over RMS of the force)."""
     difference, size = 0.0, 0.0
     for test in spread(tests):
         first, second = force_over(base, test, test.drive), force_over(augmented, test, test.drive)
@@ -187,24 +195,27 @@ def force_over(chain: Chain, test: PreparedTest, drive: FloatArray) -> FloatArra
 def simulated_history(
     chain: Chain, tests: Sequence[PreparedTest], drive_limit: float, rate_hz: float, rng: np.random.Generator
 ) -> History:
-    """Return what an inverse network learns from: the damper over the motions of tests, twice.
+    """Return training data for an inverse network: the damper simulated over the motions of tests, twice.
 
-    Each motion is run with its own drive, and again with a drive that moves between nothing and its limit as a
-    controller's does: a campaign has few of these, a model gives them for nothing.
+    Each motion is simulated with its own drive, and again with a drive that moves between 0 and its limit like that of
+    a controller, because campaigns have few such tests.
     """
     made = []
     for test in spread(tests):
-        for name, drive in (("", test.drive), ("-worked", worked_drive(test.time_s, drive_limit, rng))):
+        for name, drive in (("", test.drive), ("-worked", worked_drive(test, drive_limit, rng))):
             made.append(replace(test, name=f"{test.name}{name}", drive=drive, force_n=force_over(chain, test, drive)))
     return join(made, cycles=CYCLES, sampling_rate_hz=rate_hz)
 
 
-def worked_drive(time_s: FloatArray, limit: float, rng: np.random.Generator) -> FloatArray:
-    """Return a drive as controllers make it: ramps of 0.1 to 0.6 s between levels, every third of them nothing."""
-    count = int((time_s[-1] - time_s[0]) / 0.1) + 2
-    edges = time_s[0] + np.cumsum(rng.uniform(0.1, 0.6, count)) - 0.1
-    levels = limit * rng.uniform(0.0, 1.0, count) * (rng.uniform(size=count) > 0.33)
-    return np.asarray(np.interp(time_s, edges, levels), dtype=np.float64)
+def worked_drive(test: PreparedTest, limit: float, rng: np.random.Generator) -> FloatArray:
+    """Return a drive like that of a controller, shape (n,): ramps between random levels, a third of which are 0."""
+    time = test.time_s
+    period = 2.0 * np.pi * float(np.std(test.displacement_m)) / max(float(np.std(test.velocity_m_s)), 1e-12)
+    shortest, longest = RAMPS[0] * period, RAMPS[1] * period
+    count = int((time[-1] - time[0]) / shortest) + 2
+    edges = time[0] + np.cumsum(rng.uniform(shortest, longest, count)) - shortest
+    levels = limit * rng.uniform(0.0, 1.0, count) * (rng.uniform(size=count) > OFF)
+    return np.asarray(np.interp(time, edges, levels), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -214,11 +225,11 @@ class Retrained:
     Attributes
     ----------
     network
-        The better of both.
+        The better of the old and the retrained network.
     before_nrmse, after_nrmse
         Error of the drive over its RMS of the old and of the retrained network, on simulated validation motions.
     seconds
-        That the training took.
+        Duration of the training.
     """
 
     network: Network
@@ -244,18 +255,18 @@ def retrain_inverse(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Retrained:
-    """Train an inverse network of the old one's layout on the augmented damper, and judge both on other motions.
+    """Train an inverse network of the old layout on the damper with its effects, and compare both on other motions.
 
     Parameters
     ----------
     old
-        The controller's inverse, trained on what was measured.
+        The controller's inverse, trained on measured data.
     chain
         Damper with its effects.
     training, validation
         Prepared tests whose motions are used; of validation tests the motions only.
     options
-        How it is trained; a few starts on a subsample, seconds in all, where nothing is given.
+        How it is trained; by default a few starts on a subsample, which takes seconds.
     drive_limit
         Largest drive [A or V].
     rng

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
@@ -17,18 +17,11 @@ from mrpipe.errors import DivergedError
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions, simulate_law
 from mrpipe.structures import Frame
+from mrpipe.tracing.rules import LoopRules
 
-ALIKE = 0.01
-"""Laws whose responses differ by less than this share have no order."""
-
-FAR_BEYOND = 30.0
-"""A damper moved by this many times the stroke it was tested at is no prediction any more: the response grows."""
-
-TESTED = 1.25
-"""Damper motion over the stroke of the bench tests up to which a prediction is none beyond them."""
-
-STATIONARY = 0.08
-"""Where the energy of the base's motion grows this evenly, the first half of it is left out as settling."""
+ENERGY = (0.005, 0.05, 0.5, 0.98)
+"""Numerical technique: shares of the energy of the base motion at which a transient motion starts, growth is compared
+from, a steady motion has settled, and the motion ends."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +33,7 @@ class LoopRun:
     name, law
         Test and control law.
     gains
-        What campaign.yaml says of them; empty where nothing.
+        Gains that campaign.yaml states; empty if it states none.
     time_s
         Shape (m,).
     ground_acceleration
@@ -139,22 +132,31 @@ def simulated_runs(excitation: Excitation, laws: Sequence[str], rate_hz: float =
     return [LoopRun(law, law, {}, time, ground, empty, empty, np.zeros(0)) for law in laws]
 
 
-def judged_span(time: FloatArray, ground: FloatArray) -> tuple[float, float]:
-    """Return from when to when [s] responses are judged: the second half of a steady motion, else all of it."""
+def judged_span(time: FloatArray, ground: FloatArray, steady: float = LoopRules().steady) -> tuple[float, float]:
+    """Return the start and end [s] of the span that is judged: the second half of a steady motion, else all of it.
+
+    Parameters
+    ----------
+    time, ground
+        Time [s] and ground acceleration [m/s^2], shape (m,).
+    steady
+        Largest departure of the energy from linear growth, as a share, of a steady motion.
+    """
     energy = np.cumsum(ground**2)
     if energy[-1] <= 0.0:
         return float(time[0]), float(time[-1])
     share = energy / energy[-1]
-    first, half, last = (float(time[np.searchsorted(share, level)]) for level in (0.05, 0.5, 0.98))
+    first, half, last = (float(time[np.searchsorted(share, level)]) for level in ENERGY[1:])
     inside = (time >= first) & (time <= last)
-    straight = np.interp(time[inside], [first, last], [0.05, 0.98])
-    steady = float(np.max(np.abs(share[inside] - straight))) < STATIONARY
-    return (half, last) if steady else (float(time[np.searchsorted(share, 0.005)]), last)
+    straight = np.interp(time[inside], [first, last], [ENERGY[1], ENERGY[3]])
+    if float(np.max(np.abs(share[inside] - straight))) < steady:
+        return half, last
+    return float(time[np.searchsorted(share, ENERGY[0])]), last
 
 
 @dataclass(frozen=True)
 class Bench:
-    """What the loop is simulated with.
+    """Structure, sensors and rules of the simulations.
 
     Attributes
     ----------
@@ -163,9 +165,11 @@ class Bench:
     options
         How the loop is run.
     seed
-        Of the sensors' noise: every way and law meets the same.
+        Seed of the sensors' noise, the same for every arrangement and law.
     tested_stroke_m
-        Largest displacement at which the damper was tested.
+        Largest displacement at which the damper was tested [m].
+    rules
+        Decision thresholds.
     """
 
     frame: Frame
@@ -173,6 +177,7 @@ class Bench:
     options: LoopOptions
     seed: int
     tested_stroke_m: float
+    rules: LoopRules = field(default_factory=LoopRules)
 
 
 def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
@@ -181,14 +186,14 @@ def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
     Raises
     ------
     DivergedError
-        If the response grows without bound, or far beyond what the damper was tested at.
+        If the response grows without bound, or far beyond the tested stroke.
     """
     time, ground = run.time_s, run.ground_acceleration
 
     def at(moments: FloatArray) -> FloatArray:
         return np.asarray(np.interp(moments, time, ground), dtype=np.float64)
 
-    span = judged_span(time, ground)
+    span = judged_span(time, ground, bench.rules.steady)
     response = simulate_law(
         bench.frame,
         way.chain,
@@ -199,7 +204,7 @@ def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
         rng=np.random.default_rng(bench.seed),
     )
     beyond = float(np.max(np.abs(response.damper_displacement))) / bench.tested_stroke_m
-    if beyond > FAR_BEYOND:
+    if beyond > bench.rules.diverged:
         raise DivergedError(f"law {run.law}: the damper would move {beyond:.0f} times the stroke it was tested at")
     found = run_indices(response.time_s, span, response.displacement, response.acceleration, response.force)
     found["peak_over_tested_stroke"] = beyond
@@ -229,12 +234,12 @@ def run_indices(
 
 
 def best_ways(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench: Bench) -> dict[str, str]:
-    """Return for each law the way of least RMS top displacement in its first run; an earlier one unless it is worse.
+    """Return for each law the arrangement with the least RMS top displacement in the first run of the law.
 
     Parameters
     ----------
     ways
-        Name -> way, the least changed first; a later one must be better by :data:`ALIKE`.
+        Name -> arrangement, the least changed first; a later one must be better by `rules.alike`.
     runs
         Laws under their motion.
     bench
@@ -249,7 +254,7 @@ def best_ways(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench: B
                 value = predicted(run, way, bench)["rms_x_top_m"]
             except DivergedError:
                 continue
-            if value < (1.0 - ALIKE) * least:
+            if value < (1.0 - bench.rules.alike) * least:
                 best, least = name, value
         found[law] = best
     return found
@@ -268,13 +273,13 @@ def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench
     bench
         Structure and sensors.
     """
-    rows = []
+    rows, rules = [], bench.rules
     for run in runs:
         row: dict[str, Any] = {"test": run.name, "law": run.law, "recorded": run.recorded}
         if run.recorded:
             row["measured"] = run_indices(
                 run.time_s,
-                judged_span(run.time_s, run.ground_acceleration),
+                judged_span(run.time_s, run.ground_acceleration, rules.steady),
                 run.displacement,
                 run.relative_acceleration,
                 run.damper_force,
@@ -286,26 +291,40 @@ def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench
                 row[when] = {"diverged": str(error)}
         rows.append(row)
     recorded = [row for row in rows if row["recorded"]]
-    found: dict[str, Any] = {"tests": rows, "laws": law_rows(rows, ("measured", *ways))}
+    found: dict[str, Any] = {"tests": rows, "laws": law_rows(rows, ("measured", *ways), rules.tested)}
     rankings = {when: ranking(rows, when) for when in ways}
-    swapped = reversed_pairs(rows, "before", "after") if "after" in ways else []
+    swapped = reversed_pairs(rows, "before", "after", rules.alike) if "after" in ways else []
     found |= {"ranking": rankings, "ranking_changes": bool(swapped), "reversed_pairs": swapped}
     if recorded:
         rankings["measured"] = ranking(recorded, "measured")
-        found["ranking_agrees_with_measured"] = {when: not reversed_pairs(recorded, "measured", when) for when in ways}
+        found["ranking_agrees_with_measured"] = {
+            when: not reversed_pairs(recorded, "measured", when, rules.alike) for when in ways
+        }
         found["nrmse_x_top"] = {when: _error(recorded, when) for when in ways if when != "recalibrated"}
         compared = [when for when in ways if when != "recalibrated"]
         for key, name in (("rms_x_top_m", "rms_x_top_error"), ("rms_a1_m_s2", "rms_a1_error")):
             found[name] = {when: _index_error(recorded, when, key) for when in compared}
-        within = [row for row in recorded if all(_peak(row[when]) <= TESTED for when in compared)]
+        within = [row for row in recorded if all(_peak(row[when]) <= rules.tested for when in compared)]
         found["rms_x_top_error_within_tested_stroke"] = {
             when: _index_error(within, when, "rms_x_top_m") for when in compared
         }
     return found
 
 
-def law_rows(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> list[dict[str, Any]]:
-    """Return one row a law: its indices, the mean over its runs, by column."""
+def law_rows(
+    rows: Sequence[Mapping[str, Any]], columns: Sequence[str], tested: float = LoopRules().tested
+) -> list[dict[str, Any]]:
+    """Return one row per law: the mean of each index over its runs, by column.
+
+    Parameters
+    ----------
+    rows
+        Rows of the runs.
+    columns
+        Keys of the rows that hold indices.
+    tested
+        Damper motion over the tested stroke above which a prediction is an extrapolation.
+    """
     found = []
     for law in dict.fromkeys(row["law"] for row in rows):
         own = [row for row in rows if row["law"] == law]
@@ -316,7 +335,7 @@ def law_rows(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> list[
                 entry[when] = {key: float(np.mean([item[key] for item in given])) for key in given[0]}
             elif any("diverged" in row.get(when, {}) for row in own):
                 entry[when] = {"diverged": own[0][when]["diverged"]}
-        entry["extrapolated"] = any(_peak(row["after"], 0.0) > TESTED for row in own if "after" in row)
+        entry["extrapolated"] = any(_peak(row["after"], 0.0) > tested for row in own if "after" in row)
         found.append(entry)
     return found
 
@@ -335,13 +354,25 @@ def ranking(rows: Sequence[Mapping[str, Any]], when: str) -> list[str]:
     return sorted(means, key=lambda law: means[law])
 
 
-def reversed_pairs(rows: Sequence[Mapping[str, Any]], first: str, second: str) -> list[list[str]]:
-    """Return the pairs of laws whose order differs, the better by `second` first; alike ones have no order."""
+def reversed_pairs(
+    rows: Sequence[Mapping[str, Any]], first: str, second: str, alike: float = LoopRules().alike
+) -> list[list[str]]:
+    """Return the pairs of laws whose order differs between two columns, the law that is better by `second` first.
+
+    Parameters
+    ----------
+    rows
+        Rows of the runs.
+    first, second
+        Columns that are compared.
+    alike
+        Laws whose responses differ by less than this share have no order.
+    """
     one, other = _means(rows, first), _means(rows, second)
     found = []
     for a, b in combinations([law for law in one if law in other], 2):
         changes = (np.log(one[a] / one[b]), np.log(other[a] / other[b]))
-        if changes[0] * changes[1] < 0.0 and min(abs(float(change)) for change in changes) > ALIKE:
+        if changes[0] * changes[1] < 0.0 and min(abs(float(change)) for change in changes) > alike:
             found.append([a, b] if changes[1] < 0.0 else [b, a])
     return found
 

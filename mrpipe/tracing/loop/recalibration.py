@@ -12,13 +12,11 @@ from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law
 from mrpipe.control.linearisation import equivalent_stiffness
 from mrpipe.tracing.loop.augmented import ForceInUse
-
-FACTORS = (0.5, 2.0)
-"""Gains move within these factors; where that does not do, the residual force decides and not the gain: it stays."""
+from mrpipe.tracing.rules import LoopRules
 
 
 def realised_force(law: Law, gains: Gains, damper: ForceInUse, amplitude_m: float) -> Callable[..., FloatArray]:
-    """Return the force over displacement and velocity that a damper makes of a law: never less than its residual."""
+    """Return the force of a damper under a law, over displacement and velocity; it is at least the residual force."""
     demand = law.harmonic_force
     if demand is None:
         raise ValueError(f"law {law.name} has no force in harmonic motion")
@@ -33,33 +31,41 @@ def realised_force(law: Law, gains: Gains, damper: ForceInUse, amplitude_m: floa
 
 
 def equivalent_loss(law: Law, gains: Gains, damper: ForceInUse, omega: float, amplitude_m: float) -> float:
-    """Return Im H [N/m] of what the damper makes of a law in harmonic motion (4.21)."""
+    """Return Im H [N/m] of the force of the damper under a law in harmonic motion (4.21)."""
     return equivalent_stiffness(realised_force(law, gains, damper, amplitude_m), amplitude_m, omega).imag
 
 
 def gain_factor(
-    law: Law, gains: Gains, before: ForceInUse, after: ForceInUse, omega: float, amplitude_m: float
+    law: Law,
+    gains: Gains,
+    before: ForceInUse,
+    after: ForceInUse,
+    omega: float,
+    amplitude_m: float,
+    most: float = LoopRules().most_gain,
 ) -> float:
     """Return the factor on the tuned gain with which the new damper has the equivalent damping of the old one.
 
-    The best equivalent damping depends on the frame alone (4.13), (4.25). A law that was calibrated for it stays so if
-    its gain makes up for the other force of the damper. Stiffness is kept.
+    The best equivalent damping depends on the frame only (4.13), (4.25). A calibrated law stays calibrated if its gain
+    compensates the changed force of the damper. The equivalent stiffness is not changed.
 
     Parameters
     ----------
     law, gains
-        What is tuned; the law must have a force in harmonic motion.
+        Law and its calibrated gains; the law must have a force in harmonic motion.
     before, after
-        Forces of the damper that the gains were calibrated for, and of the one at hand.
+        Forces of the damper that the gains were calibrated for, and of the damper with its effects.
     omega, amplitude_m
-        Of the motion at the damper.
+        Angular frequency [rad/s] and amplitude [m] of the motion at the damper.
+    most
+        Largest factor either way; the gain is kept where no factor within it restores the equivalent damping.
     """
     wanted = equivalent_loss(law, gains, before, omega, amplitude_m)
 
     def excess(factor: float) -> float:
         return equivalent_loss(law, law.scaled(gains, factor), after, omega, amplitude_m) - wanted
 
-    low, high = FACTORS
+    low, high = 1.0 / most, most
     if excess(low) * excess(high) >= 0.0:
         return 1.0
     return float(brentq(excess, low, high, xtol=1e-4))

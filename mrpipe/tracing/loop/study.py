@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -20,7 +20,6 @@ from mrpipe.simulation.rig import Rig, excitation_of
 from mrpipe.simulation.settings import SimulateSettings
 from mrpipe.tracing.bench.summary import Tracing
 from mrpipe.tracing.loop.augmented import (
-    CHANGED,
     ForceInUse,
     changed_share,
     force_in_use,
@@ -37,11 +36,12 @@ from mrpipe.tracing.loop.comparison import (
     with_unrecorded,
 )
 from mrpipe.tracing.loop.recalibration import gain_factor, switch_threshold
+from mrpipe.tracing.rules import LoopRules
 
 
 @dataclass(frozen=True)
 class LoopStudy:
-    """What the closed loop is compared with.
+    """Inputs of the comparison in the closed loop.
 
     Attributes
     ----------
@@ -55,6 +55,8 @@ class LoopStudy:
         Settings of the simulation.
     recorded
         Recordings of the closed loop; empty for none.
+    rules
+        Decision thresholds.
     rng, seed, jobs, progress
         Randomness of a retrained inverse, seed of the sensor noise, processes, and progress.
     """
@@ -68,13 +70,15 @@ class LoopStudy:
     seed: int
     jobs: int = 1
     progress: Progress = no_progress
+    rules: LoopRules = field(default_factory=LoopRules)
 
 
 def closed_loop(study: LoopStudy) -> dict[str, Any]:
-    """Return each law measured, before, after and with a controller renewed for the damper with its effects."""
+    """Return every law as measured, before and after the effects, and with a controller renewed for them."""
     rig, traced = study.rig, study.traced
     position = rig.controllers.calibrated.position
-    bench = Bench(rig.frame, position, rig.options, study.seed, traced.selection.base.problem.scales.stroke)
+    stroke = traced.selection.base.problem.scales.stroke
+    bench = Bench(rig.frame, position, rig.options, study.seed, stroke, study.rules)
     runs, status = _runs(study)
     base, chosen = plant_chain(traced.selection.base), plant_chain(traced.selection.chosen)
     ways = {
@@ -95,7 +99,7 @@ def closed_loop(study: LoopStudy) -> dict[str, Any]:
 
 
 def _runs(study: LoopStudy) -> tuple[list[LoopRun], str]:
-    """Return the recordings and every other law under their motion; without recordings all laws as simulate has it."""
+    """Return the recordings and every other law under their motion; without recordings, all laws as in simulate."""
     laws, recorded = study.rig.controllers.available(), study.recorded
     if recorded:
         runs = with_unrecorded(list(recorded), laws)
@@ -131,7 +135,7 @@ def _as_it_ran(rig: Rig, run: LoopRun) -> Controller:
 
 @dataclass(frozen=True)
 class Renewed:
-    """What is new in a controller that knows the effect."""
+    """The renewed parts of a controller for the damper with its effects."""
 
     inverse: Network | InverseTable | None
     threshold_n: float
@@ -150,17 +154,18 @@ def _renewed(study: LoopStudy) -> Renewed:
     training = [test for test in study.tests if test.role != "validation"]
     share = changed_share(base, chosen, training)
     viscous_force = calibrated.gains_of("vd").c_n_s_m * amplitude * omega
+    speed, scales = amplitude * omega, traced.selection.base.problem.scales
     before, after = (
         force_in_use(
             chain,
             limit,
-            stroke_m=traced.selection.base.problem.scales.stroke,
+            stroke_m=scales.stroke,
+            speed_m_s=max(scales.speed, speed),
             omega=omega,
-            working_drive=_working_drive(rig, viscous_force, limit),
+            working_drive=_working_drive(rig, viscous_force, limit, speed),
         )
         for chain in (base, chosen)
     )
-    speed = amplitude * omega
     threshold = switch_threshold(rig.controllers.switch_force_n, before, after, speed)
     summary: dict[str, Any] = {
         "force_change_share": share,
@@ -170,22 +175,22 @@ def _renewed(study: LoopStudy) -> Renewed:
         "switch_force_after_n": threshold,
     }
     inverse: Network | InverseTable | None = None
-    if share < CHANGED:
+    if share < study.rules.force_changed:
         summary["inverse"] = f"kept: the effect changes the force by {100.0 * share:.1f} %"
     elif settings.inverse == "model":
         inverse = after.table()
         summary["inverse"] = "rebuilt from the damper with its effects"
     else:
         inverse = _retrained(study, limit, summary)
-    factors = _factors(rig, before, after, omega, amplitude)
+    factors = _factors(rig, before, after, omega, amplitude, study.rules.most_gain)
     summary["gain_factors"] = factors
     return Renewed(inverse, threshold, factors, summary)
 
 
-def _working_drive(rig: Rig, force_n: float, limit: float) -> float:
-    """Return the drive at which the damper without effects gives the peak force of viscous damping."""
+def _working_drive(rig: Rig, force_n: float, limit: float, speed_m_s: float) -> float:
+    """Return the drive at which the damper without effects has the peak force of viscous damping at a speed."""
     drive = np.linspace(0.0, limit, 101)
-    forces = np.asarray(rig.damper.quasi_static_force(0.05, drive))
+    forces = np.asarray(rig.damper.quasi_static_force(speed_m_s, drive))
     return float(drive[min(int(np.searchsorted(np.maximum.accumulate(forces), force_n)), 100)])
 
 
@@ -209,14 +214,16 @@ def _retrained(study: LoopStudy, limit: float, summary: dict[str, Any]) -> Netwo
     return again.network
 
 
-def _factors(rig: Rig, before: ForceInUse, after: ForceInUse, omega: float, amplitude: float) -> dict[str, float]:
-    """Return by what the gain of each law moves, from the calibrated gains."""
+def _factors(
+    rig: Rig, before: ForceInUse, after: ForceInUse, omega: float, amplitude: float, most: float
+) -> dict[str, float]:
+    """Return the factor on the calibrated gain of each law."""
 
     found = {}
     for name, gains in rig.controllers.calibrated.gains.items():
         law = law_named(name)
         if law.tuned_gain and law.harmonic_force is not None:
-            found[name] = gain_factor(law, gains, before, after, omega, amplitude)
+            found[name] = gain_factor(law, gains, before, after, omega, amplitude, most)
     return found
 
 

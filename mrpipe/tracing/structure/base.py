@@ -1,28 +1,36 @@
-"""From recordings to spectra with the right band and weights, and the ladder of linear frames."""
+"""Band, weights and spectra of a structure's records, and the linear frames that are compared with them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.fit import Base, Design, base_rows, coefficients, design_of, stacked
 from mrpipe.tracing.structure.records import FrameRecord
 from mrpipe.tracing.structure.spectra import Band, Spectra, motion_of, noise_of, spectra_of, storey_sums
 
-HIGH_SHARE, LOW_SHARE = 1.3, 0.45
-"""Band over the highest and the lowest mode."""
+OF_RATE = 0.4
+"""Numerical technique: highest frequency in use, as a share of the sampling rate; above it anti-alias filters act."""
 
-COUPLING_SHARE = 0.05
-"""Couplings of a storey to floors that are not its own are sought within about this share of its stiffness."""
+POWER_SHARE = 0.002
+"""Numerical technique: share of the power outside either edge of the band that the first fit starts from."""
+
+ABOVE_NOISE = 3.0
+"""Numerical technique: the first band counts only power that exceeds the sensors' flat noise by this factor."""
+
+START_MARGINS = (0.5, 1.3, 4.0)
+"""Numerical technique: factors on the lowest and the highest frequency with power, and least ratio of the two. The band
+that is used follows from the fitted modes."""
 
 
 @dataclass(frozen=True)
 class FrameProblem:
-    """Spectra of training and validation records, and what is known of the structure.
+    """Spectra of training and validation records, and the linear shear frame fitted to them.
 
     Attributes
     ----------
@@ -38,6 +46,8 @@ class FrameProblem:
         Floor masses, shape (n,).
     band
         Frequencies in use.
+    rules
+        Decision thresholds.
     """
 
     training: tuple[Spectra, ...]
@@ -46,33 +56,51 @@ class FrameProblem:
     band: Band
     storey_stiffness: FloatArray
     frequencies_hz: FloatArray
+    rules: FrameRules = field(default_factory=FrameRules)
 
 
 def frame_problem(
-    training: Sequence[FrameRecord], validation: Sequence[FrameRecord], masses: FloatArray
+    training: Sequence[FrameRecord],
+    validation: Sequence[FrameRecord],
+    masses: FloatArray,
+    rules: FrameRules | None = None,
 ) -> FrameProblem:
-    """Find band and weights by fitting a shear frame twice, and return the spectra of all records."""
+    """Find band and weights by fitting a shear frame three times, and return the spectra of all records.
+
+    Parameters
+    ----------
+    training, validation
+        Records that hold the motion of every floor.
+    masses
+        Floor masses, shape (n,) [kg].
+    rules
+        Decision thresholds; their defaults if None.
+    """
+    rules = rules or FrameRules()
     n = len(masses)
     band = _band_of_power(training)
     storey = np.full(n, float(np.mean(masses)) * (2.0 * np.pi * np.sqrt(band.low_hz * band.high_hz)) ** 2)
     frequencies = np.zeros(n)
-    # band and weights need few records only: the shortest that are forced
+    # band and weights need few records: the shortest forced ones
     few = _few(training)
     for _ in range(3):
-        spectra = _spectra(few, masses, band, _matrix(storey))
+        spectra = _spectra(few, masses, band, _matrix(storey), rules)
         storey, frequencies = shear_stiffness_of(design_of("shear-frame", spectra), masses)
-        limits = [0.4 * item.rate_hz for item in training]
-        band = Band(LOW_SHARE * float(frequencies[0]), min(HIGH_SHARE * float(frequencies[-1]), *limits))
-    stiffness = coupled_stiffness(_spectra(few, masses, band, _matrix(storey)), _matrix(storey))
-    found, held = (tuple(_spectra(items, masses, band, stiffness)) for items in (training, validation))
-    return FrameProblem(found, held, masses, band, storey, frequencies)
+        limits = [OF_RATE * item.rate_hz for item in training]
+        band = Band(rules.band_below * float(frequencies[0]), min(rules.band_above * float(frequencies[-1]), *limits))
+    few_spectra = _spectra(few, masses, band, _matrix(storey), rules)
+    stiffness = coupled_stiffness(few_spectra, _matrix(storey), rules.coupling)
+    found, held = (tuple(_spectra(items, masses, band, stiffness, rules)) for items in (training, validation))
+    return FrameProblem(found, held, masses, band, storey, frequencies, rules)
 
 
-def _spectra(records: Sequence[FrameRecord], masses: FloatArray, band: Band, stiffness: FloatArray) -> list[Spectra]:
+def _spectra(
+    records: Sequence[FrameRecord], masses: FloatArray, band: Band, stiffness: FloatArray, rules: FrameRules
+) -> list[Spectra]:
     found = []
     for item in records:
-        noise = noise_of(item, band)
-        found.append(spectra_of(item, masses, band, noise, stiffness, motion_of(item, band, noise)))
+        noise = noise_of(item, band, rules)
+        found.append(spectra_of(item, masses, band, noise, stiffness, motion_of(item, band, noise, rules), rules))
     return found
 
 
@@ -87,16 +115,21 @@ def _matrix(storey: FloatArray) -> FloatArray:
     return np.asarray(storey[:, None] * (np.eye(n) - np.eye(n, k=-1)))
 
 
-def coupled_stiffness(spectra: Sequence[Spectra], sheared: FloatArray) -> FloatArray:
+def coupled_stiffness(
+    spectra: Sequence[Spectra], sheared: FloatArray, coupling: float = FrameRules().coupling
+) -> FloatArray:
     """Return the shear of each storey per floor displacement of any linear frame, shape (n, n) [N/m].
 
-    Floors without a laser are known far worse at low frequencies than those with one: where a storey feels them, be it
-    little, their noise rules its equation. Couplings that the records hardly tell are held near those of a shear frame.
+    At low frequencies the displacement of a floor without a laser is far noisier than that of a floor with one. If it
+    enters the equation of a storey, even weakly, its noise dominates there. Couplings that the records hardly determine
+    are therefore held near those of a shear frame.
 
     Parameters
     ----------
     sheared
         Of the shear frame, shape (n, n) [N/m].
+    coupling
+        Expected size of the couplings, as a share of the storey stiffness.
     spectra
         Spectra of the records.
     """
@@ -109,7 +142,7 @@ def coupled_stiffness(spectra: Sequence[Spectra], sheared: FloatArray) -> FloatA
         target = np.concatenate([stacked(item.target[storey] * item.weight[storey]) for item in spectra])
         left = target + sheared[storey] @ regressors[:n]
         prior = np.zeros((width, width))
-        prior[:n, :n] = np.eye(n) / (COUPLING_SHARE * sheared[storey, storey])
+        prior[:n, :n] = np.eye(n) / (coupling * sheared[storey, storey])
         scale = np.linalg.norm(regressors, axis=1)
         prior[np.arange(n, width), np.arange(n, width)] = 1e-6 * scale[n:]
         equations = np.concatenate([regressors, prior], axis=1).T
@@ -119,7 +152,7 @@ def coupled_stiffness(spectra: Sequence[Spectra], sheared: FloatArray) -> FloatA
 
 
 def _band_of_power(records: Sequence[FrameRecord]) -> Band:
-    """Return where the floors' motion lies."""
+    """Return the band that holds the power of the floors' motion."""
     lowest, highest = [], []
     for item in records:
         frequencies, density = signal.welch(
@@ -129,13 +162,16 @@ def _band_of_power(records: Sequence[FrameRecord]) -> Band:
             axis=0,
         )
         power = density.sum(axis=1)
-        # noise of sensors is flat: only what stands out of it counts
-        power = np.maximum(power - 3.0 * np.median(power[len(power) // 2 :]), 0.0)
+        # the noise of sensors is flat: subtract it
+        power = np.maximum(power - ABOVE_NOISE * np.median(power[len(power) // 2 :]), 0.0)
         share = np.cumsum(power) / max(float(power.sum()), 1e-300)
-        lowest.append(float(frequencies[max(1, int(np.searchsorted(share, 0.002)))]))
-        highest.append(float(frequencies[min(len(share) - 1, int(np.searchsorted(share, 0.998)))]))
-    low, high = max(0.5 * min(lowest), 0.02), max(highest)
-    return Band(low, min(max(1.3 * high, 4.0 * low), 0.4 * min(item.rate_hz for item in records)))
+        lowest.append(float(frequencies[max(1, int(np.searchsorted(share, POWER_SHARE)))]))
+        highest.append(float(frequencies[min(len(share) - 1, int(np.searchsorted(share, 1.0 - POWER_SHARE)))]))
+    below, above, ratio = START_MARGINS
+    # no record resolves less than one period
+    resolved = min(item.rate_hz / len(item.ground) for item in records)
+    low, high = max(below * min(lowest), resolved), max(highest)
+    return Band(low, min(max(above * high, ratio * low), OF_RATE * min(item.rate_hz for item in records)))
 
 
 def shear_stiffness_of(design: Design, masses: FloatArray) -> tuple[FloatArray, FloatArray]:

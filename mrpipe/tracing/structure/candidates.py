@@ -1,9 +1,9 @@
-"""Effects of a structure fitted to what a linear frame leaves: histories, columns, search of shapes and places."""
+"""Effects of a structure fitted to the residual of a linear frame: histories, columns, search of shapes and places."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy import optimize
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.effects.contract import EffectScales, Parameter
 from mrpipe.effects.structural.contract import STEP_SIGNATURE, StructuralEffect, StructuralForm
+from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.fit import Columns, Design, Solved, solve
 from mrpipe.tracing.structure.spectra import Spectra
 
@@ -74,9 +75,18 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What columns need beside the records: relative stiffness of the storeys (for the turn of a base)."""
+    """What a search needs in addition to the records.
+
+    Attributes
+    ----------
+    storey_stiffness
+        Stiffness of the storeys, shape (n,) [N/m]; the rotation of a base is distributed by it.
+    rules
+        Decision thresholds.
+    """
 
     storey_stiffness: FloatArray
+    rules: FrameRules = field(default_factory=FrameRules)
 
 
 @dataclass(frozen=True)
@@ -120,7 +130,7 @@ def histories_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Histo
         names = [item.name for item in form.searched]
         turn = np.diff(motion.displacement, axis=1, prepend=0.0) @ weight
         turns = form.columns(turn, dt, dict(zip(names, fitted.numbers, strict=True)))
-        # every storey of equal height bends by the same turn less
+        # storeys of equal height: the rotation of the base changes the drift of each by the same amount
         return Histories(turns, np.arange(kinds), np.tile(about.storey_stiffness, (kinds, 1)))
     drift, drift_rate = motion.drift, motion.drift_rate
     forces = [unit_forces(form, drift[storey], drift_rate[storey], dt, fitted.numbers) for storey in range(n)]
@@ -176,7 +186,7 @@ def search(
     design
         The linear frame that the residual is judged against.
     about
-        Scales of the structure.
+        Scales of the structure and decision thresholds.
     evaluations
         Largest number of evaluations.
     screen_only
@@ -186,7 +196,7 @@ def search(
     bounds = [item.bounds(scales) for item in placed.form.searched]
 
     def outcome(numbers: FloatArray) -> Outcome:
-        fitted = Fitted(placed, numbers, _at_bound(placed.form.searched, numbers, bounds))
+        fitted = Fitted(placed, numbers, _at_bound(placed.form.searched, numbers, bounds, about.rules.at_bound))
         own = design.project([columns_of(fitted, item, about) for item in design.spectra])
         return Outcome(fitted, solve(design, own if before is None else np.concatenate([before, own])))
 
@@ -226,10 +236,10 @@ def _chi_square(item: Outcome) -> float:
 
 
 def _at_bound(
-    parameters: Sequence[Parameter], numbers: FloatArray, bounds: Sequence[tuple[float, float]]
+    parameters: Sequence[Parameter], numbers: FloatArray, bounds: Sequence[tuple[float, float]], share: float
 ) -> tuple[str, ...]:
     return tuple(
         item.name
         for item, value, (low, high) in zip(parameters, numbers, bounds, strict=True)
-        if value < 1.02 * low or value > 0.98 * high
+        if value < (1.0 + share) * low or value > (1.0 - share) * high
     )

@@ -1,7 +1,7 @@
-"""The damper seen through the structure: the tracing of a bench on closed-loop tests, and a brace that gives.
+"""The damper in a structure: closed-loop tests traced like those of a bench, and the compliance of a flexible brace.
 
 A brace stretches with the force, so the damper's rod moves less than the floor: rod = floor - compliance x force. The
-measured force is used for that stretch; it must not be smoothed less than the displacement's noise asks for.
+stretch follows from the measured force, which is low-pass filtered because its noise would otherwise be differentiated.
 """
 
 from __future__ import annotations
@@ -23,35 +23,46 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
 from mrpipe.tracing.bench.summary import Tracing, TracingOptions
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.rules import BraceRules
 
-STRETCH_CUTOFF_HZ = 40.0
-SEARCHED_S = 7.0
-"""Of a long test so much is used to search the compliance."""
+STRETCH_HARMONICS = 30.0
+"""Numerical technique: cutoff of the force before it is turned into a stretch, in multiples of the mean frequency of
+the motion. The force of a damper that switches between levels has harmonics far above the motion."""
 
-STRONG_SHARE = 0.5
+OF_RATE = 0.3
+"""Numerical technique: highest cutoff, as a share of the sampling rate."""
 
-LEAST_MOTION = 50.0
-"""A test whose rod moves less than so many times the noise of its motion tells nothing of the damper but that noise."""
+SEARCHED_CYCLES = 9.0
+"""Numerical technique: cycles of motion of each test by which the compliance is searched; more cost time only."""
+
+JUDGED_CYCLES = 32.0
+"""Numerical technique: cycles of motion of each validation test by which the errors are computed."""
 
 PIECES = 12
-"""Closed-loop tests are cut into at least so many pieces."""
+"""Numerical technique: least number of pieces into which closed-loop tests are cut."""
 
 SHARES = (0.01, 0.03, 0.08, 0.2, 0.4)
-"""Compliances tried, in strokes over RMS of force."""
+"""Numerical technique: compliances that are tried first, in strokes over the RMS force."""
+
+WORSE = 1.5
+"""Numerical technique: the search stops at a compliance whose mean squared error is this multiple of the least one."""
+
+RESOLUTION, LEAST_RESOLVED = 0.05, 0.005
+"""Numerical technique: relative spacing at which the search ends, and the least compliance that it refers to."""
 
 
 @dataclass(frozen=True)
 class BraceFinding:
-    """What a spring between floor and damper makes of the fit.
+    """The compliance of least error of a spring between floor and damper.
 
     Attributes
     ----------
     compliance_m_n, interval
-        Of least error.
+        Compliance of least error and its interval [m/N].
     rigid, chi_square, noise
-        Chi-square of a rigid brace, of this one, and of noise.
+        Mean squared error with a rigid brace, with this one, and of noise alone [N^2].
     nrmse_before, nrmse_after
-        On validation tests.
+        NRMSE on validation tests with a rigid brace and with this one.
     """
 
     compliance_m_n: float
@@ -67,17 +78,18 @@ class BraceFinding:
         """Share of the recoverable residual that it explains."""
         return (self.rigid - self.chi_square) / max(self.rigid - self.noise, 1e-12)
 
-    @property
-    def strong(self) -> bool:
-        """Whether it takes away so much that a damper's effect has to be as good in a single step to be named."""
-        return self.share > STRONG_SHARE and self.nrmse_after < 0.8 * self.nrmse_before
+    def strong(self, rules: BraceRules) -> bool:
+        """Return whether the brace explains so much that an effect of the damper must explain as much by itself."""
+        return self.share > rules.strong_share and self.nrmse_after < rules.better * self.nrmse_before
 
 
-def prepared_loops(campaign: Campaign) -> list[PreparedTest]:
+def prepared_loops(campaign: Campaign, rules: BraceRules | None = None) -> list[PreparedTest]:
     """Return closed-loop tests, given as a bench campaign, prepared as those of a bench are.
 
-    Tests whose rod hardly moves are left out where others are there to learn and to judge by.
+    Skip tests whose RMS rod motion is below `rules.least_motion` times its noise, because they carry no information on
+    the damper; keep them if no training test or no validation test would remain.
     """
+    least = (rules or BraceRules()).least_motion
     noises = {
         item.name: (
             float(item.details.get("displacement_noise_m", 0.0)),
@@ -90,7 +102,7 @@ def prepared_loops(campaign: Campaign) -> list[PreparedTest]:
         for item in prepare_campaign(campaign, PreparationOptions()).tests
         for noise, band in [noises.get(item.test.name, (0.0, 0.0))]
     ]
-    moved = [test for test in tests if np.std(test.displacement_m) > LEAST_MOTION * test.displacement_noise_m]
+    moved = [test for test in tests if np.std(test.displacement_m) > least * test.displacement_noise_m]
     whole = {test.role == "validation" for test in moved} == {True, False}
     return moved if whole else tests
 
@@ -107,39 +119,60 @@ def trace_damper(
 ) -> Tracing:
     """Trace the damper's residual on prepared closed-loop tests, as on a bench.
 
-    A closed loop brings few long tests where a bench brings many short ones: they are cut, so that forms are tried on a
-    share of them, and the tracing takes no longer than on a bench.
+    A closed loop has few long tests, a bench many short ones. The long tests are cut into pieces, so that forms can be
+    tried on some of the pieces and the tracing takes no longer than on a bench.
     """
     training = enough_tests([item for item in tests if item.role != "validation"], PIECES)
     judged = [item for item in tests if item.role == "validation"]
     return trace_campaign([*training, *judged], effects, declared, options, rng=rng, jobs=jobs, progress=progress)
 
 
-def find_brace(tests: Sequence[PreparedTest], options: TracingOptions, declared: Sequence[Effect]) -> BraceFinding:
-    """Search the compliance of a brace: the base is fitted anew for each, the weights are those of a rigid one."""
+def find_brace(
+    tests: Sequence[PreparedTest],
+    options: TracingOptions,
+    declared: Sequence[Effect],
+    rules: BraceRules | None = None,
+) -> BraceFinding:
+    """Search the compliance of a brace: the base model is fitted anew for each compliance.
+
+    Parameters
+    ----------
+    tests
+        Prepared closed-loop tests.
+    options
+        How the base model is fitted.
+    declared
+        Effects of the damper that the campaign declares.
+    rules
+        Decision thresholds; their defaults if None.
+    """
+    rules = rules or BraceRules()
     training = enough_tests([item for item in tests if item.role != "validation"])
     validation = [item for item in tests if item.role == "validation"]
     force = float(np.sqrt(np.mean(np.concatenate([item.force_n for item in training]) ** 2)))
     stroke = max(0.5 * float(np.ptp(item.displacement_m)) for item in training)
     unit = stroke / force
+    period = float(np.median([mean_period(item) for item in training]))
     tried: dict[float, Fit] = {}
 
     def error(share: float) -> float:
         recordings = record_tests(
-            [_moved(item, share * unit) for item in training], rate_hz=options.fit_rate_hz, longest_s=SEARCHED_S
+            [_moved(item, share * unit, period) for item in training],
+            rate_hz=options.fit_rate_hz,
+            longest_s=SEARCHED_CYCLES * period,
         )
         base = declared_base(recordings, options.model, options.yield_order, options.viscosity_order)
         baseline = fit_baseline(recordings, base, declared)
         noise.append(baseline.noise)
         tried[share] = baseline.fit
-        # in newtons: the weights of different compliances are not the same
+        # in newtons, because the weights depend on the compliance
         return _mean_square(baseline.fit)
 
     noise: list[float] = []
     values = {0.0: error(0.0)}
     for share in SHARES:
         values[share] = error(share)
-        if values[share] > 1.5 * min(values.values()):
+        if values[share] > WORSE * min(values.values()):
             break
     for _ in range(4):
         ordered = sorted(values)
@@ -147,25 +180,32 @@ def find_brace(tests: Sequence[PreparedTest], options: TracingOptions, declared:
         place = ordered.index(best)
         for other in (ordered[max(place - 1, 0)], ordered[min(place + 1, len(ordered) - 1)]):
             middle = 0.5 * (best + other)
-            if middle not in values and abs(other - best) > 0.05 * max(best, 0.005):
+            if middle not in values and abs(other - best) > RESOLUTION * max(best, LEAST_RESOLVED):
                 values[middle] = error(middle)
     best = min(values, key=lambda share: values[share])
-    near = [share for share in values if values[share] < 1.1 * values[best]]
+    near = [share for share in values if values[share] < rules.equivalent * values[best]]
     scale = noise[0] / max(tried[0.0].chi_square, 1e-12) * values[0.0]
     errors = [
-        _nrmse(tried[share], [_moved(item, share * unit) for item in validation], options) for share in (0.0, best)
+        _nrmse(tried[share], [_moved(item, share * unit, period) for item in validation], options, period)
+        for share in (0.0, best)
     ]
     return BraceFinding(
         best * unit, (min(near) * unit, max(near) * unit), values[0.0], values[best], scale, errors[0], errors[1]
     )
 
 
-def _moved(test: PreparedTest, compliance: float) -> PreparedTest:
+def mean_period(test: PreparedTest) -> float:
+    """Return the mean period of the motion of a test [s], from the RMS of displacement and velocity."""
+    return float(2.0 * np.pi * np.std(test.displacement_m) / max(float(np.std(test.velocity_m_s)), 1e-12))
+
+
+def _moved(test: PreparedTest, compliance: float, period: float) -> PreparedTest:
     """Return a test with the motion of the rod of a damper behind a brace."""
     if compliance == 0.0:
         return test
     rate = test.sampling_rate_hz
-    stretch = compliance * butterworth_lowpass(test.force_raw_n, min(STRETCH_CUTOFF_HZ, 0.3 * rate), rate)
+    cutoff = min(STRETCH_HARMONICS / period, OF_RATE * rate)
+    stretch = compliance * butterworth_lowpass(test.force_raw_n, cutoff, rate)
     displacement = test.displacement_m - stretch
     velocity = np.gradient(displacement, test.dt)
     return replace(
@@ -186,8 +226,8 @@ def _mean_square(found: Fit) -> float:
     return float(np.mean(_in_newtons(found) ** 2))
 
 
-def _nrmse(found: Fit, tests: Sequence[PreparedTest], options: TracingOptions) -> float:
-    recordings = record_tests(tests, rate_hz=options.fit_rate_hz, longest_s=25.0)
+def _nrmse(found: Fit, tests: Sequence[PreparedTest], options: TracingOptions, period: float) -> float:
+    recordings = record_tests(tests, rate_hz=options.fit_rate_hz, longest_s=JUDGED_CYCLES * period)
     error = recordings.force - predict(found, recordings)
     sums = np.bincount(recordings.test, weights=error) / np.bincount(recordings.test)
     error = error - sums[recordings.test]

@@ -1,8 +1,9 @@
-"""Is the controller late: drive against desired force, desired force against its law, on shifts of the clock.
+"""Whether the controller is late: drive against desired force, and desired force against its law.
 
-A controller samples, filters and holds: a lag of that much belongs to it. The drive is compared with a table over the
-sizes of desired force and velocity at an earlier time, learnt on training tests; the desired force with its own law
-(proportional to velocity and displacement, where it is not clipped). The shift of least error is the lag.
+A controller samples, filters and holds its command, which makes a lag that is granted to it. The drive is compared with
+a table over desired force and velocity at an earlier time, which is learnt on training tests. The desired force is
+compared with its own law: it is proportional to velocity and displacement where it is not clipped. The shift of the
+clock with the least error is the lag.
 """
 
 from __future__ import annotations
@@ -15,23 +16,25 @@ from scipy import ndimage
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.laws import is_linear
+from mrpipe.tracing.rules import DelayRules
 
-FILTER_S = 0.004
-"""Lag that a low-pass on the command is granted: a second-order one at 60 Hz (thesis section 5.2)."""
+STEP_PERIODS = 0.00125
+"""Numerical technique: step of the search for the lag, in mean periods of the motion."""
 
-LEAST_S = 0.003
-"""A dead time below this is within what holding and filters of unknown make may take."""
+COARSE = 4
+"""Numerical technique: the search starts with every fourth step."""
 
-STEP_S = 0.001
 BINS = (16, 10)
+"""Numerical technique: bins of the table over desired force and velocity."""
 
 
 @dataclass(frozen=True)
 class LoopSignals:
     """A closed-loop test on its own clock; SI, shape (m,) each.
 
-    `displacement`, `velocity` are those of the damper, relative to the ground; `gains` are the law's on velocity
-    [N s/m] and displacement [N/m], None where they were not told.
+    `displacement` and `velocity` are those of the damper, relative to the ground. `gains` are those of the law on
+    velocity [N s/m] and displacement [N/m]; None if the campaign does not state them. `controller_rate_hz` and
+    `command_filter_hz` (cutoff of a second-order low-pass on the command) are 0 if the campaign does not state them.
     """
 
     name: str
@@ -43,22 +46,32 @@ class LoopSignals:
     desired: FloatArray
     controller_rate_hz: float = 0.0
     gains: tuple[float, float] | None = None
+    command_filter_hz: float = 0.0
+
+    @property
+    def period_s(self) -> float:
+        """Mean period of the motion [s], from the RMS of displacement and velocity."""
+        return float(2.0 * np.pi * np.std(self.displacement) / max(float(np.std(self.velocity)), 1e-12))
 
 
 @dataclass(frozen=True)
 class DelayFinding:
-    """What was found of one part of the controller.
+    """Lag of one part of the controller.
 
     Attributes
     ----------
     part
         `drive-late` or `law-late`.
     lag_s, granted_s
-        Shift of least error; what sampling and filters are granted of it.
+        Shift of least error, and the part of it that sampling and filters explain [s].
     before, after
         Error on validation tests over the RMS of the signal, without and with the dead time beyond what is granted.
     interval_s
-        Interval of the delay [s].
+        Interval of the lag [s].
+    least_s
+        Dead time beyond the granted lag that is reported [s].
+    better
+        Ratio of the errors below which the lag is reported.
     """
 
     part: str
@@ -67,6 +80,8 @@ class DelayFinding:
     before: float
     after: float
     interval_s: tuple[float, float]
+    least_s: float
+    better: float
 
     @property
     def delay_s(self) -> float:
@@ -75,38 +90,60 @@ class DelayFinding:
 
     @property
     def late(self) -> bool:
-        """Whether the controller is late at all."""
-        return self.interval_s[0] > self.granted_s + LEAST_S and self.after < 0.8 * self.before
+        """Whether the controller is later than it is granted."""
+        return self.interval_s[0] > self.granted_s + self.least_s and self.after < self.better * self.before
 
 
 def _shifted(values: FloatArray, shift_s: float, rate_hz: float) -> FloatArray:
     return np.asarray(ndimage.shift(values, shift_s * rate_hz, order=1, mode="nearest"))
 
 
-def drive_lag(tests: Sequence[LoopSignals], *, longest_s: float = 0.08) -> DelayFinding | None:
-    """Return how late the drive is for desired force and motion, None where no test varies its drive."""
-    varied = [item for item in tests if np.std(item.drive) > 1e-3 and np.std(item.desired) > 1e-6]
+def drive_lag(tests: Sequence[LoopSignals], rules: DelayRules | None = None) -> DelayFinding | None:
+    """Return by how much the drive lags desired force and motion; None if no test varies its drive."""
+    rules = rules or DelayRules()
+    varied = [
+        item
+        for item in tests
+        if _varies(item.drive, [other.drive for other in tests], rules.varies)
+        and _varies(item.desired, [other.desired for other in tests], rules.varies)
+    ]
     training = [item for item in varied if item.role != "validation"]
     validation = [item for item in varied if item.role == "validation"] or training
     if not training:
         return None
-    granted = FILTER_S
+    period = _period(varied)
 
     def errors(shift: float) -> FloatArray:
-        table = _Table(training, shift)
+        table = _Table(training, shift, rules.acting)
         return np.array([_relative(table.drive(item, shift), item.drive) for item in validation])
 
-    return _least(errors, "drive-late", granted, longest_s)
+    return _least(errors, "drive-late", _filter_lag(varied, period, rules), period, rules)
+
+
+def _varies(values: FloatArray, every: Sequence[FloatArray], share: float) -> bool:
+    largest = max(float(np.max(np.abs(item), initial=0.0)) for item in every)
+    return bool(np.std(values) > share * largest)
+
+
+def _period(tests: Sequence[LoopSignals]) -> float:
+    return float(np.median([item.period_s for item in tests]))
+
+
+def _filter_lag(tests: Sequence[LoopSignals], period: float, rules: DelayRules) -> float:
+    """Return the lag [s] of the filter on the command: as declared, else the granted share of a period."""
+    cutoffs = [item.command_filter_hz for item in tests if item.command_filter_hz > 0.0]
+    # delay of a second-order Butterworth filter at low frequency
+    return float(np.sqrt(2.0) / (2.0 * np.pi * min(cutoffs))) if cutoffs else rules.filter_periods * period
 
 
 class _Table:
-    """Mean drive over bins of the sizes of desired force and velocity, at one shift."""
+    """Mean drive over bins of the magnitudes of desired force and velocity, at one shift."""
 
-    def __init__(self, tests: Sequence[LoopSignals], shift: float) -> None:
+    def __init__(self, tests: Sequence[LoopSignals], shift: float, least: float) -> None:
         pairs = np.concatenate([_sizes(item, shift) for item in tests])
         drive = np.concatenate([item.drive for item in tests])
-        acting = pairs[:, 0] > 0.02 * float(pairs[:, 0].max())
-        # what is not asked for is a bin of its own
+        acting = pairs[:, 0] > least * float(pairs[:, 0].max())
+        # desired forces near zero, where the drive is off, have their own bin
         self.edges = [
             np.unique(np.quantile(pairs[acting, k], np.linspace(0.0, 1.0, bins)[: -1 if k == 0 else None]))
             for k, bins in enumerate(BINS)
@@ -121,7 +158,7 @@ class _Table:
         return np.asarray(first * (len(self.edges[1]) + 1) + second, dtype=np.int64)
 
     def drive(self, item: LoopSignals, shift: float) -> FloatArray:
-        """Return the drive that the table tells, shape (m,)."""
+        """Return the drive that the table predicts, shape (m,)."""
         return np.asarray(self.mean[self._place(_sizes(item, shift))])
 
 
@@ -130,8 +167,10 @@ def _sizes(item: LoopSignals, shift: float) -> FloatArray:
     return np.abs(np.column_stack([_shifted(values, shift, item.rate_hz) for values in pair]))
 
 
-def law_lag(tests: Sequence[LoopSignals], laws: Mapping[str, str], *, longest_s: float = 0.08) -> DelayFinding | None:
-    """Return how late the desired force is for the motion, None where no test follows a linear law.
+def law_lag(
+    tests: Sequence[LoopSignals], laws: Mapping[str, str], rules: DelayRules | None = None
+) -> DelayFinding | None:
+    """Return by how much the desired force lags the motion; None if no test follows a linear law.
 
     Parameters
     ----------
@@ -139,9 +178,10 @@ def law_lag(tests: Sequence[LoopSignals], laws: Mapping[str, str], *, longest_s:
         Test -> law; those of vd, vdps and vdns are linear in velocity and displacement where they are not clipped.
     tests
         Closed-loop recordings.
-    longest_s
-        Longest delay that is searched [s].
+    rules
+        Decision thresholds; their defaults if None.
     """
+    rules = rules or DelayRules()
     linear = [item for item in tests if is_linear(laws.get(item.name, "")) and np.std(item.desired) > 0.0]
     validation = [item for item in linear if item.role == "validation"] or linear
     if not linear:
@@ -150,42 +190,54 @@ def law_lag(tests: Sequence[LoopSignals], laws: Mapping[str, str], *, longest_s:
     def errors(shift: float) -> FloatArray:
         found = []
         for item in validation:
-            acting = np.abs(item.desired) > 0.02 * np.max(np.abs(item.desired))
+            acting = np.abs(item.desired) > rules.acting * np.max(np.abs(item.desired))
             rows = np.column_stack([_shifted(v, shift, item.rate_hz) for v in (item.velocity, item.displacement)])
             if item.gains is not None:
-                # in harmonic motion gains left free would turn a delay into stiffness
+                # in harmonic motion free gains would take a delay for stiffness
                 rows = (rows @ np.array(item.gains))[:, None]
             numbers = np.linalg.lstsq(rows[acting], item.desired[acting], rcond=None)[0]
             found.append(_relative(rows[acting] @ numbers, item.desired[acting]))
         return np.array(found)
 
-    return _least(errors, "law-late", _held(linear), longest_s)
+    period = _period(linear)
+    return _least(errors, "law-late", _held(linear, period, rules), period, rules)
 
 
-def _held(tests: Sequence[LoopSignals]) -> float:
-    """Return half a sample of the controller: what sampling and holding make of it."""
+def _held(tests: Sequence[LoopSignals], period: float, rules: DelayRules) -> float:
+    """Return the lag of sampling and holding [s]: half a sample of the controller, else the granted share."""
     rates = [item.controller_rate_hz for item in tests if item.controller_rate_hz > 0.0]
-    return 0.5 / min(rates) if rates else 0.0025
+    return 0.5 / min(rates) if rates else rules.filter_periods * period
 
 
 def _relative(predicted: FloatArray, measured: FloatArray) -> float:
     return float(np.sqrt(np.mean((predicted - measured) ** 2) / max(float(np.var(measured)), 1e-300)))
 
 
-def _least(errors: Callable[[float], FloatArray], part: str, granted: float, longest_s: float) -> DelayFinding:
-    coarse = np.arange(0.0, longest_s + 1e-9, 4.0 * STEP_S)
+def _least(
+    errors: Callable[[float], FloatArray], part: str, granted: float, period: float, rules: DelayRules
+) -> DelayFinding:
+    """Return the shift of least error: every fourth step first, then every step about the best of these."""
+    step = STEP_PERIODS * period
+    coarse = COARSE * step * np.arange(int(rules.longest_periods / (COARSE * STEP_PERIODS)) + 1)
     table = {float(shift): errors(float(shift)) for shift in coarse}
     centre = min(table, key=lambda shift: float(np.mean(table[shift])))
-    for shift in centre + STEP_S * np.arange(-3, 4):
-        if shift >= 0.0 and round(float(shift), 6) not in [round(key, 6) for key in table]:
+    for shift in centre + step * np.arange(1 - COARSE, COARSE):
+        if shift >= 0.0 and not any(np.isclose(shift, key, atol=1e-3 * step) for key in table):
             table[float(shift)] = errors(float(shift))
     shifts = np.array(sorted(table))
     values = np.stack([table[shift] for shift in shifts])
     own = shifts[np.argmin(values, axis=0)]
     lag = float(shifts[int(np.argmin(values.mean(axis=1)))])
-    before = float(values[shifts <= granted + 1e-9].mean(axis=1).min())
-    spread = float(np.std(own)) / np.sqrt(len(own)) if len(own) > 1 else STEP_S
-    half = max(2.0 * spread, STEP_S)
+    before = float(values[shifts <= granted].mean(axis=1).min())
+    spread = float(np.std(own)) / np.sqrt(len(own)) if len(own) > 1 else step
+    half = max(2.0 * spread, step)
     return DelayFinding(
-        part, lag, granted, before, float(values.mean(axis=1).min()), (float(lag - half), float(lag + half))
+        part,
+        lag,
+        granted,
+        before,
+        float(values.mean(axis=1).min()),
+        (float(lag - half), float(lag + half)),
+        rules.least_periods * period,
+        rules.better,
     )

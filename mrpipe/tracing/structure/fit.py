@@ -15,6 +15,7 @@ from mrpipe.tracing.structure.spectra import Spectra
 
 Base = Literal["shear-frame", "linear-frame"]
 _TINY = 1e-9
+"""Numerical technique: singular values below this share of the largest one count as zero."""
 
 
 @dataclass(frozen=True)

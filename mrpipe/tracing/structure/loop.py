@@ -14,42 +14,81 @@ from mrpipe.tracing.structure.delay import LoopSignals
 from mrpipe.tracing.structure.records import part_of
 from mrpipe.tracing.structure.spectra import noise_density
 
-CROSSOVERS_HZ = (0.5, 15.0)
-"""Bounds of the frequency below which the laser tells the damper's motion, above which the accelerometer."""
+CROSSOVERS = (0.4, 12.0)
+"""Numerical technique: bounds of the frequency at which the accelerometers take over from the laser, in multiples of
+the mean frequency of the motion."""
+
+LOWEST = 0.2
+"""Numerical technique: without a laser the motion is taken from accelerometers above this multiple of its mean
+frequency; below it integrated noise dominates."""
+
+SMOOTHED = 50.0
+"""Numerical technique: cutoff of the motion whose velocity is taken, in multiples of its mean frequency."""
+
+OF_RATE = 0.3
+"""Numerical technique: highest cutoff, as a share of the sampling rate."""
 
 NOISE_ABOVE_SHARE = 0.25
-"""Share of the sampling rate above which noise is told."""
+"""Numerical technique: the noise of a channel is measured above this share of the sampling rate."""
+
+STRONG_LINES = 1e-3
+"""Numerical technique: lines below this share of the strongest one do not count in the mean frequency."""
 
 
-LOWEST_HZ = 0.25
-"""Accelerometers alone tell no motion below it."""
+def mean_frequency(values: FloatArray, rate_hz: float, *, acceleration: bool) -> float:
+    """Return the mean frequency of a motion [Hz]: RMS velocity over RMS displacement, divided by 2 pi.
+
+    Parameters
+    ----------
+    values
+        Displacement or acceleration, shape (m,).
+    rate_hz
+        Sampling rate.
+    acceleration
+        Whether `values` is an acceleration.
+    """
+    frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=max(len(values) // 4, 8))
+    frequencies, density = frequencies[1:], density[1:]
+    power = np.maximum(density - noise_density(values, rate_hz, NOISE_ABOVE_SHARE * rate_hz), 0.0)
+    power = np.where(power >= STRONG_LINES * float(power.max()), power, 0.0)
+    displacement = power / frequencies**4 if acceleration else power
+    whole = float(np.sum(displacement))
+    return float(np.sqrt(np.sum(frequencies**2 * displacement) / whole)) if whole > 0.0 else float(frequencies[0])
 
 
 def crossover_of(recording: Recording) -> float:
-    """Return the frequency [Hz] above which floor 1's accelerometers tell its motion better than its laser."""
+    """Return the frequency [Hz] above which floor 1's accelerometers measure its motion better than its laser."""
     laser, relative = _densities(recording)
-    return float(np.clip((relative / max(laser, 1e-300)) ** 0.25 / (2.0 * np.pi), *CROSSOVERS_HZ))
+    low, high = (factor * _frequency_of(recording) for factor in CROSSOVERS)
+    return float(np.clip((relative / max(laser, 1e-300)) ** 0.25 / (2.0 * np.pi), low, high))
+
+
+def _frequency_of(recording: Recording) -> float:
+    """Return the mean frequency [Hz] of the motion of floor 1, from its relative acceleration."""
+    relative = recording.channels["floor_acceleration_1"] - recording.channels["ground_acceleration"]
+    return mean_frequency(relative, recording.sampling_rate_hz, acceleration=True)
 
 
 def motion_noise(recording: Recording) -> tuple[float, float]:
     """Return standard deviation [m] and band [Hz] of the noise of :func:`damper_motion`.
 
-    Integrated accelerometers are noisy where the motion is and nowhere else, so that the motion itself does not tell.
-    Both are nought where one sensor alone tells the motion.
+    The noise of integrated accelerometers lies in the band of the motion, so it cannot be estimated from the motion
+    itself. Both are 0 if a single displacement sensor measures the motion.
     """
     channels = recording.channels
     if "damper_displacement" in channels or not {"floor_acceleration_1", "ground_acceleration"} <= set(channels):
         return 0.0, 0.0
     laser, relative = _densities(recording)
     if "floor_displacement_1" not in channels:
-        return float(np.sqrt(relative / (3.0 * (2.0 * np.pi) ** 4 * LOWEST_HZ**3))), 2.0 * LOWEST_HZ
+        lowest = LOWEST * _frequency_of(recording)
+        return float(np.sqrt(relative / (3.0 * (2.0 * np.pi) ** 4 * lowest**3))), 2.0 * lowest
     crossover = crossover_of(recording)
-    # of both, each weighed by the other's noise: the integral of laser / (1 + (f / crossover)^4)
+    # both sensors, each weighted by the noise of the other: the integral of laser / (1 + (f / crossover)^4)
     return float(np.sqrt(laser * crossover * np.pi / np.sqrt(8.0))), crossover
 
 
 def _densities(recording: Recording) -> tuple[float, float]:
-    """Return the noise of floor 1's laser [m2/Hz] (nought without) and of its relative acceleration [(m/s2)^2/Hz]."""
+    """Return the noise of floor 1's laser [m2/Hz] (0 without one) and of its relative acceleration [(m/s2)^2/Hz]."""
     channels, rate = recording.channels, recording.sampling_rate_hz
     above = NOISE_ABOVE_SHARE * rate
     laser = channels.get("floor_displacement_1")
@@ -75,14 +114,14 @@ def damper_motion(recording: Recording, part: slice) -> FloatArray | None:
     longer = np.concatenate([2.0 * stack[0] - stack[:0:-1], stack, 2.0 * stack[-1] - stack[-2::-1]])
     lines, frequencies = fft.rfft(longer, axis=0), fft.rfftfreq(len(longer), 1.0 / rate)
     omega = 2.0 * np.pi * np.maximum(frequencies, 1e-9)
-    corner = LOWEST_HZ if laser is None else crossover_of(recording)
+    corner = LOWEST * _frequency_of(recording) if laser is None else crossover_of(recording)
     share = (frequencies / corner) ** 4 / (1.0 + (frequencies / corner) ** 4)
     mixed = share * (-lines[:, 0] / omega**2) + (1.0 - share) * lines[:, 1]
     return np.asarray(fft.irfft(mixed, len(longer))[size - 1 : 2 * size - 1])
 
 
 def bench_of(loops: Sequence[Recording], directory: Path, name: str, drive_unit: str) -> Campaign | None:
-    """Return the closed-loop tests as a campaign of a damper bench; None where none holds motion, drive and force."""
+    """Return the closed-loop tests as a campaign of a damper bench; None if no test holds motion, drive and force."""
     found = []
     for item in loops:
         part = part_of(item)
@@ -125,12 +164,13 @@ def loop_signals(loops: Sequence[Recording]) -> list[LoopSignals]:
         if moved is None:
             continue
         rate = item.sampling_rate_hz
-        smooth = signal.filtfilt(*signal.butter(2, min(60.0, 0.3 * rate), fs=rate), moved)
+        cutoff = min(SMOOTHED * mean_frequency(moved, rate, acceleration=False), OF_RATE * rate)
+        smooth = signal.filtfilt(*signal.butter(2, cutoff, fs=rate), moved)
         found.append(
             LoopSignals(
                 item.name, item.role, rate, smooth, np.gradient(smooth, 1.0 / rate), item.channels["drive"][part],
                 item.channels["desired_force"][part], float(item.details.get("controller_rate_hz", 0.0)),
-                _gains_of(item),
+                _gains_of(item), float(item.details.get("command_filter_hz") or 0.0),
             )
         )  # fmt: skip
     return found

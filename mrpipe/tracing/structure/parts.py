@@ -1,4 +1,4 @@
-"""What is judged on a structure's campaign, part by part, each with the keys of docs/close-loop-json.md."""
+"""The verdicts on the parts of a rig: frame, controller command and damper, each with its part of the JSON."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.tracing.bench.summary import TracingOptions
+from mrpipe.tracing.rules import BraceRules, DelayRules, TracingRules
 from mrpipe.tracing.structure.damper import BraceFinding, find_brace, prepared_loops, trace_damper
 from mrpipe.tracing.structure.delay import DelayFinding, drive_lag, law_lag
-from mrpipe.tracing.structure.groups import OF_FLOOR
 from mrpipe.tracing.structure.loop import bench_of, loop_signals
 
 COMMAND_QUANTITY = (
@@ -51,15 +51,18 @@ class Part:
 
 
 def command_part(
-    loops: Sequence[Recording], effects: Mapping[str, StructuralEffect], declared: Sequence[str]
+    loops: Sequence[Recording],
+    effects: Mapping[str, StructuralEffect],
+    declared: Sequence[str],
+    rules: DelayRules | None = None,
 ) -> Part | None:
-    """Return the verdict on the controller's command; None where no test records what it is judged by."""
+    """Return the verdict on the controller's command; None if no test records desired force, drive and motion."""
     effect = effects.get("controller-delay")
     signals = loop_signals(loops)
     if effect is None or effect.name in declared or not signals:
         return None
     laws = {item.name: str(item.details.get("law", "")) for item in loops}
-    found = [item for item in (drive_lag(signals), law_lag(signals, laws)) if item is not None]
+    found = [item for item in (drive_lag(signals, rules), law_lag(signals, laws, rules)) if item is not None]
     if not found:
         return None
     late = [item for item in found if item.late]
@@ -125,35 +128,38 @@ def damper_part(
     effects: Mapping[str, Effect],
     brace: StructuralEffect | None,
     options: TracingOptions,
+    rules: TracingRules,
     *,
     rng: np.random.Generator,
     jobs: int,
     progress: Progress,
 ) -> Part | None:
-    """Return the verdict on the damper behind floor 1; None where motion, drive and force are not all recorded."""
+    """Return the verdict on the damper at floor 1; None if motion, drive and force are not all recorded."""
     bench = bench_of(loops, campaign.directory, campaign.name, campaign.drive_unit)
     if bench is None:
         return None
-    tests = prepared_loops(bench)
+    tests = prepared_loops(bench, rules.brace)
     declared = [effects[name] for name in campaign.declared_effects if name in effects]
     measured = any("damper_displacement" in item.channels for item in loops)
     found = None
     if brace is not None and not measured and brace.name not in campaign.declared_effects:
-        found = find_brace(tests, options, declared)
-    if found is not None and found.strong:
-        # sensors' noise is no yardstick for a rigid brace: rivals are weighed by what the brace leaves, one at a time
+        found = find_brace(tests, options, declared, rules.brace)
+    if found is not None and found.strong(rules.brace):
+        # with a rigid brace the residual is far above the noise: weigh rival effects, one at a time, by what the
+        # flexible brace leaves
         options = replace(options, model_error_share=max(options.model_error_share, found.nrmse_after), most_effects=1)
     summary = dict(trace_damper(tests, effects, declared, options, rng=rng, jobs=jobs, progress=progress).summary)
     summary["quantity"] = DAMPER_QUANTITY
-    if not summary["effects"] and summary["before"]["nrmse"] <= (1.0 + OF_FLOOR) * summary["noise_floor_nrmse"]:
+    most = (1.0 + rules.frame.of_floor) * summary["noise_floor_nrmse"]
+    if not summary["effects"] and summary["before"]["nrmse"] <= most:
         _nothing_that_matters(summary)
     if brace is not None and found is not None:
-        _with_brace(summary, found, brace, options)
+        _with_brace(summary, found, brace, options, rules.brace)
     return Part("damper", summary)
 
 
 def _nothing_that_matters(summary: dict[str, Any]) -> None:
-    """Say of a damper part that it lacks nothing: its error is that of noise, to what clocks and held commands make."""
+    """Change a verdict to: nothing is missing, because the error exceeds that of noise by too little to matter."""
     if summary["residual"]["structured"]:
         summary["verdict"] = "what stands out of the noise is too little to matter: nothing is missing"
     summary["residual"] = {**summary["residual"], "structured": False}
@@ -161,9 +167,13 @@ def _nothing_that_matters(summary: dict[str, Any]) -> None:
 
 
 def _with_brace(
-    summary: dict[str, Any], found: BraceFinding, effect: StructuralEffect, options: TracingOptions
+    summary: dict[str, Any],
+    found: BraceFinding,
+    effect: StructuralEffect,
+    options: TracingOptions,
+    brace_rules: BraceRules,
 ) -> None:
-    """Put the brace among the candidates, and name it where it explains more than any effect within the damper."""
+    """Add the brace to the candidates, and name it if it explains more than any effect within the damper."""
     rules = options.rules
     share = float(np.clip(found.share, 0.0, 1.0)) if found.compliance_m_n > 0.0 else 0.0
     entry = {
@@ -171,7 +181,7 @@ def _with_brace(
         "share": share, "at_bound": [],
     }  # fmt: skip
     summary["candidates"] = sorted([*summary["candidates"], entry], key=lambda item: -item["share"])
-    better = found.nrmse_after < min([summary["after"]["nrmse"], 0.8 * found.nrmse_before])
+    better = found.nrmse_after < min([summary["after"]["nrmse"], brace_rules.better * found.nrmse_before])
     if not summary["residual"]["structured"] or share < rules.least_share or not better:
         return
     rivals = [
@@ -205,7 +215,7 @@ def _score(nrmse: float) -> dict[str, float]:
 
 
 def merged(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return one verdict: that of the part that names an effect, with the effects of all and the parts beside it."""
+    """Return one verdict: that of the part that names an effect, with the effects of all parts and a list of parts."""
     order = sorted(parts, key=lambda part: (not part.named, not part.unexplained))
     first = order[0]
     summary = dict(first.summary)

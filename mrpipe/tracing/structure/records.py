@@ -14,7 +14,10 @@ from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
 
 FASTEST_HZ = 250.0
-"""Records are thinned to at most about this rate: ten times the highest mode of a frame of the laboratory."""
+"""Numerical technique: records are decimated to about this rate unless the caller gives another."""
+
+UNEVEN = 0.02
+"""Numerical technique: a clock whose steps differ by more than this share of their median is resampled."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +93,15 @@ class FrameData:
         return [item for item in self.records if item.role in roles]
 
 
-def frame_data(campaign: Campaign) -> FrameData:
+def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
     """Return the recordings of a campaign of a shear frame.
+
+    Parameters
+    ----------
+    campaign
+        The campaign.
+    rate_hz
+        Rate to which faster records are decimated.
 
     Raises
     ------
@@ -128,7 +138,7 @@ def frame_data(campaign: Campaign) -> FrameData:
         )  # fmt: skip
     if not any(item.role == "validation" for item in (*whole, *loops)):
         raise UserError(source, "tests", "no validation test", "give one test the role validation")
-    records = tuple(_record(item) for item in whole)
+    records = tuple(_record(item, rate_hz) for item in whole)
     return FrameData(masses, records, loops, tuple(left_out))
 
 
@@ -142,27 +152,27 @@ def _floors_of(recording: Recording) -> list[int]:
 
 
 def part_of(recording: Recording) -> slice:
-    """Return the longest stretch that is to be used."""
+    """Return the longest segment of a recording that is used."""
     if not recording.segments:
         return slice(None)
     begin, end = max(recording.segments, key=lambda item: item[1] - item[0])
     return slice(begin, end)
 
 
-def thinning(rate_hz: float) -> int:
-    """Return by which factor records of a rate are thinned."""
-    return max(1, round(rate_hz / FASTEST_HZ))
+def thinning(rate_hz: float, wanted_hz: float) -> int:
+    """Return the factor by which records are decimated to about the wanted rate."""
+    return max(1, round(rate_hz / wanted_hz))
 
 
-def on_even_clock(recording: Recording, values: FloatArray, part: slice) -> FloatArray:
-    """Return a channel on the nominal clock, thinned after a zero-phase low-pass."""
+def on_even_clock(recording: Recording, values: FloatArray, part: slice, rate_hz: float) -> FloatArray:
+    """Return a channel on the nominal clock, decimated to about `rate_hz` after a zero-phase low-pass."""
     time = recording.time_s[part]
     steps = np.diff(time)
     chosen = values[part]
-    if float(np.ptp(steps)) > 0.02 * float(np.median(steps)):
+    if float(np.ptp(steps)) > UNEVEN * float(np.median(steps)):
         even = np.arange(time[0], time[-1], 1.0 / recording.sampling_rate_hz)
         chosen = np.interp(even, time, chosen)
-    factor = thinning(recording.sampling_rate_hz)
+    factor = thinning(recording.sampling_rate_hz, rate_hz)
     if factor == 1:
         return np.asarray(chosen, dtype=np.float64)
     ratio = Fraction(1, factor)
@@ -172,12 +182,14 @@ def on_even_clock(recording: Recording, values: FloatArray, part: slice) -> Floa
     )
 
 
-def _record(recording: Recording) -> FrameRecord:
+def _record(recording: Recording, rate_hz: float) -> FrameRecord:
     part = part_of(recording)
     channels = {
-        name: on_even_clock(recording, values, part) for name, values in recording.channels.items() if name != "time"
+        name: on_even_clock(recording, values, part, rate_hz)
+        for name, values in recording.channels.items()
+        if name != "time"
     }
-    rate = recording.sampling_rate_hz / thinning(recording.sampling_rate_hz)
+    rate = recording.sampling_rate_hz / thinning(recording.sampling_rate_hz, rate_hz)
     size = len(next(iter(channels.values())))
     ground = channels.get("ground_acceleration", np.zeros(size))
     floors = _floors_of(recording)

@@ -1,4 +1,4 @@
-"""Errors on validation records, what is recoverable at all, and on what a residual depends."""
+"""Errors on validation records, the share of them that is recoverable, and the states that a residual depends on."""
 
 from __future__ import annotations
 
@@ -13,9 +13,14 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.structure.model import FrameModel, in_time
 from mrpipe.tracing.structure.spectra import Spectra
 
-LAGS_S = (0.02, 0.06, 0.2, 0.5)
+LAGS = (0.03, 0.1, 0.3, 0.8)
+"""Numerical technique: lags of the states that the flexible model sees, in periods of the lowest mode."""
+
 MOST_ROWS = 8000
+"""Numerical technique: samples that the flexible model is trained on."""
+
 BINS = 16
+"""Numerical technique: steps of the step function of a state."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +52,12 @@ def noise_floor(records: Sequence[Spectra], scale: FloatArray) -> float:
 
 
 def residual_in_time(model: FrameModel, record: Spectra) -> FloatArray:
-    """Return what a model leaves of each storey's shear force in the band, shape (m, n) [N]."""
+    """Return the residual of each storey's shear force in the band, shape (m, n) [N]."""
     return in_time(record.target - model.predict(record), record)
 
 
 def states_of(record: Spectra, storey: int) -> dict[str, FloatArray]:
-    """Return what the residual of a storey may depend on, each of shape (m,)."""
+    """Return the states that the residual of a storey may depend on, each of shape (m,)."""
     motion, dt = record.motion, record.record.dt
     drift, rate = motion.drift[storey], motion.drift_rate[storey]
     time = np.arange(len(drift)) * dt
@@ -71,22 +76,38 @@ def states_of(record: Spectra, storey: int) -> dict[str, FloatArray]:
     }
 
 
-def _features(record: Spectra, storey: int) -> FloatArray:
+def _features(record: Spectra, storey: int, period_s: float) -> FloatArray:
     states = states_of(record, storey)
     columns = list(states.values())[:6]
-    for lag in LAGS_S:
-        shift = round(lag * record.record.rate_hz)
+    for lag in LAGS:
+        shift = max(1, round(lag * period_s * record.record.rate_hz))
         columns += [np.concatenate([np.full(shift, values[0]), values[:-shift]]) for values in columns[:2]]
     return np.column_stack(columns)
 
 
 def flexible_score(
-    model: FrameModel, training: Sequence[Spectra], validation: Sequence[Spectra], storeys: Sequence[int]
+    model: FrameModel,
+    training: Sequence[Spectra],
+    validation: Sequence[Spectra],
+    storeys: Sequence[int],
+    period_s: float,
 ) -> float:
-    """Return the NRMSE on validation records of the model with boosted trees on the residual of some storeys."""
+    """Return the NRMSE on validation records of the model with boosted trees on the residual of some storeys.
+
+    Parameters
+    ----------
+    model
+        The frame with its effects.
+    training, validation
+        Records that the trees learn from, and records that are judged.
+    storeys
+        Storeys, from 0, whose residual the trees predict.
+    period_s
+        Period of the lowest mode; the trees see earlier states by shares of it.
+    """
     extra = [np.zeros_like(item.motion.acceleration) for item in validation]
     for storey in storeys:
-        x = np.concatenate([_features(item, storey) for item in training])
+        x = np.concatenate([_features(item, storey, period_s) for item in training])
         y = np.concatenate([residual_in_time(model, item)[:, storey] for item in training])
         step = max(1, len(y) // MOST_ROWS)
         trees = HistGradientBoostingRegressor(
@@ -100,10 +121,10 @@ def flexible_score(
         with threadpool_limits(1):
             trees.fit(x[::step], y[::step])
             for item, force in zip(validation, extra, strict=True):
-                force[:, storey] = trees.predict(_features(item, storey))
+                force[:, storey] = trees.predict(_features(item, storey, period_s))
     errors = wholes = 0.0
     for item, force in zip(validation, extra, strict=True):
-        # trees learn a tapered, band-limited residual: their own sum is brought to the same lines
+        # the trees learn a tapered, band-limited residual: compare their sum on the same lines
         left = item.target - model.predict(item) - item.lines_of(force)
         errors += float(np.sum(np.abs(left * item.weight) ** 2))
         wholes += float(np.sum(np.abs(item.target * item.weight) ** 2))

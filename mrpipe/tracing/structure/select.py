@@ -1,4 +1,4 @@
-"""Which linear frame, which effects: shares of what stands out of noise, forward selection, left-out gains."""
+"""The choice of the linear frame and of the effects, by forward selection and cross-validation."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.tracing.bench.crossvalidation import Gain
 from mrpipe.tracing.bench.verdict import Rules
+from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, ladder
 from mrpipe.tracing.structure.candidates import Fitted, Outcome, Placed, Surroundings, columns_of, search
 from mrpipe.tracing.structure.fit import Base, Design, design_of
@@ -20,14 +21,11 @@ from mrpipe.tracing.structure.groups import LINES_OF_A_GROUP, Groups, groups_of
 from mrpipe.tracing.structure.model import model_of
 from mrpipe.tracing.structure.spectra import Spectra
 
-SECOND_GAIN, SECOND_SHARE = 0.05, 0.5
-"""A further effect must recover this share of what the frame lacked, and this share of what is left."""
-
-ROCKING_SHARE, ROCKING_LEAD = 0.8, 0.03
-"""A rocking base is taken where it explains what any linear frame does less the lead, or so much and more by it."""
-
 REFINED = 3
-"""Families whose shape is searched downhill after screening."""
+"""Numerical technique: effects whose parameters are searched in full after screening."""
+
+MOST_FORMS = (5, 2)
+"""Numerical technique: forms of the best and of every other effect that are searched."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +49,11 @@ class FrameSelection:
     Attributes
     ----------
     base
-        The linear frame that the residual is judged against, and why it was taken.
+        The linear frame that the residual is judged against.
     chi_squares
-        Of the ladder of linear frames.
+        Chi-square of every linear frame.
     groups
-        What stands out of the noise under the base.
+        Groups of lines of the residual of the base that exceed the noise.
     chosen
         Effects in the order of choice, amplitudes one after another.
     design
@@ -63,15 +61,17 @@ class FrameSelection:
     rounds
         Candidates of each round of the selection.
     amplitudes
-        Of the chosen effects, one after another.
+        Amplitudes of the chosen effects, one after another.
     residual
         Weighted residual with the chosen effects.
     gains
         Cross-validated gain of each chosen effect.
     declared
-        How many of them the campaign declares.
+        Number of them that the campaign declares.
     storey_stiffness
-        Of the shear frame, shape (n,) [N/m].
+        Stiffness of the storeys of the shear frame, shape (n,) [N/m].
+    rules
+        Decision thresholds.
     """
 
     base: Base
@@ -85,19 +85,20 @@ class FrameSelection:
     gains: tuple[Gain, ...] = ()
     declared: int = 0
     storey_stiffness: FloatArray = field(default_factory=lambda: np.zeros(0))
+    rules: FrameRules = field(default_factory=FrameRules)
 
     @property
     def about(self) -> Surroundings:
-        """What columns need beside the records."""
-        return Surroundings(self.storey_stiffness)
+        """What a search needs in addition to the records."""
+        return Surroundings(self.storey_stiffness, self.rules)
 
     @property
     def structured(self) -> bool:
-        """Whether anything that matters stands out of the noise."""
+        """Whether the residual exceeds the noise by an amount that matters."""
         return self.groups.material(self.design.residual)
 
     def share(self, residual: FloatArray) -> float:
-        """Return the share of what stands out that a fit explains."""
+        """Return the share of the excess over the noise that a fit explains."""
         return 1.0 - self.groups.excess(residual) / max(self.groups.excess(self.design.residual), 1e-12)
 
 
@@ -116,7 +117,7 @@ def _round(
     selection: FrameSelection, forms: Sequence[Placed], about: Surroundings, jobs: int
 ) -> tuple[FrameCandidate, ...]:
     """Screen all forms at their starts, then search those of the best families."""
-    design = selection.design
+    design, rules = selection.design, selection.rules
     before = _projected(design, selection.chosen, about)
     present = {item.name for item in selection.chosen}
     able = [item for item in forms if item.effect.name not in present]
@@ -129,11 +130,12 @@ def _round(
         ranked = sorted(families.values(), key=lambda items: -selection.share(items[0].solved.residual))
         best_share = selection.share(ranked[0][0].solved.residual) if ranked else 0.0
         current = selection.share(selection.residual) if selection.chosen else 0.0
-        promising = [items for items in ranked if selection.share(items[0].solved.residual) > 0.4 * best_share]
-        if selection.chosen and best_share - current < 0.5 * SECOND_GAIN:
+        least = rules.promising * best_share
+        promising = [items for items in ranked if selection.share(items[0].solved.residual) > least]
+        if selection.chosen and best_share - current < 0.5 * rules.second_gain:
             promising = []
         for place, items in enumerate(promising[:REFINED]):
-            most = 5 if place == 0 else 2
+            most = MOST_FORMS[min(place, 1)]
             work += [item.fitted.placed for item in _distinct(items)[:most]]
         refined = list(pool.map(lambda item: search(item, design, before, about), work))
     found = []
@@ -143,7 +145,7 @@ def _round(
         if not own:
             continue
         shares = {_label(item): selection.share(item.solved.residual) for item in [*reversed(items), *own]}
-        best = min(own, key=_penalised)
+        best = min(own, key=lambda item: _penalised(item, rules.per_parameter))
         found.append(FrameCandidate(best, selection.share(best.solved.residual), shares))
     return tuple(sorted(found, key=lambda item: -item.share))
 
@@ -170,10 +172,10 @@ def _label(item: Outcome) -> str:
     return f"{placed.form.name} at floor {placed.floor}" if placed.floor else placed.form.name
 
 
-def _penalised(item: Outcome) -> float:
-    # of forms that fit alike the simpler one
+def _penalised(item: Outcome, per_parameter: float) -> float:
+    # prefer the simpler of two forms that fit alike
     placed = item.fitted.placed.form
-    return item.solved.chi_square * (1.0 + 0.003 * (len(placed.searched) + len(placed.amplitudes)))
+    return item.solved.chi_square * (1.0 + per_parameter * (len(placed.searched) + len(placed.amplitudes)))
 
 
 def _projected(design: Design, chosen: Sequence[Fitted], about: Surroundings) -> FloatArray | None:
@@ -196,7 +198,7 @@ def select(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> FrameSelection:
-    """Choose the linear frame and add effects one after another while each recovers a fair share.
+    """Choose the linear frame and add effects one after another while each recovers a sufficient share.
 
     Parameters
     ----------
@@ -205,7 +207,7 @@ def select(
     declared
         Effects that the campaign declares: fitted first, part of the baseline.
     problem
-        Spectra and what is known of the structure.
+        Spectra of the records and the shear frame fitted to them.
     rules
         Decision thresholds.
     most
@@ -219,16 +221,16 @@ def select(
     progress
         Called with the share done and a text.
     """
-    storeys = problem.storey_stiffness
-    about = Surroundings(storeys)
+    storeys, frame_rules = problem.storey_stiffness, problem.rules
+    about = Surroundings(storeys, frame_rules)
     designs = ladder(problem.training)
     chi = {str(name): item.chi_square for name, item in designs.items()}
     forms = placed_forms(effects, len(problem.masses_kg))
-    simple = FrameSelection(
-        "shear-frame", designs["shear-frame"], groups_of(designs["shear-frame"]), chi, storey_stiffness=storeys
-    )
-    free = FrameSelection(
-        "linear-frame", designs["linear-frame"], groups_of(designs["linear-frame"]), chi, storey_stiffness=storeys
+    simple, free = (
+        FrameSelection(
+            name, designs[name], groups_of(designs[name], frame_rules), chi, storey_stiffness=storeys, rules=frame_rules
+        )
+        for name in ("shear-frame", "linear-frame")
     )
     progress(0.3, "linear frames")
     if not simple.structured and not declared:
@@ -272,32 +274,32 @@ def _rocking(
     rules: Rules,
     jobs: int,
 ) -> FrameSelection | None:
-    """Return the shear frame on a rocking base where it explains what a shear frame lacks as well as any linear frame.
+    """Return the shear frame on a rocking base if it explains the residual of a shear frame as well as a linear frame.
 
-    A rocking base without inertia is a linear frame whose stiffness is not tri-diagonal, so it shows against the shear
-    frame only, and only if that one kind of coupling is all that a general linear frame would bring.
+    A rocking base without inertia is a linear frame whose stiffness is not tri-diagonal. It can therefore be seen only
+    against the shear frame, and only if a general linear frame needs no other kind of coupling.
     """
     base_forms = [item for item in forms if item.effect.acts_on == "base"]
     if not base_forms:
         return None
-    # what a general linear frame, of many more numbers, makes of the same groups
+    # share that a general linear frame, which has many more parameters, explains of the same groups
     reachable = simple.share(free.design.residual)
-    # a base that rocks shows at the first of its starts already: without, its shape is not worth a search
+    # a rocking base is visible at one of the start values already; otherwise skip the search
     screened = [search(item, simple.design, None, about, screen_only=True) for item in base_forms]
     if max(simple.share(item.solved.residual) for item in screened) < 0.5 * rules.least_share:
         return None
     found = _round(simple, base_forms, about, jobs)
     if not found or found[0].share < rules.least_share:
         return None
-    # the storeys' own stiffness comes out once the base's turn is taken from their drift
+    # the stiffness of the storeys follows once the rotation of the base is subtracted from their drift
     model = model_of(simple.design, (found[0].outcome.fitted,), about)
     own = np.array([-numbers[0] for numbers in model.linear])
     if np.all(own > 0.0):
-        about = Surroundings(own)
+        about = Surroundings(own, simple.rules)
         found = _round(simple, base_forms, about, jobs) or found
-    proven = found[0].share >= max(rules.named_share, reachable - ROCKING_LEAD)
-    # an edge that lifts is no linear frame: few numbers that do better than a general one's many tell as much
-    ahead = found[0].share >= max(ROCKING_SHARE, reachable + ROCKING_LEAD)
+    proven = found[0].share >= max(rules.named_share, reachable - simple.rules.rocking_lead)
+    # a base whose edge lifts is not linear: with few parameters it may explain more than any linear frame
+    ahead = found[0].share >= max(simple.rules.rocking_share, reachable + simple.rules.rocking_lead)
     if not proven and not ahead:
         return None
     return _taken(replace(simple, rounds=(found,), storey_stiffness=about.storey_stiffness), found[0])
@@ -307,9 +309,10 @@ def _forward(
     selection: FrameSelection, forms: Sequence[Placed], about: Surroundings, most: int, jobs: int, progress: Progress
 ) -> FrameSelection:
     rounds: list[tuple[FrameCandidate, ...]] = []
+    rules = selection.rules
     while len(rounds) < most:
         left = 1.0 - (selection.share(selection.residual) if selection.chosen else 0.0)
-        if left < SECOND_GAIN:
+        if left < rules.second_gain:
             break
         found = _round(selection, forms, about, jobs)
         rounds.append(found)
@@ -317,7 +320,7 @@ def _forward(
         if not found:
             break
         gain = found[0].share - (1.0 - left)
-        if gain < SECOND_GAIN or (len(rounds) > 1 and gain < SECOND_SHARE * left):
+        if gain < rules.second_gain or (len(rounds) > 1 and gain < rules.second_share * left):
             break
         selection = _taken(selection, found[0])
     return replace(selection, rounds=tuple(rounds))
@@ -326,7 +329,7 @@ def _forward(
 def _gains(
     selection: FrameSelection, problem: FrameProblem, about: Surroundings, rng: np.random.Generator, draws: int
 ) -> tuple[Gain, ...]:
-    """Return what each effect gains on training records left out, with shapes kept and all amplitudes fitted anew."""
+    """Return the gain of each effect on left-out training records; shapes are kept, all amplitudes are refitted."""
     if len(problem.training) < 2:
         return ()
     folds = min(3, len(problem.training))

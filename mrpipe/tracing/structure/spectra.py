@@ -1,9 +1,9 @@
-"""The equation of motion of each storey as weighted spectra: what the floors' inertia says, and what motion explains.
+"""The equation of motion of each storey as weighted spectra: shear force from inertia against motion.
 
-With every floor's acceleration measured, the shear force of storey s is known: the sum of mass times absolute
-acceleration of the floors above it. Displacement and velocity come from the same accelerometers, integrated twice in
-the frequency domain, so that the equation holds sample by sample; it is multiplied by a taper, transformed, and each
-line of the spectrum weighted by what the accelerometers' noise makes of it (integrated noise rules at low frequencies).
+If the acceleration of every floor is measured, the shear force of storey s is known: the sum of mass times absolute
+acceleration of the floors above it. Displacement and velocity come from the same accelerometers, integrated in the
+frequency domain, so the equation holds sample by sample. It is multiplied by a taper and transformed. Each line of the
+spectrum is weighted by the noise that the accelerometers cause in it; at low frequencies integrated noise dominates.
 """
 
 from __future__ import annotations
@@ -16,25 +16,32 @@ from scipy import fft, signal, stats
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.structures.dynamics import ComplexArray
+from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.records import FrameRecord
 
-MODEL_FLOOR = 0.001
-"""No line is trusted better than this share of the storey's own force: errors of clocks and gains below it are of no
-interest."""
-
 INTEGRATION_SHARE = 0.6
-"""Corner of the integration over the lower edge of the band."""
-
+"""Numerical technique: corner of the integration, in multiples of the lower edge of the band."""
 
 NOISE_BLOCKS = 14
-"""Least number of blocks that the spectrum of a sensor's noise is averaged over."""
+"""Numerical technique: least number of blocks over which the spectrum of a sensor's noise is averaged."""
 
-NOISE_PARTS, LEAST_PART, QUIETEST = 8, 250, 0.1
-"""Parts of a record whose noise is told apart, least samples of one, and the least share of the whole's noise that the
-quieter ones may show."""
+NOISE_PARTS, LEAST_PART, FEWEST_PARTS = 8, 250, 3
+"""Numerical technique: parts of a record whose noise is estimated separately, least number of samples of a part, and
+least number of parts."""
 
-SAME_GAIN = 0.02
-"""Gains of laser and accelerometer that differ by less are taken as one."""
+STRONG_LINES = 0.1
+"""Numerical technique: gains are compared on lines whose power exceeds this share of the strongest one."""
+
+ABOVE_EDGE = 1.5
+"""Numerical technique: gains are compared above this multiple of the lower edge of the band."""
+
+QUIET_SECOND = 0.01
+"""Numerical technique: a record starts or ends at rest if its quietest second has less than this share of its mean
+power; the mean of a laser is then taken there."""
+
+ABOVE_BAND, HIGHEST_START, HIGHEST = 1.25, 0.3, 0.45
+"""Numerical technique: noise is measured above this multiple of the band's upper edge, which starts at the second share
+of the sampling rate at the latest and ends at the third."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +75,9 @@ class Noise:
 class Motion:
     """Motion of a record in time, relative to the ground; shape (m, n), SI.
 
-    `acceleration` is absolute and without what lies below the band; `state_displacement` and `state_velocity` carry the
-    slow part of lasers where there are any: what memories and gaps of effects are judged by; `drift` and
-    `drift_rate` are theirs, storey after storey, shape (n, m).
+    `acceleration` is absolute and high-pass filtered at the band. `state_displacement` and `state_velocity` include the
+    slow part that lasers measure, because memories and gaps of effects depend on it. `drift` and `drift_rate` are their
+    differences between floors, storey after storey, shape (n, m).
     """
 
     displacement: FloatArray
@@ -143,7 +150,7 @@ def lines_in_band(samples: int, dt: float, band: Band) -> FloatArray:
 def taper_of(samples: int, dt: float, low_hz: float) -> FloatArray:
     """Return a window that is flat but for a few periods of the lower edge at either end.
 
-    The first and last of these are left out altogether: what integration makes of a record's ends dies away there.
+    The window is zero in the first and last of these periods, where the transients of the integration decay.
     """
     margin = int(min(1.5 / (low_hz * dt), 0.06 * samples))
     inner = samples - 2 * margin
@@ -151,11 +158,23 @@ def taper_of(samples: int, dt: float, low_hz: float) -> FloatArray:
     return np.pad(signal.windows.tukey(inner, share), margin)
 
 
-def motion_of(record: FrameRecord, band: Band, noise: Noise) -> Motion:
-    """Return the motion of a record: accelerations integrated, mixed with lasers by what either's noise makes of it.
+def motion_of(record: FrameRecord, band: Band, noise: Noise, rules: FrameRules | None = None) -> Motion:
+    """Return the motion of a record: integrated accelerations, mixed with lasers by the noise of both.
 
-    What lies below the band is taken away smoothly from what the equation of motion is written in.
+    The signals of the equation of motion are high-pass filtered below the band.
+
+    Parameters
+    ----------
+    record
+        The record.
+    band
+        Frequencies in use.
+    noise
+        Noise of the sensors.
+    rules
+        Decision thresholds; their defaults if None.
     """
+    rules = rules or FrameRules()
     dt, corner = record.dt, INTEGRATION_SHARE * band.low_hz
     size, n = record.acceleration.shape
     pad = _padding(size, int(6.0 / (corner * dt)))
@@ -175,7 +194,7 @@ def motion_of(record: FrameRecord, band: Band, noise: Noise) -> Motion:
         seen = _laser_lines(record, floors, pad)
         for k, floor in enumerate(floors):
             share = laser_share(omega[:, 0], noise, floor)[:, None]
-            own = seen[:, k : k + 1] * _gain_of(seen[:, k], integrated[:, floor - 1], frequencies, band)
+            own = seen[:, k : k + 1] * _gain_of(seen[:, k], integrated[:, floor - 1], frequencies, band, rules)
             moved[:, floor - 1 : floor] = keep * (share * own + (1.0 - share) * integrated[:, floor - 1 : floor])
         slow = (seen * (1.0 - keep)) @ _over_floors(n, floors)
     displacement, velocity = back(moved), back(moved * 1j * omega)
@@ -187,7 +206,7 @@ def motion_of(record: FrameRecord, band: Band, noise: Noise) -> Motion:
 
 
 def laser_share(omega: FloatArray, noise: Noise, floor: int) -> FloatArray:
-    """Return the weight of a floor's laser beside its integrated acceleration, shape (f,)."""
+    """Return the weight of a floor's laser relative to its integrated acceleration, 0 to 1, shape (f,)."""
     if floor not in noise.displacement:
         return np.zeros_like(omega)
     accelerometer = noise.acceleration[floor] + noise.acceleration[0]
@@ -199,20 +218,23 @@ def _laser_lines(record: FrameRecord, floors: Sequence[int], pad: int) -> Comple
     return _padded_lines(seen - np.mean(seen[_at_rest(record)], axis=0), pad, record.dt)[0]
 
 
-def _gain_of(laser: ComplexArray, integrated: ComplexArray, frequencies: FloatArray, band: Band) -> float:
-    """Return what a laser is to be multiplied by to agree with the accelerometer; 1 where they disagree altogether."""
-    inside = (frequencies > 1.5 * band.low_hz) & (frequencies < band.high_hz)
+def _gain_of(
+    laser: ComplexArray, integrated: ComplexArray, frequencies: FloatArray, band: Band, rules: FrameRules
+) -> float:
+    """Return the factor that brings a laser to the gain of the accelerometer; 1 if they do not measure the same."""
+    inside = (frequencies > ABOVE_EDGE * band.low_hz) & (frequencies < band.high_hz)
     power = np.where(inside, np.abs(laser) ** 2, 0.0)
-    # the strongest lines alone: elsewhere the noise of one or the other would pass for a gain
-    strong = power > 0.1 * float(power.max())
+    # use the strongest lines only, because noise of either sensor would bias the gain
+    strong = power > STRONG_LINES * float(power.max())
     gain = float(np.sum((np.conj(laser[strong]) * integrated[strong]).real)) / max(float(power[strong].sum()), 1e-300)
-    return gain if 0.8 < gain < 1.25 and abs(gain - 1.0) > SAME_GAIN else 1.0
+    known = 1.0 / rules.gain_range < gain < rules.gain_range
+    return gain if known and abs(gain - 1.0) > rules.same_gain else 1.0
 
 
 def _over_floors(n: int, floors: Sequence[int]) -> FloatArray:
-    """Return how the slow motion of lasers is carried to all floors, shape (lasers, n).
+    """Return the matrix that extends the slow motion of lasers to all floors, shape (lasers, n).
 
-    It has about the shape of the first mode of a uniform frame: between lasers its factor is interpolated.
+    The slow motion has about the shape of the first mode of a uniform frame; its factor is interpolated between lasers.
     """
     shape = np.sin(np.pi * np.arange(1, n + 1) / (2 * n + 1))
     own = shape[np.array(floors) - 1]
@@ -220,7 +242,7 @@ def _over_floors(n: int, floors: Sequence[int]) -> FloatArray:
 
 
 def _padding(size: int, wanted: int) -> int:
-    """Return by how much to lengthen a record at either end, so that its transform is quick."""
+    """Return the number of samples to add at either end of a record, so that its Fourier transform is fast."""
     for pad in range(min(size - 1, wanted), size - 1):
         if fft.next_fast_len(size + 2 * pad, real=True) == size + 2 * pad:
             return pad
@@ -238,53 +260,66 @@ def _high_pass(frequencies: FloatArray, corner: float) -> FloatArray:
 
 
 def _at_rest(record: FrameRecord) -> slice:
-    """Return the quietest second of a record where it is quiet; all of it otherwise."""
+    """Return the quietest second of a record if the frame is at rest in it, else the whole record."""
     size = max(8, round(record.rate_hz))
     strength = np.sum(record.relative - np.mean(record.relative, axis=0), axis=1) ** 2
     blocks = strength[: len(strength) // size * size].reshape(-1, size).mean(axis=1)
-    if len(blocks) < 2 or blocks.min() > 1e-2 * blocks.mean():
+    if len(blocks) < 2 or blocks.min() > QUIET_SECOND * blocks.mean():
         return slice(None)
     quiet = int(np.argmin(blocks))
     return slice(quiet * size, (quiet + 1) * size)
 
 
-def noise_density(values: FloatArray, rate_hz: float, above_hz: float) -> float:
-    """Return the power density of the noise on a channel, told by what lies above the band [unit^2/Hz].
+def noise_density(values: FloatArray, rate_hz: float, above_hz: float, quietest: float | None = None) -> float:
+    """Return the power density of the noise on a channel, measured above the band [unit^2/Hz].
 
-    Slip and impact reach far above the band, but not while a frame rests or moves little: the quieter parts of a record
-    tell the noise, never less than a share of what all of it would tell.
+    Slip and impact reach far above the band, but not while a frame rests or moves little. The noise is therefore taken
+    from the quieter parts of a record.
+
+    Parameters
+    ----------
+    values
+        The channel, shape (m,).
+    rate_hz
+        Sampling rate.
+    above_hz
+        Upper edge of the band.
+    quietest
+        Least share of the density of the whole record that is returned; the default of the rules if None.
     """
+    quietest = FrameRules().quietest if quietest is None else quietest
     whole = _density_above(values, rate_hz, above_hz)
     parts = min(NOISE_PARTS, len(values) // LEAST_PART)
-    if parts < 3:
+    if parts < FEWEST_PARTS:
         return whole
     pieces = np.array_split(values, parts)
     levels = sorted(_density_above(piece, rate_hz, above_hz) for piece in pieces)
-    # by how many deviations the second least lies below the mean (Blom); that of a level goes by its number of lines
+    # expected distance of the second smallest level from the mean, in standard deviations (Blom); the deviation of a
+    # level follows from its number of lines
     below = -float(stats.norm.ppf((2.0 - 0.375) / (parts + 0.25)))
     inside = len(pieces[0]) * max(0.9 - 2.0 * min(above_hz / rate_hz, 0.3), 0.1)
     quiet = levels[1] / (1.0 - below * min(0.7, np.sqrt(3.5 / inside)))
-    return float(min(max(quiet, QUIETEST * whole), whole))
+    return float(min(max(quiet, quietest * whole), whole))
 
 
 def _density_above(values: FloatArray, rate_hz: float, above_hz: float) -> float:
     length = min(2048, max(64, len(values) // NOISE_BLOCKS), len(values))
     frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=length)
-    high = (frequencies > min(above_hz, 0.3 * rate_hz)) & (frequencies < 0.45 * rate_hz)
-    # the lower quartile passes by resonances of what the model does not hold; its place below the mean goes by how many
-    # blocks were averaged (half overlapping Hann windows: 1.06 of the variance of separate ones)
+    high = (frequencies > min(above_hz, HIGHEST_START * rate_hz)) & (frequencies < HIGHEST * rate_hz)
+    # the lower quartile ignores resonances; its ratio to the mean depends on the number of averaged blocks (half
+    # overlapping Hann windows have 1.06 times the variance of separate ones)
     freedom = 2.0 * max(1.0, 2.0 * len(values) / length - 1.0) / 1.06
     return float(np.quantile(density[high], 0.25)) / float(stats.chi2.ppf(0.25, freedom) / freedom)
 
 
-def noise_of(record: FrameRecord, band: Band) -> Noise:
-    """Return the noise of a record's sensors, told by what lies above the band."""
-    above, rate = 1.25 * band.high_hz, record.rate_hz
+def noise_of(record: FrameRecord, band: Band, rules: FrameRules | None = None) -> Noise:
+    """Return the noise of a record's sensors, measured above the band."""
+    above, rate, quietest = ABOVE_BAND * band.high_hz, record.rate_hz, (rules or FrameRules()).quietest
     channels = (record.ground, *record.acceleration.T)
     return Noise(
-        np.array([noise_density(channel, rate, above) for channel in channels]),
-        {floor: noise_density(x, rate, above) for floor, x in record.measured_displacement.items()},
-        {floor: noise_density(x, rate, above) for floor, x in record.known_loads.items()},
+        np.array([noise_density(channel, rate, above, quietest) for channel in channels]),
+        {floor: noise_density(x, rate, above, quietest) for floor, x in record.measured_displacement.items()},
+        {floor: noise_density(x, rate, above, quietest) for floor, x in record.known_loads.items()},
     )
 
 
@@ -294,7 +329,13 @@ def storey_sums(floors: int) -> FloatArray:
 
 
 def spectra_of(
-    record: FrameRecord, masses: FloatArray, band: Band, noise: Noise, stiffness: FloatArray, motion: Motion
+    record: FrameRecord,
+    masses: FloatArray,
+    band: Band,
+    noise: Noise,
+    stiffness: FloatArray,
+    motion: Motion,
+    rules: FrameRules | None = None,
 ) -> Spectra:
     """Return the lines of a record.
 
@@ -303,7 +344,7 @@ def spectra_of(
     masses
         Shape (n,) [kg].
     stiffness
-        Row a storey, column a floor's displacement, shape (n, n) [N/m]: for the weights alone.
+        Shear of each storey per floor displacement, shape (n, n) [N/m]; used for the weights only.
     record
         The record.
     band
@@ -312,6 +353,8 @@ def spectra_of(
         Of the sensors.
     motion
         Motion of the record in the time domain.
+    rules
+        Decision thresholds; their defaults if None.
     """
     n, dt = record.floors, record.dt
     frequencies = lines_in_band(len(record.ground), dt, band)
@@ -338,9 +381,9 @@ def spectra_of(
     variance = np.einsum("slb,l->sb", by_floor**2, noise.acceleration[1:])
     variance += noise.acceleration[0] * np.einsum("sl,lb->sb", stiffness, inverse) ** 2
     variance += np.einsum("sl,lb->sb", stiffness**2, of_lasers)
-    # a measured load brings the noise of its cell to every storey below it
+    # the noise of a load cell enters the equation of every storey below the load
     for floor, density in noise.loads.items():
         variance[:floor] += density
     own = np.mean(np.abs(target) ** 2, axis=1, keepdims=True)
-    variance = variance + MODEL_FLOOR**2 * own
+    variance = variance + (rules or FrameRules()).model_floor ** 2 * own
     return Spectra(record, motion, frequencies, taper, target, np.concatenate(parts), np.sqrt(2.0 / variance), variance)

@@ -1,4 +1,4 @@
-"""The whole tracing of a structure: linear frame, what stands out, effects, errors before and after, verdict."""
+"""The whole tracing of a structure: linear frame, residual, effects, errors before and after, verdict."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from scipy import stats
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.tracing.bench.verdict import Rules, confidence_of
+from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.candidates import Fitted
 from mrpipe.tracing.structure.model import FrameModel, model_of
@@ -24,13 +25,19 @@ QUANTITY = (
     "pooled over storeys; lines of the spectrum weighted by the accelerometers' noise"
 )
 
-LEAST_STOREY = 0.05
-"""Storeys with a smaller share of what stands out are not worth a flexible model."""
+BY_STOREY = 3
+"""Numerical technique: with fewer storeys their largest amplitude is reported, else the median of those that act."""
+
+LISTED = 6
+"""Numerical technique: most states that are listed under `depends_on`."""
+
+NO_GAIN = 1e-12
+"""Numerical technique: a smaller squared error counts as zero in a ratio."""
 
 
 @dataclass(frozen=True)
 class FrameTracing:
-    """What was found of the structure; `summary` is the JSON of docs/close-loop-json.md."""
+    """Result of tracing a structure; `summary` is the JSON of docs/close-loop-json.md."""
 
     summary: dict[str, Any]
     problem: FrameProblem
@@ -44,6 +51,7 @@ def trace_frame(
     effects: Sequence[StructuralEffect],
     declared: Sequence[StructuralEffect],
     rules: Rules,
+    frame_rules: FrameRules | None = None,
     *,
     most: int = 3,
     draws: int = 400,
@@ -56,13 +64,15 @@ def trace_frame(
     Parameters
     ----------
     effects, declared
-        The library, and what the campaign declares of it.
+        The library, and the effects of it that the campaign declares.
     most
         Most effects that are named together.
     data
         Records of the structure.
     rules
-        Decision thresholds.
+        Shares that prove a name.
+    frame_rules
+        Thresholds of the frame's residual; their defaults if None.
     draws
         Of the bootstrap.
     rng
@@ -73,7 +83,7 @@ def trace_frame(
         Called with the share done and a text.
     """
     training = data.with_role("training", "repeat")
-    problem = frame_problem(training, data.with_role("validation") or training, data.masses_kg)
+    problem = frame_problem(training, data.with_role("validation") or training, data.masses_kg, frame_rules)
     progress(0.2, "spectra")
     selection = select(
         problem, effects, rules, most=most, declared=declared, rng=rng, draws=draws, jobs=jobs, progress=progress
@@ -94,7 +104,7 @@ def _unnamed(selection: FrameSelection, rules: Rules) -> str:
     if len(selection.chosen) <= selection.declared:
         return "no effect of the library changes the error"
     if selection.share(selection.residual) < rules.least_share:
-        return "no effect of the library recovers enough of what stands out of the noise"
+        return "no effect of the library recovers enough of what exceeds the noise"
     return ""
 
 
@@ -110,11 +120,14 @@ def _summary(
     scores = frame_score(before, problem.validation), frame_score(after, problem.validation)
     named = [] if reason else _named(selection, after, rules)
     structured = selection.structured
-    lacking = [k for k, value in enumerate(_by_storey(selection)) if value > LEAST_STOREY]
-    ceiling = flexible_score(before, problem.training, problem.validation, lacking) if lacking else scores[0].nrmse
+    lacking = [k for k, value in enumerate(_by_storey(selection)) if value > problem.rules.least_storey]
+    ceiling = scores[0].nrmse
+    if lacking:
+        period = 1.0 / float(problem.frequencies_hz[0])
+        ceiling = flexible_score(before, problem.training, problem.validation, lacking, period)
     best = min(ceiling, scores[1].nrmse)
     gain = scores[0].nrmse ** 2 - best**2
-    recovered = (scores[0].nrmse ** 2 - scores[1].nrmse ** 2) / gain if gain > 1e-12 else 0.0
+    recovered = (scores[0].nrmse ** 2 - scores[1].nrmse ** 2) / gain if gain > NO_GAIN else 0.0
     share = selection.share(selection.residual) if named else 0.0
     still = (
         structured
@@ -156,8 +169,8 @@ def _summary(
             "share_of_residual": float(np.clip(1.0 - share, 0.0, 1.0)) if structured else 0.0,
             "depends_on": [
                 {"state": f"{name} of storey {worst + 1}", "share": value}
-                for name, value in dependence(after, problem.training, worst)[:6]
-                if value > 0.002
+                for name, value in dependence(after, problem.training, worst)[:LISTED]
+                if value > problem.rules.listed
             ]
             if still
             else [],
@@ -215,8 +228,8 @@ def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[d
         entry: dict[str, Any] = {
             "name": effect.name,
             "form": item.placed.form.name,
-            "place": place_in_words(item, own),
-            "parameters": parameters_of(item, own),
+            "place": place_in_words(item, own, selection.rules.acting),
+            "parameters": parameters_of(item, own, selection.rules.acting),
             "confidence": confidence_of(total, lead, None, rules),
             "tied_with": rivals,
             "physics": effect.physics,
@@ -238,28 +251,49 @@ def _amplitudes_of(item: Fitted, floors: int) -> int:
     return kinds * floors if item.placed.effect.acts_on == "storey" else kinds
 
 
-def place_in_words(item: Fitted, amplitudes: FloatArray) -> str:
-    """Return where an effect acts: a floor, all storeys alike, or the storeys that carry it."""
+def place_in_words(item: Fitted, amplitudes: FloatArray, acting: float) -> str:
+    """Return where an effect acts: a floor, every storey, or the storeys with a large amplitude.
+
+    Parameters
+    ----------
+    item
+        The effect.
+    amplitudes
+        Its amplitudes, storey after storey.
+    acting
+        Least share of the largest amplitude.
+    """
     if item.placed.floor:
         return f"floor {item.placed.floor}"
     if item.placed.effect.acts_on == "base":
         return "base"
     by_storey = amplitudes.reshape(-1, len(item.placed.form.amplitudes)).sum(axis=1)
-    strong = np.flatnonzero(by_storey > 0.25 * float(by_storey.max()))
+    strong = np.flatnonzero(by_storey > acting * float(by_storey.max()))
     if len(strong) == len(by_storey):
         return "every storey"
     return "storey " + ", ".join(str(k + 1) for k in strong)
 
 
-def parameters_of(item: Fitted, amplitudes: FloatArray) -> dict[str, dict[str, Any]]:
-    """Return value and unit of every number; amplitudes of several storeys by storey, with their median as value."""
+def parameters_of(item: Fitted, amplitudes: FloatArray, acting: float) -> dict[str, dict[str, Any]]:
+    """Return value and unit of every parameter; amplitudes of several storeys by storey, with their median as value.
+
+    Parameters
+    ----------
+    item
+        The effect.
+    amplitudes
+        Its amplitudes, storey after storey.
+    acting
+        Share of the largest amplitude below which a storey does not count in the median.
+    """
     found: dict[str, dict[str, Any]] = {}
     for parameter, value in zip(item.placed.form.searched, item.numbers, strict=True):
         found[parameter.name] = {"value": float(value), "unit": parameter.unit, "interval": [float(value)] * 2}
     kinds = len(item.placed.form.amplitudes)
     for k, parameter in enumerate(item.placed.form.amplitudes):
         own = amplitudes[k::kinds]
-        found[parameter.name] = {"value": float(np.max(own)) if len(own) < 3 else _typical(own), "unit": parameter.unit}
+        value = float(np.max(own)) if len(own) < BY_STOREY else _typical(own, acting)
+        found[parameter.name] = {"value": value, "unit": parameter.unit}
         found[parameter.name]["interval"] = [float(np.min(own)), float(np.max(own))]
         if len(own) > 1:
             found[parameter.name]["by_storey"] = [float(value) for value in own]
@@ -268,8 +302,8 @@ def parameters_of(item: Fitted, amplitudes: FloatArray) -> dict[str, dict[str, A
     return found
 
 
-def _typical(values: FloatArray) -> float:
-    strong = values[values > 0.25 * float(values.max())] if float(values.max()) > 0.0 else values
+def _typical(values: FloatArray, acting: float) -> float:
+    strong = values[values > acting * float(values.max())] if float(values.max()) > 0.0 else values
     return float(np.median(strong))
 
 

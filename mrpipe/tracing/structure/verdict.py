@@ -1,4 +1,4 @@
-"""One verdict on a structure's campaign: the frame's own residual, the command's, and the damper's seen through it."""
+"""One verdict on a structure's campaign, from the residuals of the frame, of the command and of the damper."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from mrpipe.effects.contract import Effect
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 from mrpipe.tracing.bench.summary import TracingOptions
+from mrpipe.tracing.rules import TracingRules
 from mrpipe.tracing.structure.parts import Part, command_part, damper_part, merged
-from mrpipe.tracing.structure.records import FrameData, frame_data
+from mrpipe.tracing.structure.records import FASTEST_HZ, FrameData, frame_data
 from mrpipe.tracing.structure.scores import residual_in_time
 from mrpipe.tracing.structure.trace import FrameTracing, trace_frame
 
@@ -31,7 +32,7 @@ class History:
 
 @dataclass(frozen=True)
 class StructureTracing:
-    """What was found.
+    """Result of tracing a structure's campaign.
 
     Attributes
     ----------
@@ -44,7 +45,7 @@ class StructureTracing:
     shown
         (test, storey, time [s], measured, before, after) of validation records: residual shear forces [N].
     findings
-        What the user should know, one line each.
+        Messages for the user, one line each.
     """
 
     summary: dict[str, Any]
@@ -59,21 +60,24 @@ def trace_structure(
     effects: Mapping[str, StructuralEffect],
     damper_effects: Mapping[str, Effect],
     options: TracingOptions,
+    rules: TracingRules | None = None,
     *,
     rng: np.random.Generator,
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> StructureTracing:
-    """Trace what a structure's recordings lack: in the frame, in the command, in the damper seen through it.
+    """Trace the residuals of a structure's recordings: of the frame, of the command, and of the damper.
 
     Parameters
     ----------
     campaigns
-        Of one and the same rig.
+        Campaigns of the same rig.
     effects, damper_effects
-        The libraries.
+        The libraries of effects of a structure and of a damper.
     options
         How it is traced.
+    rules
+        Decision thresholds; their defaults if None.
     rng
         Source of randomness.
     jobs
@@ -81,22 +85,23 @@ def trace_structure(
     progress
         Called with the share done and a text.
     """
-    data, campaign = joined_data(campaigns), campaigns[0]
-    findings = [f"test {name} does not record every floor: it is not judged for the frame" for name in data.left_out]
+    rules = rules or TracingRules()
+    data, campaign = joined_data(campaigns, options.fit_rate_hz), campaigns[0]
+    findings = [f"test {name} does not record every floor: it is not used for the frame" for name in data.left_out]
     names = campaign.declared_effects
     declared = [effects[name] for name in names if name in effects]
     parts, frame = [], None
     if any(item.role != "validation" for item in data.records):
         library = [item for item in effects.values() if item not in declared]
         frame = trace_frame(
-            data, library, declared, options.rules, most=options.most_effects, draws=options.bootstrap_draws, rng=rng,
-            jobs=jobs, progress=progress,
+            data, library, declared, options.rules, rules.frame, most=options.most_effects,
+            draws=options.bootstrap_draws, rng=rng, jobs=jobs, progress=progress,
         )  # fmt: skip
         parts.append(Part("frame", frame.summary))
     found = [
-        command_part(data.loops, effects, names),
+        command_part(data.loops, effects, names, rules.delay),
         damper_part(
-            data.loops, campaign, damper_effects, effects.get("brace-flexibility"), options, rng=rng, jobs=jobs,
+            data.loops, campaign, damper_effects, effects.get("brace-flexibility"), options, rules, rng=rng, jobs=jobs,
             progress=progress,
         ),
     ]  # fmt: skip
@@ -112,9 +117,9 @@ def trace_structure(
     return StructureTracing(summary, _histories(frame), _maps(frame), _shown(frame), findings)
 
 
-def joined_data(campaigns: Sequence[Campaign]) -> FrameData:
-    """Return the recordings of several campaigns of one rig."""
-    parts = [frame_data(item) for item in campaigns]
+def joined_data(campaigns: Sequence[Campaign], rate_hz: float = FASTEST_HZ) -> FrameData:
+    """Return the recordings of several campaigns of one rig, decimated to about `rate_hz`."""
+    parts = [frame_data(item, rate_hz) for item in campaigns]
     masses = next((item.masses_kg for item in parts if item.masses_kg.size), np.zeros(0))
     return FrameData(
         masses,

@@ -53,7 +53,7 @@ def with_effect(damper: DamperModel, name: str, form: str, values: dict[str, flo
 
 
 def in_use(chain: Chain) -> ForceInUse:
-    return force_in_use(chain, LIMIT, stroke_m=STROKE, omega=OMEGA, working_drive=2.0)
+    return force_in_use(chain, LIMIT, stroke_m=STROKE, speed_m_s=0.4, omega=OMEGA, working_drive=2.0)
 
 
 @pytest.mark.oracle
