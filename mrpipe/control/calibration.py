@@ -10,6 +10,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control import exact, limits
+from mrpipe.control.calibration_settings import CalibrationSettings
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law, Plant
 from mrpipe.control.laws import all_laws, law_named
@@ -85,9 +86,13 @@ class Calibration:
     skipped: Mapping[str, str] = field(default_factory=dict)
 
 
+_SETTINGS = CalibrationSettings()
+"""The defaults that the options share with the settings."""
+
+
 @dataclass(frozen=True)
 class CalibrationOptions:
-    """What is calibrated.
+    """What the laws are calibrated for.
 
     Attributes
     ----------
@@ -105,11 +110,11 @@ class CalibrationOptions:
         Of laws that are designed by an optimum; None: from the frame.
     """
 
-    mode: int = 1
-    source: Source = "exact"
+    mode: int = _SETTINGS.target_mode
+    source: Source = _SETTINGS.gains
     published: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    positive_stiffness_n_m: float | None = None
-    negative_stiffness_n_m: float | None = None
+    positive_stiffness_n_m: float | None = _SETTINGS.positive_stiffness_n_m
+    negative_stiffness_n_m: float | None = _SETTINGS.negative_stiffness_n_m
     overrides: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     weights: Weights | None = None
 

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, solve_continuous_are, solve_discrete_are
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.control.calibration_settings import RegulatorSettings
+from mrpipe.control.settings import ControllerSettings
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame, discretise_zero_order, state_space
 
@@ -34,6 +36,10 @@ class Observer:
     floors: int
 
 
+_REGULATOR, _CONTROLLER = RegulatorSettings(), ControllerSettings()
+"""The defaults that the weights share with the settings."""
+
+
 @dataclass(frozen=True)
 class Weights:
     """What LQG weighs and what noise it reckons with.
@@ -54,13 +60,13 @@ class Weights:
         Noise of the sensors.
     """
 
-    energy: float = 1.0
-    top_displacement: float = 0.0
+    energy: float = _REGULATOR.energy_weight
+    top_displacement: float = _REGULATOR.top_displacement_weight
     force: float = 1e-4
-    ground_noise_m_s2: float = 0.1
+    ground_noise_m_s2: float = _REGULATOR.ground_noise_m_s2
     force_noise_n: float = 20.0
-    displacement_noise_m: float = 20e-6
-    acceleration_noise_m_s2: float = 0.1
+    displacement_noise_m: float = _CONTROLLER.kalman_displacement_noise_m
+    acceleration_noise_m_s2: float = _CONTROLLER.kalman_acceleration_noise_m_s2
 
 
 def state_weight(frame: Frame, weights: Weights) -> FloatArray:

@@ -7,10 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.control.calibration_settings import NeuralReferenceSettings
 from mrpipe.networks.assembly import History
 from mrpipe.networks.network import FeatureSpec, Network, lagged
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
+
+_SETTINGS = NeuralReferenceSettings()
+"""The defaults that the options share with the settings."""
 
 
 @dataclass(frozen=True)
@@ -47,15 +51,15 @@ class ReferenceOptions:
     alpha_n_m: float
     amplitudes_m: tuple[float, ...]
     frequencies_hz: tuple[float, ...]
-    rate_hz: float = 200.0
-    past_values: int = 5
-    hidden: tuple[int, ...] = (6, 6)
-    starts: int = 4
-    iterations: int = 150
+    rate_hz: float = _SETTINGS.rate_hz
+    past_values: int = _SETTINGS.past_values
+    hidden: tuple[int, ...] = _SETTINGS.hidden
+    starts: int = _SETTINGS.starts
+    iterations: int = _SETTINGS.iterations
     rows: int = 6000
     rounding_m_s: float = 0.0
     disturbances_rad_s: tuple[float, ...] = ()
-    disturbance_share: float = 0.2
+    disturbance_share: float = _SETTINGS.disturbance_share
     displacement_noise_m: float = 2e-5
     velocity_noise_m_s: float = 3e-3
 

@@ -17,6 +17,7 @@ from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import bench_recordings, blocks_of, thinned
 from mrpipe.fitting.scoring import PooledScore, TestScore, pool, score_tests
+from mrpipe.fitting.settings import DamperFitSettings
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
 
@@ -34,6 +35,10 @@ COUPLED_SAMPLES = 20_000
 
 CONTENDER = 1.3
 """Forms that leave more than the best draft by this factor are not fitted to all samples."""
+
+
+_SETTINGS = DamperFitSettings()
+"""The defaults that the options share with the settings."""
 
 
 @dataclass(frozen=True)
@@ -58,14 +63,14 @@ class FitOptions:
     """
 
     method: FitMethod = field(default_factory=FitMethod)
-    cycles: int = 2
-    maximum_samples: int = 30_000
+    cycles: int = _SETTINGS.cycles
+    maximum_samples: int = _SETTINGS.maximum_samples
     raw_force: bool = False
-    offsets: bool = True
-    equal_tests: bool = False
-    drive_law: str = "cross-validated"
-    yield_order: int = 3
-    viscosity_order: int = 1
+    offsets: bool = _SETTINGS.offset_per_test
+    equal_tests: bool = _SETTINGS.equal_tests
+    drive_law: str = _SETTINGS.drive_law
+    yield_order: int = _SETTINGS.yield_order
+    viscosity_order: int = _SETTINGS.viscosity_order
 
 
 @dataclass(frozen=True)

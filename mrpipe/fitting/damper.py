@@ -9,9 +9,7 @@ from mrpipe.dampers.laws import law_names
 from mrpipe.dampers.model import Addition, DamperModel
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.problem import Term
-
-ASSUMED_ETA = 100.0
-"""Rate of the driver's lag [1/s] given to a damper where every test holds the drive constant."""
+from mrpipe.fitting.settings import ASSUMED_ETA
 
 
 def damper_model(

@@ -13,11 +13,12 @@ from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.laws import law_names
 from mrpipe.dampers.model import DamperModel
 from mrpipe.errors import DivergedError
-from mrpipe.fitting.damper import ASSUMED_ETA, damper_model
+from mrpipe.fitting.damper import damper_model
 from mrpipe.fitting.engine import Fit, centred, finish, fit, regressors, solve, start_of, weighting
 from mrpipe.fitting.problem import Base, Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import blocks_of
+from mrpipe.fitting.settings import DamperFitSettings
 from mrpipe.fitting.start import BEGUN_STEPS, MORE_POINTS, best_starts, first_problem, followed
 
 NELDER_MEAD_ITERATIONS = 1000
@@ -90,6 +91,10 @@ class FormFit:
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
+_SETTINGS = DamperFitSettings()
+"""The defaults that the options share with the settings."""
+
+
 @dataclass(frozen=True)
 class FitMethod:
     """How a form is searched.
@@ -109,10 +114,10 @@ class FitMethod:
         Name of a form -> the user's own file that defines it.
     """
 
-    method: str = "least-squares"
-    starts: int = 2
+    method: str = _SETTINGS.method
+    starts: int = _SETTINGS.starts
     iterations: int = 40
-    assumed_eta: float = ASSUMED_ETA
+    assumed_eta: float = _SETTINGS.assumed_eta_per_s
     form_files: Mapping[str, str] | None = None
 
 

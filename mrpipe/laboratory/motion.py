@@ -9,15 +9,19 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.laboratory.options import Servo
+from mrpipe.laboratory.options import CustomTest, Servo
 
 MotionKind = Literal["sine", "triangle", "random", "earthquake", "dwell", "hold"]
 CurrentKind = Literal["constant", "half-sine", "steps", "random"]
 
 
+_ORDERED = CustomTest(name="")
+"""The defaults that a test shares with the settings."""
+
+
 @dataclass(frozen=True)
 class BenchTest:
-    """One test as it is ordered.
+    """One test of a plan.
 
     Attributes
     ----------
@@ -51,13 +55,13 @@ class BenchTest:
     motion: MotionKind
     amplitude_m: float
     frequency_hz: float
-    current: CurrentKind = "constant"
-    current_a: float = 0.0
+    current: CurrentKind = _ORDERED.current
+    current_a: float = _ORDERED.current_a
     duration_s: float = 0.0
-    repeat_of: str = ""
-    pause_s: float = 0.4
-    middle_m: float = 0.0
-    later: bool = False
+    repeat_of: str = _ORDERED.repeat_of
+    pause_s: float = _ORDERED.pause_s
+    middle_m: float = _ORDERED.middle_m
+    later: bool = _ORDERED.later
 
 
 def smooth_start(time: FloatArray, length: float) -> FloatArray:

@@ -110,3 +110,24 @@ class LoopRig(Section):
     def step_s(self) -> float:
         """Integration step [s]."""
         return 1.0 / (self.sampling_rate_hz * self.fine_steps)
+
+
+class CustomTest(Section):
+    """One test of a custom plan."""
+
+    name: str = Field(description="Name of the test.")
+    role: Literal["training", "validation", "repeat"] = Field("training", description="What it is for.")
+    motion: Literal["sine", "triangle", "random", "earthquake", "dwell", "hold"] = Field(
+        "sine", description="Motion; `dwell` visits several positions, `hold` pauses in the middle."
+    )
+    amplitude_m: float = Field(0.010, gt=0.0, description="Amplitude or largest excursion [m].")
+    middle_m: float = Field(0.0, description="Position about which it moves [m].")
+    frequency_hz: float = Field(1.0, gt=0.0, description="Frequency, or upper end of the band of random motion [Hz].")
+    current: Literal["constant", "half-sine", "steps", "random"] = Field("constant", description="Kind of current.")
+    current_a: float = Field(0.0, ge=0.0, description="Level, amplitude or largest value of the current [A].")
+    duration_s: float = Field(10.0, gt=0.0, description="Duration [s].")
+    repeat_of: str = Field("", description="Test whose command is repeated.")
+    later: bool = Field(
+        False, description="Made after the others: the strength of effects given as shares is that of the others."
+    )
+    pause_s: float = Field(0.4, gt=0.0, description="Pause of `hold`, or time between steps of current [s].")

@@ -10,6 +10,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.gains import Gains
+from mrpipe.law_design.options import DesignSettings
 
 Value = Callable[[Gains], float]
 
@@ -42,6 +43,10 @@ class FreeGain:
         return float(np.log(low)), float(np.log(high))
 
 
+_SETTINGS = DesignSettings()
+"""The defaults that the options share with the settings."""
+
+
 @dataclass(frozen=True)
 class SearchOptions:
     """How gains are searched.
@@ -56,8 +61,8 @@ class SearchOptions:
         Relative accuracy of a gain at which the search ends.
     """
 
-    grid: int = 7
-    evaluations: int = 14
+    grid: int = _SETTINGS.grid
+    evaluations: int = _SETTINGS.evaluations
     tolerance: float = 0.02
 
 

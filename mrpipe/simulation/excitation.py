@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.simulation.settings import ExcitationSettings
 from mrpipe.structures import Frame, frequency_response
 
 
@@ -41,13 +42,17 @@ class Excitation:
     details: dict[str, Any] = field(default_factory=dict)
 
 
+_SETTINGS = ExcitationSettings()
+"""The defaults that the functions share with the settings."""
+
+
 def harmonic(
     amplitude_m_s2: float,
     omega: float,
     *,
-    cycles: int = 40,
-    settling_cycles: int = 20,
-    ramp_cycles: float = 2.0,
+    cycles: int = _SETTINGS.cycles,
+    settling_cycles: int = _SETTINGS.settling_cycles,
+    ramp_cycles: float = _SETTINGS.ramp_cycles,
     decay_s: float = 0.0,
 ) -> Excitation:
     """Return a_g = -A sin(omega t), eased in over `ramp_cycles`, stopped after whole cycles for a free decay.

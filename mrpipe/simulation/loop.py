@@ -27,6 +27,7 @@ from mrpipe.dampers.plant import Chain, build_chain, new_state, sum_step
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import kernel, parts
 from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.settings import SensorFaultSettings, SimulateSettings
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
 Tracking = Literal["damper", "ideal", "continuous", "unclipped"]
@@ -55,6 +56,13 @@ MISSING, ZERO, STUCK = float("nan"), float("-inf"), float("inf")
 """What stands in the noise of a sensor where a reading is missing, zero, or the one before."""
 
 
+RECORD_RATE_HZ = 1000.0
+"""Rate of the histories if the settings give none. With a perfect damper, whose force jumps, it is the plant's rate."""
+
+_FAULT, _SETTINGS = SensorFaultSettings(), SimulateSettings()
+"""The defaults that the options share with the settings."""
+
+
 @dataclass(frozen=True)
 class SensorFault:
     """Faulty readings.
@@ -72,9 +80,9 @@ class SensorFault:
     """
 
     mark: float
-    sensor: str = "all"
-    share: float = 0.01
-    samples: int = 1
+    sensor: str = _FAULT.sensor
+    share: float = _FAULT.share
+    samples: int = _FAULT.samples
 
 
 @dataclass(frozen=True)
@@ -103,12 +111,12 @@ class LoopOptions:
         Rate of the histories in the response.
     """
 
-    plant_rate_hz: float = 2000.0
-    tracking: Tracking = "damper"
-    delay_s: float = 0.0
-    driver_time_constant_s: float = 0.0
+    plant_rate_hz: float = _SETTINGS.plant_rate_hz
+    tracking: Tracking = _SETTINGS.tracking
+    delay_s: float = _SETTINGS.controller.delay_s
+    driver_time_constant_s: float = _SETTINGS.driver_time_constant_s
     noise: SensorNoise = field(default_factory=SensorNoise)
-    record_rate_hz: float = 1000.0
+    record_rate_hz: float = RECORD_RATE_HZ
     fault: SensorFault | None = None
 
 

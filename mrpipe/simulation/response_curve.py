@@ -20,11 +20,16 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.errors import DivergedError
 from mrpipe.simulation.excitation import Excitation, harmonic
 from mrpipe.simulation.loop import Response
+from mrpipe.simulation.settings import ResonanceSettings
 
 QUANTITIES = ("rms_x_top_m", "rms_x1_m", "rms_a1_m_s2", "rms_a_top_m_s2", "rms_stroke_m")
 """The steady quantities of one frequency, in the order of the columns of `ResponseCurve.values`."""
 
 Run = Callable[[Excitation], Response]
+
+
+_SETTINGS = ResonanceSettings()
+"""The defaults that the options share with the settings."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +56,11 @@ class CurveOptions:
         Whether accelerations are absolute; else relative to the ground.
     """
 
-    points: int = 19
+    points: int = _SETTINGS.points
     settling_cycles: int = 10
-    window_cycles: int = 6
-    tolerance: float = 2e-3
-    most_cycles: int = 160
+    window_cycles: int = _SETTINGS.window_cycles
+    tolerance: float = _SETTINGS.tolerance
+    most_cycles: int = _SETTINGS.most_cycles
     frequency_tolerance: float = 2e-3
     refined_share: float = 0.9
     absolute: bool = False

@@ -25,6 +25,7 @@ from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.ground_record import read_ground_record
 from mrpipe.simulation.loop import (
     MISSING,
+    RECORD_RATE_HZ,
     STUCK,
     ZERO,
     LoopOptions,
@@ -41,9 +42,6 @@ DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 
 SWEEP = (0.4, 2.4)
 """First and last frequency of a sweep over the free frequency, where the settings give none."""
-
-RECORD_RATE_HZ = 1000.0
-"""Rate of the histories where the settings give none; with a perfect damper, whose force jumps, every plant step."""
 
 
 @dataclass(frozen=True)

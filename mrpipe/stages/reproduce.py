@@ -10,11 +10,9 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.artifacts import atomic_write_text
-    from mrpipe.thesis import ClaimOptions, collect_claims, page
+    from mrpipe.thesis import collect_claims, page
 
-    settings = context.settings.reproduce
-    options = ClaimOptions(tuple(settings.chapters), settings.frame, settings.duration_s)
-    claims = collect_claims(options, context.progress)
+    claims = collect_claims(context.settings.reproduce, context.progress)
     number = page.counts(claims)
     with context.write("reproduce.h5") as artifact:
         artifact.put_json("claims", [claim.as_dict() for claim in claims])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.structures import frame_from_parameter_set
 from mrpipe.thesis.chapter2 import chapter_2
@@ -12,28 +10,10 @@ from mrpipe.thesis.chapter4 import chapter_4
 from mrpipe.thesis.chapter5 import chapter_5
 from mrpipe.thesis.chapter6 import chapter_6
 from mrpipe.thesis.claim import Claim
+from mrpipe.thesis.options import ReproduceSettings
 
 
-@dataclass(frozen=True)
-class ClaimOptions:
-    """What is recomputed.
-
-    Attributes
-    ----------
-    chapters
-        Of the thesis, 2 to 6.
-    frame
-        Parameter set of chapters 3 to 5.
-    duration_s
-        Of each closed-loop run.
-    """
-
-    chapters: tuple[int, ...] = (2, 3, 4, 5, 6)
-    frame: str = "thesis"
-    duration_s: float = 60.0
-
-
-def collect_claims(options: ClaimOptions, progress: Progress = no_progress) -> list[Claim]:
+def collect_claims(options: ReproduceSettings, progress: Progress = no_progress) -> list[Claim]:
     """Return the claims in the order of the chapters.
 
     Raises

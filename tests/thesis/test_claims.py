@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from mrpipe.errors import UserError
-from mrpipe.thesis import Claim, ClaimOptions, cannot, collect_claims, compare, page
+from mrpipe.thesis import Claim, ReproduceSettings, cannot, collect_claims, compare, page
 
 
 @pytest.fixture(scope="module")
 def claims() -> list[Claim]:
-    return collect_claims(ClaimOptions(duration_s=40.0))
+    return collect_claims(ReproduceSettings(duration_s=40.0))
 
 
 def by_id(claims: list[Claim]) -> dict[str, Claim]:
@@ -83,12 +83,12 @@ def test_page_json_and_figure_hold_every_claim(claims: list[Claim]) -> None:
 
 @pytest.mark.property
 def test_chapters_and_frame_are_followed() -> None:
-    third = collect_claims(ClaimOptions(chapters=(3,), frame="geometry"))
+    third = collect_claims(ReproduceSettings(chapters=(3,), frame="geometry"))
     assert {claim.chapter for claim in third} == {3}
     # the frame by its dimensions has another stiffness than the printed one
     assert by_id(third)["B3"].verdict == "differs"
     with pytest.raises(UserError, match="no such parameter set"):
-        collect_claims(ClaimOptions(chapters=(3,), frame="thesys"))
+        collect_claims(ReproduceSettings(chapters=(3,), frame="thesys"))
 
 
 @pytest.mark.property

@@ -8,11 +8,11 @@ from typing import Literal
 from pydantic import Field, ValidationInfo, field_validator
 
 from mrpipe.artifacts.yaml_source import nearest
-from mrpipe.config.section import Section
 from mrpipe.dampers.forms import form_names
+from mrpipe.fitting.settings import DamperFitSettings
 
 
-class IdentifyDamperSettings(Section):
+class IdentifyDamperSettings(DamperFitSettings):
     """Which parametric damper is fitted to the bench tests, and how."""
 
     form_files: tuple[Path, ...] = Field(
@@ -29,58 +29,15 @@ class IdentifyDamperSettings(Section):
         description="Forms that are compared; empty for all of the library. Every form is ranked on a share of the "
         "samples, those near the best are fitted to all and judged on the validation tests.",
     )
-    drive_law: Literal["cross-validated", "polynomial"] = Field(
-        "cross-validated",
-        description="How yield force and viscosity depend on the drive. cross-validated: the law with the fewest "
-        "numbers that predicts levels of drive left out of the fit, among constant, linear, polynomial, monotone and "
-        "saturating laws (tanh, Langevin, Froehlich), none of them negative. polynomial: of the degrees below.",
-    )
-    method: Literal["least-squares", "nelder-mead"] = Field(
-        "least-squares",
-        description="least-squares: trust region over the nonlinear parameters, linear ones projected out; "
-        "nelder-mead: the simplex of thesis 2.2 in its place, restarted until it gains nothing (slow).",
-    )
-    starts: int = Field(2, ge=1, le=20, description="How many starts of each form are followed to the end.")
-    yield_order: int = Field(
-        3,
-        ge=0,
-        le=5,
-        description="Largest degree of the yield force in the drive (2.3); lowered to what the levels determine.",
-    )
-    viscosity_order: int = Field(
-        1,
-        ge=0,
-        le=3,
-        description="Largest degree of the viscosity in the drive (2.3); lowered to what the levels determine.",
-    )
     smooth_motion: bool = Field(
         True,
         description="Low-pass the displacement of periodic tests where it sinks into its noise (zero phase): at a "
         "reversal micrometres of noise become newtons and bias the shape of the hysteresis.",
     )
-    cycles: int = Field(2, ge=0, description="Steady cycles of each periodic test that the fit sees; 0 for all.")
-    maximum_samples: int = Field(
-        30_000, ge=500, description="Forces are compared at about so many samples; the model runs at the full rate."
-    )
     force: Literal["filtered", "raw"] = Field(
         "filtered", description="The measured force to fit and to judge by: as prepared, or without its low-pass."
     )
-    offset_per_test: bool = Field(
-        True,
-        description="Fit an offset of the force in each training test, in addition to what prepare took out; else one "
-        "for all tests.",
-    )
-    equal_tests: bool = Field(
-        False, description="Weight each test by its own force, so that weak tests count as much as strong ones."
-    )
-    assumed_eta_per_s: float = Field(
-        100.0,
-        gt=0.0,
-        description="Rate of the drive's lag (2.4) given to the damper where every test holds the drive constant, "
-        "because such tests do not determine it.",
-    )
     folds: int = Field(5, ge=2, le=20, description="Parts of the cross-validation where form is best.")
-
     reference_A: float = Field(  # noqa: N815 - the thesis' symbol
         1000.0,
         gt=0.0,
