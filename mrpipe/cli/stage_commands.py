@@ -15,6 +15,7 @@ from mrpipe.errors import CheckFailed, UserError
 if TYPE_CHECKING:
     from mrpipe.pipeline.runner import Outcome, Pipeline
 
+_EXPORTS = ("controller", "damper", "frame", "forward", "inverse")
 _RIGS = ("bench", "frame", "closed-loop")
 
 
@@ -153,19 +154,31 @@ def simulate(
     build_and_print([f"{kind}-{item}" for item in laws for kind in kinds], options, together=kinds)
 
 
-@with_common_options("campaign")
+@with_common_options()
 def export(
     options: CommonOptions,
-    what: Annotated[str, typer.Argument(metavar="[WHAT]", help="controller")] = "controller",
+    what: Annotated[str, typer.Argument(metavar="[WHAT]", help=f"{', '.join(_EXPORTS)}; or all.")] = "controller",
     law: Annotated[
         str | None, typer.Option(metavar="LAW", help="Control law. Default: the setting export.law.")
     ] = None,
+    damper: Annotated[
+        str | None,
+        typer.Option(metavar="DAMPER", help="identified, traced (by close-loop), a set of configs/dampers, or a file."),
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option("--format", metavar="FORMAT", help="c, json, matlab, onnx; repeatable. Default: all possible."),
+    ] = None,
 ) -> None:
-    """Write the calibrated controller as C and JSON."""
-    if what != "controller":
-        raise UserError("export", what, "cannot be exported", "one of controller")
-    chosen = options if law is None else replace(options, overrides=[*options.overrides, f"export.law={law}"])
-    build_and_print(["export-controller"], chosen)
+    """Write the calibrated controller or a model for other programs, with test vectors."""
+    if what not in (*_EXPORTS, "all"):
+        raise UserError("export", what, "cannot be exported", f"one of {', '.join((*_EXPORTS, 'all'))}")
+    given = {"export.law": law, "simulate.damper": damper}
+    overrides = [f"{name}={value}" for name, value in given.items() if value is not None]
+    if formats:
+        overrides.append(f"export.formats=[{', '.join(formats)}]")
+    chosen = replace(options, overrides=[*options.overrides, *overrides])
+    build_and_print([f"export-{name}" for name in (_EXPORTS if what == "all" else (what,))], chosen)
 
 
 _FAMILIES: dict[str, Callable[..., None]] = {"record": record, "simulate": simulate, "export": export}

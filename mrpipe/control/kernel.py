@@ -2,7 +2,7 @@
 
 A controller consists of its law (a compiled function), the arrays `numbers` (float) and `layout` (integers), and an
 array for its memory. The same function runs in every plant integrator and translates to C line by line
-(:mod:`mrpipe.control.export`).
+(:mod:`mrpipe.exports.controller`).
 """
 
 from __future__ import annotations

@@ -165,6 +165,11 @@ def sum_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: fl
     wire[FORCE] = wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]
 
 
+def in_order(steps: Sequence[Step]) -> list[Step]:
+    """Return the steps sorted by phase, with the sum of (2.1)."""
+    return sorted([*steps, Step("sum", Phase.SUM, sum_step, np.zeros(0))], key=lambda step: step.phase)
+
+
 def build_chain(steps: Sequence[Step]) -> Chain:
     """Sort the steps by phase and pack them; the sum of (2.1) is put in.
 
@@ -173,7 +178,7 @@ def build_chain(steps: Sequence[Step]) -> Chain:
     UserError
         If there are more than :data:`CHAIN_LENGTH` steps.
     """
-    ordered = sorted([*steps, Step("sum", Phase.SUM, sum_step, np.zeros(0))], key=lambda step: step.phase)
+    ordered = in_order(steps)
     if len(ordered) > CHAIN_LENGTH:
         raise UserError(
             "damper model",

@@ -2,7 +2,7 @@
 
 A stage's function imports modules; each of these imports others. Two things are not imports, so modules say them:
 
-- `LOADS_FROM = ("mrpipe.effects", "mrpipe/control/controller_template.c")` at the top level of a module names the
+- `LOADS_FROM = ("mrpipe.effects", "mrpipe/exports/controller_template.c")` at the top level of a module names the
   packages that it walks at run time and the files of the program that it reads.
 - `load_parameter_set("frames", ...)` reads `configs/frames`: the whole folder counts, or the one file where the call
   names it.

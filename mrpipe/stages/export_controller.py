@@ -16,9 +16,9 @@ DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.artifacts import atomic_write_text
     from mrpipe.control.assembly import ControllerFactory, inverse_network
-    from mrpipe.control.export import controller_files
     from mrpipe.control.storage import read_calibrated
     from mrpipe.effects.damper import damper_named
+    from mrpipe.exports.controller import controller_files
     from mrpipe.reporting import export_controller as section
     from mrpipe.structures import read_frame
 
@@ -37,7 +37,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         inverse_network(chosen, lambda: context.artifact("train-inverse")),
     )
     built = factory.build(settings.law)
-    details = {"drive_unit": damper.drive_unit, "inverse": context.settings.simulate.controller.inverse}
+    details = {"drive_unit": damper.drive_unit, "stroke_m": damper.stroke_m}
+    details["inverse"] = chosen.inverse
     folder = context.run_directory / FOLDER
     files = controller_files(built, settings.prefix, details)
     for name, text in files.items():
@@ -54,12 +55,15 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 STAGE = Stage(
     name="export-controller",
-    summary="Write the calibrated controller as C and JSON.",
+    summary="Write the calibrated controller as C and JSON, with test vectors.",
     run=_run,
     inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
     conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
     settings=("export", "simulate.controller", "simulate.damper"),
     after=("reproduce",),
     family="export",
-    outputs=(f"{FOLDER}/controller.json", f"{FOLDER}/controller.c", f"{FOLDER}/controller.h", f"{FOLDER}/README.md"),
+    outputs=tuple(
+        f"{FOLDER}/{name}"
+        for name in ("controller.json", "controller.c", "controller.h", "self_test.c", "vectors.csv", "README.md")
+    ),
 )

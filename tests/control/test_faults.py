@@ -11,7 +11,6 @@ import pytest
 
 from mrpipe.control import ControllerOptions, Gains, build_controller, inverse_table
 from mrpipe.control.controller import DYNAMIC_RANGE, Controller
-from mrpipe.control.export import controller_files
 from mrpipe.control.kernel import (
     COMMAND_DRIVE,
     COMMAND_FAULT,
@@ -22,8 +21,9 @@ from mrpipe.control.kernel import (
 )
 from mrpipe.control.laws import all_laws, law_names
 from mrpipe.control.lqg import Weights
+from mrpipe.exports.controller import controller_files
 from tests.control.conftest import random_network
-from tests.control.test_export import recorded_signal
+from tests.exports.test_controller import recorded_signal
 
 LIMIT = 0.3
 GAINS = {

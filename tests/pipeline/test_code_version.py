@@ -43,7 +43,7 @@ def test_tracing_depends_on_every_effect(stage: str, folder: str) -> None:
 @pytest.mark.parametrize(
     ("module", "file"),
     [
-        ("mrpipe.stages.export_controller", "mrpipe/control/controller_template.c"),
+        ("mrpipe.stages.export_controller", "mrpipe/exports/controller_template.c"),
         ("mrpipe.stages.simulate", "configs/dampers/set-c.yaml"),
         ("mrpipe.stages.simulate", "configs/frames/thesis.yaml"),
         ("mrpipe.stages.record", "configs/dampers/set-c.yaml"),

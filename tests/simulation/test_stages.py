@@ -29,7 +29,7 @@ from mrpipe.networks.network import write_network
 from mrpipe.pipeline.runner import plain
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.stages import calibrate, export_controller
+from mrpipe.stages import calibrate, export_controller, export_models
 from mrpipe.stages.simulate import STAGES
 from mrpipe.structures import frame_from_parameter_set, shear_frame, write_frame
 from tests.control.conftest import random_network
@@ -244,7 +244,20 @@ def test_export_writes_a_folder(run):
     summary = run(export_controller.STAGE, {"export": {"law": "vdns", "prefix": "rig"}})
     folder = summary["directory"] / "controller"
     assert {"controller.c", "controller.h", "controller.json", "README.md"} <= {item.name for item in folder.iterdir()}
-    assert json.loads((folder / "controller.json").read_text())["gains"]["k_n_m"] == -4500.0
+    content = json.loads((folder / "controller.json").read_text())
+    assert content["gains"]["k_n_m"] == content["parameters"]["k_n_m"]["value"] == -4500.0
+    assert (folder / "vectors.csv").read_text().startswith("displacement [m],acceleration [m/s^2]")
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("name", ["damper", "frame"])
+def test_export_of_a_model_writes_a_folder_with_the_formats_asked_for(run, name):
+    stage = {item.name: item for item in export_models.STAGES}[f"export-{name}"]
+    summary = run(stage, {"export": {"formats": ["json", "c"]}})
+    files = {item.name for item in (summary["directory"] / "export" / name).iterdir()}
+    assert files == {*summary["files"]} == {f"{name}.{end}" for end in ("c", "h", "json")} | {
+        "self_test.c", "vectors.csv", "README.md",
+    }  # fmt: skip
 
 
 def _write_other_rig(path: Path) -> None:

@@ -13,7 +13,7 @@ from mrpipe.control import laws
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import all_laws, law_names
 from mrpipe.errors import UserError
-from tests.control.test_export import in_c, in_python, recorded_signal
+from tests.exports.test_controller import in_c, in_python, recorded_signal
 from tests.simulation.test_stages import SMALL, run  # noqa: F401
 
 NEW_LAW = '''

@@ -12,9 +12,10 @@ import pytest
 
 from mrpipe.control import COMMAND_SIZE, ControllerOptions, Gains, build_controller, controller_step, inverse_table
 from mrpipe.control.controller import Controller
-from mrpipe.control.export import controller_files
 from mrpipe.control.lqg import Weights, lqg_observer
+from mrpipe.exports.controller import controller_files
 from tests.control.conftest import random_network
+from tests.exports.building import self_test
 
 MAIN = """
 #include <stdio.h>
@@ -91,6 +92,7 @@ def test_c_equals_python(law, kind, tmp_path, thesis_frame, floor_one, set_c):
     )
     signal = recorded_signal(controller.measured_size, rate)
     python, c = in_python(controller, signal), in_c(controller, signal, tmp_path)
+    self_test(tmp_path, "controller", "RIG")
     assert python.shape == c.shape
     assert np.ptp(python[:, 0]) > 0.5 or law == "passive-on"
     np.testing.assert_allclose(c, python, rtol=1e-11, atol=1e-12)

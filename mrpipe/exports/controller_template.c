@@ -7,9 +7,11 @@
 
 #include <math.h>
 
+@PRECISION@
 @MACROS@
 
-static const double numbers[] = {
+/* In memory that can be written, so that gains and limits can be changed at run time: @PREFIX@_controller_parameters */
+static double numbers[] = {
 @NUMBERS@
 };
 
@@ -179,6 +181,8 @@ static double inverse(const double *state, double force)
     if (layout[INVERSE] == INVERSE_NETWORK) return evaluate(state, layout[NETWORK_INVERSE], numbers[INVERSE_SPACING]);
     return 0.0;
 }
+
+double *@PREFIX@_controller_parameters(void) { return numbers; }
 
 void @PREFIX@_controller_reset(double state[@UPPER@_STATE_SIZE])
 {

@@ -1,0 +1,329 @@
+"""The controller as C99 and JSON for a real-time target; the same arithmetic as :mod:`mrpipe.control.kernel`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control import kernel
+from mrpipe.control.controller import Controller
+from mrpipe.control.law import Law
+from mrpipe.control.laws import law_named
+from mrpipe.exports import c_text
+from mrpipe.exports.contract import Channel, Vectors
+
+LOADS_FROM = ("mrpipe/exports/controller_template.c",)
+"""Files of the program that are read at run time: they belong to the code version of a stage."""
+_TEMPLATE = Path(__file__).with_name("controller_template.c")
+
+_MACROS = (
+    "MEASURED_DISPLACEMENT",
+    "MEASURED_ACCELERATION",
+    "MEASURED_VELOCITY",
+    "MEASURED_GROUND",
+    "MEASURED_FORCE",
+    "MEASURED_FLOORS",
+    "COMMAND_DRIVE",
+    "COMMAND_FORCE",
+    "COMMAND_UNCLIPPED",
+    "COMMAND_DISPLACEMENT",
+    "COMMAND_VELOCITY",
+    "COMMAND_AMPLITUDE",
+    "COMMAND_CLIPPED",
+    "COMMAND_SWITCHED",
+    "COMMAND_INVERSE",
+    "COMMAND_FAULT",
+    "COMMAND_SIZE",
+)
+_INNER_MACROS = tuple(
+    name for name in vars(kernel) if name.isupper() and isinstance(getattr(kernel, name), int) and name not in _MACROS
+)
+
+
+PARAMETERS: dict[str, tuple[int, str, str]] = {
+    "c_n_s_m": (kernel.GAIN_C, "N*s/m", "gain: viscosity"),
+    "k_n_m": (kernel.GAIN_K, "N/m", "gain: stiffness"),
+    "alpha_n_m": (kernel.GAIN_ALPHA, "N/m", "gain: friction with negative stiffness"),
+    "residual_force": (kernel.RESIDUAL_FORCE, "N", "desired force below which the drive is 0"),
+    "drive_limit": (kernel.DRIVE_LIMIT, "drive", "largest drive"),
+    "safe_drive": (kernel.SAFE_DRIVE, "drive", "drive while the readings cannot be used"),
+    "kalman_displacement": (kernel.KALMAN, "1", "gain of the Kalman filter on the displacement"),
+    "kalman_velocity": (kernel.KALMAN + 1, "1/s", "gain of the Kalman filter on the velocity"),
+    "kalman_bias": (kernel.KALMAN + 2, "1/s^2", "gain of the Kalman filter on the bias of the accelerometer"),
+    "dead_band": (kernel.DEAD_BAND, "m/s", "speed below which the direction of motion is unchanged"),
+    "friction_rounding": (kernel.ROUNDING, "m/s", "speed over which friction changes its sign; 0: a jump"),
+    "extremum_step": (kernel.EXTREMUM_STEP, "m", "way back that makes an extremum count"),
+    "extremum_share": (kernel.EXTREMUM_SHARE, "1", "the same as a share of the amplitude"),
+    "extremum_memory": (kernel.MEMORY, "s", "time after which a pending extremum counts"),
+    "low_pass_b0": (kernel.LOW_PASS, "1", "low-pass on the drive"),
+    "low_pass_b1": (kernel.LOW_PASS + 1, "1", "low-pass on the drive"),
+    "low_pass_b2": (kernel.LOW_PASS + 2, "1", "low-pass on the drive"),
+    "low_pass_a1": (kernel.LOW_PASS + 3, "1", "low-pass on the drive"),
+    "low_pass_a2": (kernel.LOW_PASS + 4, "1", "low-pass on the drive"),
+}
+"""Named parameters of every controller: place among its numbers, unit and meaning. They may change at run time."""
+
+VECTOR_ROWS = 400
+_FAULT = slice(300, 340)
+"""Rows of the test vectors in which the displacement cannot be true."""
+
+
+def controller_files(controller: Controller, prefix: str, details: dict[str, Any]) -> dict[str, str]:
+    """Return file name -> text of the exported folder.
+
+    Parameters
+    ----------
+    controller
+        What to export.
+    prefix
+        Of the C names.
+    details
+        Further entries of controller.json (where gains come from, units).
+    """
+    law = law_named(controller.law)
+    vectors = controller_vectors(controller, float(details.get("stroke_m", 0.01)))
+    upper = prefix.upper()
+    return {
+        "controller.h": _header(controller, prefix),
+        "controller.c": c_text.in_either_precision(_source(controller, law, prefix), prefix),
+        "controller.json": json.dumps(_description(controller, prefix, details), indent=2) + "\n",
+        "vectors.csv": vectors.as_csv(),
+        "self_test.c": c_text.self_test(
+            "controller.h",
+            prefix,
+            vectors,
+            (
+                f"{prefix}_real state[{upper}_STATE_SIZE], command[{upper}_COMMAND_SIZE] = {{0}};",
+                f"{prefix}_controller_reset(state);",
+            ),
+            (
+                f"{prefix}_controller_step(state, input, command);",
+                "for (int place = 0; place < OUTPUTS; ++place) output[place] = command[place];",
+            ),
+        ),
+        "README.md": _readme(controller, prefix),
+    }
+
+
+def controller_vectors(controller: Controller, stroke_m: float) -> Vectors:
+    """Return readings of sensors and the commands of the controller in Python.
+
+    The damper moves harmonically, then its motion decays. The readings have a ripple, as measured ones have noise, and
+    for a while the displacement is impossible.
+
+    Parameters
+    ----------
+    controller
+        The controller.
+    stroke_m
+        Largest displacement of the damper [m].
+    """
+    time = controller.sample_time_s * np.arange(VECTOR_ROWS)
+    omega = 2.0 * np.pi * 0.75 / controller.options.extremum_memory_s
+    half = time[VECTOR_ROWS // 2]
+    envelope = 0.8 * stroke_m * np.exp(-0.15 * omega * np.maximum(time - half, 0.0))
+    x = envelope * np.sin(omega * time)
+    measured = np.zeros((VECTOR_ROWS, controller.measured_size))
+    ripple = np.sin(61.0 * omega * time + 1.0)
+    measured[:, kernel.MEASURED_DISPLACEMENT] = x + 1e-3 * stroke_m * ripple
+    measured[:, kernel.MEASURED_ACCELERATION] = -omega * omega * x * (1.0 + 0.01 * ripple)
+    measured[:, kernel.MEASURED_VELOCITY] = np.gradient(x, time)
+    measured[:, kernel.MEASURED_GROUND] = 0.3 * np.sin(2.3 * omega * time)
+    measured[:, kernel.MEASURED_FORCE] = 50.0 * np.tanh(
+        measured[:, kernel.MEASURED_VELOCITY] / (0.1 * stroke_m * omega)
+    )
+    for floor in range(controller.floors):
+        share = (floor + 1.0) / controller.floors
+        measured[:, kernel.MEASURED_FLOORS + floor] = -omega * omega * x * share + 0.1 * np.cos(
+            1.7 * omega * time + floor
+        )
+    measured[_FAULT, kernel.MEASURED_DISPLACEMENT] = 1e12
+    commands = _commands(controller, measured)
+    inputs = {place: name for name, place in _places("MEASURED_").items() if place < kernel.MEASURED_FLOORS}
+    inputs.update({kernel.MEASURED_FLOORS + floor: f"floor_{floor + 1}" for floor in range(controller.floors)})
+    outputs = {place: name for name, place in _places("COMMAND_").items()}
+    return Vectors(
+        tuple(Channel(name, _UNITS.get(name, "m/s^2"), measured[:, place]) for place, name in sorted(inputs.items())),
+        tuple(Channel(name, _UNITS.get(name, "1"), commands[:, place]) for place, name in sorted(outputs.items())),
+        controller.sample_time_s,
+        single_limit=1e-2,
+    )
+
+
+def _commands(controller: Controller, measured: FloatArray) -> FloatArray:
+    state = controller.new_state()
+    commands = np.zeros((len(measured), kernel.COMMAND_SIZE))
+    for row, command in zip(measured, commands, strict=True):
+        kernel.controller_step(*controller.arguments, state, np.ascontiguousarray(row), command)
+    return commands
+
+
+_UNITS = {
+    "displacement": "m",
+    "velocity": "m/s",
+    "amplitude": "m",
+    "acceleration": "m/s^2",
+    "ground": "m/s^2",
+    "force": "N",
+    "unclipped": "N",
+    "drive": "drive",
+    "inverse": "drive",
+}
+
+
+def _header(controller: Controller, prefix: str) -> str:
+    upper = prefix.upper()
+    lines = [
+        f"/* Controller of law {controller.law}: Kalman velocity, law, clipping, inverse, switch, low-pass, limits. */",
+        f"#ifndef {upper}_CONTROLLER_H",
+        f"#define {upper}_CONTROLLER_H",
+        "",
+        c_text.precision_header(prefix),
+        "/* Indices into measured[] (SI) and command[]. */",
+        *(f"#define {upper}_{name} {getattr(kernel, name)}" for name in _MACROS),
+        f"#define {upper}_MEASURED_SIZE {controller.measured_size}",
+        f"#define {upper}_STATE_SIZE {controller.state_size}",
+        f"#define {upper}_SAMPLE_TIME_S {controller.sample_time_s!r}",
+        "",
+        "/* Indices into the array of parameters, which may be changed between two calls. */",
+        *(
+            f"#define {upper}_PARAMETER_{name.upper()} {place} /* {meaning} [{unit}] */"
+            for name, (place, unit, meaning) in PARAMETERS.items()
+        ),
+        f"{prefix}_real *{prefix}_controller_parameters(void);",
+        "",
+        "/* Set the memory to zero before the first call and whenever the loop was open. */",
+        f"void {prefix}_controller_reset({prefix}_real state[{upper}_STATE_SIZE]);",
+        "",
+        "/* Call once a sample; hold command[COMMAND_DRIVE] until the next call. */",
+        f"void {prefix}_controller_step({prefix}_real state[{upper}_STATE_SIZE],",
+        f"                              const {prefix}_real measured[{upper}_MEASURED_SIZE],",
+        f"                              {prefix}_real command[{upper}_COMMAND_SIZE]);",
+        "",
+        "#endif",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _source(controller: Controller, law: Law, prefix: str) -> str:
+    upper = prefix.upper()
+    numbers = ",\n".join(
+        "    " + ", ".join(_literal(value) for value in controller.numbers[start : start + 4])
+        for start in range(0, len(controller.numbers), 4)
+    )
+    layout = ", ".join(str(int(value)) for value in controller.layout)
+    macros = "\n".join(f"#define {name} {getattr(kernel, name)}" for name in (*_INNER_MACROS, *_MACROS))
+    text = _TEMPLATE.read_text(encoding="utf-8")
+    for key, value in {
+        "@PREFIX@": prefix,
+        "@UPPER@": upper,
+        "@MACROS@": macros,
+        "@PRECISION@": c_text.precision_macros(prefix),
+        "@NUMBERS@": numbers,
+        "@LAYOUT@": layout,
+        "@LAW@": controller.law,
+        "@LAW_HELPERS@": f"{law.c_helpers}\n" if law.c_helpers else "",
+        "@LAW_BODY@": law.c_body,
+    }.items():
+        text = text.replace(key, value)
+    return text
+
+
+def _literal(value: float) -> str:
+    """Return a C literal that reads back to the same double."""
+    return float(value).hex()
+
+
+def _description(controller: Controller, prefix: str, details: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "law": controller.law,
+        "prefix": prefix,
+        "gains": dict(controller.gains),
+        "options": asdict(controller.options),
+        "sample_time_s": controller.sample_time_s,
+        "parameters": {
+            name: {"index": place, "value": float(controller.numbers[place]), "unit": unit, "meaning": meaning}
+            for name, (place, unit, meaning) in PARAMETERS.items()
+        },
+        "measured": _places("MEASURED_"),
+        "measured_size": controller.measured_size,
+        "command": _places("COMMAND_"),
+        "state_size": controller.state_size,
+        "numbers": [float(value) for value in controller.numbers],
+        "layout": [int(value) for value in np.asarray(controller.layout)],
+        **details,
+    }
+
+
+def _limits(controller: Controller) -> str:
+    """Return the largest plausible readings in words."""
+    at = int(controller.layout[kernel.AT_LIMITS])
+    named = {
+        "displacement": (kernel.MEASURED_DISPLACEMENT, "m"),
+        "acceleration": (kernel.MEASURED_ACCELERATION, "m/s2"),
+        "velocity": (kernel.MEASURED_VELOCITY, "m/s"),
+        "force": (kernel.MEASURED_FORCE, "N"),
+    }
+    limits = {name: (float(controller.numbers[at + place]), unit) for name, (place, unit) in named.items()}
+    return ", ".join(f"{name} {limit:.3g} {unit}" for name, (limit, unit) in limits.items() if limit > 0.0)
+
+
+def _places(prefix: str) -> dict[str, int]:
+    names = (name for name in _MACROS if name.startswith(prefix) and not name.endswith("_SIZE"))
+    return {name.removeprefix(prefix).lower(): getattr(kernel, name) for name in names}
+
+
+def _readme(controller: Controller, prefix: str) -> str:
+    upper = prefix.upper()
+    floors = (
+        f"\n- `{upper}_MEASURED_GROUND` and from `{upper}_MEASURED_FLOORS` on: absolute accelerations of the ground "
+        f"and of {controller.floors} floors [m/s2]"
+        if controller.floors
+        else ""
+    )
+    hold = int(controller.layout[kernel.HOLD])
+    return f"""# Controller of law {controller.law}
+
+C99 without allocation and files; the only library is `math.h`. Build with `cc -std=c99 -c controller.c` and link
+`-lm`. Define `{upper}_SINGLE` for single precision (`float`), else the numbers are `double`. A compiler that contracts
+`a*b+c` (some do by default) changes the last digits, which `-ffp-contract=off` avoids.
+
+`vectors.csv` holds readings of the sensors and the commands that mrpipe computes from them. `self_test.c` compares the
+C code with them: `cc -std=c99 controller.c self_test.c -lm` builds a program that returns 0 where they agree.
+
+Call `{prefix}_controller_reset` once, then `{prefix}_controller_step` every {controller.sample_time_s:g} s with
+
+- `{upper}_MEASURED_DISPLACEMENT`: damper displacement [m]
+- `{upper}_MEASURED_ACCELERATION`: damper acceleration, floor less ground [m/s2]
+- `{upper}_MEASURED_VELOCITY`: damper velocity [m/s], read only where the controller was built without a filter{floors}
+
+and hold `command[{upper}_COMMAND_DRIVE]` (A or V, as the damper was measured) until the next call. The other entries of
+`command` are the desired force before and after clipping, the estimated motion, whether clipping and switch acted, and
+`{upper}_COMMAND_FAULT`. The damper force is positive where it resists the motion.
+
+## Faulty readings
+
+A reading is refused if it is NaN or infinite, or larger than the largest plausible one ({_limits(controller)}).
+
+- For up to {hold} samples in a row ({1e3 * hold * controller.sample_time_s:.0f} ms) the last good reading replaces it;
+  `{upper}_COMMAND_FAULT` is 1.
+- After that, and before the first good sample, the drive is {controller.options.safe_drive:g};
+  `{upper}_COMMAND_FAULT` is 2.
+- At the next sample with good readings the controller starts anew, and `{upper}_COMMAND_FAULT` is 0.
+
+Whatever the readings are, the drive is finite and lies between 0 and the drive limit, and the memory stays finite. This
+holds for code compiled without `-ffast-math`, which would drop the test for NaN.
+
+## Parameters
+
+`{prefix}_controller_parameters()[{upper}_PARAMETER_C_N_S_M]` and the other names of `controller.h` give access to the
+gains, limits and filters. They may be changed between two calls of the step.
+
+`controller.json` holds gains, options, named parameters and all numbers.
+"""
