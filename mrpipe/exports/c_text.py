@@ -48,9 +48,11 @@ def precision_macros(prefix: str) -> str:
 #ifdef {prefix.upper()}_SINGLE
 #define R(number) number##f
 #define M(function) function##f
+#define BIG(number) 1e30f
 #else
 #define R(number) number
 #define M(function) function
+#define BIG(number) number
 #endif
 """
 
@@ -78,7 +80,8 @@ def in_either_precision(text: str, prefix: str) -> str:
 def _number(text: str) -> str:
     value = float.fromhex(text) if text[:2] in ("0x", "0X") else float(text)
     if abs(value) > _LARGEST_SINGLE:
-        return "HUGE_VAL"
+        # it stays finite in either precision, because a product of infinity and zero is not a number
+        return f"BIG({text})"
     # beyond the range of float the compiler rounds, without a warning because of the cast
     return f"R({text})" if value == 0.0 or abs(value) > _SMALLEST_SINGLE else f"(float){text}"
 
