@@ -38,6 +38,19 @@ class ValidationRules(Section):
         description="Above this NRMSE the base model does not predict the validation tests: at 0.5 a quarter of the "
         "squared force is missing, more than any single effect of the planted benchmark contributes.",
     )
+    fewest_training: int = Field(
+        2,
+        ge=1,
+        description="Harmed training tests are left out only if this many training tests remain, because tests are "
+        "judged by comparison.",
+    )
+    worst_share: float = Field(
+        0.9,
+        gt=0.0,
+        le=1.0,
+        description="Quantile of the relative errors of left-out training tests with which validation tests are "
+        "compared.",
+    )
     odd_ratio: float = Field(
         2.0,
         gt=0.0,
@@ -103,6 +116,143 @@ class ValidationRules(Section):
         lt=1.0,
         description="Largest probability of a residual's autocorrelation or dependence on states by chance; it is as "
         "small because samples are many and noise of real sensors is not perfectly white.",
+    )
+
+
+class NoiseRules(Section):
+    """How the noise of a bench campaign is estimated. Numbers without a unit are dimensionless."""
+
+    least_share: float = Field(
+        0.002,
+        ge=0.0,
+        description="Least standard deviation of a sample, as a share of the RMS force: a smaller error of the model "
+        "has no consequence.",
+    )
+    same_drive: float = Field(
+        0.02,
+        gt=0.0,
+        description="Two tests or cycles have the same drive if their RMS difference is below this share of the "
+        "largest drive.",
+    )
+    same_motion: float = Field(
+        0.04,
+        gt=0.0,
+        description="They have the same motion if the standard deviation of their difference is below this share of "
+        "that of the motion; testing machines repeat a command to a few percent.",
+    )
+    least_samples: int = Field(
+        400,
+        ge=10,
+        description="Repeated motion shows noise only if it has this many samples, which fixes a variance to about "
+        "7 percent.",
+    )
+    least_factor: float = Field(
+        0.25,
+        gt=0.0,
+        le=1.0,
+        description="Least variance from repeated motion, as a share of what the channels themselves show, because "
+        "short repeats may agree by chance.",
+    )
+
+
+class OffsetRules(Section):
+    """When a load cell whose zero moves between tests is named. All numbers are dimensionless."""
+
+    fewest_tests: int = Field(
+        4, ge=2, description="Tests from which a spread of the offsets between them is estimated."
+    )
+    least_spread: float = Field(
+        0.01,
+        gt=0.0,
+        description="Spread of the offsets, as a share of the RMS force, below which the zero of the load cell counts "
+        "as steady.",
+    )
+    least_excess: float = Field(
+        0.2,
+        gt=0.0,
+        description="One common offset must raise the chi-square by this share, else the tests do not require separate "
+        "ones.",
+    )
+    confidence: float = Field(
+        0.97,
+        gt=0.0,
+        lt=1.0,
+        description="Confidence of this finding, which compares two fits of the same model and has no rival effect.",
+    )
+
+
+class NuisanceRules(Section):
+    """When gains of sessions and filters of the records are taken as real. All numbers are dimensionless."""
+
+    least_gain: float = Field(
+        0.05,
+        gt=0.0,
+        lt=1.0,
+        description="A moving average of the records, or a lag that differs between rising and falling drive, must "
+        "remove this share of the sum of squares.",
+    )
+    fewest_of_session: int = Field(
+        3, ge=2, description="Number of records that must agree on a gain before it counts as a gain of the session."
+    )
+    spreads: float = Field(
+        2.0,
+        gt=0.0,
+        description="The gain of a record differs if it lies this many standard deviations of the training tests' "
+        "gains from 1.",
+    )
+    agreement: float = Field(
+        0.5,
+        gt=0.0,
+        description="Gains of a session agree if their standard deviation is below this share of their mean distance "
+        "from 1.",
+    )
+
+
+class TestabilityRules(Section):
+    """When a campaign can show an effect at all. All numbers are dimensionless."""
+
+    drive_change: float = Field(
+        0.05,
+        gt=0.0,
+        description="The drive varies if its range within a test exceeds this share of the largest drive of the "
+        "campaign.",
+    )
+    frequency_ratio: float = Field(
+        1.15,
+        gt=1.0,
+        description="Tests have several frequencies if the highest exceeds the lowest by this factor.",
+    )
+    speed_ratio: float = Field(
+        1.5,
+        gt=1.0,
+        description="Speeds vary if the 90 % quantile exceeds the 25 % quantile by this factor: it is 2.6 for a sine "
+        "and 1 for triangles of one speed.",
+    )
+    turning: float = Field(
+        0.1,
+        gt=0.0,
+        description="Motions turn at several positions if these spread by more than this share of the stroke.",
+    )
+    long_cycles: float = Field(
+        20.0,
+        gt=0.0,
+        description="A long test has this many cycles of motion, far more than the hysteresis needs to settle.",
+    )
+
+
+class LocationRules(Section):
+    """How the report divides the residual by the state of the damper. Numbers without a unit are dimensionless."""
+
+    post_yield: float = Field(
+        0.9,
+        gt=0.0,
+        lt=1.0,
+        description="The damper has yielded where the hysteretic variable exceeds this share of its final value.",
+    )
+    drive_rate: float = Field(
+        0.05,
+        gt=0.0,
+        description="The drive rises or falls where its rate exceeds this share of the largest drive in a second.",
     )
 
 
@@ -360,6 +510,11 @@ class TracingRules(Section):
     validation: ValidationRules = Field(
         ValidationRules(), description="How errors on the validation tests decide the class of the verdict."
     )
+    noise: NoiseRules = Field(NoiseRules(), description="How the noise of a bench campaign is estimated.")
+    offsets: OffsetRules = Field(OffsetRules(), description="When a moving zero of the load cell is named.")
+    nuisances: NuisanceRules = Field(NuisanceRules(), description="When gains of sessions and filters are real.")
+    testability: TestabilityRules = Field(TestabilityRules(), description="When a campaign can show an effect.")
+    location: LocationRules = Field(LocationRules(), description="How the report divides the residual.")
     frame: FrameRules = Field(FrameRules(), description="How the residual of a linear frame is judged.")
     brace: BraceRules = Field(BraceRules(), description="When a flexible brace of the damper is named.")
     delay: DelayRules = Field(DelayRules(), description="When a controller is called late.")

@@ -18,6 +18,7 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, fit_with_form, polynomial_laws
 from mrpipe.tracing.bench.screen import screen
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, force_deviation, noise_scale, sensor_deviation
+from mrpipe.tracing.rules import NoiseRules
 
 FREE_EXPONENT = "bouc-wen-n"
 """Name of the base form whose hysteresis has a free exponent."""
@@ -66,9 +67,14 @@ def family_of(model: str) -> str:
 
 
 def fit_baseline(
-    recordings: Recordings, base: Base, declared: Sequence[Effect] = (), *, model_error_share: float = 0.0
+    recordings: Recordings,
+    base: Base,
+    declared: Sequence[Effect] = (),
+    *,
+    model_error_share: float = 0.0,
+    rules: NoiseRules | None = None,
 ) -> Baseline:
-    """Fit the declared model, weigh the samples by what noise makes of its force, and fit again.
+    """Fit the declared model, weight the samples by the noise of the force, and fit again.
 
     Parameters
     ----------
@@ -79,11 +85,14 @@ def fit_baseline(
     declared
         Effects that belong to the baseline; each in the form that fits best.
     model_error_share
-        Model error to reckon with as a share of the force RMS: on real recordings it outweighs the sensors' noise.
+        Expected model error as a share of the RMS force: on real recordings it exceeds the sensors' noise.
+    rules
+        Thresholds of the noise; their defaults if None.
     """
+    rules = rules or NoiseRules()
     problem = first_problem(recordings, base)
     found = best_fit(problem)
-    found = _weighted(found, recordings, model_error_share)
+    found = _weighted(found, recordings, model_error_share, rules)
     laws = adequate_laws(found)
     if laws != found.problem.base.laws:
         problem = replace(found.problem, base=replace(base, laws=laws))
@@ -91,18 +100,20 @@ def fit_baseline(
     for effect in declared:
         found = _with_declared(found, effect)
     if declared:
-        found = _weighted(found, recordings, model_error_share)
-    scale = noise_scale(found)
+        found = _weighted(found, recordings, model_error_share, rules)
+    scale = noise_scale(found, rules)
     if scale != AS_SHOWN:
-        # noise that only repeated motion shows counts in the weights, too
-        found = _weighted(found, recordings, model_error_share, scale)
-        scale = noise_scale(found)
-    deviation = force_deviation(found, recordings, model_error_share, scale)
+        # noise that only repeated motion shows counts in the weights as well
+        found = _weighted(found, recordings, model_error_share, rules, scale)
+        scale = noise_scale(found, rules)
+    deviation = force_deviation(found, recordings, model_error_share, scale, rules)
     return Baseline(found, noise_level_of(found, scale), deviation, scale)
 
 
-def _weighted(found: Fit, recordings: Recordings, model_error_share: float, scale: NoiseScale = AS_SHOWN) -> Fit:
-    deviation = force_deviation(found, recordings, model_error_share, scale)
+def _weighted(
+    found: Fit, recordings: Recordings, model_error_share: float, rules: NoiseRules, scale: NoiseScale = AS_SHOWN
+) -> Fit:
+    deviation = force_deviation(found, recordings, model_error_share, scale, rules)
     problem = replace(found.problem, root_weight=recordings.used / deviation, reference=positive(found))
     return fit(problem, found.theta, iterations=12)
 

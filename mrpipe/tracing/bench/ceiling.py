@@ -1,4 +1,4 @@
-"""How much of a residual is recoverable at all: boosted trees on lagged states, judged on samples they never saw."""
+"""The recoverable part of a residual: boosted trees on lagged states, judged on samples they have not seen."""
 
 from __future__ import annotations
 
@@ -15,21 +15,24 @@ from mrpipe.tracing.bench.crossvalidation import folds_of
 from mrpipe.tracing.bench.residual_structure import states_of
 
 LAGS_S = (0.01, 0.03, 0.1, 0.3)
+"""Numerical technique: lags [s] of the states that the flexible model sees."""
+
 MOST_ROWS = 15_000
+"""Numerical technique: samples that the flexible model is trained on."""
 
 PIECES = 8
-"""Every validation record is cut into this many pieces; each piece is predicted by a model that has not seen it."""
+"""Numerical technique: pieces of a validation record; each is predicted by a model that has not seen it."""
 
 PARTS = 4
-"""Number of parts of the cross-fitting: pieces 0, 4, then 1, 5, ... are left out together."""
+"""Numerical technique: parts of the cross-fitting: pieces 0, 4, then 1, 5, ... are left out together."""
 
 DRAWS = 200
-"""Draws of the bootstrap over pieces."""
+"""Numerical technique: draws of the bootstrap over pieces."""
 
 
 @dataclass(frozen=True)
 class Ceiling:
-    """What a flexible model leaves that could learn every validation condition.
+    """Residual of a flexible model that has learnt from every validation condition.
 
     Attributes
     ----------
@@ -66,11 +69,11 @@ def cross_fitted(
     found: Fit, training: Recordings, residual: FloatArray, validation: Recordings, measured: FloatArray,
     simulated: FloatArray, *, seed: int = 0, iterations: int = 60,
 ) -> Ceiling:  # fmt: skip
-    """Return what a flexible model leaves on pieces of the validation records that it has not seen.
+    """Return the residual of a flexible model on pieces of the validation records that it has not seen.
 
     It learns from the training tests and from the other pieces of the same record: first a gain, a lag and an offset
-    of that record, then trees on the simulated states. So it can learn every validation condition, which a model of
-    the training tests alone cannot.
+    of that record, then trees on the simulated states. It therefore learns every validation condition, unlike a model
+    of the training tests.
 
     Parameters
     ----------
@@ -110,7 +113,7 @@ def cross_fitted(
         left[judged] = rest[judged] - trees.predict(states[judged])
     for test in range(validation.tests):
         own = validation.test == test
-        # where nothing can be learnt, a flexible model only adds to the error
+        # where nothing can be learnt, a flexible model increases the error
         options = (target[own], plain[own], left[own])
         left[own] = min(options, key=lambda item: float(item @ item))
     return Ceiling(validation, measured, left, piece)
@@ -127,7 +130,7 @@ def _record_columns(recordings: Recordings, simulated: FloatArray) -> FloatArray
 
 
 def _without_record_fit(recordings: Recordings, columns: FloatArray, target: FloatArray, seen: BoolArray) -> FloatArray:
-    """Return the target without what a linear fit on the samples seen makes of each record."""
+    """Return the target less a linear fit of each record to its samples that are seen."""
     rest = target.copy()
     for test in range(recordings.tests):
         inside = recordings.test == test
@@ -209,7 +212,7 @@ def _trees(seed: int, iterations: int) -> HistGradientBoostingRegressor:
 
 
 def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations: int = 80) -> float:
-    """Return the mean square that a flexible model leaves of a fit's weighted residual, on whole tests left out."""
+    """Return the mean square of a fit's weighted residual after a flexible model, on whole tests left out."""
     problem = found.problem
     used = problem.root_weight > 0.0
     features, target = lagged_states(found, problem.recordings), found.residual

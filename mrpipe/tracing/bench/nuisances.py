@@ -1,4 +1,4 @@
-"""What is no physics of the damper: gains of records, and a moving average that the records went through."""
+"""Artefacts of the measurement: gains of single records and sessions, and a moving average of the records."""
 
 from __future__ import annotations
 
@@ -13,21 +13,13 @@ from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.residual_structure import BLOCK_S
+from mrpipe.tracing.rules import NuisanceRules, ValidationRules
 
 WINDOW_SHARES = (0.05, 0.1, 0.15)
-LEAST_GAIN = 0.05
-"""A filter, or a lag of the drive that falls otherwise than it rises, is believed in only if it takes this share of the
-sum of squares."""
+"""Numerical technique: lengths of a moving average that are tried first, in shares of a period."""
 
-
-LEAST_DEVIATION = 0.03
-"""Gains nearer to 1 than this are not worth a word."""
-
-DECLARED_SHARE = 1.0 / 3.0
-"""A session's gain is estimated from this first share of each of its records and judged on the rest."""
-
-FEWEST_OF_A_SESSION = 3
-"""So many records must agree on a gain before it is that of a session and not a record's own."""
+FIRST_STEP, LEAST_WINDOW = 0.02, 0.005
+"""Numerical technique: first step of the search for its length, and the shortest length, in shares of a period."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +28,20 @@ class RecordGain:
 
     value: float
     interval: tuple[float, float]
+    least: float = ValidationRules().deviation
 
     @property
     def deviates(self) -> bool:
-        """Return whether it is worth a word: away from 1, and surely so."""
-        return abs(self.value - 1.0) > LEAST_DEVIATION and not self.interval[0] <= 1.0 <= self.interval[1]
+        """Return whether the gain differs from 1 by more than `least`, and 1 lies outside its interval."""
+        return abs(self.value - 1.0) > self.least and not self.interval[0] <= 1.0 <= self.interval[1]
 
 
 def record_gains(
-    recordings: Recordings, measured: FloatArray, simulated: FloatArray, part: BoolArray | None = None
+    recordings: Recordings,
+    measured: FloatArray,
+    simulated: FloatArray,
+    part: BoolArray | None = None,
+    least: float = ValidationRules().deviation,
 ) -> dict[str, RecordGain]:
     """Return the gain of each test.
 
@@ -55,7 +52,9 @@ def record_gains(
     measured, simulated
         Offset-free force [N], shape (n,).
     part
-        Samples to go by, shape (n,); all that are compared where left out.
+        Samples that are used, shape (n,); by default all that are compared.
+    least
+        Difference from 1 that is reported.
     """
     found = {}
     for index, name in enumerate(recordings.names):
@@ -67,13 +66,13 @@ def record_gains(
         block = (own - own[0]) // max(1, round(BLOCK_S / recordings.dt[index]))
         scores = np.bincount(block, weights=simulated[own] * (measured[own] - gain * simulated[own]))
         half = 1.96 * float(np.sqrt(scores @ scores)) / power
-        found[name] = RecordGain(gain, (gain - half, gain + half))
+        found[name] = RecordGain(gain, (gain - half, gain + half), least)
     return found
 
 
 @dataclass(frozen=True)
 class SessionGain:
-    """One factor on the force of several validation records: a load cell or damper that was otherwise that day.
+    """One factor on the force of several validation records, because the load cell or the damper has changed.
 
     Attributes
     ----------
@@ -85,6 +84,8 @@ class SessionGain:
         Standard deviation of the gains of the training tests.
     without, with_it
         NRMSE over the rest of all validation records, which the estimate has not seen.
+    first_part
+        Share of each record from which the gain is estimated.
     """
 
     value: float
@@ -93,15 +94,16 @@ class SessionGain:
     spread_in_training: float
     without: float
     with_it: float
+    first_part: float = ValidationRules().first_part
 
     def as_json(self) -> dict[str, Any]:
-        """Return what the summary says of it."""
+        """Return the gain as JSON."""
         return {
             "value": self.value,
             "unit": "1",
             "interval": list(self.interval),
             "tests": list(self.tests),
-            "estimated_from": f"the first {100.0 * DECLARED_SHARE:.0f} % of each record; errors are those of the rest",
+            "estimated_from": f"the first {100.0 * self.first_part:.0f} % of each record; errors are those of the rest",
             "spread_of_training_gains": self.spread_in_training,
             "nrmse_without": self.without,
             "nrmse_with": self.with_it,
@@ -114,11 +116,13 @@ def session_gain(
     simulated: FloatArray,
     training: Mapping[str, RecordGain],
     levels: FloatArray | None = None,
+    rules: NuisanceRules | None = None,
+    validation: ValidationRules | None = None,
 ) -> SessionGain | None:
-    """Return the gain that validation records of one session share, or None where none is confirmed.
+    """Return the gain that validation records of one session share, or None if none is confirmed.
 
-    It is confirmed where at least three records deviate to the same side by more than twice the spread of the training
-    tests' gains, and agree among themselves to within half of what they deviate by.
+    It is confirmed if enough records deviate to the same side by more than the spread of the training tests' gains, and
+    their gains agree.
 
     Parameters
     ----------
@@ -127,23 +131,27 @@ def session_gain(
     training
         Gains of the training tests, by the same model.
     levels
-        Mean drive of each training test: a record whose drive is none of these tells of the model between the levels,
-        not of its session. Not looked at where left out.
+        Mean drive of each training test. A record at another drive is skipped, because its gain depends on how the
+        model interpolates between the levels. All records are used if None.
+    rules, validation
+        Decision thresholds; their defaults if None.
     """
-    first = recordings.time < DECLARED_SHARE * (np.diff(recordings.starts) * recordings.dt)[recordings.test]
-    gains = record_gains(recordings, measured, simulated, first)
+    rules, validation = rules or NuisanceRules(), validation or ValidationRules()
+    first = recordings.time < validation.first_part * (np.diff(recordings.starts) * recordings.dt)[recordings.test]
+    gains = record_gains(recordings, measured, simulated, first, validation.deviation)
     if levels is not None:
-        strange = _strange_to(recordings, levels)
+        strange = _strange_to(recordings, levels, validation.level)
         gains = {name: item for name, item in gains.items() if name not in strange}
     spread = float(np.std([item.value for item in training.values()])) if training else 0.0
     for side in (-1.0, 1.0):
-        chosen = {name: g.value for name, g in gains.items() if g.deviates and side * (g.value - 1.0) > 2.0 * spread}
-        if len(chosen) < FEWEST_OF_A_SESSION:
+        away = {name: side * (gain.value - 1.0) for name, gain in gains.items() if gain.deviates}
+        chosen = {name: gains[name].value for name, distance in away.items() if distance > rules.spreads * spread}
+        if len(chosen) < rules.fewest_of_session:
             continue
         values = np.array(list(chosen.values()))
         value = float(np.mean(values))
         deviation = float(np.std(values, ddof=1))
-        if deviation > 0.5 * abs(value - 1.0):
+        if deviation > rules.agreement * abs(value - 1.0):
             continue
         half = float(stats.t.ppf(0.975, len(values) - 1) * deviation / np.sqrt(len(values)))
         rest = recordings.used & ~first
@@ -153,7 +161,8 @@ def session_gain(
             float(np.sqrt(np.mean((measured - simulated * factor)[rest] ** 2))) / power
             for factor in (np.ones(len(measured)), np.where(weaker, value, 1.0))
         )
-        return SessionGain(value, (value - half, value + half), tuple(chosen), spread, without, with_it)
+        interval = (value - half, value + half)
+        return SessionGain(value, interval, tuple(chosen), spread, without, with_it, validation.first_part)
     return None
 
 
@@ -163,44 +172,48 @@ def mean_drives(recordings: Recordings) -> FloatArray:
     return np.asarray(np.bincount(recordings.test, weights=recordings.drive, minlength=recordings.tests) / counts)
 
 
-def _strange_to(recordings: Recordings, levels: FloatArray) -> set[str]:
+def _strange_to(recordings: Recordings, levels: FloatArray, share: float) -> set[str]:
     means = mean_drives(recordings)
-    margin = 0.1 * max(float(np.max(np.abs(levels))), 1e-12)
+    margin = share * max(float(np.max(np.abs(levels))), 1e-12)
     return {name for name, mean in zip(recordings.names, means, strict=True) if np.min(np.abs(levels - mean)) > margin}
 
 
-def observation_window(found: Fit, shares: Sequence[float] = WINDOW_SHARES) -> tuple[float, Fit]:
-    """Return the moving average (as share of each test's period) that suits the records, and the fit with it.
+def observation_window(
+    found: Fit, shares: Sequence[float] = WINDOW_SHARES, rules: NuisanceRules | None = None
+) -> tuple[float, Fit]:
+    """Return the length of a moving average of the records (as share of each test's period), and the fit with it.
 
-    The share is 0 and the fit the same where none is worth it. Displacement and force went through the same filter;
-    what is left of it is that the force of the filtered motion is not the filtered force.
+    The share is 0 and the fit is unchanged if no moving average lowers the error enough. Displacement and force went
+    through the same filter. It is visible because the force of the filtered motion is not the filtered force.
     """
+    least = (rules or NuisanceRules()).least_gain
     given = len(shares) == 1
     trials = {share: _with(found, share) for share in shares}
     best = min(trials, key=lambda share: trials[share].cost)
     if given:
         return best, trials[best]
-    if trials[best].cost > (1.0 - LEAST_GAIN) * found.cost:
+    if trials[best].cost > (1.0 - least) * found.cost:
         return 0.0, found
-    width = 0.02
+    width = FIRST_STEP
     for _ in range(3):
         for share in (best - width, best + width):
-            if share > 0.005 and share not in trials:
+            if share > LEAST_WINDOW and share not in trials:
                 trials[share] = _with(trials[best], share)
         best = min(trials, key=lambda share: trials[share].cost)
         width *= 0.5
     return best, trials[best]
 
 
-def with_lag_apart(found: Fit) -> Fit:
-    """Return the fit with rates of its own for the falling drive, or the same fit where that is not worth it."""
+def with_lag_apart(found: Fit, rules: NuisanceRules | None = None) -> Fit:
+    """Return the fit with a separate lag for the falling drive, or the same fit if that does not lower the error."""
+    least = (rules or NuisanceRules()).least_gain
     base = found.problem.base
     if not base.lag_known or base.lag_apart:
         return found
     problem = replace(found.problem, base=replace(base, lag_apart=True))
     values = {**found.base_values, "eta_fall": found.base_values["eta"]}
     trial = fit(problem, start_of(problem, values, found.term_values), iterations=12)
-    return trial if trial.cost < (1.0 - LEAST_GAIN) * found.cost else found
+    return trial if trial.cost < (1.0 - least) * found.cost else found
 
 
 def _with(found: Fit, share: float) -> Fit:

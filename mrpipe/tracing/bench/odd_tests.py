@@ -10,9 +10,7 @@ import numpy as np
 
 from mrpipe.campaigns.plausibility import Finding, TestArrays, compare_tests
 from mrpipe.signals.prepared import PreparedTest
-
-FEWEST = 2
-"""So many training tests must remain; with fewer nothing is left out, because there is nothing to compare with."""
+from mrpipe.tracing.rules import ValidationRules
 
 SAME_RECORD = "same-record"
 """Finding for tests that hold the same samples: the second of them is no independent test."""
@@ -57,12 +55,13 @@ class SortedTests:
         return [{**item.as_dict(), "left_out": item.test in self.left_out} for item in self.findings]
 
 
-def sort_tests(tests: Sequence[PreparedTest]) -> SortedTests:
+def sort_tests(tests: Sequence[PreparedTest], rules: ValidationRules | None = None) -> SortedTests:
     """Compare the tests with each other and leave harmed ones out of the fit.
 
     A harmed validation test stays: its error is reported, and the verdict names it. A validation test that holds the
     samples of another test is left out, because the fit may have seen it.
     """
+    fewest_training = (rules or ValidationRules()).fewest_training
     findings = compare_tests([_arrays(test) for test in tests])
     named = {item.test: item for item in reversed(findings) if item.test}
     out = [
@@ -71,7 +70,7 @@ def sort_tests(tests: Sequence[PreparedTest]) -> SortedTests:
         if test.name in named and (test.role != "validation" or named[test.name].name == SAME_RECORD)
     ]
     kept = [test for test in tests if test.name not in out]
-    for validation, fewest in ((False, FEWEST), (True, 1)):
+    for validation, fewest in ((False, fewest_training), (True, 1)):
         if sum((test.role == "validation") == validation for test in kept) < fewest:
             out = [
                 name for name in out if any(t.name == name and (t.role == "validation") != validation for t in tests)

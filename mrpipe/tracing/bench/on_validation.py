@@ -1,4 +1,4 @@
-"""Errors on the validation tests before and after, what of them is comparable, and the verdict that follows."""
+"""Errors on the validation tests before and after, their comparable part, and the verdict that follows."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def on_validation(
         shared = None
     judged: Judged = judged_part(validation, after, shared, first)
     recordings = judged.recordings
-    gains = record_gains(recordings, judged.measured, after)
+    gains = record_gains(recordings, judged.measured, after, least=rules.deviation)
     if record_gain:
         given = record_gains(validation, judged.measured, after, first)
         factor = np.array([given[name].value if name in given else 1.0 for name in validation.names])[validation.test]

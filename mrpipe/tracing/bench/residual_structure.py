@@ -1,4 +1,4 @@
-"""Is there anything in a residual but noise, and what does it vary with."""
+"""Whether a residual contains more than noise, and which states it depends on."""
 
 from __future__ import annotations
 
@@ -11,11 +11,22 @@ from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.fitting.engine import Fit, chain_of
 from mrpipe.fitting.kernel import CURRENT_AT, HYSTERESIS_AT, WORK_AT, run_recordings
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.tracing.rules import LocationRules
 
 BLOCK_S = 0.4
-"""Length of the blocks whose means are taken as independent."""
+"""Numerical technique: length [s] of the blocks whose means are taken as independent."""
 
 BINS = 16
+"""Numerical technique: steps of the step function of a state."""
+
+LAGS_FIT = 4
+"""Numerical technique: autocorrelations are tested on records of at least this many times as many samples as lags."""
+
+ELASTIC_SHARE = 0.1
+"""Numerical technique: yield displacement of a form that has no such parameter, as a share of the stroke."""
+
+THIRD = 1.0 / 3.0
+"""Numerical technique: a test is divided into three parts of equal length."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +82,11 @@ def memory_of(recordings: Recordings) -> tuple[FloatArray, FloatArray, FloatArra
 
 
 def structure_p_value(residual: FloatArray, states: States) -> float:
-    """Return the probability that noise alone hangs together with the states as this residual does.
+    """Return the probability that noise alone correlates with the states as strongly as this residual does.
 
-    For each state and its product with direction the covariance with the residual is summed in blocks; blocks are
-    independent where samples are not, so the bounds allow for autocorrelation. Corrected for the number of states.
+    For each state and its product with direction, the covariance with the residual is summed in blocks. Blocks are
+    independent although samples are not, so the result allows for autocorrelation. It is corrected for the number of
+    states.
     """
     used = residual != 0.0
     blocks, index = np.unique(states.block[used], return_inverse=True)
@@ -115,7 +127,7 @@ def correlation_p_value(residual: FloatArray, recordings: Recordings, lags: int 
     for test in range(recordings.tests):
         values = residual[recordings.used & (recordings.test == test)]
         size = len(values)
-        if size < 4 * lags:
+        if size < LAGS_FIT * lags:
             continue
         centred = values - np.mean(values)
         power = float(centred @ centred)
@@ -153,18 +165,21 @@ def dependence(residual: FloatArray, states: States) -> list[tuple[str, float]]:
     return sorted(found, key=lambda item: -item[1])
 
 
-def location(residual: FloatArray, found: Fit, recordings: Recordings, states: States) -> dict[str, dict[str, float]]:
-    """Return where the residual lives: shares of its sum of squares by stage of the cycle, drive, direction, time."""
+def location(
+    residual: FloatArray, found: Fit, recordings: Recordings, states: States, rules: LocationRules | None = None
+) -> dict[str, dict[str, float]]:
+    """Return the shares of the residual's sum of squares by part of the cycle, drive, direction and time."""
+    rules = rules or LocationRules()
     squares = residual**2
     total = max(float(np.sum(squares)), 1e-300)
     z, v = states.values["hysteresis"], states.values["velocity"]
     y = np.sign(v) * z
-    length = found.base_values.get("yield_displacement", 0.1 * found.problem.scales.stroke)
+    length = found.base_values.get("yield_displacement", ELASTIC_SHARE * found.problem.scales.stroke)
     reversal = (y < 0.0) | (states.values["past of displacement"] < 0.5 * length)
-    post = (y > 0.9) & ~reversal
+    post = (y > rules.post_yield) & ~reversal
     rate = states.values["rate of drive"]
     scale = max(float(np.max(np.abs(recordings.drive))), 1e-12)
-    rising, falling = rate > 0.05 * scale, rate < -0.05 * scale
+    rising, falling = rate > rules.drive_rate * scale, rate < -rules.drive_rate * scale
     thirds = recordings.time / np.maximum(np.diff(recordings.starts) * recordings.dt, 1e-12)[recordings.test]
 
     def shares(parts: dict[str, BoolArray]) -> dict[str, float]:
@@ -175,6 +190,10 @@ def location(residual: FloatArray, found: Fit, recordings: Recordings, states: S
         "drive": shares({"rising": rising, "falling": falling, "constant": ~rising & ~falling}),
         "direction": shares({"positive": v > 0.0, "negative": v <= 0.0}),
         "time": shares(
-            {"first": thirds < 1 / 3, "second": (thirds >= 1 / 3) & (thirds < 2 / 3), "third": thirds >= 2 / 3}
+            {
+                "first": thirds < THIRD,
+                "second": (thirds >= THIRD) & (thirds < 2.0 * THIRD),
+                "third": thirds >= 2.0 * THIRD,
+            }
         ),
     }

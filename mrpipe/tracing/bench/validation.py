@@ -16,7 +16,7 @@ from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Difference
 
 LAGS = 41
-"""Number of lags on the grid; the best is refined by a parabola."""
+"""Numerical technique: number of lags on the grid; the best is refined by a parabola."""
 
 RANGES = {"displacement": "amplitude", "velocity": "speed", "drive": "drive"}
 """Channel -> kind of difference where a test leaves the range of the training tests."""
@@ -188,7 +188,7 @@ def compare(
         Decision thresholds.
     """
     typical = float(np.median([item.error for item in trained])) if trained else 0.0
-    high = float(np.quantile([item.error for item in trained], 0.9)) if trained else 0.0
+    high = float(np.quantile([item.error for item in trained], rules.worst_share)) if trained else 0.0
     used, squares = validation.used, (measured - simulated) ** 2
     comparable = used.copy()
     kinds: dict[str, list[tuple[str, float]]] = {}

@@ -1,4 +1,4 @@
-"""Weights of samples: what noise of the channels makes of the force, and what repeated motion shows of it."""
+"""Weights of the samples, from the noise of the channels and from motion that is repeated."""
 
 from __future__ import annotations
 
@@ -13,36 +13,31 @@ from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.kernel import FORCE_AT, run_recordings
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.signals.filters import butterworth_lowpass
-
-LEAST_SHARE = 0.002
-"""No sample is trusted better than this share of the force RMS: model error below it is of no interest."""
-
-LEAST_PAIR_SAMPLES = 400
-"""So many samples must be repeated before their differences count as noise."""
-
-LEAST_FACTOR = 0.25
-"""Repeats of few samples may agree by chance: no variance is taken below this share of what the channel shows."""
+from mrpipe.tracing.rules import NoiseRules
 
 SHORTEST_CYCLE = 8
-"""Cycles of fewer samples cannot be compared sample by sample."""
+"""Numerical technique: cycles of fewer samples are not compared sample by sample."""
 
 AVERAGED_S = 0.02
-"""Time over which simulated effects of noise are averaged."""
+"""Numerical technique: time [s] over which the simulated variance of the noise is averaged."""
+
+LEAST_EXPECTED = 0.05
+"""Numerical technique: least expected variance in the regression of the factors, as a share of the first guess."""
 
 
 @dataclass(frozen=True)
 class NoiseScale:
     """How much larger the variance of the noise is than the channels themselves show.
 
-    White noise of a channel is seen at its highest frequencies. Noise that lies in the band of the motion, hum and
-    what a machine does not repeat are not seen there; repeated motion shows them.
+    White noise of a channel is visible at its highest frequencies. Noise in the band of the motion, hum, and motion
+    that the machine does not repeat are not visible there. They show in repeated motion.
 
     Attributes
     ----------
     force, motion
-        Factors on the variance of the force channel's noise and of what displacement noise does to the simulated force.
+        Factors on the variance of the force channel's noise, and on that of the force that displacement noise causes.
     repeats, cycles
-        Number of pairs of repeated tests and of repeated cycles that the factors come from.
+        Number of pairs of repeated tests and of repeated cycles that the factors are estimated from.
     """
 
     force: float = 1.0
@@ -65,11 +60,11 @@ AS_SHOWN = NoiseScale()
 def noise_variances(
     found: Fit, recordings: Recordings, *, draws: int = 3, seed: int = 0
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the variances of the force that white noise of force and displacement channels explain [N^2], (n,) each.
+    """Return the variances of the force due to white noise of the force and the displacement channel [N^2], (n,) each.
 
     That of the displacement is (F(x + noise) - F(x))^2 from simulations, averaged over a short time. At a reversal the
     force rises by hundreds of newtons for each millimetre, so micrometres of displacement noise become newtons; where
-    the rod rests or creeps, noise turns the hysteresis back and forth, which no formula in the present slope shows.
+    the rod rests or creeps, noise reverses the hysteresis again and again, which a linearisation does not show.
 
     Parameters
     ----------
@@ -98,15 +93,16 @@ def sensor_deviation(found: Fit, recordings: Recordings, scale: NoiseScale = AS_
     return np.asarray(np.sqrt(scale.force * force + scale.motion * motion), dtype=np.float64)
 
 
-def noise_scale(found: Fit) -> NoiseScale:
-    """Return by how much repeated tests and cycles differ, in units of the noise that the channels show.
+def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
+    """Return the noise in repeated tests and cycles, in units of the noise that the channels show.
 
-    The error of a model is the same function of the motion in both, so it cancels in the difference of their
+    The error of a model is the same function of the motion in both repeats, so it cancels in the difference of their
     residuals. Squared differences are regressed on the two variances; neither factor is negative.
     """
+    rules = rules or NoiseRules()
     problem = found.problem
     recordings, root = problem.recordings, problem.root_weight
-    repeats, cycles = _repeats(recordings), _cycles(recordings)
+    repeats, cycles = _repeats(recordings, rules), _cycles(recordings, rules)
     residual = np.divide(found.residual, root, out=np.zeros_like(root), where=root > 0.0)
     force, motion = noise_variances(found, recordings)
     rows, targets = [], []
@@ -115,29 +111,29 @@ def noise_scale(found: Fit) -> NoiseScale:
         a, b = first[both], second[both]
         rows.append(np.stack([force[a] + force[b], motion[a] + motion[b]], axis=1))
         targets.append(np.square(residual[a] - residual[b]))
-    if not rows or sum(map(len, targets)) < LEAST_PAIR_SAMPLES:
+    if not rows or sum(map(len, targets)) < rules.least_samples:
         return AS_SHOWN
     columns, target = np.concatenate(rows), np.concatenate(targets)
-    # squared differences scatter as their mean does: weigh by it, once guessed and once found
+    # the scatter of squared differences is proportional to their mean: weight by the mean, and repeat
     expected = columns.sum(axis=1)
     factors = np.ones(2)
     for _ in range(3):
         weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
         factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
-        expected = np.maximum(columns @ factors, 0.05 * columns.sum(axis=1))
-    force_factor, motion_factor = (max(float(factor), LEAST_FACTOR) for factor in factors)
+        expected = np.maximum(columns @ factors, LEAST_EXPECTED * columns.sum(axis=1))
+    force_factor, motion_factor = (max(float(factor), rules.least_factor) for factor in factors)
     return NoiseScale(force_factor, motion_factor, len(repeats), len(cycles))
 
 
-def _repeats(recordings: Recordings) -> list[tuple[IntArray, IntArray]]:
+def _repeats(recordings: Recordings, rules: NoiseRules) -> list[tuple[IntArray, IntArray]]:
     starts = recordings.starts
     return [
         (np.arange(starts[first], starts[first + 1]), np.arange(starts[second], starts[second + 1]))
-        for first, second in repeated_pairs(recordings)
+        for first, second in repeated_pairs(recordings, rules)
     ]
 
 
-def _cycles(recordings: Recordings) -> list[tuple[IntArray, IntArray]]:
+def _cycles(recordings: Recordings, rules: NoiseRules) -> list[tuple[IntArray, IntArray]]:
     """Return the samples of one cycle and of the next, for tests whose motion and drive repeat from cycle to cycle."""
     found = []
     largest = max(float(np.max(np.abs(recordings.drive))), 1e-12)
@@ -150,8 +146,8 @@ def _cycles(recordings: Recordings) -> list[tuple[IntArray, IntArray]]:
             a = np.arange(begin, begin + period)
             b = a + period
             x, y = recordings.displacement[a], recordings.displacement[b]
-            alike = np.sqrt(np.mean((recordings.drive[a] - recordings.drive[b]) ** 2)) < 0.02 * largest
-            if alike and np.std(x - y) < 0.04 * np.std(x):
+            alike = np.sqrt(np.mean((recordings.drive[a] - recordings.drive[b]) ** 2)) < rules.same_drive * largest
+            if alike and np.std(x - y) < rules.same_motion * np.std(x):
                 found.append((a, b))
     return found
 
@@ -179,9 +175,13 @@ def _locally_averaged(values: FloatArray, recordings: Recordings) -> FloatArray:
 
 
 def force_deviation(
-    found: Fit, recordings: Recordings, model_error_share: float = 0.0, scale: NoiseScale = AS_SHOWN
+    found: Fit,
+    recordings: Recordings,
+    model_error_share: float = 0.0,
+    scale: NoiseScale = AS_SHOWN,
+    rules: NoiseRules | None = None,
 ) -> FloatArray:
-    """Return the deviation that weights go by [N], shape (n,): of noise and of what a model cannot follow.
+    """Return the standard deviation of noise and expected model error [N], shape (n,), whose inverse is the weight.
 
     Parameters
     ----------
@@ -193,13 +193,16 @@ def force_deviation(
         Tests.
     scale
         Factors on the force noise and on the motion noise.
+    rules
+        Decision thresholds; their defaults if None.
     """
-    floor = max(LEAST_SHARE, model_error_share) * recordings.force_rms
+    floor = max((rules or NoiseRules()).least_share, model_error_share) * recordings.force_rms
     return np.asarray(np.hypot(sensor_deviation(found, recordings, scale), floor), dtype=np.float64)
 
 
-def repeated_pairs(recordings: Recordings) -> list[tuple[int, int]]:
-    """Return pairs of tests whose motion and drive are the same but for what the machine cannot repeat."""
+def repeated_pairs(recordings: Recordings, rules: NoiseRules | None = None) -> list[tuple[int, int]]:
+    """Return pairs of tests with the same motion and drive, within the accuracy of the machine."""
+    rules = rules or NoiseRules()
     pairs = []
     starts = recordings.starts
     drive_scale = max(float(np.max(np.abs(recordings.drive))), 1e-12)
@@ -209,8 +212,9 @@ def repeated_pairs(recordings: Recordings) -> list[tuple[int, int]]:
                 continue
             a, b = slice(starts[first], starts[first + 1]), slice(starts[second], starts[second + 1])
             x, y = recordings.displacement[a], recordings.displacement[b]
-            same = np.std(x - y) < 0.04 * np.std(x)
-            alike = np.sqrt(np.mean((recordings.drive[a] - recordings.drive[b]) ** 2)) < 0.02 * drive_scale
+            same = np.std(x - y) < rules.same_motion * np.std(x)
+            difference = np.sqrt(np.mean((recordings.drive[a] - recordings.drive[b]) ** 2))
+            alike = difference < rules.same_drive * drive_scale
             if same and alike and np.std(x) > 0.0:
                 pairs.append((first, second))
     return pairs
