@@ -24,7 +24,7 @@ REALISATION = 5
 CAPACITY = 6  # N, of all dampers at one position together
 COUNT = 7  # dampers side by side at each position
 FILTER_RATE = 8  # 1/s of the voltage filter, 0: none
-CONTROL_EVERY = 9  # steps a controller sample, at which forces are asked for and voltages commanded
+CONTROL_EVERY = 9  # steps a controller sample, at which forces are requested and voltages commanded
 FORCE_A = 10  # Bingham of one damper: N, N/V, N s/m, N s/m/V
 FORCE_B = 11
 VISCOSITY_A = 12
@@ -67,7 +67,7 @@ def dissipative_force(
     Moving forward it resists with max(0, push + viscosity v), backward with min(0, -pull + viscosity v), at rest with
     anything between. Where the velocity passes zero within the step the force is that before the reversal for the part
     of the step up to it, and after it what holds the rod, or resists it on its way back: reversals do not wait for the
-    end of a step, so that what they do depends little on its length.
+    end of a step, so that the result depends little on its length.
 
     Parameters
     ----------

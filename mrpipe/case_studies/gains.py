@@ -111,7 +111,7 @@ def exact_viscous(modal: ModalModel, stiffness: float, scale: float, modes: int 
 def viscous_for_damping(modal: ModalModel, stiffness: float, ratio: float, scale: float, modes: int = 1) -> float:
     """Return c [N s/m] of every device that gives the lowest modes at least the damping ratio `ratio`.
 
-    Where no gain reaches it, the gain of the largest damping is returned.
+    If no gain reaches it, the gain of the largest damping is returned.
     """
     best = exact_viscous(modal, stiffness, scale, modes)
     if lowest_damping(modal, best, stiffness, modes) <= ratio:

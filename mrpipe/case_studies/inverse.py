@@ -14,7 +14,7 @@ from mrpipe.networks.training import Trained, train
 KINDS = ("sine", "triangle", "step", "gaussian")
 """Displacement inputs of the training set (6.1)."""
 RATE_HZ = 200.0
-"""Sampling of the training records; the inverse has no memory, so that the rate of its use is free."""
+"""Sampling of the training records; the inverse has no memory, so it can be used at any rate."""
 _RECORD_S = 4.0
 
 

@@ -214,7 +214,7 @@ def command(
     if law == CONSTANT:
         return 0.0, gains[VOLTAGE]
     if abs(v) < REST:
-        v = 0.0  # a rod that its damper holds: what is left of its velocity is rounding, and so is its sign
+        v = 0.0  # a rod that its damper holds: its remaining velocity is rounding error, and so is the sign
     desired = wanted if law == LQG else desired_force(law, gains, x, v, amplitude)
     if settings[REALISATION] < BINGHAM:
         return desired, 0.0
@@ -229,7 +229,7 @@ def device_force(
     motion: tuple[float, float, float, float],
     compliance: float,
 ) -> float:
-    """Return the mean force [N] of one device over a step (all but damper chains).
+    """Return the mean force [N] of one device over a step (except damper chains).
 
     `drive` is desired force, voltage, amplitude; `motion` is x, v at the start, and both at the end without the force.
     """

@@ -161,7 +161,7 @@ def sampled_loop_radius(A: FloatArray, B: FloatArray, controller: SampledControl
     A, B
         Plant, forces that push.
     controller
-        Its measurement sees the force of the sample before, as in a run.
+        Its measurement contains the force of the previous sample, as in a run.
     """
     n, k = B.shape
     m = controller.step.shape[0]

@@ -159,7 +159,7 @@ def load_motion(
     Parameters
     ----------
     file, second_file
-        Record, and that of the second component where it has a file of its own.
+        Record, and that of the second component if it is a separate file.
     rng
         For the synthetic motion.
     unit, interval_s

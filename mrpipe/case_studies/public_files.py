@@ -1,4 +1,4 @@
-"""Models and records by name: those of the public data stand under names of their own, all others are paths."""
+"""Models and records by name: names refer to the public data, everything else is a path."""
 
 from __future__ import annotations
 

@@ -175,7 +175,7 @@ def beside_thesis(
     indices, thesis
         Law -> index -> value.
     model
-        `published` or `surrogate`, said in a column of its own.
+        `published` or `surrogate`, shown in a separate column.
     """
     rows = []
     for name in next(iter(indices.values())):

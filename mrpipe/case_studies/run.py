@@ -63,7 +63,7 @@ class Controller:
     law
         `none` (no device), `kelvin` (4.14), `friction` (4.18 with 4.20), `lqg`, or `constant` voltage.
     realisation
-        `active` (the force as asked), `semi-active` (an ideal damper: clipped to what it can resist), `bingham` (the
+        `active` (the force as asked), `semi-active` (an ideal damper: clipped to resisting forces), `bingham` (the
         damper of P4 (6) under a voltage), `chain` (a damper as a chain of steps, one position only).
     viscous, stiffness, friction, voltage
         Gains c [N s/m], k_d [N/m], alpha [N/m] and constant voltage [V]; of each position.

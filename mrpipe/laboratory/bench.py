@@ -140,7 +140,7 @@ def record_bench(
     rng
         Generator: one number is drawn, from which each test has its own.
     progress
-        Told how far it is.
+        Called with the share done and a text.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def record_bench(
 
 
 def _at_first(tests: Sequence[BenchTest], motions: Sequence[FineMotion]) -> list[FineMotion]:
-    """Return the motions that shares are told of: a test made later does not change the damper."""
+    """Return the motions that shares of effects refer to; later tests do not count, so the damper stays the same."""
     first = [motion for test, motion in zip(tests, motions, strict=True) if not test.later]
     return first or list(motions)
 

@@ -63,7 +63,7 @@ def run_loop(
     ground
         Ground acceleration on the fine clock, shape (m,) [m/s2].
     rig
-        Clock and sensors; the controller sees the noise of its own sensors.
+        Clock and sensors; the noise of its sensors enters the controller.
     rng
         Generator of that noise.
 
@@ -141,7 +141,7 @@ def record_closed_loop(
     rng
         Generator.
     progress
-        Told how far it is.
+        Called with the share done and a text.
     """
     floors = structure.frame.floors
     lasers = tuple(floor for floor in rig.laser_floors if 1 <= floor <= floors)

@@ -139,7 +139,7 @@ def parallel_force(
         elif code == INERTIA_PLAIN:
             force += numbers[0] * a * (1.0 + (x / numbers[1]) ** 2)
         elif code == INERTIA_GROWTH:
-            # what is left of it where the constant part moves as a mass of the structure
+            # the remaining part, if the constant part moves as a mass of the structure
             force += numbers[0] * a * (x / numbers[1]) ** 2
         elif code == DRAG_POWER:
             force += numbers[0] * v * abs(v) ** (numbers[1] - 1.0)

@@ -206,12 +206,12 @@ UNFAMILIAR_FORMS = tuple(form.form for form in FORMS if form.effect == "unfamili
 
 
 def find_form(effect: str, form: str = "", *, source: str = "laboratory.effects") -> Form:
-    """Return a form by name (the first of the effect where none is named).
+    """Return a form by name (the first form of the effect if no form is named).
 
     Raises
     ------
     UserError
-        If there is no such effect or form.
+        If the effect or the form does not exist.
     """
     found = [item for item in FORMS if item.effect == effect and form in ("", item.form)]
     if not found:

@@ -150,7 +150,7 @@ def record_frame(
     rng
         Generator of offsets, noise and random motion.
     progress
-        Told how far it is.
+        Called with the share done and a text.
     """
     assembled = assemble(structure, rig.step_s)
     n = structure.frame.floors

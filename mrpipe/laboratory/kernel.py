@@ -97,7 +97,7 @@ def damper_step(
     x1, v0, v1, a1
         Motion of the actuator at the end (v0: start) of the step [m], [m/s], [m/s2].
     drive
-        Coil current that the driver is asked for, at the end of the step [A].
+        Coil current commanded to the driver at the end of the step [A].
     time
         Time in the test at the end of the step [s].
     h

@@ -1,4 +1,4 @@
-"""Motions and currents of a bench test on the fine clock, and what the servo makes of them."""
+"""Commanded motions and currents of a bench test on the fine clock, and how the servo distorts them."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def current_of(
     if test.current == "steps":
         count = int(np.ceil(time[-1] / test.pause_s)) + 1
         levels = rng.uniform(0.0, 1.0, count)
-        # one step to nothing and one to the largest at least, so that residual and peak are both seen
+        # at least one step to 0 and one to the largest current, so that residual and peak force are recorded
         levels[count // 3], levels[count // 3 - 1] = 0.0, 1.0
         edges = (np.arange(count) + rng.uniform(-0.25, 0.25, count)) * test.pause_s
         index = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, count - 1)

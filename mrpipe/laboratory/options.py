@@ -116,7 +116,7 @@ class CustomTest(Section):
     """One test of a custom plan."""
 
     name: str = Field(description="Name of the test.")
-    role: Literal["training", "validation", "repeat"] = Field("training", description="What it is for.")
+    role: Literal["training", "validation", "repeat"] = Field("training", description="Role of the test.")
     motion: Literal["sine", "triangle", "random", "earthquake", "dwell", "hold"] = Field(
         "sine", description="Motion; `dwell` visits several positions, `hold` pauses in the middle."
     )

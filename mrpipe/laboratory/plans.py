@@ -1,4 +1,4 @@
-"""Which tests a bench campaign is made of."""
+"""The tests of a bench campaign."""
 
 from __future__ import annotations
 

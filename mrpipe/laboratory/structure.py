@@ -95,7 +95,7 @@ class TrueStructure:
 
 
 def find_frame_form(effect: str, form: str = "", *, source: str = "laboratory.frame.hidden_effects") -> Form:
-    """Return a form of a structural effect (the first one where none is named).
+    """Return a form of a structural effect (the first one if no form is named).
 
     Raises
     ------
@@ -150,7 +150,7 @@ class Assembled:
 def exact_step(A: FloatArray, B: FloatArray, h: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return Ad, B0, B1 of z+ = Ad z + B0 u + B1 u+ for inputs linear within the step."""
     n, m = B.shape
-    # exponential of the chain u' = s, s' = 0 beside the states (Van Loan)
+    # exponential of the states augmented by u' = s, s' = 0 (Van Loan)
     block = np.zeros((n + 2 * m, n + 2 * m))
     block[:n, :n], block[:n, n : n + m] = A, B
     block[n : n + m, n + m :] = np.eye(m)
@@ -195,7 +195,7 @@ def assemble(structure: TrueStructure, h: float, *, added_mass_kg: float = 0.0) 
         heights[:n] = STOREY_HEIGHT_M * np.arange(1, n + 1)
         stiffness = 1.0 / max(rocking.strength, 1e-9)
         inertia = _ROCKING_INERTIA_SHARE * float(np.sum(np.diag(frame.mass) * heights[:n] ** 2))
-        # the columns bend by what is left when the base's turn is taken from the motion of the floors
+        # the columns bend by the motion of the floors less the rotation of the base
         for matrix in (K, C):
             inner = matrix[:-1, :-1]
             matrix[:-1, -1] = matrix[-1, :-1] = -inner @ heights

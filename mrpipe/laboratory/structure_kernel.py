@@ -102,7 +102,7 @@ _ROWS = float64[:, ::1]
 _ROW = float64[::1]
 
 
-# the signature is written out, so that a law is passed as a pointer and not compiled into a version of its own
+# the explicit signature passes a law as a pointer, so the function is not compiled again for each law
 @njit(
     types.Tuple((_ROWS, _ROWS, _ROWS))(
         _ROWS, _ROWS, _ROWS, _ROWS, _ROWS, _ROW, _ROWS, int64, _ROW, float64, int64, int64[::1], _ROWS, boolean,

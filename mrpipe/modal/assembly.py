@@ -36,7 +36,7 @@ class PartialModes:
     scaled_residues
         Shape (r,) [1/kg]: acceleration over force at the floor `driven`, nan where unknown.
     driven
-        Floor (from 0) where a measured force acts; -1 where none does.
+        Floor (from 0) where a measured force acts; -1 if none does.
     """
 
     angular_frequencies: FloatArray
@@ -51,7 +51,7 @@ class PartialModes:
 
 @dataclass(frozen=True)
 class Assembly:
-    """The structure as far as the modes determine it.
+    """The part of the structure that the modes determine.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ def _completed(shapes: FloatArray, modes: PartialModes, masses: FloatArray) -> F
     With L = M^(1/2) the mass-normalised shapes form an orthogonal matrix. Its measured rows A are known up to a scale
     d_r of each mode, and A diag(d^2) A' = 1 gives these scales. The other rows span the complement of the measured
     ones. Of all rotations of the complement the one is taken that leaves the smallest stiffness between floors that
-    are no neighbours, because the measurements themselves cannot tell.
+    are no neighbours, because the measurements cannot show it.
     """
     root = np.sqrt(masses)[:, None]
     rows = list(modes.measured)
@@ -208,7 +208,7 @@ def _completed(shapes: FloatArray, modes: PartialModes, masses: FloatArray) -> F
 
 
 def _mode_scales(rows: FloatArray) -> FloatArray:
-    """Return d (n,) of A diag(d^2) A' = 1 by least squares, or ones where that has no positive solution."""
+    """Return d (n,) of A diag(d^2) A' = 1 by least squares, or ones if there is no positive solution."""
     size = rows.shape[0]
     upper = [(i, j) for i in range(size) for j in range(i, size)]
     if len(upper) < rows.shape[1]:

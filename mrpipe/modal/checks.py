@@ -56,7 +56,7 @@ def sign_changes(mode_shape: ArrayLike, negligible: float = 0.03) -> int:
 def wrong_signs(mode_shapes: ArrayLike, mass: ArrayLike) -> tuple[tuple[int, int], ...]:
     """Return the fewest elements (floor, mode), from 1, whose sign must turn to make the columns orthogonal.
 
-    All sets of up to three elements are tried; empty where none takes the coupling off the diagonal below a quarter.
+    All sets of up to three elements are tried; empty if none reduces the off-diagonal coupling to less than a quarter.
     """
     U = np.asarray(mode_shapes, dtype=np.float64)
     M = np.asarray(mass, dtype=np.float64)

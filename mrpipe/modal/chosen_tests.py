@@ -115,7 +115,7 @@ def with_clocks(
 
 
 def without_complex(search: ModeSearch) -> ModeSearch:
-    """Return the modes without those whose shape is not real even with correct clocks: they are no modes."""
+    """Return the modes without those whose shape is not real even with correct clocks, because they are not modes."""
     kept = real_modes(search.fit)
     if not kept or len(kept) == len(search.numbers):
         return search

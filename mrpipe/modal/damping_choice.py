@@ -16,7 +16,7 @@ _WIDEST_DECAY_INTERVAL = 0.02
 
 
 def decays_of_modes(tests: FrameTests, fit: MultiModeFit) -> tuple[dict[int, DecayResult], list[str]]:
-    """Return the most certain free decay of each mode, by mode number from 1, and what the user should know."""
+    """Return the most certain free decay of each mode, by mode number from 1, and messages for the user."""
     results: dict[int, DecayResult] = {}
     findings = []
     for test in tests.decays:
@@ -37,7 +37,7 @@ def decays_of_modes(tests: FrameTests, fit: MultiModeFit) -> tuple[dict[int, Dec
 
 
 def _same_sensors(test: FrameTest, fit: MultiModeFit) -> tuple[FrameTest | None, FloatArray]:
-    """Return a decay test with the sensors that the fit knows as well, and the shapes at those, shape (s, r)."""
+    """Return a decay test with those sensors that the fit also has, and the shapes at them, shape (s, r)."""
     known = [Place(sensor.floor, sensor.direction) for sensor in fit.sensors]
     columns = [i for i, sensor in enumerate(test.sensors) if Place(sensor.floor, sensor.direction) in known]
     if not columns:
@@ -77,7 +77,7 @@ def choose_damping(
 
     Returns
     -------
-    Damping ratios, their sources, and what the user should know.
+    Damping ratios, their sources, and messages for the user.
     """
     chosen: list[Estimate] = []
     sources: list[str] = []

@@ -113,7 +113,7 @@ def decay_start(test: FrameTest, coordinate: FloatArray, omega: float) -> int:
     rate = test.sampling_rate_hz
     envelope = np.abs(signal.hilbert(_band_pass(coordinate, omega, rate)))
     largest = int(np.argmax(envelope))
-    # a decay that begins with the record is largest at its beginning, apart from the ringing of the filter
+    # a decay that begins with the record is largest at its beginning, except for the ringing of the filter
     largest = 0 if largest < _edge_s(2.0 * np.pi / omega, coordinate.size / rate, True) * rate else largest
     if test.excitation is None:
         return largest
@@ -161,7 +161,7 @@ def _peaks(values: FloatArray, rate: float, omega: float) -> tuple[FloatArray, F
 
 
 def _useful(peak: FloatArray, noise: float) -> int:
-    """Number of leading peaks down to a fifth of the first and well above the noise (six where there are so many)."""
+    """Number of leading peaks down to a fifth of the first and well above the noise (at most six)."""
     above = peak > max(0.2 * peak[: min(4, peak.size)].max(), 8.0 * noise)
     below = np.flatnonzero(~above)
     return int(max(below[0] if below.size else peak.size, min(6, peak.size)))
@@ -234,7 +234,7 @@ def exponential_fit(
 def analyse_decay(
     test: FrameTest, mode_shapes: FloatArray, angular_frequencies: FloatArray, damping_ratios: FloatArray
 ) -> DecayResult | None:
-    """Return the damping that a decay test shows, or None where no decay stands out of the noise.
+    """Return the damping that a decay test shows, or None if no decay exceeds the noise.
 
     Parameters
     ----------

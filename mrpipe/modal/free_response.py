@@ -46,12 +46,12 @@ class FreeMode:
 
 
 def same_place(test: FrameTest, first: float, second: float) -> bool:
-    """Return whether two angular frequencies [rad/s] are one, as far as the length of the test tells."""
+    """Return whether two angular frequencies [rad/s] are equal within the resolution of the test."""
     return abs(first - second) <= max(0.01 * second, 4.0 * np.pi / test.duration_s)
 
 
 def strongest_frequency(test: FrameTest, band_hz: tuple[float, float]) -> float | None:
-    """Return where [rad/s] a decay test is strongest inside a band; None where it has no line there."""
+    """Return where [rad/s] a decay test is strongest inside a band; None if it has no line there."""
     accelerations = _accelerations(test)
     frequency = np.fft.rfftfreq(accelerations.shape[0], 1.0 / test.sampling_rate_hz)
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])

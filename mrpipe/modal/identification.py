@@ -47,7 +47,7 @@ class FrameIdentification:
     decays
         One a mode at most (the most certain one); modes without a decay are missing.
     fit, tridiagonal, in_time, in_frequency
-        Parts, for the artifact and the report; None or empty where there is no frame.
+        Parts, for the artifact and the report; None or empty without a frame.
     phase_scatter
         Shape (n,): largest imaginary part of a mode's residues over the largest residue.
     tests
@@ -55,7 +55,7 @@ class FrameIdentification:
     band_hz
         Band of the fit.
     findings
-        What the user should know, one line each.
+        Messages for the user, one line each.
     numbers
         Mode number (from 1) of each mode.
     clocks

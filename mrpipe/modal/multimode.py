@@ -55,7 +55,7 @@ class MultiModeFit:
     participations
         Shape (k, r) complex: what an input contributes to a mode, relative to the input of `residues`.
     input_residues
-        Shape (n, k, r) complex: the residues of each input; nan where no test has this sensor and this input.
+        Shape (n, k, r) complex: the residues of each input; nan if no test has this sensor and this input.
     spectra
         The spectra that were fitted.
     transients

@@ -1,6 +1,6 @@
 """Search for modes that are hidden under the response of stronger ones.
 
-A mode whose shaker stands near one of its nodes has no peak of its own. It still leaves a coherent residual at all
+A mode whose shaker stands near one of its nodes has no separate peak. It still leaves a coherent residual at all
 sensors after the fit of the other modes. The search tries a pole at each frequency of a fine grid and takes the one
 that reduces the residual of all tests and sensors most, judged by the Bayesian information criterion.
 """

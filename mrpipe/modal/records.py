@@ -56,13 +56,13 @@ class FrameTest:
     mode
         Mode of a decay test, from 1; 0 where the campaign does not name it.
     displacements
-        Floor (from 1) and displacement [m], shape (m,), where lasers measured beside accelerometers.
+        Floor (from 1) and displacement [m], shape (m,), for floors with a laser in addition to accelerometers.
     role
-        training, validation or repeat; validation tests are kept for verification where there are others.
+        training, validation or repeat; validation tests are kept for verification if other tests exist.
     places
         Place of each column of `responses`; empty where column i is floor i + 1.
     further_inputs
-        Place and values of the excitations beside the first one.
+        Place and values of the further excitations.
     direction
         Direction of the first excitation; empty where the campaign has one direction only.
     """
@@ -110,7 +110,7 @@ _FORCE_CHANNEL = re.compile(r"^input_force(?:_([a-z0-9]+))?$")
 
 
 def _sensors(recording: Recording) -> dict[Sensor, str]:
-    """Return the sensors of a recording and their channels; a displacement only where no accelerometer is."""
+    """Return the sensors of a recording and their channels; a displacement only without an accelerometer."""
     found: dict[Sensor, str] = {}
     for name in recording.channels:
         match = _FLOOR_CHANNEL.match(name)
@@ -246,7 +246,7 @@ def frame_tests(campaign: Campaign) -> FrameTests:
     Raises
     ------
     UserError
-        If the rig is no shear-frame, no forced or ambient test is there, or masses are too few or not positive.
+        If the rig is not a shear-frame, no test is forced or ambient, or masses are too few or not positive.
     """
     source = campaign.directory / "campaign.yaml"
     if campaign.rig != "shear-frame":

@@ -32,7 +32,7 @@ _LOOSE_TOLERANCE = 0.03
 
 @dataclass(frozen=True)
 class Layout:
-    """What is known of the structure before its modes are.
+    """Prior knowledge of the structure for the selection of its modes.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Layout:
 
 
 def floor_shapes(fit: MultiModeFit, layout: Layout) -> tuple[FloatArray, FloatArray]:
-    """Return shapes and their errors at all floors, shape (floors, r); zero and infinite where no sensor is."""
+    """Return shapes and their errors at all floors, shape (floors, r); zero and infinite at floors without a sensor."""
     shapes = np.zeros((layout.floors, fit.residues.shape[1]))
     errors = np.full(shapes.shape, np.inf)
     for row, sensor in enumerate(fit.sensors):
@@ -131,7 +131,7 @@ def sign_ranges(fit: MultiModeFit, layout: Layout, tolerance: float = _SHAPE_TOL
 
 
 def complete_set(fit: MultiModeFit, layout: Layout) -> tuple[int, ...]:
-    """Return one pole for each floor, or nothing where there is no such set.
+    """Return one pole for each floor, or nothing if no such set exists.
 
     The modes are the lowest poles of which each has one more sign change and that are orthogonal to the mass. The peak
     of a flexible support above the band has the shape of the highest mode, so the lowest possible choice is taken.
@@ -164,7 +164,7 @@ def complete_set(fit: MultiModeFit, layout: Layout) -> tuple[int, ...]:
 
 
 def contradicts(fit: MultiModeFit, layout: Layout) -> bool:
-    """Return whether two modes of a final fit have nearly one shape or one has an unknown shape: one is no mode."""
+    """Return whether one of two modes of a final fit is spurious: their shapes are nearly equal, or one is unknown."""
     coupling, _, same = couplings(fit, layout)
     equal = np.abs(np.triu(coupling, 1)) >= same
     return bool(not usable(fit).all() or (equal.any() and all_floors_measured(fit, layout)))
@@ -194,7 +194,7 @@ def _distinct(fit: MultiModeFit, layout: Layout, poles: Sequence[int]) -> list[i
     sampled = same > _SAME_SHAPE
     kept: list[int] = []
     for index in sorted(poles, key=lambda i: -float(strength(fit)[i])):
-        # sensors on few floors see different modes alike: then only neighbours in frequency are taken for one mode
+        # with sensors on few floors different modes look alike: merge only neighbours in frequency
         rivals = [i for i in kept if not sampled or abs(omega[i] - omega[index]) < 0.05 * omega[index]]
         if all(abs(coupling[index, other]) < same for other in rivals):
             kept.append(index)
@@ -209,7 +209,7 @@ def largest_set(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
         return {pole: number for number, pole in enumerate(poles, start=1)}
     numbered = _numbered(fit, layout, poles, _LOOSE_TOLERANCE)
     if len(numbered) < min(len(poles), layout.floors) and _mutually_orthogonal(fit, layout, poles):
-        # a structure that is no chain: its modes need not follow the sign changes
+        # the modes of a structure that is not a chain need not follow the sign changes
         strongest = sorted(sorted(poles, key=lambda i: -float(strength(fit)[i]))[: layout.floors])
         numbered = {pole: number for number, pole in enumerate(strongest, start=1)}
     return numbered

@@ -26,7 +26,7 @@ class FrequencyResponses:
     response
         Shape (m, n): output over excitation.
     coherence
-        Shape (m, n) [1]; 1 is no noise and no leakage.
+        Shape (m, n) [1]; 1 means neither noise nor leakage.
     """
 
     frequency_hz: FloatArray
@@ -67,7 +67,7 @@ class RecordSpectrum:
         return np.asarray(self.excitations[:, 0])
 
     def input_columns(self, inputs: Sequence[Place]) -> ComplexArray:
-        """Return the spectra of `inputs`, shape (m, len(inputs)); zero where the test has no such input."""
+        """Return the spectra of `inputs`, shape (m, len(inputs)); zero if the test has no such input."""
         columns = np.zeros((self.omega.size, len(inputs)), dtype=np.complex128)
         for index, place in enumerate(inputs):
             if place in self.inputs:

@@ -58,7 +58,7 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
         "second_method_damping_ratios": [float(item.value) for item in result.sweep_damping],
         "second_method_damping_ratio_intervals": [_interval(item) for item in result.sweep_damping],
         "decays": [_decay_row(result.decays[mode]) for mode in sorted(result.decays)],
-        # without a measured excitation there is no coherence with it
+        # without a measured excitation its coherence does not exist
         "coherence_at_peaks": result.fit.mode_coherence().tolist() if result.fit.spectra else [None] * len(result.mac),
         "coherence_at_peaks_by_floor": result.fit.coherence.tolist() if result.fit.spectra else [],
         "reconstruction_error": [] if result.in_frequency is None else result.in_frequency.error.tolist(),

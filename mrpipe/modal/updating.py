@@ -75,7 +75,7 @@ class MeasuredModes:
     scaled_residues
         Shape (r,) [1/kg]: acceleration over force at the degree of freedom `driven`, nan where unknown.
     driven
-        Degree of freedom (from 0) where the measured force acts; -1 where there is none.
+        Degree of freedom (from 0) where the measured force acts; -1 if there is none.
     frequency_error, shape_error, scale_error
         Standard errors for the weights: relative; of a shape of unit norm; relative.
     """
@@ -209,7 +209,7 @@ def _collect(problem: _Problem, theta: FloatArray, jacobian: FloatArray, cost: f
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-12)
     freedom = max(1, jacobian.shape[0] - theta.size)
     spread = _NORMAL_95 * np.sqrt(np.diag(covariance) * max(cost / freedom, 1e-30))
-    # directions that the data do not touch have no variance in the pseudo-inverse: their parameters are open
+    # directions that the data do not determine have no variance in the pseudo-inverse: their parameters are unknown
     _, singular, right = np.linalg.svd(jacobian, full_matrices=False)
     blind = right[singular < 1e-6 * singular[0]]
     spread = np.where(np.any(np.abs(blind) > 0.1, axis=0), _RANGE, spread) if blind.size else spread

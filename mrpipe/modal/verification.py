@@ -28,7 +28,7 @@ class TimeVerification:
     time_s
         Shape (m,).
     measured, simulated
-        Shape (m, s), absolute acceleration [m/s2] (displacement [m] where a floor has no accelerometer).
+        Shape (m, s), absolute acceleration [m/s2] (displacement [m] for a floor without an accelerometer).
     nrmse
         Shape (s,): RMS error over RMS of the measured response.
     fit_percent

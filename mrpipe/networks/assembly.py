@@ -84,7 +84,7 @@ class History:
         joins = self.starts[1:-1] - 1
         within = np.delete(steps, joins)
         largest = float(within.max()) if len(within) else 0.0
-        # rounding of a constant channel is no step
+        # rounding of a constant channel is not a step
         moves = largest > 1e-9 * float(np.max(np.abs(values), initial=0.0))
         return float(steps[joins].max()) / largest if len(joins) and moves else 0.0
 
@@ -146,9 +146,9 @@ def cut(test: PreparedTest, cycles: int) -> tuple[int, int]:
 def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float) -> History:
     """Join the steady cycles of tests at zero crossings of displacement and bring them to the rate of the network.
 
-    Each test is low-passed as a whole before it is cut, so that no filter ever sees a join. Displacement is continuous
-    across joins; what cannot be (the velocity of another frequency, the force of another current) is kept out of the
-    windows of past values instead of being smoothed into data that nobody measured.
+    Each test is low-passed as a whole before it is cut, so that no filter runs across a join. Displacement is
+    continuous across joins. Other channels are not (the velocity at another frequency, the force at another current);
+    no window of past values crosses a join, because smoothing would invent data.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _which_drives_vary(history: History) -> tuple[bool, ...]:
     drive = history.channels["drive"]
     span = float(np.ptp(drive)) if len(drive) else 0.0
     records = [history.record(index, "drive") for index in range(len(history.names))]
-    # percentiles, because noise and the ends of a filter are no change of the set point
+    # percentiles, because noise and the ends of a filter are not a change of the set point
     moves = [float(np.ptp(np.percentile(record, [2, 98]))) if len(record) else 0.0 for record in records]
     return tuple(bool(span > 0.0 and move > 0.05 * span) for move in moves)
 
@@ -219,7 +219,7 @@ def window_starts(history: History, past_values: int) -> IntArray:
 
 
 def rows_at(history: History, spec: FeatureSpec, places: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return features (m, R) and targets (m,) of some samples; see :func:`window_starts` for which can be asked for."""
+    """Return features (m, R) and targets (m,) of some samples; see :func:`window_starts` for possible samples."""
     columns = [history.channels[name][places - lag] for name in spec.channels for lag in range(spec.past_values + 1)]
     if spec.past_target:
         columns += [history.channels[spec.target][places - lag] for lag in range(1, spec.past_values + 1)]

@@ -215,7 +215,7 @@ class Judgement:
 
     @property
     def finding(self) -> str:
-        """What a user should know of the validation tests; empty where there is nothing to say."""
+        """Message on the validation tests for the user; empty if there is none."""
         share = 100.0 * self.outside_training_range
         return f"{share:.1f} % of the validation samples lie outside the training range" if share > 1.0 else ""
 

@@ -58,7 +58,7 @@ class TrainingData:
     def relative(self, mean_square: float, *, held: bool = False) -> float:
         """Turn a mean squared normalised error into RMS error over RMS of the target.
 
-        Where the held-out records have no drive at all, the fitted ones say what the target's size is.
+        If the held-out records have no drive, the scale of the target is taken from the fitted ones.
         """
         target = self.held_rows.target if held else self.fit_rows.target
         size = float(np.sqrt(np.mean(target**2))) if len(target) else float("nan")

@@ -1,6 +1,6 @@
 """Levenberg-Marquardt with the stopping rules of MATLAB's trainlm.
 
-Three methods share the rules: scipy's `least_squares` on the exactly compressed problem, and a loop of our own with the
+Three methods share the rules: scipy's `least_squares` on the exactly compressed problem, and our own loop with the
 damping mu I of trainlm or mu diag(J'J) of Marquardt.
 """
 
@@ -27,9 +27,9 @@ class FitResult:
     Attributes
     ----------
     parameters
-        The best on the held-out rows (the last where there are none).
+        The best on the held-out rows (the last if there are none).
     mean_square, held_out_mean_square
-        Mean squared normalised error on the training rows and on the held-out rows (NaN where none), at `parameters`.
+        Mean squared normalised error at `parameters` on the training rows and on the held-out rows (NaN without any).
     iterations
         Accepted steps.
     reason

@@ -1,6 +1,6 @@
 """A feed-forward network as plain arrays: tanh hidden layers, linear output (thesis 2.7).
 
-Layout, for those who evaluate the arrays in a kernel of their own
+Layout, for an evaluation of the arrays in another kernel
 -------------------------------------------------------------------
 A feature row holds, channel after channel in the order of `FeatureSpec.channels`, the present value, then the
 past values of k-1, k-2 .. k-p, as in (2.8) and (2.9):
@@ -130,7 +130,7 @@ class Network:
     has_biases
         Whether the biases were trained (the thesis has none).
     members
-        How many networks stand side by side in this one, see :func:`averaged`.
+        Number of networks that this one combines, see :func:`averaged`.
     """
 
     weights: tuple[FloatArray, ...]
@@ -183,7 +183,7 @@ class Network:
         features
             Feature rows as for :meth:`predict`.
         margin
-            How far beyond counts as within, as a share of the range (noise at the edge is no extrapolation).
+            How far beyond counts as within, as a share of the range (noise at the edge is not an extrapolation).
         """
         if not len(self.feature_minimum) or not len(features):
             return 0.0
@@ -195,7 +195,7 @@ class Network:
         """Return this network for inputs that do not change: a network without past values, to 1e-12 the same.
 
         Every past value equals the present one, so that the weights of a channel add up. An inverse asked so gives the
-        drive at which the damper would hold this force at this speed, whatever force was asked for before.
+        drive at which the damper would hold this force at this speed, whatever force was requested before.
         """
         spec = self.features
         if spec.past_target:
@@ -236,7 +236,7 @@ def averaged(networks: Sequence[Network]) -> Network:
     layers = range(len(first.weights) - 1)
     outputs = [network.weights[-1] for network in networks]
     last = np.hstack(outputs) / len(networks) if layers else np.mean(outputs, axis=0)
-    # the first layers share their inputs, the next see those of their own network only
+    # the first layers share their inputs, the next ones use the outputs of the same network only
     inner = [
         np.asarray((block_diag if layer else _stacked)(*(network.weights[layer] for network in networks)))
         for layer in layers

@@ -171,7 +171,7 @@ class TrainingOptions(Section):
         Raises
         ------
         UserError
-            If the architecture is that of a sweep (:func:`mrpipe.networks.plan.training_plan` puts in what it chose).
+            If the architecture is that of a sweep (:func:`mrpipe.networks.plan.training_plan` inserts the chosen one).
         """
         if self.architecture == "sweep":
             raise UserError("architecture", "sweep", "needs the result of a sweep", "give the hidden layers, as (6, 6)")
@@ -204,8 +204,8 @@ class InverseTrainingOptions(TrainingOptions):
     )
     biases: bool = Field(
         True,
-        description="Biases are trained. The thesis has none; but on absolute values the drive is no odd function, and "
-        "without them it is bound to zero at zero force, where the damper holds its residual force.",
+        description="Biases are trained. The thesis has none; but on absolute values the drive is not an odd function, "
+        "and without them it is bound to zero at zero force, where the damper holds its residual force.",
     )
     starts: int = Field(6, ge=1, description="Random starts; the best on held-out records go on.")
     refined_starts: int = Field(4, ge=1, description="How many of the starts go on.")

@@ -1,4 +1,4 @@
-"""What a training stage trains: the features and options that settings, training set and sweep come to."""
+"""What a training stage trains: features and options from the settings, the training set and the sweep."""
 
 from __future__ import annotations
 

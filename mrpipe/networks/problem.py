@@ -33,7 +33,7 @@ def layer_slices(layers: tuple[int, ...], biases: bool) -> list[tuple[slice, sli
 
 
 def unpack(parameters: FloatArray, layers: tuple[int, ...], biases: bool) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return weights (out, in) and biases (out,) of each layer; zeros where there are no biases."""
+    """Return weights (out, in) and biases (out,) of each layer; zeros without biases."""
     weights = []
     offsets = []
     for (at, beside), (inner, outer) in zip(layer_slices(layers, biases), pairwise(layers), strict=True):
@@ -103,7 +103,7 @@ class Problem:
         return self.output(parameters) - self.target
 
     def mean_square(self, parameters: FloatArray) -> float:
-        """Return the mean squared residual, and the penalty where there is one."""
+        """Return the mean squared residual, and the penalty if there is one."""
         total = 0.0
         for start in range(0, self.rows, 4 * CHUNK_ROWS):
             part = slice(start, start + 4 * CHUNK_ROWS)

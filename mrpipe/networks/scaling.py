@@ -18,7 +18,7 @@ from mrpipe.networks.network import FeatureSpec
 Normalisation = Literal["maximum", "range", "standard"]
 
 NORMALISATION: Normalisation = "maximum"
-"""What is used where nothing else is asked for: zero stays zero."""
+"""The default scaling: zero stays zero."""
 
 _SMALLEST_EIGENVALUE = 1e-9
 
@@ -99,7 +99,7 @@ def scaling_of(
 
 
 def channel_blocks(spec: FeatureSpec) -> list[slice]:
-    """Return the columns of each channel, and last those of the past target where there are any."""
+    """Return the columns of each channel, and last those of the past target if there are any."""
     window = spec.past_values + 1
     blocks = [slice(index * window, (index + 1) * window) for index in range(len(spec.channels))]
     if spec.past_target and spec.past_values:

@@ -20,7 +20,7 @@ class StoppingRules:
     improvement
         Relative gain of the last ten steps below which training ends (trainlm has no such rule: 0).
     mu, mu_increase, mu_decrease, mu_maximum
-        Damping of the loop of our own: first value, factors after a failed and a good step, limit.
+        Damping of the built-in loop: first value, factors after a failed and a good step, limit.
     """
 
     iterations: int = 1000

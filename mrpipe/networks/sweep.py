@@ -98,8 +98,8 @@ def sweep(
     jobs
         Threads; no result depends on it.
     cache
-        Folder in which each fit is kept as soon as it is done, under a name made of everything it depends on; a sweep
-        that was interrupted, or is widened, takes them from there.
+        Folder in which each fit is kept as soon as it is done, under a name derived from everything it depends on. A
+        sweep that was interrupted, or is widened, takes them from there.
     crossings
         Names further candidates once the first are screened (see :meth:`mrpipe.networks.candidates.Grid.crossings`),
         and how many they can be.
@@ -219,7 +219,7 @@ def _fit_all(
     features, target = rows_at(data.fit, spec, data.screen if starts is None else data.refine)
     scaling = scaling_of(features, target, spec, data.normalisation, whitened=options.whitened)
     if starts is not None:
-        # the parameters of the screening live in the basis of its rows
+        # the parameters of the screening refer to the basis of its rows
         small = rows_at(data.fit, spec, data.screen)
         scaling = scaling_of(*small, spec, data.normalisation, whitened=options.whitened)
     held_features, held_target = rows_at(data.held, spec, data.judged)
@@ -343,6 +343,6 @@ def _file_name(name: str, candidate: Candidate) -> str:
 
 
 def _kept_file(cache: Path | None, name: str, candidate: Candidate) -> Path | None:
-    """Return the file in which an earlier run kept the fits of a candidate; None where there is none."""
+    """Return the file in which an earlier run kept the fits of a candidate; None if there is none."""
     path = None if cache is None else cache / _file_name(name, candidate)
     return path if path is not None and path.is_file() else None

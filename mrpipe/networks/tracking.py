@@ -93,7 +93,7 @@ class ViscousEmulation:
     tracking
         Desired and obtained force, drive.
     damping_n_s_m, frequency_hz, amplitude_m
-        What was asked for.
+        Requested value.
     figures, fast
         Error of the force, over all and at more than half the peak velocity.
     negative_share
@@ -180,7 +180,7 @@ class TrackingJudgement:
 
     @property
     def finding(self) -> str:
-        """What a user should know; empty where there is nothing to say."""
+        """Message for the user; empty if there is none."""
         share = 100.0 * self.viscous.outside_training_range
         if share <= 1.0:
             return ""

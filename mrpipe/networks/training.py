@@ -81,12 +81,12 @@ class Trained:
 def initial_parameters(
     problem: Problem, rng: np.random.Generator, kind: Literal["random", "perceptron"] = "random"
 ) -> FloatArray:
-    """Return a start: uniform within +-0.5, or what scikit-learn's MLPRegressor reaches from a start of its own."""
+    """Return a start: uniform within +-0.5, or what scikit-learn's MLPRegressor reaches from another random start."""
     if kind == "random":
         return rng.uniform(-0.5, 0.5, problem.size)
     from sklearn.neural_network import MLPRegressor
 
-    # every so many rows: the first ones alone would be the first tests alone
+    # rows at equal spacing, because the first rows are those of the first tests only
     stride = max(1, problem.rows // 4000)
     perceptron = MLPRegressor(
         hidden_layer_sizes=problem.layers[1:-1],

@@ -113,7 +113,7 @@ def _folders(name: str) -> list[Path]:
 
 
 def _path_of(name: str) -> Path | None:
-    """Find the source of a module without importing it; None where there is no such module."""
+    """Find the source of a module without importing it; None if the module does not exist."""
     if name == "mrpipe":
         return _package() / "__init__.py"
     parent, _, own = name.rpartition(".")

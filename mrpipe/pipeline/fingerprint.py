@@ -14,7 +14,7 @@ from typing import Any
 
 MISSING = "missing"
 """Stands for the digest of a file that is not there."""
-# how the artifact was made; not part of what it says
+# how the artifact was made, not part of its content
 _NOT_CONTENT = {
     "created_utc",
     "config",
@@ -70,7 +70,7 @@ class FileHashes:
     """Digests of files, remembered by size, times and inode, so that an unchanged gigabyte is read once.
 
     A file whose content changed keeps its size and may get its old time of modification back (`cp -p`, `rsync -t`); its
-    time of status change and its inode tell that it is another one.
+    time of status change and its inode show that it is another file.
     """
 
     def __init__(self, memory: Path) -> None:

@@ -20,14 +20,14 @@ def read_run(directory: Path) -> KeptRun:
     Raises
     ------
     UserError
-        If the directory is missing or is no run directory, or if its configuration is not valid YAML.
+        If the directory is missing or is not a run directory, or if its configuration is not valid YAML.
     """
     if not directory.is_dir():
         raise UserError(directory, "", "no such run directory", _REMEDY)
     files = sorted(path for path in (directory / "manifests").glob("*.json") if not path.name.startswith("."))
     if not files or not (directory / "config.yaml").is_file():
         missing = "config.yaml" if files else "manifests of stages"
-        raise UserError(directory, "", f"is no run directory, because it has no {missing}", _REMEDY)
+        raise UserError(directory, "", f"is not a run directory, because it has no {missing}", _REMEDY)
     content = read_yaml(directory / "config.yaml").content
     listed = [str(name) for name in content.get("stages") or []]
     names = sorted((path.stem for path in files), key=lambda name: (_place(name, listed), name))

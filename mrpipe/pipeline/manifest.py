@@ -44,7 +44,7 @@ class Manifest:
     outputs
         File, relative to the run directory -> digest: artifacts, and the stage's part of the report.
     skipped
-        Why the stage had nothing to do, or what it failed of; empty where it ran.
+        Why the stage was skipped or has failed; empty if it ran.
     failed
         What went wrong, in one line: of the whole stage where `skipped` says the same, else of a part of it.
     stage
@@ -52,9 +52,9 @@ class Manifest:
     key
         What its result depends on.
     summary
-        What it printed.
+        Summary that the stage printed.
     warnings
-        What it warned of.
+        Warnings of the stage.
     seconds
         Wall time.
     """
@@ -74,7 +74,7 @@ class Manifest:
 
     @classmethod
     def load(cls, directory: Path, stage: str) -> Manifest | None:
-        """Read the manifest of a stage, or None where there is none that can be read."""
+        """Read the manifest of a stage, or None if it does not exist or cannot be read."""
         try:
             return _adapter().validate_json((directory / f"{stage}.json").read_bytes())
         except (OSError, ValueError):

@@ -18,7 +18,7 @@ PARTS = "report-parts"
 
 @dataclass
 class PartWriter:
-    """Collects one stage's part of the report and keeps it as `report-parts/<stage>.json` and files beside it."""
+    """Collects one stage's part of the report in `report-parts/<stage>.json` and files in the same folder."""
 
     stage: str
     run_directory: Path

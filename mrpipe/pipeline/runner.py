@@ -181,7 +181,7 @@ class Pipeline:
         return Outcome(stage.name, "failed", manifest)
 
     def check(self, name: str) -> None:
-        """Let a stage look at its settings, so that a mistake is told before minutes of work and not after.
+        """Let a stage check its settings, so that a mistake is reported before any work is done.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class Pipeline:
         return all(self._can_be_had(item) for item in self.stages[provider].inputs)
 
     def _is_to_be_had(self, name: str) -> bool:
-        """Return whether an optional input can be had for this campaign: nothing is recorded beside a given one."""
+        """Return whether an optional input is available: with a given campaign, no other one is recorded."""
         if not self._can_be_had(name):
             return False
         provider = self.provider(name)

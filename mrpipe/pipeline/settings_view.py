@@ -1,4 +1,4 @@
-"""Settings as a stage may see them: the declared ones and no others."""
+"""The declared settings of a stage, without all others."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def setting_named(config: BaseModel, dotted: str) -> Any:
 
 
 class SettingsView:
-    """Attribute access to declared settings; anything else raises LookupError, since the cache would not know of it."""
+    """Attribute access to declared settings; others raise LookupError, as they are not in the cache key."""
 
     def __init__(self, target: Any, declared: Sequence[str], stage: str, prefix: str = "") -> None:
         self._target = target

@@ -1,7 +1,7 @@
 """What a stage is: declared inputs, outputs and settings, and a function that does the work.
 
-The function sees the world through its :class:`StageContext` alone, which refuses settings and inputs that were not
-declared; so a stage's cache key depends on nothing else than what it reads.
+The function gets everything from its :class:`StageContext`, which refuses settings and inputs that were not
+declared; so a stage's cache key depends on everything that it reads.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class StageContext:
     jobs
         How many processes may be used (does not change results).
     progress
-        Told how far the stage is.
+        Called with the share done and a text.
     report
         The stage's part of the report.
     log
@@ -85,7 +85,7 @@ class StageContext:
             yield artifact
 
     def warn(self, message: str) -> None:
-        """Tell the user something that does not stop the stage; kept with the result and shown in the report."""
+        """Warn the user without stopping the stage; the warning is kept with the result and shown in the report."""
         self.warnings.append(message)
         self.log.warning("%s: %s", self.stage, message)
 
@@ -108,7 +108,7 @@ class Stage:
         One line for help texts and the report.
     run
         Does the work and returns the summary that `--json` prints (JSON-able, SI, keys with unit suffix). To say that
-        there is nothing to do for want of data it raises :class:`~mrpipe.errors.StageSkipped`.
+        there are no data to work on it raises :class:`~mrpipe.errors.StageSkipped`.
     inputs
         Names of stages whose artifact is read, or `campaign:bench`, `campaign:frame`, `campaign:closed-loop`.
     optional_inputs
@@ -145,7 +145,7 @@ class Stage:
     check: Callable[[Any], None] | None = None
 
     def for_configuration(self, configuration: Any) -> Stage:
-        """Return the stage with the inputs that its settings ask for in this configuration."""
+        """Return the stage with the inputs that its settings require in this configuration."""
         more: list[str] = []
         for setting, value, name in self.conditional_inputs:
             found = configuration

@@ -26,7 +26,7 @@ class SteadyCycles:
         Index of the first sample at or above the mean level in each steady cycle, and of the end of the last one,
         shape (cycles + 1,); empty where the motion is not periodic.
     frequency_hz
-        Of the steady cycles, 0 where there are none.
+        Of the steady cycles, 0 if there are none.
     amplitude
         Half of peak to peak, in the unit of the displacement.
     """
@@ -42,7 +42,7 @@ class SteadyCycles:
 
     @property
     def span(self) -> slice:
-        """Samples from the first steady cycle to the end of the last; everything where there are none."""
+        """Samples from the first steady cycle to the end of the last; everything if there are none."""
         return slice(int(self.starts[0]), int(self.starts[-1])) if self.periodic else slice(None)
 
 
@@ -98,7 +98,7 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
 
 
 def _longest_steady_run(periods: FloatArray, heights: FloatArray) -> tuple[int, int]:
-    """Return the half-open range of the longest run whose cycles lie within the tolerances of their own median."""
+    """Return the half-open range of the longest run whose cycles lie within the tolerances of their median."""
     best = (0, 0)
     # one sample of period is always allowed: fast tests have few samples a cycle
     allowed = np.maximum(PERIOD_TOLERANCE * periods, 1.0)

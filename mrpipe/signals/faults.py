@@ -15,14 +15,14 @@ from mrpipe.errors import UserError
 class KnownFaults:
     """Faults of sensors that are taken out before all else; the fields are those of `prepare.corrections`.
 
-    They are subtracted from what was recorded, and so are no part of the offsets that a prepared test remembers.
+    They are subtracted from the recorded channels. The offsets stored with a prepared test do not contain them.
 
     Attributes
     ----------
     force_late_s
         By how much the force is recorded later than displacement and drive.
     force_offset_n
-        Test -> offset of its load cell beside that of the campaign.
+        Test -> offset of its load cell in addition to that of the campaign.
     force_per_drive_n, force_per_drive_squared_n
         Offset for each unit of drive, and of drive squared.
     drive_lag_s

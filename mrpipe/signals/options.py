@@ -103,7 +103,7 @@ class PreparationOptions(Section):
         "gives it); taken out.",
     )
     cycles: int = Field(10, ge=0, description="Steady cycles kept of each periodic test; 0 keeps all.")
-    settle_cycles: int = Field(1, ge=0, description="Steady cycles left out at the beginning, where there are enough.")
+    settle_cycles: int = Field(1, ge=0, description="Steady cycles left out at the beginning, if there are enough.")
     corrections: SensorCorrections = Field(SensorCorrections(), description="Faults of sensors that are known.")
 
     @property

@@ -59,7 +59,7 @@ class Preparation:
     before
         Channels on the working rate before filters and offsets, shape (n,) each, for spectra.
     findings
-        What the user should know, one line each.
+        Messages for the user, one line each.
     """
 
     test: PreparedTest
@@ -139,7 +139,7 @@ def prepare_campaign(
 
 
 def common_rate(rates_hz: Sequence[float]) -> float:
-    """Return the lowest rate that is at least 200 Hz, the controller's; the highest where none is."""
+    """Return the lowest rate that is at least 200 Hz, the controller's; the highest if none is."""
     enough = [rate for rate in rates_hz if rate >= CONTROLLER_RATE_HZ]
     return min(enough) if enough else max(rates_hz)
 
@@ -161,7 +161,7 @@ def _on_working_rate(recording: Recording, begin: int, end: int, name: str, rate
 
 
 def _require_rate(options: PreparationOptions) -> None:
-    """Refuse a rate asked for that could not carry the velocity's band (a campaign that is slow by itself may be)."""
+    """Refuse a requested rate that cannot represent the velocity's band (a campaign that is slow by itself may be)."""
     asked, cutoff = options.working_rate_hz, options.velocity_cutoff_hz
     if 0.0 < asked < 2.5 * cutoff:
         problem = f"is {asked:g}, too slow for a velocity cut-off of {cutoff:g} Hz"
@@ -211,7 +211,7 @@ def _filter(work: _Work, options: PreparationOptions) -> None:
 
 
 def _check_acceleration(works: Sequence[_Work]) -> list[str]:
-    """Turn an acceleration round whose sign is against that of the displacement, and tell of a doubtful unit."""
+    """Invert an acceleration whose sign contradicts that of the displacement, and report a doubtful unit."""
     gains = [
         acceleration_gain(work.channels["displacement"], work.channels["acceleration"], work.rate)
         for work in works
@@ -258,7 +258,7 @@ def _measure_offsets(work: _Work) -> None:
 def _campaign_offset(works: Sequence[_Work], name: str) -> tuple[float, float]:
     """Return a sensor's offset over the campaign and its spread between the tests that give it well.
 
-    Where none does, the mean by length of all tests, and no spread.
+    If none does, the mean of all tests weighted by length, and no spread.
     """
     values = np.array([work.offsets[name] for work in works if name in work.trusted])
     if values.size:
@@ -277,7 +277,7 @@ def _share_offsets(works: Sequence[_Work]) -> None:
 
 
 def _lend_offsets(works: Sequence[_Work]) -> None:
-    """Give a test whose own motion or drive does not show an offset well that of the others, if they agree."""
+    """Use the offset of the other tests, if they agree, for a test whose motion or drive does not determine it."""
     for name in ("displacement", "force", "acceleration"):
         if not any(name in work.offsets for work in works):
             continue

@@ -34,7 +34,7 @@ class PreparedTest:
         What was taken out of the channels as static offset (add it to have the records as measured).
     displacement_noise_m, displacement_noise_band_hz
         Standard deviation and band of the displacement's noise where it was put together from several sensors, so that
-        the channel itself does not tell; 0 where it does. Not written to the artifact.
+        the channel itself does not show; 0 if it does. Not written to the artifact.
     time_s
         Clock, shape (n,) [s].
     displacement_m

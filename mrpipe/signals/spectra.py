@@ -47,7 +47,7 @@ def cutoff_by_criterion(
     """Return the frequency above which noise outweighs the signal.
 
     Above it the power density, smoothed over an eighth of its frequency, stays below twice the noise floor, so what
-    a low-pass there removes is noise as far as a spectrum tells. Differentiation weights signal and noise alike, so it
+    a low-pass there removes is noise as far as a spectrum shows. Differentiation weights signal and noise alike, so it
     is the right place for displacement, velocity and acceleration.
 
     Parameters
@@ -57,7 +57,7 @@ def cutoff_by_criterion(
     sampling_rate_hz
         Rate.
     velocity_share
-        Where given, the cut-off is no higher than the frequency that holds this share of the power of the channel's
+        If given, the cut-off is not higher than the frequency that holds this share of the power of the channel's
         time derivative. Under random motion the noise of a displacement sensor falls with frequency, and a cut-off at
         its white part alone would let most of it through (a recording with motions up to 250 Hz taught so).
     lowest_hz

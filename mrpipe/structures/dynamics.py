@@ -42,7 +42,7 @@ class ComplexModes:
     Attributes
     ----------
     poles
-        Shape (m,) complex [rad/s]; s = -zeta omega + i omega_d. A real pole counts as a mode of its own.
+        Shape (m,) complex [rad/s]; s = -zeta omega + i omega_d. A real pole counts as a separate mode.
     mode_shapes
         Shape (n, m) complex, displacement part, largest element 1.
     """

@@ -38,7 +38,7 @@ def structure_from_settings(settings: StructureSettings, read: Reader, name: str
     Raises
     ------
     UserError
-        If several descriptions are given, sizes disagree, or a matrix is not what it must be.
+        If several descriptions are given, sizes disagree, or a matrix is not symmetric and positive as required.
     """
     ways = {
         "file": bool(settings.file or settings.mass.file),
@@ -188,7 +188,7 @@ def _as_many(key: str, values: Sequence[Any], count: int) -> Sequence[Any]:
 
 
 def floor_heights(settings: StructureSettings) -> list[float] | None:
-    """Return the height of each floor above the ground [m]; None where a storey has no height."""
+    """Return the height of each floor above the ground [m]; None if a storey has no height."""
     heights = [row.height_m for row in settings.storeys for _ in range(row.repeat)]
     known = [height for height in heights if height is not None]
     return np.cumsum(known).tolist() if heights and len(known) == len(heights) else None
@@ -208,7 +208,9 @@ def degree_of_freedom(frame: Frame, name: str | int, where: str = "structure") -
     text = str(name)
     if text.isdigit() and 1 <= int(text) <= frame.floors:
         return int(text) - 1
-    raise UserError(where, text, "is no degree of freedom", f"1 to {frame.floors}, or one of {', '.join(names[:12])}")
+    raise UserError(
+        where, text, "is not a degree of freedom", f"1 to {frame.floors}, or one of {', '.join(names[:12])}"
+    )
 
 
 def device_position(

@@ -25,7 +25,9 @@ class MatrixEntry(Section):
     """Where a matrix is, and its unit."""
 
     file: str = Field("", description="File of the matrix (.mat, .csv, .h5, .json); empty: `structure.file`.")
-    name: str = Field("", description="Variable in the file, such as M or model.K; empty for a CSV file of its own.")
+    name: str = Field(
+        "", description="Variable in the file, such as M or model.K; empty for a CSV file that holds this matrix only."
+    )
     unit: str = Field("", description="Unit of the entries, such as kg, t, kN/m; empty: SI.")
 
 

@@ -23,7 +23,7 @@ from mrpipe.units import to_si
 
 GRAVITY = 9.80665
 SMALLEST_PEAK, LARGEST_PEAK = 0.05 * GRAVITY, 1.5 * GRAVITY
-"""Peaks [m/s^2] that tell the unit of a record that does not say it."""
+"""Peaks [m/s^2] from which the unit of a record is inferred if the record does not state it."""
 IMPOSSIBLE_PEAK = 3.0 * GRAVITY
 """No ground motion on record is stronger [m/s^2]."""
 
@@ -141,11 +141,11 @@ def read_motion(
         `.at2`; `.mat` (a variable with rows or columns of time and acceleration); anything else is text: one column (or
         AT2-like rows), time and acceleration, two components, or time and two components.
     unit
-        Unit of the samples; else the header tells, else the peak where only one unit is plausible.
+        Unit of the samples; by default that of the header, else the only unit with a plausible peak.
     interval_s
-        Sampling interval; must agree with the file where that tells.
+        Sampling interval; must agree with the file if the file states it.
     fallback_interval_s
-        Interval where neither the file nor `interval_s` tells.
+        Interval if neither the file nor `interval_s` gives one.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def read_motion(
     elif path.suffix.lower() in {*V2_ENDINGS, ".zip"}:
         raw = _read_v2(path)
     elif path.suffix.lower() in _FOREIGN:
-        raise UserError(path, "", f"a {path.suffix} file is no ground-motion record", "use .at2, .txt, .csv or .mat")
+        raise UserError(path, "", f"a {path.suffix} file is not a ground-motion record", "use .at2, .txt, .csv or .mat")
     else:
         raw = _read_text(path)
     _check_finite(path, raw.values)
@@ -204,11 +204,11 @@ def _read_at2(path: Path) -> _Raw:
     for number, line in enumerate(lines[first:], start=first + 1):
         row = _numbers(line)
         if row is None:
-            raise UserError(path, f"line {number}", "is no row of numbers", "leave text to the four header lines")
+            raise UserError(path, f"line {number}", "is not a row of numbers", "leave text to the four header lines")
         samples.extend(row)
     if len(samples) != count:
         raise UserError(
-            path, "NPTS", f"promises {count} points, the file holds {len(samples)}", "mend the header or the file"
+            path, "NPTS", f"promises {count} points, the file holds {len(samples)}", "correct the header or the file"
         )
     return _Raw(np.array(samples)[:, None], step, header)
 
@@ -257,11 +257,13 @@ def _read_text(path: Path) -> _Raw:
         row = _numbers(text)
         if row is None:
             if rows and text[0] not in "%#":
-                raise UserError(path, f"line {number}", f"is no row of numbers ({text[:30]!r})", "mend the row")
+                raise UserError(path, f"line {number}", f"is not a row of numbers ({text[:30]!r})", "correct the row")
             header.append(text)
             continue
         if rows and len(row) != len(rows[0]):
-            raise UserError(path, f"line {number}", f"has {len(row)} columns, the first {len(rows[0])}", "mend the row")
+            raise UserError(
+                path, f"line {number}", f"has {len(row)} columns, the first {len(rows[0])}", "correct the row"
+            )
         rows.append(row)
     if not rows:
         raise UserError(path, "", "holds no samples", "one row a sample: time and acceleration, or the components")
@@ -269,11 +271,14 @@ def _read_text(path: Path) -> _Raw:
 
 
 def _split_clock(path: Path, values: FloatArray, header: str) -> _Raw:
-    """Tell a clock in the first column from a component: the header names it, or it rises (or falls) nearly always."""
+    """Separate a clock in the first column: the header names it, or it rises (or falls) nearly always."""
     points = _POINTS.search(header)
     if points and int(points.group(1)) != len(values):
         raise UserError(
-            path, "NPTS", f"promises {points.group(1)} points, the file holds {len(values)}", "mend the header or file"
+            path,
+            "NPTS",
+            f"promises {points.group(1)} points, the file holds {len(values)}",
+            "correct the header or file",
         )
     said = _INTERVAL.search(header)
     interval = float(said.group(1)) if said else None
@@ -287,14 +292,14 @@ def _split_clock(path: Path, values: FloatArray, header: str) -> _Raw:
     back = np.flatnonzero(steps <= 0)
     if len(back):
         row = int(back[0]) + 2
-        told = f"the clock goes from {first[row - 2]:g} to {first[row - 1]:g} s"
-        raise UserError(path, f"row {row}", told, "times must rise from row to row")
+        listed = f"the clock goes from {first[row - 2]:g} to {first[row - 1]:g} s"
+        raise UserError(path, f"row {row}", listed, "times must rise from row to row")
     bad = np.flatnonzero(~(np.abs(steps - np.median(steps)) < 0.02 * np.median(steps)))
     if len(bad):
         raise UserError(path, f"row {int(bad[0]) + 2}", "the clock is not uniform", "resample to equal intervals first")
     clock = float((first[-1] - first[0]) / (len(first) - 1))
     if interval is not None and abs(clock - interval) > 0.01 * interval:
-        raise UserError(path, "DT", f"header says {interval:g} s, the clock {clock:g} s", "mend one of them")
+        raise UserError(path, "DT", f"header says {interval:g} s, the clock {clock:g} s", "correct one of them")
     return _Raw(values[:, 1:], clock, header)
 
 
@@ -304,7 +309,7 @@ def _check_finite(path: Path, values: FloatArray) -> None:
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         row, column = int(bad[0][0]) + 1, int(bad[0][1]) + 1
-        raise UserError(path, f"sample {row}, component {column}", "is not finite", "mend or leave out the sample")
+        raise UserError(path, f"sample {row}, component {column}", "is not finite", "correct or leave out the sample")
     if values.shape[1] > 3:
         raise UserError(path, "", f"has {values.shape[1]} components", "one or two horizontal components are used")
 
@@ -332,11 +337,11 @@ def _unit(path: Path, raw: _Raw, given: str | None) -> tuple[str, str]:
     if given:
         return given, "given"
     if _OTHER_QUANTITY.search(raw.header):
-        raise UserError(path, "header", "says that this is no acceleration", "give the acceleration record")
+        raise UserError(path, "header", "says that this is not an acceleration", "give the acceleration record")
     bracketed = {text.strip() for text in _UNIT_COLUMN.findall(raw.header)}
     further = {text for text in bracketed if not any(pattern.search(text) for pattern, _ in _UNITS)}
     for text in further:
-        # a unit that nobody knows, or one of another quantity, is told here
+        # refuse an unknown unit, or one of another quantity
         to_si(np.zeros(1), text, where=f"{path}: header", quantity="acceleration")
     said = {name for pattern, name in _UNITS if pattern.search(raw.header)} | further
     if len(said) > 1:
@@ -358,9 +363,11 @@ def _unit(path: Path, raw: _Raw, given: str | None) -> tuple[str, str]:
 def _check_peaks(path: Path, values: FloatArray, unit: str) -> None:
     peaks = np.abs(values).max(axis=0)
     if peaks.max() > IMPOSSIBLE_PEAK:
-        told = f"peak {peaks.max() / GRAVITY:.3g} g in {unit}"
-        raise UserError(path, "unit", f"{told} is no ground motion", "the unit is wrong: g, cm/s^2 or m/s^2?")
+        listed = f"peak {peaks.max() / GRAVITY:.3g} g in {unit}"
+        raise UserError(path, "unit", f"{listed} is not a ground motion", "the unit is wrong: g, cm/s^2 or m/s^2?")
     moving = peaks[peaks > 0.0]
     if moving.max() > 50.0 * moving.min():
-        told = ", ".join(f"{peak:.3g}" for peak in peaks)
-        raise UserError(path, "components", f"peaks {told} m/s^2 differ too much: mixed units", "use one unit for all")
+        listed = ", ".join(f"{peak:.3g}" for peak in peaks)
+        raise UserError(
+            path, "components", f"peaks {listed} m/s^2 differ too much: mixed units", "use one unit for all"
+        )

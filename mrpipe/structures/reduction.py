@@ -1,8 +1,8 @@
 """Reduction of a large structure: static condensation, Craig-Bampton, modal and balanced truncation.
 
-All but balanced truncation return a structure again, with M, C, K and an influence vector. The error of a reduction is
-the largest deviation of the frequency response to ground motion, at the degrees of freedom that stay, over the largest
-response.
+All methods except balanced truncation return a structure, with M, C, K and an influence vector. The error of a
+reduction is the largest deviation of the frequency response to ground motion, at the degrees of freedom that stay, over
+the largest response.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
         raise UserError(
             "structure.reduction",
             "keep",
-            "is empty, so the damper would have no place",
+            "is empty, so the damper could not be attached",
             "name at least the degrees of freedom of the damper and of the sensors",
         )
     kept = [degree_of_freedom(frame, name, "structure.reduction.keep") for name in settings.keep]

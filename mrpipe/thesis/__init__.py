@@ -1,4 +1,4 @@
-"""Every printed figure of the thesis beside what this program computes: a module a chapter.
+"""Every printed figure of the thesis, compared with what this program computes; one module per chapter.
 
 The names below are imported at first use, because the configuration needs the settings of this package only.
 """

@@ -39,7 +39,7 @@ def _parameters(name: str) -> tuple[ParameterSet, DamperModel]:
 def _table_2_2() -> list[Claim]:
     parameters, printed = _parameters("thesis-printed")
     limits = bouc_wen_limits(*(parameters.scalar(name) for name in ("A", "gamma", "beta", "n")))
-    small = f"z_max = sqrt(A/(gamma + beta)) = {limits[0]:.4g} m only: no single change of Table 2.2 mends both ends"
+    small = f"z_max = sqrt(A/(gamma + beta)) = {limits[0]:.4g} m only: no single change of Table 2.2 corrects both ends"
     return [
         compare(
             "A1a",

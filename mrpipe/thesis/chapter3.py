@@ -25,7 +25,7 @@ _NO_SOURCE = (
 
 
 def printed_shape_formula(floors: int, *, exchanged: bool) -> FloatArray:
-    """Return (A1) of P2 as printed (`exchanged`) or mended, a row a floor, a column a mode, shape (n, n)."""
+    """Return (A1) of P2 as printed (`exchanged`) or corrected; rows are floors, columns are modes, shape (n, n)."""
     number = np.arange(1, floors + 1)
     if exchanged:
         return np.sin(np.pi * np.outer(2 * number - 1, number) / (2 * floors + 1))
@@ -182,5 +182,5 @@ def chapter_3(frame: Frame) -> list[Claim]:
             1e-6,
             "indices i and j are exchanged",
         ),
-        compare("A7b", 3, "smallest MAC of (A1) mended, sin(pi (2i-1) j/(2n+1))", 1.0, assurance[1], 1e-6),
+        compare("A7b", 3, "smallest MAC of (A1) corrected, sin(pi (2i-1) j/(2n+1))", 1.0, assurance[1], 1e-6),
     ]

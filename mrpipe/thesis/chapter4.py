@@ -21,7 +21,7 @@ def _limits(modes: limits.LimitingModes) -> list[Claim]:
         compare(
             "A4c",
             4,
-            "omega_0, omega_inf, nu with the signs mended (errata row 4)",
+            "omega_0, omega_inf, nu with the signs corrected (errata row 4)",
             [8.0, 10.45, 1.5404e-4],
             [modes.omega_0, modes.omega_inf, modes.nu],
             2e-3,
@@ -241,7 +241,7 @@ def _formulas(modes: limits.LimitingModes) -> list[Claim]:
 
 def _kalman() -> list[Claim]:
     k, gain = continuous_kalman_gains(20e-6, 0.1)
-    # x1' = x2 + k (y - x1), x2' = l (y - x1), and the acceleration as an input of x2' where it is mended
+    # x1' = x2 + k (y - x1), x2' = l (y - x1), and the acceleration as an input of x2' where it is corrected
     s = 8.0j
     filter_matrix = np.array([[s + k, -1.0], [gain, s]])
     printed = np.linalg.solve(filter_matrix, np.array([k, gain]))[1] / s

@@ -148,7 +148,7 @@ def _tall_building() -> list[Claim]:
             share,
             0.3,
             "the published matrices give this share, the errata a smaller one; either way a damper between ground and "
-            "floor 1 of a cantilever sees next to nothing: J5 = 0.14, J11 = 0.03 of Table 6.3 cannot come from it",
+            "floor 1 of a cantilever hardly moves: J5 = 0.14, J11 = 0.03 of Table 6.3 cannot come from it",
         ),
     ]
 
@@ -157,7 +157,7 @@ def chapter_6(frame: Frame) -> list[Claim]:
     """Return the claims of chapter 6, P4 and appendix E."""
     nonlinear = (
         "the nonlinear bearings, devices, sensors and wind records of the published benchmark are not public; "
-        "`mrpipe benchmark` shows what our models give, beside the printed table"
+        "`mrpipe benchmark` compares our models with the printed table"
     )
     return [
         *_ten_storey(),

@@ -36,7 +36,7 @@ def _device() -> BinghamDevice:
 
 
 def ten_storey_claims() -> list[Claim]:
-    """Return Table 2 of P4 beside our runs under the 1940 El Centro record."""
+    """Return Table 2 of P4 compared with our runs under the 1940 El Centro record."""
     record = _public("ground_motions", "elcentro_NS.dat")
     if record is None:
         return [

@@ -1,4 +1,4 @@
-"""One printed figure, what it comes to here, and the verdict."""
+"""One printed figure, the recomputed value, and the verdict."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Verdict = Literal["holds", "differs", "cannot-be-recomputed"]
 
 @dataclass(frozen=True)
 class Claim:
-    """A printed figure beside ours.
+    """A printed figure and the recomputed one.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Claim:
     what
         What is compared, with its unit.
     printed, recomputed
-        Numbers, lists of numbers or words; None where there is none.
+        Numbers, lists of numbers or words; None if there is no value.
     tolerance
         Relative, largest over a list; None where words are compared.
     verdict, why

@@ -1,4 +1,4 @@
-"""All claims of the chapters that were asked for."""
+"""All claims of the requested chapters."""
 
 from __future__ import annotations
 

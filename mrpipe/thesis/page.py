@@ -1,4 +1,4 @@
-"""The page and the figure of `reproduce`: printed figures beside ours."""
+"""The page and the figure of `reproduce`: printed figures compared with the recomputed ones."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def markdown(claims: Sequence[Claim]) -> str:
     number = counts(claims)
     summary = ", ".join(f"{number[verdict]} {verdict.replace('-', ' ')}" for verdict in VERDICTS)
     lines = [
-        "# The thesis' printed figures beside ours",
+        "# The thesis' printed figures and ours",
         "",
         f"{len(claims)} figures: {summary}. Ids that begin with A and a number are rows of the list of errata "
         "(section A), B its section B, C and D those sections; T are tables and equations of the thesis, "
@@ -84,14 +84,14 @@ def markdown(claims: Sequence[Claim]) -> str:
 
 
 def deviations(claims: Sequence[Claim]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return the largest relative deviation of each claim, shape (claims,); NaN where there is no number to compare."""
+    """Return the largest relative deviation of each claim, shape (claims,); NaN without a number to compare."""
     return np.array(
         [deviation(claim.printed, claim.recomputed) if claim.tolerance is not None else np.nan for claim in claims]
     )
 
 
 def deviation_figure(claims: Sequence[Claim]) -> Figure:
-    """Draw the deviation of every figure that was recomputed, by verdict, beside its tolerance."""
+    """Draw the deviation and the tolerance of every recomputed figure, coloured by verdict."""
     chosen = [claim for claim in claims if claim.tolerance is not None]
     values = np.clip(deviations(chosen), _SMALLEST, _LARGEST)
     figure, axes = figure_with_axes(1, 1, height=max(3.0, 0.16 * len(chosen)))

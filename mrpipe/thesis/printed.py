@@ -1,4 +1,4 @@
-"""What the thesis and the errata print for the closed loop, to be shown beside ours (Table 5.1; errata section B)."""
+"""Printed results of the closed loop, for comparison with ours (thesis Table 5.1; errata section B)."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def short(tmp_path: Path, name: str, *more: str) -> list[str]:
         (["0.00 0.1", "0.01 nan", *[f"{0.01 * k:.2f} 0.1" for k in range(2, 30)]], "is not finite"),
         ([], "no samples"),
         (["NPTS= 99, DT= 0.01", *[f"{0.01 * k:.2f} 0.1" for k in range(30)]], "promises 99 points"),
-        (["% in units of g", *[f"{0.01 * k:.2f} {300.0 * (-1) ** k}" for k in range(30)]], "is no ground motion"),
+        (["% in units of g", *[f"{0.01 * k:.2f} {300.0 * (-1) ** k}" for k in range(30)]], "is not a ground motion"),
     ],
 )
 def test_bad_records_end_with_status_2_and_one_line(

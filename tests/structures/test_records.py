@@ -171,12 +171,12 @@ def spoilt(kind: str, folder: Path) -> Path:
         ("backwards", "the clock goes from 2.99 to 2.5 s"),
         ("shuffled", "the clock goes from"),
         ("unknown-unit", "is not a unit"),
-        ("velocity", "this is no acceleration"),
+        ("velocity", "this is not an acceleration"),
         ("no-header", "has no NPTS and DT"),
         ("no-array", "no array of real numbers"),
         ("complex", "no array of real numbers"),
         ("cube", "shape (3, 40, 2)"),
-        ("suffix", "a .json file is no ground-motion record"),
+        ("suffix", "a .json file is not a ground-motion record"),
     ],
 )
 def test_bad_records_get_one_line(tmp_path: Path, kind: str, words: str) -> None:

@@ -33,7 +33,7 @@ class IsolationResult:
     study, motion, uncontrolled, cases
         Of the main motion.
     motions
-        Motion -> law -> indices, of the seven where they were asked for.
+        Motion -> law -> indices, for those of the seven motions that were requested.
     sweep_law, sweep
         Law whose sensitivity was computed; dampers at a position -> indices.
     inverse_nrmse

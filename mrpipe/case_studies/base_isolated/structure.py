@@ -1,4 +1,4 @@
-"""The base-isolated benchmark building (appendix A): published matrices, or a surrogate of our own.
+"""The base-isolated benchmark building (appendix A): published matrices, or a surrogate model.
 
 Degrees of freedom: floors 1 to 8, each (x, y, rotation) relative to the base, then the base (x, y, rotation) relative
 to the ground: (A.18) in rising order.
@@ -163,7 +163,7 @@ def published_building(
     Parameters
     ----------
     path
-        The file; `bearing_locations_id_x_y_m.csv` beside it gives the positions.
+        The file; `bearing_locations_id_x_y_m.csv` in the same folder gives the positions.
     bearing_stiffness, bearing_viscosity
         Of each of the 92 linear bearings [N/m], [N s/m].
 

@@ -68,7 +68,7 @@ class IsolationStudy:
         Raises
         ------
         UserError
-            If there is no such law.
+            If the law does not exist.
         """
         gains = self.gains
         mr = Controller("kelvin", "bingham", device=self.device, network=self.network, dampers=self.dampers)
@@ -104,7 +104,7 @@ class IsolationStudy:
 
 
 def isolated_response(building: IsolatedBuilding, response: Response) -> IsolatedResponse:
-    """Return what the indices of appendix B are made of.
+    """Return the histories from which the indices of appendix B are computed.
 
     The base shear is all that the ground gives the building: bearings and devices.
     """
@@ -152,7 +152,7 @@ def isolation_study(
     building
         Published or surrogate.
     device, network
-        The damper, and its neural inverse (the formula where None).
+        The damper and its neural inverse (the formula if None).
     damping_ratio, stiffness_share
         See :func:`isolation_gains`.
     lqg

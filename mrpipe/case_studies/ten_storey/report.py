@@ -85,7 +85,7 @@ def describe(sink: Sink, studies: Studies, sweep: Mapping[float, Mapping[str, fl
     for name, variants in index_tables(studies).items():
         for variant, table in variants.items():
             frame = figures.beside_thesis(table, THESIS, origin)
-            sink.table(f"{name}-{variant}", frame, f"P4 Table 2 beside ours: {name}, {variant}, {motion.name}.")
+            sink.table(f"{name}-{variant}", frame, f"P4 Table 2 and our results: {name}, {variant}, {motion.name}.")
     shown = [case for case in cases if case.variant == "filtered"]
     picture = figures.histories(
         study.uncontrolled.time_s,
@@ -112,7 +112,7 @@ def describe(sink: Sink, studies: Studies, sweep: Mapping[float, Mapping[str, fl
     )
     sink.figure("loops", picture, "Damper force against displacement and velocity.")
     laws = {case.law: case.indices for case in shown}
-    sink.figure("indices", figures.index_bars(laws, THESIS), "Indices beside P4 Table 2.")
+    sink.figure("indices", figures.index_bars(laws, THESIS), "Indices compared with P4 Table 2.")
     keys = list(next(iter(sweep.values())))
     picture = figures.sensitivity(
         [number * 1000.0 for number in sweep],

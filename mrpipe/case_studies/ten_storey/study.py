@@ -17,8 +17,8 @@ from mrpipe.structures.records import GroundMotion
 
 REASON = (
     "P4 prints m = 5000 and k = 1.5e7, which gives 8.186, not 6.283 rad/s, and a corner element that makes K singular; "
-    "k is mended here, and a frame four times as heavy is shown beside it, which suits a damper of 1000 kN (errata row "
-    "16). At the printed mass the damper is too strong: its force at 0 V is half of what the viscous law asks for. P4 "
+    "k is corrected here. A frame four times as heavy is also shown, which suits a damper of 1000 kN (errata row "
+    "16). At the printed mass the damper is too strong: its force at 0 V is half of what the viscous law requires. P4 "
     "does not say how its uncontrolled frame is damped; here it is undamped."
 )
 """Why our figures differ from the printed ones."""
@@ -70,7 +70,7 @@ def stiffness_share(law: str) -> float:
     Raises
     ------
     UserError
-        If there is no such law.
+        If the law does not exist.
     """
     if law == "vd":
         return 0.0
@@ -81,12 +81,12 @@ def stiffness_share(law: str) -> float:
         value = -1.0
     if name != "kelvin" or not 0.0 < value < 1.0:
         remedy = "vd, kelvin-0.3, kelvin-0.7 (any share of the storey stiffness), passive-off or passive-on"
-        raise UserError("--law", law, "is no law of the ten-storey frame", remedy)
+        raise UserError("--law", law, "is not a law of the ten-storey frame", remedy)
     return value
 
 
 def check_laws(laws: Sequence[str]) -> None:
-    """Raise UserError if one of them is no law of the frame."""
+    """Raise UserError if one of them is not a law of the frame."""
     for law in laws:
         if law not in ("passive-off", "passive-on"):
             stiffness_share(law)

@@ -43,7 +43,7 @@ class WindGains:
     damping_ratio
         Of the first mode under ideal VD, complex eigenvalue; for a tuned mass the smaller of its two modes.
     capacity_share
-        What is left of the optimal gains of VD when they are brought down to what the dampers can give.
+        Factor on the optimal gains of VD that reduces them to the force of the dampers.
     """
 
     viscous: float
@@ -54,7 +54,7 @@ class WindGains:
     capacity_share: float = 1.0
 
     def within(self, capacity_n: float, velocity_m_s: float, displacement_m: float) -> WindGains:
-        """Return the gains brought down so that no law asks for more than the dampers' force at this motion.
+        """Return the gains, reduced so that no law requires more than the dampers' force at this motion.
 
         A law far above its dampers' capacity switches them on and off at every reversal.
         """

@@ -148,12 +148,12 @@ def read_wind(path: Path, floors: int, *, unit: str = "kN", interval_s: float | 
     unit
         Of the forces.
     interval_s
-        Sampling interval where there is no clock [s].
+        Sampling interval if the file has no clock [s].
 
     Raises
     ------
     UserError
-        If the file is missing, not a matrix of so many columns, not finite, or its interval is unknown.
+        If the file is missing, not a matrix with this number of columns, not finite, or its interval is unknown.
     """
     path = Path(path)
     if not path.is_file():
@@ -165,14 +165,16 @@ def read_wind(path: Path, floors: int, *, unit: str = "kN", interval_s: float | 
         raise UserError(path, "", f"has shape {values.shape}", f"{floors} columns, or {floors + 1} with a clock")
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
-        raise UserError(path, f"row {int(bad[0][0]) + 1}, column {int(bad[0][1]) + 1}", "is not finite", "mend the row")
+        raise UserError(
+            path, f"row {int(bad[0][0]) + 1}, column {int(bad[0][1]) + 1}", "is not finite", "correct the row"
+        )
     if values.shape[1] == floors + 1:
         steps = np.diff(values[:, 0])
         if steps.min() <= 0.0 or np.ptp(steps) > 0.02 * steps.mean():
             raise UserError(path, "column 1", "the clock is not uniform", "equal steps of time")
         interval_s, values = float(steps.mean()), values[:, 1:]
     if interval_s is None:
-        raise UserError(path, "interval", "there is no clock", "give benchmark.wind.load.interval_s")
+        raise UserError(path, "interval", "the file has no clock", "give benchmark.wind.load.interval_s")
     return WindLoad(path.stem, to_si(values, unit, where=str(path), quantity="force"), interval_s)
 
 

@@ -91,8 +91,8 @@ def describe(sink: Sink, result: WindResult) -> None:
         f"of vd are {study.gains.capacity_share:.3g} of the optimum, which is what the dampers can give in this wind."
     )
     laws = {case.law: case.indices for case in result.cases}
-    sink.table("indices", figures.beside_thesis(laws, THESIS, origin), f"Table 6.3 beside ours ({origin} model).")
-    sink.figure("indices", figures.index_bars(laws, THESIS), "Indices (ratios) beside Table 6.3.")
+    sink.table("indices", figures.beside_thesis(laws, THESIS, origin), f"Table 6.3 and our results ({origin} model).")
+    sink.figure("indices", figures.index_bars(laws, THESIS), "Indices (ratios) compared with Table 6.3.")
     free = wind_response(study.uncontrolled)
     histories = {case.law: wind_response(case.response) for case in result.cases}
     time = study.uncontrolled.time_s

@@ -1,4 +1,4 @@
-"""The 76-storey tower in wind (6.3, appendix C): published matrices, or a condensed cantilever of our own."""
+"""The 76-storey tower in wind (6.3, appendix C): published matrices, or a condensed cantilever."""
 
 from __future__ import annotations
 
@@ -241,7 +241,7 @@ def with_outrigger(tower: Tower, floor: int, arm_m: float) -> Tower:
         From the core to the damper [m].
     """
     if not 2 <= floor <= FLOORS - 1:
-        raise UserError("benchmark.wind.outrigger_floor", str(floor), "is no floor for an outrigger", "2 to 75")
+        raise UserError("benchmark.wind.outrigger_floor", str(floor), "is not a floor for an outrigger", "2 to 75")
     slope = np.zeros((tower.model.degrees_of_freedom, 1))
     storey = HEIGHT_M / FLOORS
     slope[floor, 0], slope[floor - 2, 0] = arm_m / (2.0 * storey), -arm_m / (2.0 * storey)

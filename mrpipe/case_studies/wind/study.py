@@ -31,11 +31,11 @@ THESIS = {law: dict(zip(_NAMES, values, strict=True)) for law, values in _PRINTE
 """Table 6.3; J6 and J12 in kN m/s."""
 
 REASON = (
-    "A damper between ground and floor 1 of a cantilever sees 4e-4 (surrogate) to 2e-3 (published model) of the top "
-    "motion, so J5 and J11 are of that order and no law of 1 MN changes J1 to J4 and J7 to J10 by more than a percent "
-    "(errata row 20): the printed J5 of 0.41 to 0.55 is the stroke of a tuned mass, not of this damper. The thesis "
-    "prints a damping ratio of 0.001, the benchmark has 0.01 (row 19). The wind-tunnel record is not public: the load "
-    "is synthesised, so that only the ratios compare. Where a damper can work: on an outrigger, or at a tuned mass."
+    "A damper between ground and floor 1 of a cantilever moves by 4e-4 (surrogate) to 2e-3 (published model) of the "
+    "top motion, so J5 and J11 are of that order, and no law of 1 MN changes J1 to J4 and J7 to J10 by more than a "
+    "percent (errata row 20): the printed J5 of 0.41 to 0.55 is the stroke of a tuned mass, not of this damper. The "
+    "thesis prints a damping ratio of 0.001, the benchmark has 0.01 (row 19). The wind-tunnel record is not public: "
+    "the load is synthesised, so that only the ratios compare. A damper can work on an outrigger or at a tuned mass."
 )
 """Why our figures differ from the printed ones."""
 
@@ -94,7 +94,7 @@ class WindStudy:
         Raises
         ------
         UserError
-            If there is no such law.
+            If the law does not exist.
         """
         gains = self.gains
         mr = Controller(
@@ -152,7 +152,7 @@ def run_tower(modal: ModalModel, load: WindLoad, controller: Controller | None, 
 
 
 def wind_response(response: Response) -> WindResponse:
-    """Return what the indices of appendix D are made of."""
+    """Return the histories from which the indices of appendix D are computed."""
     places = np.array(WIND_FLOORS) - 1
     rows = np.zeros((len(places), response.modal.shapes.shape[0]))
     rows[np.arange(len(places)), places] = 1.0
@@ -191,7 +191,7 @@ def wind_study(
     load
         Wind forces on the floors.
     device, network
-        The damper and its neural inverse (the formula where None).
+        The damper and its neural inverse (the formula if None).
     stiffness_share, tuned_mass_kg
         See :func:`wind_gains`.
     lqg
