@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.dampers.form import BaseForm
@@ -20,6 +22,8 @@ from mrpipe.fitting.scoring import PooledScore, TestScore, pool, score_tests
 from mrpipe.fitting.settings import DamperFitSettings
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
+
+T = TypeVar("T")
 
 WORTHWHILE = 0.01
 """Share of the error that a parameter at its bound must gain to be kept there."""
@@ -180,6 +184,7 @@ def compare_forms(
     *,
     folds: int = 0,
     keep: Sequence[str] = (),
+    jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Comparison:
     """Rank every form on a share of the training samples, fit those that may win to all, and score them on all tests.
@@ -190,8 +195,10 @@ def compare_forms(
         Above 1: cross-validate the fitted forms in so many parts.
     keep
         Names of forms that are fitted to all samples whatever their rank.
+    jobs
+        Threads; the result does not depend on their number.
     options
-        How it is traced.
+        How forms are fitted.
     progress
         Called with the share done and a text.
     forms
@@ -205,15 +212,14 @@ def compare_forms(
         training, cycles=options.cycles, maximum_samples=options.maximum_samples, raw_force=options.raw_force
     )
     laws, choice = _laws(forms[0], recordings, options)
-    drafts, starts = _drafts(forms, recordings, laws, options, progress)
+    drafts, starts = _drafts(forms, recordings, laws, options, jobs, progress)
     least = min(drafts.values())
     near = sorted(
         (form.name for form in forms if drafts[form.name] <= CONTENDER * least), key=lambda name: drafts[name]
     )
     chosen = [form for form in forms if form.name in (*near[:MOST_FITTED], *keep)]
-    judged = []
-    for place, form in enumerate(chosen):
-        progress(0.4 + 0.6 * place / len(chosen), f"fit {form.name}")
+
+    def fitted(form: BaseForm) -> JudgedFit:
         seen = thinned(recordings, COUPLED_SAMPLES) if form.coupled else recordings
         weights = _equal_weights(seen) if options.equal_tests else None
         problem = form_problem(seen, base_of(seen, form, laws), offsets=options.offsets, weights=weights)
@@ -223,7 +229,9 @@ def compare_forms(
         if folds > 1:
             pooled, each = cross_validate(found, folds)
             item = replace(item, cross_validated_nrmse=pooled, left_out_nrmse=each)
-        judged.append(item)
+        return item
+
+    judged = _each(fitted, chosen, jobs, lambda done, text: progress(0.4 + 0.6 * done, f"fit {text}"))
     progress(1.0, "fitted")
     return Comparison(tuple(judged), drafts, choice)
 
@@ -243,23 +251,37 @@ def _drafts(
     recordings: Recordings,
     laws: Sequence[LawShape],
     options: FitOptions,
+    jobs: int,
     progress: Progress,
 ) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
     """Return the NRMSE of every form on a share of the samples, and where its search ended."""
     if len(forms) == 1:
         return {forms[0].name: 0.0}, {}
     small = thinned(recordings, DRAFT_SAMPLES)
-    errors: dict[str, float] = {}
-    ends: dict[str, dict[str, float]] = {}
-    for place, form in enumerate(forms):
-        progress(0.4 * place / len(forms), f"rank {form.name}")
+
+    def draft(form: BaseForm) -> tuple[float, dict[str, float]]:
         problem = form_problem(small, base_of(small, form, laws), offsets=options.offsets)
         found = best_fit(problem, starts=options.method.starts)
         w = weighting(problem)
         force = centred(problem.recordings.force[w.at][None], w)[0][0]
-        errors[form.name] = float(np.sqrt(found.cost / max(float(force @ force), 1e-300)))
-        ends[form.name] = found.base_values
-    return errors, ends
+        return float(np.sqrt(found.cost / max(float(force @ force), 1e-300))), found.base_values
+
+    found = _each(draft, forms, jobs, lambda done, text: progress(0.4 * done, f"rank {text}"))
+    names = [form.name for form in forms]
+    errors = {name: error for name, (error, _) in zip(names, found, strict=True)}
+    return errors, {name: end for name, (_, end) in zip(names, found, strict=True)}
+
+
+def _each(
+    work: Callable[[BaseForm], T], forms: Sequence[BaseForm], jobs: int, progress: Callable[[float, str], None]
+) -> list[T]:
+    """Return the result of `work` for every form, in order, on some threads: the compiled steps run side by side."""
+    runner = Parallel(n_jobs=max(1, min(jobs, len(forms))), backend="threading", return_as="generator")
+    results: list[T] = []
+    for form, result in zip(forms, runner(delayed(work)(form) for form in forms), strict=True):
+        results.append(result)
+        progress(len(results) / len(forms), form.name)
+    return results
 
 
 def judge(fit: FormFit, tests: Sequence[PreparedTest], *, raw_force: bool = False) -> JudgedFit:

@@ -41,6 +41,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         fit_options(settings),
         folds=settings.folds if by_choice else 0,
         keep=(*settings.compare, *(() if by_choice else (settings.form,))),
+        jobs=context.jobs,
         progress=context.progress,
     )
     chosen = _chosen(comparison, settings.form)
