@@ -107,6 +107,7 @@ def _damper_force(
         LAW_FUNCTION, float64[::1], int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1],
     ),
     cache=True,
+    nogil=True,
 )  # fmt: skip
 def run_loop(
     counts: IntArray, run: FloatArray, step_matrix: FloatArray, at_end: FloatArray, lower: FloatArray,

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
-from scipy.optimize import minimize_scalar
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import DivergedError
@@ -24,6 +23,13 @@ from mrpipe.simulation.settings import ResonanceSettings
 
 QUANTITIES = ("rms_x_top_m", "rms_x1_m", "rms_a1_m_s2", "rms_a_top_m_s2", "rms_stroke_m")
 """The steady quantities of one frequency, in the order of the columns of `ResponseCurve.values`."""
+
+SMALLEST_GROUP = 3
+"""Fewest windows whose scatter says how far sensor noise reaches."""
+
+NARROW, INTO = 10.0, 0.3
+"""A maximum is found once its interval is narrower than so many frequency tolerances; share of the wider side of the
+interval that a search enters where the parabola repeats the maximum."""
 
 Run = Callable[[Excitation], Response]
 
@@ -50,6 +56,10 @@ class CurveOptions:
         Longest run. A response that is not steady by then keeps its last value.
     frequency_tolerance
         Relative accuracy of the refined resonance frequencies.
+    refinements
+        Most runs that refine one maximum.
+    refined
+        Quantities whose maxima are refined.
     refined_share
         Local maxima of the grid above this share of the largest value are refined.
     absolute
@@ -62,6 +72,8 @@ class CurveOptions:
     tolerance: float = _SETTINGS.tolerance
     most_cycles: int = _SETTINGS.most_cycles
     frequency_tolerance: float = 2e-3
+    refinements: int = 8
+    refined: tuple[str, ...] = ("rms_x_top_m", "rms_a_top_m_s2", "rms_a1_m_s2")
     refined_share: float = 0.9
     absolute: bool = False
 
@@ -116,22 +128,50 @@ class ResponseCurve:
 
 @dataclass
 class _Measured:
-    """RMS values by frequency, so that no frequency is run twice."""
+    """RMS values by frequency, so that no frequency is run twice.
 
-    measure: Callable[[float], tuple[FloatArray, bool]]
-    known: dict[float, tuple[FloatArray, bool]] = field(default_factory=dict)
+    A run starts with the length that the frequency before needed, because neighbouring frequencies need about the same.
+    """
+
+    run: Run
+    amplitude_m_s2: float
+    options: CurveOptions
+    known: dict[float, Steady] = field(default_factory=dict)
+    cycles: int = 0
 
     def __call__(self, omega: float) -> FloatArray:
         if omega not in self.known:
-            self.known[omega] = self.measure(omega)
-        return self.known[omega][0]
+            self.known[omega] = steady_values(self.run, self.amplitude_m_s2, omega, self.options, self.cycles)
+            self.cycles = self.known[omega].cycles
+        return self.known[omega].values
 
 
-def steady_values(run: Run, amplitude_m_s2: float, omega: float, options: CurveOptions) -> tuple[FloatArray, bool]:
-    """Return the steady RMS values at one frequency, shape (len(QUANTITIES),), and whether they are steady.
+@dataclass(frozen=True)
+class Steady:
+    """The steady response at one frequency.
 
-    The run is repeated with twice the settling time until the RMS values of the last two windows agree. A response
-    that grows without bound has infinite values, because an optimiser must be able to compare it.
+    Attributes
+    ----------
+    values
+        RMS values in the order of QUANTITIES.
+    steady
+        Whether they are steady.
+    cycles
+        Cycles of the shortest run that would have given steady values.
+    """
+
+    values: FloatArray
+    steady: bool
+    cycles: int
+
+
+def steady_values(
+    run: Run, amplitude_m_s2: float, omega: float, options: CurveOptions, first_cycles: int = 0
+) -> Steady:
+    """Return the steady RMS values at one frequency.
+
+    The run is repeated with twice the length until the RMS values are steady (:func:`settled`). A response that grows
+    without bound has infinite values, because an optimiser must be able to compare it.
 
     Parameters
     ----------
@@ -141,25 +181,61 @@ def steady_values(run: Run, amplitude_m_s2: float, omega: float, options: CurveO
         Of the base acceleration [m/s^2], [rad/s].
     options
         Lengths and tolerance.
+    first_cycles
+        Length of the first run in cycles; the shortest possible where it is less than that.
     """
-    window = options.window_cycles
-    cycles = options.settling_cycles + 2 * window
-    values = np.full(len(QUANTITIES), math.inf)
+    window, settling = options.window_cycles, options.settling_cycles
+    shortest = settling + 2 * window
+    cycles = min(max(first_cycles, shortest), max(options.most_cycles, shortest))
+    period = 2.0 * math.pi / omega
     while True:
         excitation = harmonic(amplitude_m_s2, omega, cycles=cycles, settling_cycles=cycles - window)
         try:
             response = run(excitation)
         except DivergedError:
-            return np.full(len(QUANTITIES), math.inf), False
-        period = 2.0 * math.pi / omega
-        end = cycles * period
-        before = rms_between(response, end - 2 * window * period, end - window * period, options.absolute)
-        values = rms_between(response, end - window * period, end, options.absolute)
-        if np.all(np.abs(values - before) <= options.tolerance * np.abs(values)):
-            return values, True
+            return Steady(np.full(len(QUANTITIES), math.inf), False, shortest)
+        count = (cycles - settling) // window
+        edges = period * (cycles - window * np.arange(count, -1, -1, dtype=np.float64))
+        windows = rms_between(response, edges, options.absolute)
+        values = settled(windows, options.tolerance)
+        if values is not None:
+            # the shortest run whose windows would have been enough
+            enough = next(k for k in range(2, count + 1) if settled(windows[:k], options.tolerance) is not None)
+            return Steady(values, True, cycles - window * (count - enough))
         if cycles >= options.most_cycles:
-            return values, False
+            return Steady(np.mean(windows[-max(2, count // 2) :], axis=0), False, cycles)
         cycles = min(2 * cycles, options.most_cycles)
+
+
+def settled(windows: FloatArray, tolerance: float) -> FloatArray | None:
+    """Return the steady RMS values of successive windows, shape (q,), or None while they still change.
+
+    Two successive windows that agree within the tolerance are steady. Sensor noise makes the windows scatter; then the
+    values are steady once the means of the last two groups of windows differ by no more than their scatter explains and
+    the mean of both groups is known within the tolerance.
+
+    Parameters
+    ----------
+    windows
+        RMS values of each window, shape (k, q), k at least 2.
+    tolerance
+        Relative.
+    """
+    last = windows[-1]
+    if np.all(np.abs(last - windows[-2]) <= tolerance * np.abs(last)):
+        return np.asarray(last)
+    size = len(windows) // 2
+    if size < SMALLEST_GROUP:
+        return None
+    first, second = windows[-2 * size : -size], windows[-size:]
+    mean = 0.5 * (first.mean(axis=0) + second.mean(axis=0))
+    scatter = np.sqrt(0.5 * (first.var(axis=0, ddof=1) + second.var(axis=0, ddof=1)))
+    error = scatter / math.sqrt(2.0 * size)
+    drift = np.abs(second.mean(axis=0) - first.mean(axis=0))
+    # the standard error of the difference of the two means is twice that of the mean of both
+    if np.all(drift <= np.maximum(4.0 * error, tolerance * np.abs(mean))) and np.all(error <= tolerance * np.abs(mean)):
+        return np.asarray(mean)
+    return None
 
 
 def response_curve(
@@ -184,24 +260,25 @@ def response_curve(
     options = options or CurveOptions()
     first, last = band_rad_s
     grid = [float(value) for value in np.geomspace(first, last, options.points)]
-    measured = _Measured(lambda omega: steady_values(run, amplitude_m_s2, omega, options))
+    measured = _Measured(run, amplitude_m_s2, options)
     table = np.array([measured(omega) for omega in grid])
-    for quantity in ("rms_x_top_m", "rms_a_top_m_s2", "rms_a1_m_s2"):
+    for quantity in options.refined:
         column = QUANTITIES.index(quantity)
         for place in _maxima(table[:, column], options.refined_share):
-            _refine(measured, column, grid, place, options.frequency_tolerance)
+            _refine(measured, column, grid, place, options)
     omegas = np.array(sorted(measured.known))
-    values = np.array([measured.known[float(omega)][0] for omega in omegas])
-    steady = np.array([measured.known[float(omega)][1] for omega in omegas])
+    values = np.array([measured.known[float(omega)].values for omega in omegas])
+    steady = np.array([measured.known[float(omega)].steady for omega in omegas])
     return ResponseCurve(amplitude_m_s2, omegas, values, steady)
 
 
-def rms_between(response: Response, start_s: float, end_s: float, absolute: bool) -> FloatArray:
-    """Return the RMS values between two times, in the order of QUANTITIES.
+def rms_between(response: Response, edges_s: FloatArray, absolute: bool) -> FloatArray:
+    """Return the RMS values between successive times, shape (len(edges_s) - 1, len(QUANTITIES)).
 
-    The integral of the square is interpolated at both ends, because a period is not a whole number of samples.
+    The integral of the square is interpolated at the edges, because a period is not a whole number of samples.
     """
     t = response.time_s
+    edges = np.minimum(edges_s, float(t[-1]))
     accelerations = response.absolute_acceleration if absolute else response.acceleration
     histories = (
         response.displacement[:, -1],
@@ -210,14 +287,14 @@ def rms_between(response: Response, start_s: float, end_s: float, absolute: bool
         accelerations[:, -1],
         response.damper_displacement,
     )
-    first = max(int(np.searchsorted(t, start_s)) - 1, 0)
+    first = max(int(np.searchsorted(t, edges[0])) - 1, 0)
     clock = t[first:]
-    values = []
+    columns = []
     for history in histories:
         integral = cumulative_trapezoid(history[first:] ** 2, clock, initial=0.0)
-        start, end = np.interp([start_s, min(end_s, float(t[-1]))], clock, integral)
-        values.append(math.sqrt(max(float(end - start), 0.0) / (min(end_s, float(t[-1])) - start_s)))
-    return np.array(values)
+        power = np.diff(np.interp(edges, clock, integral)) / np.diff(edges)
+        columns.append(np.sqrt(np.maximum(power, 0.0)))
+    return np.column_stack(columns)
 
 
 def _maxima(values: FloatArray, share: float) -> list[int]:
@@ -229,12 +306,40 @@ def _maxima(values: FloatArray, share: float) -> list[int]:
     return [int(place) for place in peaks if values[place] >= share * np.max(values)]
 
 
-def _refine(measured: _Measured, column: int, grid: Sequence[float], place: int, tolerance: float) -> None:
-    """Search the maximum between the neighbours of a grid point; the values stay in `measured`."""
-    low, high = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
-    minimize_scalar(
-        lambda omega: -float(measured(float(omega))[column]),
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": tolerance * grid[place], "maxiter": 12},
-    )
+def _refine(measured: _Measured, column: int, grid: Sequence[float], place: int, options: CurveOptions) -> None:
+    """Search the maximum between the neighbours of a grid point; the values stay in `measured`.
+
+    A parabola through the three points about the maximum gives the next frequency (in logarithms, because the grid has
+    equal ratios). Where it repeats the maximum of an interval that is still wide, the search enters the wider side.
+    """
+    points = [math.log(grid[k]) for k in (place - 1, place, place + 1) if 0 <= k < len(grid)]
+
+    def value(point: float) -> float:
+        return float(measured(math.exp(point))[column])
+
+    if len(points) == 2:
+        # the largest response is at the edge of the band: look between the edge and its neighbour
+        points.insert(1, 0.5 * (points[0] + points[1]))
+        if value(points[1]) < max(value(points[0]), value(points[2])):
+            return
+    low, top, high = points
+    for _ in range(options.refinements):
+        new = _vertex((low, top, high), (value(low), value(top), value(high)))
+        if abs(new - top) < options.frequency_tolerance:
+            if high - low < NARROW * options.frequency_tolerance:
+                return
+            new = top + INTO * (high - top) if high - top > top - low else top - INTO * (top - low)
+        if value(new) > value(top):
+            low, top, high = (top, new, high) if new > top else (low, new, top)
+        else:
+            low, high = (new, high) if new < top else (low, new)
+
+
+def _vertex(x: tuple[float, float, float], y: tuple[float, float, float]) -> float:
+    """Return where the parabola through three points has its maximum; the middle point where it has none."""
+    left, right = (x[1] - x[0]) * (y[1] - y[2]), (x[1] - x[2]) * (y[1] - y[0])
+    bottom = left - right
+    if bottom == 0.0:
+        return x[1]
+    found = x[1] - 0.5 * ((x[1] - x[0]) * left - (x[1] - x[2]) * right) / bottom
+    return found if x[0] < found < x[2] else x[1]

@@ -45,10 +45,18 @@ def read_histories(artifact: Artifact) -> dict[str, FloatArray]:
     return {name: artifact.array(name) for name in names}
 
 
-def write_curves(artifact: ArtifactWriter, curves: Sequence[ResponseCurve]) -> None:
-    """Write response curves: a group `amplitude_<k>` for each amplitude of the base acceleration."""
+def write_curves(artifact: ArtifactWriter, curves: Sequence[ResponseCurve], within: str = "") -> None:
+    """Write response curves: a group `amplitude_<k>` for each amplitude of the base acceleration.
+
+    Parameters
+    ----------
+    artifact, curves
+        Where, and what.
+    within
+        Group of these groups, with its slash at the end.
+    """
     for number, curve in enumerate(curves, start=1):
-        group = f"amplitude_{number}"
+        group = f"{within}amplitude_{number}"
         artifact.put(f"{group}/base_amplitude", curve.base_amplitude_m_s2, unit="m/s^2")
         artifact.put(f"{group}/frequency", curve.frequency_rad_s, unit="rad/s", dims=("frequency",))
         artifact.put(f"{group}/resonance", curve.resonance_rad_s, unit="rad/s")

@@ -46,12 +46,12 @@ def test_an_unclipped_linear_law_follows_the_exact_frequency_response(rig: Rig, 
         return simulate_law(rig.frame, None, controller, excitation, options)
 
     for omega in (7.0, 9.2):
-        values, steady = steady_values(run, 0.79, omega, EXACT)
+        found = steady_values(run, 0.79, omega, EXACT)
         exact = np.abs(frequency_response(controlled, [omega], absolute_acceleration=False)[0]) * 0.79 / np.sqrt(2.0)
-        assert steady
+        assert found.steady
         # relative accelerations of harmonic motion are omega^2 times the displacements
         expected = [exact[-1], exact[0], omega**2 * exact[0], omega**2 * exact[-1], exact[0]]
-        np.testing.assert_allclose(values, expected, rtol=1e-6)
+        np.testing.assert_allclose(found.values, expected, rtol=1e-6)
 
 
 @pytest.mark.property
