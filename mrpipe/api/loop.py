@@ -214,7 +214,7 @@ def design(
         Of the section `design`.
     """
     from mrpipe.law_design.options import DesignSettings
-    from mrpipe.law_design.results import study_as_json
+    from mrpipe.law_design.results import design_as_json
     from mrpipe.law_design.run import load_of, run_design
     from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
     from mrpipe.simulation.resonance import BAND
@@ -234,8 +234,8 @@ def design(
         jobs=jobs,
         progress=silent,
     )
-    summary = study_as_json(result.study, result.free, result.front, result.ranking, chosen.weights)
-    best = result.study.designed[result.study.best].best
+    summary = design_as_json(result, chosen.weights)
+    best = result.designed[result.best].best
     return Designed(best.law, best.gains, summary, result)
 
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from mrpipe.control.gains import Gains
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
@@ -165,5 +167,5 @@ def evaluate(
 def _rms_of(response: Response, absolute: bool) -> dict[str, float]:
     from mrpipe.simulation.response_curve import QUANTITIES, rms_between
 
-    values = rms_between(response, 0.0, float(response.time_s[-1]), absolute)
+    values = rms_between(response, np.array([0.0, float(response.time_s[-1])]), absolute)[0]
     return dict(zip(QUANTITIES, values.tolist(), strict=True))

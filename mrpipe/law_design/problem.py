@@ -13,9 +13,9 @@ from mrpipe.control.law import GainRange, Plant
 from mrpipe.control.laws import all_laws
 from mrpipe.dampers.model import DamperModel, parameter_unit
 from mrpipe.errors import UserError
+from mrpipe.law_design.kept import LawUnderDesign
 from mrpipe.law_design.options import DesignSettings
 from mrpipe.law_design.search import FreeGain
-from mrpipe.law_design.study import LawUnderDesign
 from mrpipe.law_design.uncertainty import Draw
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
@@ -28,7 +28,7 @@ SMALLEST_SHARE = 0.02
 
 @dataclass(frozen=True)
 class LoopOf:
-    """Gives the loop of a law; may be sent to another process.
+    """Gives the loop of a law.
 
     Attributes
     ----------
@@ -50,6 +50,13 @@ class LoopOf:
             return self.rig.run(controller, excitation, chain=chain, rng=np.random.default_rng(self.seed))
 
         return run
+
+    def at_rate(self, factor: float) -> LoopOf:
+        """Return the loop with other steps of the plant: their number a second times a factor."""
+        options = self.rig.options
+        rate = factor * options.plant_rate_hz
+        options = replace(options, plant_rate_hz=rate, record_rate_hz=min(options.record_rate_hz, rate))
+        return replace(self, rig=replace(self.rig, options=options))
 
     def drawn(self, item: Draw) -> LoopOf:
         """Return the loop with a drawn structure and damper; the controllers stay those of the nominal ones."""

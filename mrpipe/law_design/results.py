@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from mrpipe.artifacts import ArtifactWriter
 from mrpipe.control.laws import law_named
+from mrpipe.law_design.kept import Designed
 from mrpipe.law_design.objective import Evaluation
-from mrpipe.law_design.study import Designed, Study
-from mrpipe.law_design.uncertainty import Ranking, test_for
+from mrpipe.law_design.run import Confirmation, Result
+from mrpipe.law_design.uncertainty import test_for
+from mrpipe.simulation.storage import write_curves
 
 MOST_SENSITIVITIES = 5
 """Uncertain quantities that are listed."""
@@ -46,41 +48,31 @@ def point_as_json(item: Evaluation) -> dict[str, Any]:
     }
 
 
-def study_as_json(
-    study: Study,
-    free: Mapping[str, Designed],
-    front: Sequence[Evaluation],
-    ranking: Ranking | None,
-    weights: Mapping[str, float],
-) -> dict[str, Any]:
+def design_as_json(result: Result, weights: Mapping[str, float]) -> dict[str, Any]:
     """Return what `mrpipe design --json` prints, but for times.
 
     Parameters
     ----------
-    study
-        The laws in the race.
-    free
-        Law -> the same law with all gains free, where some are fixed in the race.
-    front
-        Pareto front.
-    ranking
-        Under uncertainty; None without draws.
+    result
+        Of the design.
     weights
         Of the objective.
     """
+    ranking = result.ranking
     laws = {}
-    for label, found in study.designed.items():
+    for label, found in result.designed.items():
         laws[label] = law_as_json(found)
         laws[label]["probability_best"] = None if ranking is None else ranking.probability_best[label]
-        if found.entry.law in free:
-            laws[label]["unrestricted"] = law_as_json(free[found.entry.law])
+        if label in result.free:
+            laws[label]["unrestricted"] = law_as_json(result.free[label])
     summary: dict[str, Any] = {
         "objective": " + ".join(f"{weight:g} x largest {name}" for name, weight in weights.items())
         + ", relative to law vd at its calibrated gains",
         "weights": dict(weights),
-        "best": study.best,
+        "best": result.best,
         "laws": laws,
-        "pareto": [point_as_json(item) for item in front],
+        "pareto": [point_as_json(item) for item in result.front],
+        "confirmation": _confirmation_as_json(result.confirmation),
     }
     if ranking is not None:
         listed = list(ranking.sensitivities.items())[:MOST_SENSITIVITIES]
@@ -95,16 +87,21 @@ def study_as_json(
     return summary
 
 
-def write_design(artifact: ArtifactWriter, study: Study, summary: Mapping[str, Any]) -> None:
+def _confirmation_as_json(found: Confirmation) -> dict[str, Any]:
+    return {
+        "design": point_as_json(found.design),
+        "calibrated": point_as_json(found.calibrated),
+        "improvement_x_top": found.improvement("rms_x_top_m"),
+        "improvement_a_top": found.improvement("rms_a_top_m_s2"),
+    }
+
+
+def write_design(artifact: ArtifactWriter, result: Result, summary: Mapping[str, Any]) -> None:
     """Write gains and response curves of every law, and the summary."""
-    for label, found in study.designed.items():
-        group = f"laws/{label}"
-        artifact.put_json(f"{group}/gains", dict(found.best.gains))
-        for number, curve in enumerate(found.best.curves, start=1):
-            inner = f"{group}/amplitude_{number}"
-            artifact.put(f"{inner}/base_amplitude", curve.base_amplitude_m_s2, unit="m/s^2")
-            artifact.put(f"{inner}/frequency", curve.frequency_rad_s, unit="rad/s", dims=("frequency",))
-            artifact.put(f"{inner}/rms_x_top", curve.column("rms_x_top_m"), unit="m", dims=("frequency",))
-            artifact.put(f"{inner}/rms_a_top", curve.column("rms_a_top_m_s2"), unit="m/s^2", dims=("frequency",))
+    for label, found in result.designed.items():
+        artifact.put_json(f"laws/{label}/gains", dict(found.best.gains))
+        write_curves(artifact, found.best.curves, f"laws/{label}/")
+    for label, found in result.free.items():
+        artifact.put_json(f"unrestricted/{label}/gains", dict(found.best.gains))
     artifact.put_json("summary", dict(summary))
-    artifact.attributes("/", best=study.best)
+    artifact.attributes("/", best=result.best)

@@ -1,25 +1,27 @@
-"""A whole design: from settings, rig and uncertainties to the study and its ranking."""
+"""A whole design: from settings, rig and uncertainties to the best laws, their ranking and its confirmation."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from mrpipe.artifacts import Artifact, FloatArray, Progress
 from mrpipe.control.law import Plant
 from mrpipe.errors import UserError
-from mrpipe.law_design.objective import Evaluation, Limits, Load, Motion, Objective
+from mrpipe.law_design.kept import Designed, Kept
+from mrpipe.law_design.objective import Evaluation, Limits, Load, Motion, Objective, evaluate
 from mrpipe.law_design.options import DesignSettings
 from mrpipe.law_design.problem import LoopOf, laws_in_the_race
 from mrpipe.law_design.search import SearchOptions
-from mrpipe.law_design.study import COARSE, Designed, Study, StudyOptions, design_law, pareto_front, study
+from mrpipe.law_design.study import COARSE, Loops, design_all, pareto_front, reference_evaluation
 from mrpipe.law_design.uncertainty import DamperUncertainty, Draw, FrameUncertainty, Ranking, draw, rank
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.ground_record import read_ground_record
-from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, steady_values
+from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, ResponseCurve, steady_values
 from mrpipe.simulation.rig import Rig
 from mrpipe.structures import Frame, natural_modes
 
@@ -29,30 +31,71 @@ AROUND = (0.97, 1.0, 1.03)
 LAW_OF_REFERENCE = "vd"
 
 
+SEARCH_RATE = 0.5
+"""Plant steps a second during the search, over those of the settings: peaks change by less than half a percent."""
+
+CONFIRMING_RATE = 2.0
+"""The same when the result is confirmed, with other sensor noise."""
+
+DRAWN_SHARE = 0.9
+"""Local maxima of a response curve above this share of the largest are run in every draw: one of them may be the
+largest in a drawn structure."""
+
+APART = 0.04
+"""Maxima whose frequencies differ by less than this share are one."""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """The best design and the best calibrated gains, run again at half the step with other sensor noise.
+
+    Attributes
+    ----------
+    design, calibrated
+        The two evaluations.
+    """
+
+    design: Evaluation
+    calibrated: Evaluation
+
+    def improvement(self, quantity: str) -> float:
+        """Return by how much the largest value of a quantity is smaller than with the calibrated gains [1]."""
+        return 1.0 - self.design.peaks[quantity] / self.calibrated.peaks[quantity]
+
+
 @dataclass(frozen=True)
 class Result:
     """Everything that a design found.
 
     Attributes
     ----------
-    study
-        The laws in the race.
+    designed
+        Law -> what was found for it.
     free
-        Law -> the same with all gains free, where some are fixed in the race.
+        Law -> the same with all gains free, where some are fixed.
+    best
+        Law with the smallest objective, of those in `designed`.
+    reference
+        The evaluation that scales the objective.
     front
         Designs that no other beats in both top displacement and top acceleration.
     ranking
         Under uncertainty; None without draws.
+    confirmation
+        Of the best design of all, with fixed or free gains.
     left_out
-        Law -> why it is not in the race.
+        Law -> why it is not compared.
     load
         What the design was exposed to.
     """
 
-    study: Study
+    designed: Mapping[str, Designed]
     free: Mapping[str, Designed]
+    best: str
+    reference: Evaluation
     front: tuple[Evaluation, ...]
     ranking: Ranking | None
+    confirmation: Confirmation
     left_out: Mapping[str, str]
     load: Load
 
@@ -88,8 +131,9 @@ def run_design(
     rng: np.random.Generator,
     jobs: int,
     progress: Progress,
+    kept: Kept | None = None,
 ) -> Result:
-    """Search all laws and rank them under uncertainty.
+    """Search all laws, rank them under uncertainty, and confirm the best design.
 
     Parameters
     ----------
@@ -104,54 +148,121 @@ def run_design(
     rng
         For sensor noise and draws.
     jobs
-        Processes.
+        Threads; the result does not depend on their number.
     progress
         Receives the share that is done.
+    kept
+        Results of an interrupted run; None: none are kept.
     """
     calibrated = rig.controllers.calibrated.gains
     entries, free_entries, left_out = laws_in_the_race(settings, plant, calibrated)
     run_of = LoopOf(rig, int(rng.integers(2**32)))
+    loops = Loops(run_of, run_of.at_rate(SEARCH_RATE))
     limits = Limits() if settings.stroke_limit_m is None else Limits(settings.stroke_limit_m)
-    options = StudyOptions(
-        SearchOptions(settings.grid, settings.evaluations),
-        CurveOptions(points=15, tolerance=5e-3, most_cycles=80, absolute=absolute),
-        jobs,
-    )
-    reference = (LAW_OF_REFERENCE, calibrated[LAW_OF_REFERENCE])
+    final = CurveOptions(points=15, tolerance=5e-3, most_cycles=80, absolute=absolute)
+    reference = reference_evaluation(run_of, LAW_OF_REFERENCE, calibrated[LAW_OF_REFERENCE], load, final)
+    objective = Objective(settings.weights, reference.peaks, limits)
 
     def part(start: float, share: float) -> Progress:
         return lambda done, text="": progress(start + share * done, text)
 
-    found = study(
-        run_of, entries, load, settings.weights, limits, reference, options, part(0.0, 0.7 if settings.draws else 0.9)
+    found = design_all(
+        loops,
+        [*entries, *free_entries],
+        load,
+        objective,
+        (SearchOptions(settings.grid, settings.evaluations), final),
+        kept or Kept(),
+        jobs,
+        part(0.0, 0.75),
     )
-    objective = Objective(settings.weights, found.reference.peaks, limits)
-    free = {
-        entry.law: design_law(run_of, entry, load, objective, options.search, options.final) for entry in free_entries
-    }
-    progress(0.8, "uncertainty")
+    designed = {entry.label: found[entry.label] for entry in entries}
+    free = {entry.law: found[entry.label] for entry in free_entries}
+    best = min(designed, key=lambda label: designed[label].best.value)
     ranking = None
-    if settings.draws and len(found.designed) > 1:
+    if settings.draws and len(designed) > 1:
         draws = [draw(rig.frame, rig.damper, *uncertainty, rng) for _ in range(settings.draws)]
-        ranking = _rank(run_of, found, draws, load, objective, absolute)
-    front = pareto_front(
-        replace(found, designed={**found.designed, **{f"{law}, free": item for law, item in free.items()}})
+        bests = {label: item.best for label, item in designed.items()}
+        ranking = _rank(run_of.at_rate(SEARCH_RATE), bests, best, draws, load, objective, absolute, jobs, part(0.75, 0.13))
+    every = [*designed.values(), *free.values()]
+    front = _front(run_of, every, load, objective, final, jobs)
+    progress(0.94, "confirmation")
+    confirmation = _confirmation(run_of, every, load, objective, final, jobs)
+    return Result(designed, free, best, reference, front, ranking, confirmation, left_out, load)
+
+
+def _front(
+    run_of: LoopOf, found: Sequence[Designed], load: Load, objective: Objective, final: CurveOptions, jobs: int
+) -> tuple[Evaluation, ...]:
+    """Return the Pareto front of all gains that were tried; what the search saw coarsely is run again accurately."""
+    accurate = [item for each in found for item in (each.best, each.calibrated)]
+    coarse = pareto_front([*accurate, *(item for each in found for item in each.tried)])
+    known = {(item.law, item.gains): item for item in accurate}
+    rough = [item for item in coarse if (item.law, item.gains) not in known]
+    runner = Parallel(n_jobs=max(1, jobs), backend="threading")
+    again = runner(delayed(evaluate)(run_of, item.law, item.gains, load, objective, final) for item in rough)
+    return tuple(pareto_front([*accurate, *again]))
+
+
+def _confirmation(
+    run_of: LoopOf, found: Sequence[Designed], load: Load, objective: Objective, final: CurveOptions, jobs: int
+) -> Confirmation:
+    """Run the best design and the best calibrated gains at half the step with other sensor noise."""
+    best = min((item.best for item in found), key=lambda item: item.value)
+    calibrated = min((item.calibrated for item in found), key=lambda item: item.value)
+    finer = replace(run_of.at_rate(CONFIRMING_RATE), seed=run_of.seed + 1)
+    runner = Parallel(n_jobs=max(1, jobs), backend="threading")
+    again = runner(
+        delayed(evaluate)(finer, item.law, item.gains, load, objective, final) for item in (best, calibrated)
     )
-    return Result(found, free, tuple(front), ranking, left_out, load)
+    return Confirmation(*again)
 
 
-def _rank(run_of: LoopOf, found: Study, draws: list[Draw], load: Load, objective: Objective, absolute: bool) -> Ranking:
-    """Run every law at its best gains in every draw, near its resonance at the largest amplitude."""
+def _rank(
+    run_of: LoopOf,
+    bests: Mapping[str, Evaluation],
+    chosen: str,
+    draws: Sequence[Draw],
+    load: Load,
+    objective: Objective,
+    absolute: bool,
+    jobs: int,
+    progress: Progress,
+) -> Ranking:
+    """Run every law at its best gains in every draw, near its resonances at the largest amplitude."""
     amplitude = max(load.amplitudes_m_s2)
     options = replace(COARSE, absolute=absolute)
+    frequencies = {
+        label: [f * omega for omega in resonances(item.curves[-1]) for f in AROUND] for label, item in bests.items()
+    }
 
     def value(label: str, item: Draw) -> float:
-        best = found.designed[label].best
-        run = run_of.drawn(item)(best.law, best.gains)
-        table = np.array([steady_values(run, amplitude, f * best.resonance_rad_s, options)[0] for f in AROUND])
+        run = run_of.drawn(item)(bests[label].law, bests[label].gains)
+        table = np.array([steady_values(run, amplitude, omega, options).values for omega in frequencies[label]])
         return objective.value(dict(zip(QUANTITIES, table.max(axis=0).tolist(), strict=True)))
 
-    return rank(list(found.designed), found.best, draws, value)
+    runner = Parallel(n_jobs=max(1, jobs), backend="threading", return_as="generator")
+    values = []
+    for number, found in enumerate(runner(delayed(value)(label, item) for item in draws for label in bests), start=1):
+        values.append(found)
+        progress(number / (len(draws) * len(bests)), "uncertainty")
+    return rank(list(bests), chosen, draws, np.array(values).reshape(len(draws), len(bests)))
+
+
+def resonances(curve: ResponseCurve) -> list[float]:
+    """Return the frequencies [rad/s] of the largest top displacement and of all maxima that come near it.
+
+    Two maxima nearer than :data:`APART` are one, because sensor noise roughens a curve.
+    """
+    values = curve.column("rms_x_top_m")
+    padded = np.concatenate([[-np.inf], values, [-np.inf]])
+    places = np.flatnonzero((padded[1:-1] >= padded[:-2]) & (padded[1:-1] >= padded[2:]))
+    found: list[float] = []
+    for place in sorted(places, key=lambda k: -float(values[k])):
+        omega = float(curve.frequency_rad_s[place])
+        if values[place] >= DRAWN_SHARE * values.max() and all(abs(omega / known - 1.0) > APART for known in found):
+            found.append(omega)
+    return found
 
 
 def frame_uncertainty(artifact: Artifact, frame: Frame) -> FrameUncertainty:

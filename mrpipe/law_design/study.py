@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from joblib import Parallel, delayed
@@ -10,75 +10,39 @@ from joblib import Parallel, delayed
 from mrpipe.artifacts import Progress
 from mrpipe.control.gains import Gains
 from mrpipe.errors import DivergedError
-from mrpipe.law_design.objective import Evaluation, Limits, Load, Objective, RunOf, evaluate
-from mrpipe.law_design.search import FreeGain, SearchOptions, search
+from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
+from mrpipe.law_design.objective import Evaluation, Load, Objective, RunOf, evaluate
+from mrpipe.law_design.search import SearchOptions, search
 from mrpipe.simulation.response_curve import CurveOptions
 
 COARSE = CurveOptions(
-    points=9, settling_cycles=8, window_cycles=6, tolerance=2e-2, most_cycles=40, frequency_tolerance=1e-2
+    points=9,
+    settling_cycles=8,
+    window_cycles=6,
+    tolerance=2e-2,
+    most_cycles=40,
+    frequency_tolerance=1e-2,
+    refinements=5,
+    refined=("rms_x_top_m",),
 )
-"""Response curves during the search: accurate to about a percent, at a tenth of the cost of the final ones."""
+"""Response curves during the search: peaks are accurate to about half a percent, at a tenth of the cost of the final
+ones."""
 
 
 @dataclass(frozen=True)
-class LawUnderDesign:
-    """A law with the gains that may change.
+class Loops:
+    """The loops of a study.
 
     Attributes
     ----------
-    law
-        Its name.
-    start
-        Calibrated gains; the fixed ones keep their values.
-    free
-        Gains to search; none: the law is only evaluated.
-    label
-        Key of the result, such as `vdns` or `vdns (free stiffness)`.
+    accurate
+        Gives the loop of a law as the settings describe it.
+    searched
+        The same with a larger step of the plant, for the search.
     """
 
-    law: str
-    start: Gains
-    free: tuple[FreeGain, ...]
-    label: str
-
-
-@dataclass(frozen=True)
-class Designed:
-    """What the study found for one law.
-
-    Attributes
-    ----------
-    entry
-        The law under design.
-    best, calibrated
-        Evaluation at the best gains and at the calibrated ones, with accurate response curves.
-    tried
-        All gains that the search evaluated, with coarse response curves.
-    """
-
-    entry: LawUnderDesign
-    best: Evaluation
-    calibrated: Evaluation
-    tried: tuple[Evaluation, ...]
-
-
-@dataclass(frozen=True)
-class Study:
-    """Result of a design.
-
-    Attributes
-    ----------
-    designed
-        Label -> what was found.
-    best
-        Label of the law with the smallest objective.
-    reference
-        The reference evaluation that scales the objective.
-    """
-
-    designed: Mapping[str, Designed]
-    best: str
-    reference: Evaluation
+    accurate: RunOf
+    searched: RunOf
 
 
 @dataclass
@@ -94,7 +58,7 @@ class _Archive:
 
 
 def design_law(
-    run_of: RunOf,
+    loops: Loops,
     entry: LawUnderDesign,
     load: Load,
     objective: Objective,
@@ -105,8 +69,8 @@ def design_law(
 
     Parameters
     ----------
-    run_of
-        Gives the loop of a law.
+    loops
+        Give the loop of a law.
     entry
         The law and its free gains.
     load, objective
@@ -117,20 +81,20 @@ def design_law(
         Of the accurate response curves.
     """
     archive = _Archive()
-    coarse = replace(COARSE, absolute=final.absolute)
+    coarse = replace(COARSE, absolute=final.absolute, refined=tuple(objective.weights) or COARSE.refined)
     fixed = {name: value for name, value in entry.start.items() if name not in {gain.name for gain in entry.free}}
 
     # the largest response is that at the largest amplitude; the other amplitudes are checked with the best gains
     searched = replace(load, amplitudes_m_s2=(max(load.amplitudes_m_s2),))
 
     def value(gains: Gains) -> float:
-        return archive.add(evaluate(run_of, entry.law, gains, searched, objective, coarse))
+        return archive.add(evaluate(loops.searched, entry.law, gains, searched, objective, coarse))
 
-    calibrated = evaluate(run_of, entry.law, entry.start, load, objective, final)
+    calibrated = evaluate(loops.accurate, entry.law, entry.start, load, objective, final)
     if not entry.free:
         return Designed(entry, calibrated, calibrated, ())
     found = search(value, entry.free, fixed, options)
-    best = evaluate(run_of, entry.law, found, load, objective, final)
+    best = evaluate(loops.accurate, entry.law, found, load, objective, final)
     if calibrated.value < best.value:
         # the accurate curves decide; the search saw the coarse ones
         best = calibrated
@@ -155,86 +119,71 @@ def _finite(value: float) -> bool:
     return value == value and abs(value) < float("inf")
 
 
-@dataclass(frozen=True)
-class StudyOptions:
-    """How a study is made.
-
-    Attributes
-    ----------
-    search
-        Size of the search of the gains.
-    final
-        Accurate response curves of the best gains.
-    jobs
-        Processes; the result does not depend on it.
-    """
-
-    search: SearchOptions
-    final: CurveOptions
-    jobs: int = 1
-
-
-def study(
-    run_of: RunOf,
+def design_all(
+    loops: Loops,
     entries: Sequence[LawUnderDesign],
     load: Load,
-    weights: Mapping[str, float],
-    limits: Limits,
-    reference: tuple[str, Gains],
-    options: StudyOptions,
+    objective: Objective,
+    options: tuple[SearchOptions, CurveOptions],
+    kept: Kept,
+    jobs: int,
     progress: Progress,
-) -> Study:
-    """Design every law and name the best one.
+) -> dict[str, Designed]:
+    """Design every law on some threads and return label -> what was found, in the order of the entries.
 
     Parameters
     ----------
-    run_of
-        Gives the loop of a law; must be picklable where several processes are used.
+    loops
+        Give the loop of a law.
     entries
         Laws under design.
-    load
+    load, objective
         Of the design.
-    weights, limits
-        Of the objective.
-    reference
-        Law and gains whose largest responses are the unit of the objective.
     options
-        Of the study.
+        Of the search, and of the accurate response curves.
+    kept
+        Results of an interrupted run, which are not computed again.
+    jobs
+        Threads; the result does not depend on their number.
     progress
         Receives the share that is done.
-
-    Raises
-    ------
-    DivergedError
-        If the reference loop is unstable.
     """
-    base = reference_evaluation(run_of, *reference, load, options.final)
-    objective = Objective(weights, base.peaks, limits)
-    parallel = Parallel(n_jobs=options.jobs, return_as="generator")
-    tasks = (delayed(design_law)(run_of, entry, load, objective, options.search, options.final) for entry in entries)
-    designed: dict[str, Designed] = {}
-    for entry, found in zip(entries, parallel(tasks), strict=True):
-        designed[entry.label] = found
-        progress(len(designed) / len(entries), entry.label)
-    best = min(designed, key=lambda label: designed[label].best.value)
-    return Study(designed, best, base)
+
+    def one(entry: LawUnderDesign) -> tuple[str, Designed]:
+        known = kept.read(entry)
+        if known is None:
+            known = design_law(loops, entry, load, objective, *options)
+            kept.write(known)
+        return entry.label, known
+
+    # the longest searches first, so that the threads end together
+    ordered = sorted(entries, key=lambda entry: -len(entry.free))
+    total = sum(1 + len(entry.free) ** 2 for entry in entries)
+    runner = Parallel(n_jobs=max(1, jobs), backend="threading", return_as="generator_unordered")
+    found: dict[str, Designed] = {}
+    done = 0
+    for label, item in runner(delayed(one)(entry) for entry in ordered):
+        found[label] = item
+        done += 1 + len(item.entry.free) ** 2
+        progress(done / total, label)
+    return {entry.label: found[entry.label] for entry in entries}
 
 
-def pareto_front(study_: Study, first: str = "rms_x_top_m", second: str = "rms_a_top_m_s2") -> list[Evaluation]:
+def pareto_front(
+    items: Sequence[Evaluation], first: str = "rms_x_top_m", second: str = "rms_a_top_m_s2"
+) -> list[Evaluation]:
     """Return the designs that no other design beats in both quantities, ascending in the first.
 
     Parameters
     ----------
-    study_
-        Result of a design.
+    items
+        Designs.
     first, second
         Quantities to compare.
     """
-    items = [item for found in study_.designed.values() for item in (*found.tried, found.best, found.calibrated)]
-    items.sort(key=lambda item: (item.peaks[first], item.peaks[second]))
     front: list[Evaluation] = []
     lowest = float("inf")
-    for item in items:
+    for item in sorted(items, key=lambda item: (item.peaks[first], item.peaks[second])):
         height = item.peaks[second]
         if _finite(item.peaks[first]) and height < lowest:
             front.append(item)

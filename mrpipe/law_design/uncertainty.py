@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -162,31 +162,29 @@ class Ranking:
     values: Mapping[str, FloatArray]
 
 
-def rank(laws: Sequence[str], chosen: str, draws: Sequence[Draw], objective: Callable[[str, Draw], float]) -> Ranking:
-    """Evaluate every law in every draw.
+def rank(laws: Sequence[str], chosen: str, draws: Sequence[Draw], values: FloatArray) -> Ranking:
+    """Compare the laws over all draws.
 
     Parameters
     ----------
     laws, chosen
-        Laws in the race, and the one that the design chose.
+        Laws that are compared, and the one that the design chose.
     draws
         Realisations; every law sees the same ones.
-    objective
-        Of a law in a draw.
+    values
+        Objective of each law in each draw, shape (draws, laws).
     """
-    table = np.array([[objective(law, item) for law in laws] for item in draws])
-    best = np.argmin(table, axis=1)
+    best = np.argmin(values, axis=1)
     place = laws.index(chosen)
-    lowest = table.min(axis=1)
-    regret = table[:, place] / lowest - 1.0
-    others = np.delete(table, place, axis=1)
-    lead = others.min(axis=1) - table[:, place] if others.size else np.zeros(len(draws))
+    regret = values[:, place] / values.min(axis=1) - 1.0
+    others = np.delete(values, place, axis=1)
+    lead = others.min(axis=1) - values[:, place] if others.size else np.zeros(len(draws))
     return Ranking(
         {law: float(np.mean(best == k)) for k, law in enumerate(laws)},
         float(np.mean(regret)),
         float(np.quantile(regret, 0.9)),
         _sensitivities(draws, lead),
-        {law: table[:, k] for k, law in enumerate(laws)},
+        {law: values[:, k] for k, law in enumerate(laws)},
     )
 
 

@@ -54,6 +54,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         sentences.append(
             f"The second best law is {name}; its objective is {item['objective'] / best['objective'] - 1.0:.0%} larger."
         )
+    sentences.append(_confirmed(summary["confirmation"]))
     uncertainty = summary.get("uncertainty")
     if uncertainty:
         sentences.append(
@@ -66,6 +67,17 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
                 f"The lead depends most on {first['parameter']}. The test that determines it: {first['test']}."
             )
     return " ".join(sentences)
+
+
+def _confirmed(found: Mapping[str, Any]) -> str:
+    design, calibrated = found["design"], found["calibrated"]
+    return (
+        f"At half the step of the simulation and with other sensor noise, the best design of all ({design['law']}, "
+        f"{_words(design['gains']) or 'no gains'}) has a largest RMS top displacement of "
+        f"{1e3 * design['peak_rms_x_top_m']:.1f} mm and top acceleration of {design['peak_rms_a_top_m_s2']:.2f} m/s^2; "
+        f"the best law at its calibrated gains ({calibrated['law']}) has {1e3 * calibrated['peak_rms_x_top_m']:.1f} mm "
+        f"and {calibrated['peak_rms_a_top_m_s2']:.2f} m/s^2."
+    )
 
 
 def laws_table(summary: Mapping[str, Any]) -> pd.DataFrame:
@@ -93,7 +105,7 @@ def laws_table(summary: Mapping[str, Any]) -> pd.DataFrame:
 def curves_figure(result: Result) -> Figure:
     """Return top displacement and top acceleration over frequency at the largest amplitude, one line per law."""
     figure, axes = figure_with_axes(1, 2, height=3.2)
-    order = sorted(result.study.designed.values(), key=lambda found: found.best.value)
+    order = sorted(result.designed.values(), key=lambda found: found.best.value)
     for axis, quantity, scale, name in zip(
         axes[0],
         ("rms_x_top_m", "rms_a_top_m_s2"),

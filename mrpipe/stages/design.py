@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from mrpipe.pipeline.stage import Stage, StageContext
 
+KEPT = "design-kept"
+"""Folder with the results of the laws that are done, until the design is complete."""
+
 if TYPE_CHECKING:
     from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
     from mrpipe.simulation.rig import Rig
@@ -16,7 +19,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     import time
 
     from mrpipe.control.calibration import CalibrationOptions, plant_of
-    from mrpipe.law_design.results import study_as_json, write_design
+    from mrpipe.law_design.kept import Kept
+    from mrpipe.law_design.results import design_as_json, write_design
     from mrpipe.law_design.run import load_of, run_design
     from mrpipe.reporting import design as report
     from mrpipe.simulation.resonance import default_band
@@ -40,14 +44,24 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         rng=context.rng,
         jobs=context.jobs,
         progress=context.progress,
+        kept=(kept := Kept(context.run_directory / KEPT, _problem(context))),
     )
     for law, why in result.left_out.items():
         context.warn(f"law {law} is not in the race, because {why}")
-    summary = study_as_json(result.study, result.free, result.front, result.ranking, settings.weights)
+    summary = design_as_json(result, settings.weights)
     with context.write("design.h5") as artifact:
-        write_design(artifact, result.study, summary)
+        write_design(artifact, result, summary)
     report.describe(context.report, result, summary)
+    kept.clear()
     return {**summary, "seconds": time.perf_counter() - began}
+
+
+def _problem(context: StageContext) -> str:
+    """Return everything that the result for a law depends on, as text: inputs, settings, seed and version."""
+    from mrpipe import __version__
+
+    provenance = context.provenance
+    return f"{sorted(provenance.inputs.items())}|{provenance.config}|{provenance.seed}|{__version__}"
 
 
 def _amplitude(details: Mapping[str, Any]) -> float:
