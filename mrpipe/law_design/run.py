@@ -183,7 +183,8 @@ def run_design(
     if settings.draws and len(designed) > 1:
         draws = [draw(rig.frame, rig.damper, *uncertainty, rng) for _ in range(settings.draws)]
         bests = {label: item.best for label, item in designed.items()}
-        ranking = _rank(run_of.at_rate(SEARCH_RATE), bests, best, draws, load, objective, absolute, jobs, part(0.75, 0.13))
+        coarse = run_of.at_rate(SEARCH_RATE)
+        ranking = _rank(coarse, bests, best, draws, load, objective, absolute, jobs, part(0.75, 0.13))
     every = [*designed.values(), *free.values()]
     front = _front(run_of, every, load, objective, final, jobs)
     progress(0.94, "confirmation")

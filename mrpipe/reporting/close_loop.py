@@ -20,7 +20,7 @@ from mrpipe.reporting.bench_tracing import (
     residual_location,
     residual_maps,
 )
-from mrpipe.reporting.closed_loop import law_table, response_by_law
+from mrpipe.reporting.closed_loop import band_table, law_table, response_by_law
 from mrpipe.reporting.closed_loop_words import in_words
 from mrpipe.reporting.sink import Sink
 from mrpipe.tracing.bench.summary import Tracing
@@ -190,6 +190,13 @@ def _loop(sink: Sink, found: Mapping[str, Any]) -> None:
         "that ran; and with the controller renewed for the effect.",
     )
     sink.table("laws", pd.DataFrame(law_table(found)), "The same as a table.")
+    low, high = found["over_band"]["band_rad_s"]
+    sink.table(
+        "laws-over-band",
+        pd.DataFrame(band_table(found)),
+        f"Every law at its own resonance: the largest responses to harmonic base motion from {low:.3g} to {high:.3g} "
+        f"rad/s at {found['over_band']['base_amplitude_m_s2']:.3g} m/s2. The laws are ranked by the top displacement.",
+    )
     rows = []
     for item in found["tests"]:
         if item["recorded"]:

@@ -38,6 +38,23 @@ def _scaled(values: Mapping[str, float], key: str, factor: float) -> float | Non
     return factor * values[key] if key in values else None
 
 
+def band_table(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return a row a law: resonance and largest RMS responses over the frequency band, by column."""
+    rows = []
+    for item in found["over_band"]["laws"]:
+        row: dict[str, Any] = {"law": item["law"]}
+        for when in COLUMNS:
+            values = item.get(when)
+            if values is None:
+                continue
+            grows = "diverged" in values
+            row[f"resonance {when} [rad/s]"] = "grows" if grows else values["resonance_rad_s"]
+            row[f"largest rms_x_top {when} [mm]"] = "grows" if grows else 1e3 * values["peak_rms_x_top_m"]
+            row[f"largest rms_a1 {when} [m/s2]"] = "grows" if grows else values["peak_rms_a1_m_s2"]
+        rows.append(row)
+    return rows
+
+
 def response_by_law(found: Mapping[str, Any]) -> Figure:
     """Draw the RMS displacement of the top floor and acceleration of the first by law: measured and predicted."""
     laws = found["laws"]

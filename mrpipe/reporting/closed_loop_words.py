@@ -24,7 +24,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     parts += [f"The effect {name} is not in the plant: {why}." for name, why in found["plant"]["left_out"].items()]
     if effects and "controller" in found:
         parts.append(controller_in_words(found))
-    parts += _doubts(found["laws"])
+    parts += _doubts([*found["laws"], *found["over_band"]["laws"]])
     return " ".join(parts)
 
 
@@ -49,7 +49,9 @@ def errors_in_words(found: Mapping[str, Any]) -> str:
 
 def _doubts(laws: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return what to be careful about: responses that grow, and motion beyond what the damper was tested at."""
-    grows = [f"{row['law']} ({when})" for row in laws for when in WHEN if "diverged" in row.get(when, {})]
+    grows = list(
+        dict.fromkeys(f"{row['law']} ({when})" for row in laws for when in WHEN if "diverged" in row.get(when, {}))
+    )
     far = [
         f"{row['law']} ({row['after']['peak_over_tested_stroke']:.1f} times)" for row in laws if row.get("extrapolated")
     ]
@@ -62,22 +64,27 @@ def _doubts(laws: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def ranking_in_words(found: Mapping[str, Any]) -> str:
-    """Return whether the effect changes the order of the laws."""
+    """Return whether the effect changes the order of the laws over the frequency band."""
     order = found["ranking"]
     listed = ", ".join(order["after"])
+    low, high = found["over_band"]["band_rad_s"]
+    over = (
+        f"by the largest RMS top displacement from {low:.3g} to {high:.3g} rad/s at a base acceleration of "
+        f"{found['over_band']['base_amplitude_m_s2']:.3g} m/s^2"
+    )
     if not found["plant"]["effects"]:
-        return f"The damper stays as it is, and so does the ranking of the laws: {listed} (the best first)."
+        return f"The damper stays as it is, and so does the ranking of the laws {over}: {listed} (the best first)."
     if found["ranking_changes"]:
         swaps = ", ".join(f"{a} is now ahead of {b}" for a, b in found["reversed_pairs"])
-        said = f"The effect changes the ranking of the laws ({swaps}): {listed} (the best first)."
+        said = f"The effect changes the ranking of the laws {over} ({swaps}): {listed} (the best first)."
     else:
-        said = f"The effect does not change the ranking of the laws: {listed} (the best first)."
-    if "measured" in order:
+        said = f"The effect does not change the ranking of the laws {over}: {listed} (the best first)."
+    if "recorded_ranking" in found:
         agrees = found["ranking_agrees_with_measured"]
         words = {(True, True): "both before and after", (True, False): "before only", (False, True): "only after"}
         said += (
-            f" The order measured is {', '.join(order['measured'])}; the model agrees with it "
-            f"{words.get((agrees['before'], agrees['after']), 'neither before nor after')}."
+            f" Under the recorded motions the measured order is {', '.join(found['recorded_ranking']['measured'])}; "
+            f"the model agrees with it {words.get((agrees['before'], agrees['after']), 'neither before nor after')}."
         )
     return said
 
@@ -100,25 +107,27 @@ def controller_in_words(found: Mapping[str, Any]) -> str:
         f"{'gains ' + gains if gains else 'the gains it had'}. Each law uses the changes that lower its simulated "
         f"response: {taken or 'no law uses any'}."
     )
-    return f"{text} {gain_in_words(found['laws'])}"
+    return f"{text} {gain_in_words(found['over_band']['laws'])}"
 
 
 def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
-    """Return what the renewed controller changes on the damper with the effect."""
+    """Return what the renewed controller changes on the damper with the effect, from the peaks over the band."""
+    key = "peak_rms_x_top_m"
     changes = {
-        row["law"]: row["recalibrated"]["rms_x_top_m"] / row["after"]["rms_x_top_m"] - 1.0
+        row["law"]: row["recalibrated"][key] / row["after"][key] - 1.0
         for row in laws
-        if "rms_x_top_m" in row.get("recalibrated", {}) and "rms_x_top_m" in row.get("after", {})
+        if key in row.get("recalibrated", {}) and key in row.get("after", {})
     }
     changed = {law: change for law, change in changes.items() if abs(change) > WORTH_SAYING}
     if not changed:
         return (
-            "Retuning for the effect changes the RMS top displacement of no law by more than 1 %: the effect "
+            "Retuning for the effect changes the largest RMS top displacement of no law by more than 1 %: the effect "
             "matters for prediction, not for control."
         )
     listed = ", ".join(f"{law} {100.0 * change:+.0f} %" for law, change in changed.items())
     return (
-        f"On the damper with the effect it changes the RMS top displacement: {listed}; the other laws stay within 1 %."
+        f"On the damper with the effect it changes the largest RMS top displacement: {listed}; the other laws stay "
+        "within 1 %."
     )
 
 

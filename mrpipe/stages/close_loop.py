@@ -74,6 +74,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     from mrpipe.control.storage import read_calibrated
     from mrpipe.fitting.damper import damper_model
     from mrpipe.reporting.closed_loop_words import in_words
+    from mrpipe.simulation.resonance import default_band
     from mrpipe.simulation.rig import Rig, loop_options
     from mrpipe.structures import read_frame
     from mrpipe.tracing.loop import study
@@ -102,6 +103,8 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
             tests,
             settings,
             recorded,
+            _laws(context, controllers.available()),
+            context.settings.resonance.band_rad_s or default_band(context.artifact("calibrate")),
             context.rng,
             context.seed,
             context.jobs,
@@ -110,6 +113,17 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
         )
     )
     return {**found, "statement": in_words(found)}
+
+
+def _laws(context: StageContext, available: list[str]) -> list[str]:
+    """Return the laws to compare in addition to the recorded ones; warn of those that cannot run."""
+    from mrpipe.tracing.loop.study import laws_to_compare
+
+    asked = context.settings.close_loop.laws
+    for law in asked:
+        if law not in available:
+            context.warn(f"law {law} is not compared, because it is not calibrated")
+    return laws_to_compare(asked, context.settings.stages, available)
 
 
 def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
@@ -215,8 +229,10 @@ STAGE = Stage(
     inputs=("prepare", "campaign:bench"),
     optional_inputs=("identify-frame", "calibrate", "train-inverse", "campaign:closed-loop"),
     settings=(
+        "stages",
         "close_loop",
         "simulate",
+        "resonance.band_rad_s",
         "prepare.displacement_late_s",
         "prepare.corrections",
         "laboratory.bench.tests",

@@ -8,6 +8,7 @@ from pydantic import Field, field_validator
 
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.config.section import Section
+from mrpipe.control.laws import known_law
 from mrpipe.dampers.forms import form_names
 from mrpipe.tracing.rules import TracingRules
 
@@ -57,8 +58,18 @@ class CloseLoopSettings(Section):
         description="Model error to weigh by, as a share of the force RMS, where it is known to outweigh the sensors' "
         "noise, as on real dampers; 0 finds out by a first pass, for twice the time.",
     )
+    laws: tuple[str, ...] = Field(
+        (),
+        description="Laws that the closed loop compares in addition to the recorded ones; empty: those that `stages` "
+        "simulates, or all that are calibrated where it simulates none.",
+    )
     rules: TracingRules = Field(TracingRules(), description="Thresholds of the decisions.")
     unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")
+
+    @field_validator("laws")
+    @classmethod
+    def _laws_are_known(cls, laws: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(known_law(law) for law in laws)
 
     @field_validator("model")
     @classmethod

@@ -8,6 +8,7 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns import Campaign
@@ -233,35 +234,10 @@ def run_indices(
     return found
 
 
-def best_ways(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench: Bench) -> dict[str, str]:
-    """Return for each law the arrangement with the least RMS top displacement in the first run of the law.
-
-    Parameters
-    ----------
-    ways
-        Name -> arrangement, the least changed first; a later one must be better by `rules.alike`.
-    runs
-        Laws under their motion.
-    bench
-        Structure and sensors.
-    """
-    found = {}
-    for law in dict.fromkeys(run.law for run in runs):
-        run = next(item for item in runs if item.law == law)
-        best, least = next(iter(ways)), float("inf")
-        for name, way in ways.items():
-            try:
-                value = predicted(run, way, bench)["rms_x_top_m"]
-            except DivergedError:
-                continue
-            if value < (1.0 - bench.rules.alike) * least:
-                best, least = name, value
-        found[law] = best
-    return found
-
-
-def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench: Bench) -> dict[str, Any]:
-    """Return measured and predicted indices of every run and law, errors, and the ranking of the laws.
+def compare_laws(
+    runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench: Bench, jobs: int = 1
+) -> dict[str, Any]:
+    """Return measured and predicted indices of every run and law, errors, and the measured ranking of the laws.
 
     Parameters
     ----------
@@ -272,36 +248,21 @@ def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench
         Laws under their motion.
     bench
         Structure and sensors.
+    jobs
+        Threads; the result does not depend on their number.
     """
-    rows, rules = [], bench.rules
-    for run in runs:
-        row: dict[str, Any] = {"test": run.name, "law": run.law, "recorded": run.recorded}
-        if run.recorded:
-            row["measured"] = run_indices(
-                run.time_s,
-                judged_span(run.time_s, run.ground_acceleration, rules.steady),
-                run.displacement,
-                run.relative_acceleration,
-                run.damper_force,
-            )
-        for when, way in ways.items():
-            try:
-                row[when] = predicted(run, way, bench)
-            except DivergedError as error:
-                row[when] = {"diverged": str(error)}
-        rows.append(row)
+    rules = bench.rules
+    runner = Parallel(n_jobs=max(1, jobs), backend="threading")
+    rows = runner(delayed(_row)(run, ways, bench) for run in runs)
     recorded = [row for row in rows if row["recorded"]]
     found: dict[str, Any] = {"tests": rows, "laws": law_rows(rows, ("measured", *ways), rules.tested)}
-    rankings = {when: ranking(rows, when) for when in ways}
-    swapped = reversed_pairs(rows, "before", "after", rules.alike) if "after" in ways else []
-    found |= {"ranking": rankings, "ranking_changes": bool(swapped), "reversed_pairs": swapped}
     if recorded:
-        rankings["measured"] = ranking(recorded, "measured")
-        found["ranking_agrees_with_measured"] = {
-            when: not reversed_pairs(recorded, "measured", when, rules.alike) for when in ways
-        }
-        found["nrmse_x_top"] = {when: _error(recorded, when) for when in ways if when != "recalibrated"}
         compared = [when for when in ways if when != "recalibrated"]
+        found["recorded_ranking"] = {when: ranking(recorded, when) for when in ("measured", *compared)}
+        found["ranking_agrees_with_measured"] = {
+            when: not reversed_pairs(recorded, "measured", when, rules.alike) for when in compared
+        }
+        found["nrmse_x_top"] = {when: _error(recorded, when) for when in compared}
         for key, name in (("rms_x_top_m", "rms_x_top_error"), ("rms_a1_m_s2", "rms_a1_error")):
             found[name] = {when: _index_error(recorded, when, key) for when in compared}
         within = [row for row in recorded if all(_peak(row[when]) <= rules.tested for when in compared)]
@@ -309,6 +270,29 @@ def compare_laws(runs: Sequence[LoopRun], ways: Mapping[str, Arrangement], bench
             when: _index_error(within, when, "rms_x_top_m") for when in compared
         }
     return found
+
+
+def _row(run: LoopRun, ways: Mapping[str, Arrangement], bench: Bench) -> dict[str, Any]:
+    """Return measured and predicted indices of one run."""
+    row: dict[str, Any] = {"test": run.name, "law": run.law, "recorded": run.recorded}
+    if run.recorded:
+        row["measured"] = run_indices(
+            run.time_s,
+            judged_span(run.time_s, run.ground_acceleration, bench.rules.steady),
+            run.displacement,
+            run.relative_acceleration,
+            run.damper_force,
+        )
+    done: dict[int, dict[str, Any]] = {}
+    for when, way in ways.items():
+        # a way that stands under two names is run once
+        if id(way) not in done:
+            try:
+                done[id(way)] = predicted(run, way, bench)
+            except DivergedError as error:
+                done[id(way)] = {"diverged": str(error)}
+        row[when] = dict(done[id(way)])
+    return row
 
 
 def law_rows(

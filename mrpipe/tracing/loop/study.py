@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -16,6 +16,7 @@ from mrpipe.control.inverse import InverseTable
 from mrpipe.control.laws import law_named
 from mrpipe.networks.network import Network
 from mrpipe.signals.prepared import PreparedTest
+from mrpipe.simulation.response_curve import ResponseCurve
 from mrpipe.simulation.rig import Rig, excitation_of
 from mrpipe.simulation.settings import SimulateSettings
 from mrpipe.tracing.bench.summary import Tracing
@@ -26,11 +27,11 @@ from mrpipe.tracing.loop.augmented import (
     plant_chain,
     retrain_inverse,
 )
+from mrpipe.tracing.loop.band import Band, amplitude_of, best_way, curves_of, rank_over_band
 from mrpipe.tracing.loop.comparison import (
     Arrangement,
     Bench,
     LoopRun,
-    best_ways,
     compare_laws,
     simulated_runs,
     with_unrecorded,
@@ -55,6 +56,10 @@ class LoopStudy:
         Settings of the simulation.
     recorded
         Recordings of the closed loop; empty for none.
+    laws
+        Laws that are compared in addition to the recorded ones.
+    band_rad_s
+        Lowest and highest frequency over which the laws are ranked [rad/s].
     rules
         Decision thresholds.
     rng, seed, jobs, progress
@@ -66,11 +71,20 @@ class LoopStudy:
     tests: Sequence[PreparedTest]
     settings: SimulateSettings
     recorded: Sequence[LoopRun]
+    laws: Sequence[str]
+    band_rad_s: tuple[float, float]
     rng: np.random.Generator
     seed: int
     jobs: int = 1
     progress: Progress = no_progress
     rules: LoopRules = field(default_factory=LoopRules)
+
+
+NOTHING = "nothing"
+"""What a law renews that does better with the controller as it was."""
+
+PARTS = (("inverse",), ("inverse", "switch"), ("inverse", "switch", "gain"))
+"""Parts of the controller that are renewed together, the least change first."""
 
 
 def closed_loop(study: LoopStudy) -> dict[str, Any]:
@@ -81,26 +95,64 @@ def closed_loop(study: LoopStudy) -> dict[str, Any]:
     bench = Bench(rig.frame, position, rig.options, study.seed, stroke, study.rules)
     runs, status = _runs(study)
     base, chosen = plant_chain(traced.selection.base), plant_chain(traced.selection.chosen)
-    ways = {
-        "before": Arrangement(base, lambda run: _as_it_ran(rig, run)),
-        "after": Arrangement(chosen, lambda run: _as_it_ran(rig, run)),
-    }
+    before = Arrangement(base, lambda run: _as_it_ran(rig, run))
+    after = Arrangement(chosen, lambda run: _as_it_ran(rig, run))
+    unchanged = traced.selection.chosen is traced.selection.base
+    ways = {"before": before, "after": before if unchanged else after}
     found: dict[str, Any] = {"status": status, "plant": _plant_words(traced)}
+    band = Band(study.band_rad_s, amplitude_of(runs[0], study.rules.steady))
+    laws = tuple(dict.fromkeys(run.law for run in runs))
+    offered: dict[str, Arrangement] = {}
     if found["plant"]["effects"]:
         renewed = _renewed(study)
         offered = {
-            ", ".join(parts) or "nothing": Arrangement(chosen, partial(_renewed_controller, rig, renewed, parts))
-            for parts in ((), ("inverse",), ("inverse", "switch"), ("inverse", "switch", "gain"))
+            ", ".join(parts): Arrangement(chosen, partial(_renewed_controller, rig, renewed, parts)) for parts in PARTS
         }
-        taken = best_ways(runs, offered, bench)
+    # a law that commands the drive itself uses neither inverse nor switch
+    ways_of = {law: ways | (offered if law_named(law).output == "force" else {}) for law in laws}
+    curves = curves_of(
+        runs, ways_of, bench, band, study.jobs, lambda done, text="": study.progress(0.5 + 0.4 * done, text)
+    )
+    if offered:
+        taken = {law: _best_parts(own, tuple(offered), study.rules.alike) for law, own in curves.items()}
         found["controller"] = {**renewed.summary, "renewed": taken}
-        ways["recalibrated"] = Arrangement(chosen, lambda run: offered[taken[run.law]].controller(run))
-    return found | compare_laws(runs, ways, bench)
+        for law, parts in taken.items():
+            curves[law]["recalibrated"] = curves[law]["after" if parts == NOTHING else parts]
+        kept = {**offered, NOTHING: ways["after"]}
+        ways["recalibrated"] = Arrangement(chosen, lambda run: kept[taken[run.law]].controller(run))
+    return (
+        found
+        | compare_laws(runs, ways, bench, study.jobs)
+        | rank_over_band(curves, band, tuple(ways), study.rules.alike)
+    )
+
+
+def _best_parts(curves: Mapping[str, ResponseCurve | None], offered: Sequence[str], alike: float) -> str:
+    """Return the renewed parts with which a law does best over the band."""
+    found = {parts: curves[parts] for parts in offered if parts in curves}
+    return best_way({NOTHING: curves["after"], **found}, alike)
+
+
+def laws_to_compare(asked: Sequence[str], stages: Sequence[str], available: Sequence[str]) -> list[str]:
+    """Return the laws that are compared in addition to the recorded ones.
+
+    Parameters
+    ----------
+    asked
+        Setting `close_loop.laws`; empty: the laws that the run simulates, or all where it simulates none.
+    stages
+        Stages of the run.
+    available
+        Laws for which everything is there that they need.
+    """
+    simulated = [stage.removeprefix("simulate-") for stage in stages if stage.startswith("simulate-")]
+    wanted = asked or simulated or available
+    return [law for law in available if law in wanted]
 
 
 def _runs(study: LoopStudy) -> tuple[list[LoopRun], str]:
-    """Return the recordings and every other law under their motion; without recordings, all laws as in simulate."""
-    laws, recorded = study.rig.controllers.available(), study.recorded
+    """Return the recordings and the other laws under their motion; without recordings the excitation of `simulate`."""
+    laws, recorded = study.laws, study.recorded
     if recorded:
         runs = with_unrecorded(list(recorded), laws)
         others = [law for law in laws if law not in {run.law for run in recorded}]
@@ -207,7 +259,7 @@ def _retrained(study: LoopStudy, limit: float, summary: dict[str, Any]) -> Netwo
         limit,
         study.rng,
         jobs=study.jobs,
-        progress=lambda fraction, text="": study.progress(fraction, f"inverse {text}"),
+        progress=lambda fraction, text="": study.progress(0.5 * fraction, f"inverse {text}"),
     )
     summary["inverse"] = "retrained on the damper with its effects" if again.replaced else "kept: the better of both"
     summary["inverse_nrmse"] = {"before": again.before_nrmse, "after": again.after_nrmse}
