@@ -120,11 +120,8 @@ def closed_loop(study: LoopStudy) -> dict[str, Any]:
             curves[law]["recalibrated"] = curves[law]["after" if parts == NOTHING else parts]
         kept = {**offered, NOTHING: ways["after"]}
         ways["recalibrated"] = Arrangement(chosen, lambda run: kept[taken[run.law]].controller(run))
-    return (
-        found
-        | compare_laws(runs, ways, bench, study.jobs)
-        | rank_over_band(curves, band, tuple(ways), study.rules.alike)
-    )
+    found |= compare_laws(runs, ways, bench, study.jobs)
+    return found | rank_over_band(curves, band, tuple(ways), study.rules.alike)
 
 
 def _best_parts(curves: Mapping[str, ResponseCurve | None], offered: Sequence[str], alike: float) -> str:
