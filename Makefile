@@ -54,7 +54,7 @@ bench: $(RUN_STAMP)  ## timings: optimiser, closed loop
 bench-tracing: $(RUN_STAMP)  ## how often planted effects are found on rigs independent of the program
 	$(BIN)/python -m benchmarks.tracing --first-seed $(SEED) --cases $(CASES)
 
-reproduce: $(RUN_STAMP)  ## every printed figure of the thesis beside ours
+reproduce: $(RUN_STAMP)  ## results and statements of the thesis, recomputed from the run
 	$(BIN)/mrpipe reproduce --config $(CONFIG)
 
 train-inverse: $(RUN_STAMP)  ## the inverse network

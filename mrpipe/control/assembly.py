@@ -164,7 +164,7 @@ class ControllerFactory:
             bias_drift_m_s2=settings.kalman_bias_drift_m_s2,
             inverse_request=settings.inverse_request,
             residual_force_n=self.switch_force_n if residual_force_n is None else residual_force_n,
-            low_pass_hz=settings.low_pass_hz,
+            low_pass_hz=settings.cutoff_hz,
             drive_limit=limit,
             dead_band_m_s=settings.dead_band_m_s,
             extremum_step_m=settings.extremum_step_m or EXTREMUM_NOISE * settings.kalman_displacement_noise_m,

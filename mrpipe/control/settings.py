@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import Field
@@ -46,6 +47,12 @@ class ControllerSettings(Section):
         description="Switch: below this desired force the drive is 0 (P2 24); null: the damper's residual force.",
     )
     low_pass_hz: float | None = Field(60.0, gt=0.0, description="Butterworth low-pass on the drive; null: none.")
+    low_pass_delay_s: float | None = Field(
+        None,
+        gt=0.0,
+        description="Delay of the low-pass at low frequencies, which sets its cut-off in place of `low_pass_hz`; "
+        "paper P5 filters the current with 0.05 s.",
+    )
     drive_limit: float | None = Field(None, gt=0.0, description="Largest drive; null: that of the damper.")
     dead_band_m_s: float = Field(0.0, ge=0.0, description="Speed below which the direction of motion is kept.")
     friction_rounding_m_s: float | None = Field(
@@ -82,3 +89,13 @@ class ControllerSettings(Section):
         description="Time for which the last good reading replaces a refused one; then the drive is `safe_drive`.",
     )
     safe_drive: float = Field(0.0, ge=0.0, description="Drive while readings are refused.")
+
+    @property
+    def cutoff_hz(self) -> float | None:
+        """Cut-off of the second-order Butterworth low-pass on the drive [Hz]; None: no filter.
+
+        Its delay at low frequencies is sqrt(2) over the angular cut-off.
+        """
+        if self.low_pass_delay_s is None:
+            return self.low_pass_hz
+        return math.sqrt(2.0) / (2.0 * math.pi * self.low_pass_delay_s)

@@ -80,6 +80,50 @@ class DecayResult:
     filtered: bool
 
 
+@dataclass(frozen=True)
+class Envelope:
+    """A curve through the peaks of a decay (Figure 3.10a).
+
+    Attributes
+    ----------
+    damping_ratio
+        By the decay rate of the curve at its start [1].
+    rms_error
+        Of the peaks, in their unit.
+    """
+
+    damping_ratio: float
+    rms_error: float
+
+
+def linear_envelope(peak_time_s: FloatArray, peak: FloatArray) -> Envelope:
+    """Fit a straight line to the peaks of a decay (section 3.2.2).
+
+    The damping ratio follows from the slope of the line over its value at the first peak, which is the decay rate of
+    the exponential that touches it there.
+
+    Parameters
+    ----------
+    peak_time_s
+        Times of the peaks of both signs, two in a period, shape (k,) [s].
+    peak
+        Their heights, positive, shape (k,).
+    """
+    slope, level = np.polyfit(peak_time_s - peak_time_s[0], peak, 1)
+    period = 2.0 * float(np.mean(np.diff(peak_time_s)))
+    error = peak - (level + slope * (peak_time_s - peak_time_s[0]))
+    return Envelope(damping_from_decrement(-slope / level * period), float(np.sqrt(np.mean(error**2))))
+
+
+def logarithmic_envelope(peak_time_s: FloatArray, peak: FloatArray) -> Envelope:
+    """Fit an exponential to the peaks of a decay by a straight line through their logarithms; arguments as above."""
+    clock = peak_time_s - peak_time_s[0]
+    slope, level = np.polyfit(clock, np.log(peak), 1, w=peak)
+    period = 2.0 * float(np.mean(np.diff(peak_time_s)))
+    error = peak - np.exp(level + slope * clock)
+    return Envelope(damping_from_decrement(-slope * period), float(np.sqrt(np.mean(error**2))))
+
+
 def damping_from_decrement(decrement: float) -> float:
     """Return the damping ratio of a logarithmic decrement over one period (3.1)."""
     return float(decrement / np.sqrt(4.0 * np.pi**2 + decrement**2))

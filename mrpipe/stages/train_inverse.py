@@ -40,13 +40,15 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         progress=context.progress,
     )
     judged = judge(trained.network, training, validation)
+    signed = _signed(context, plan) if settings.compare_signed and plan.spec.absolute else None
     unit = training.drive_unit
     with context.write("inverse.h5") as artifact:
         write_network(artifact, "network", trained.network)
         artifact.put_json("held_out", list(trained.held_out))
         artifact.put("path", trained.path, unit="1", dims=("iteration",), description="training NRMSE")
         artifact.put("drive_range", span, unit=unit)
-    signed = _signed(context, plan) if settings.compare_signed and plan.spec.absolute else None
+        if signed is not None:
+            artifact.put_json("signed", _compared(signed))
     tracking = None
     if "train-forward" in context.inputs:
         forward = read_network(context.artifact("train-forward"), "network")
@@ -56,7 +58,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for finding in (judged.finding, tracking.finding if tracking else ""):
         if finding:
             context.warn(finding)
-    section.describe(context.report, section.TrainedInverse(trained, judged, validation, span, signed, tracking))
+    compared = signed["signed"] if signed else None
+    section.describe(context.report, section.TrainedInverse(trained, judged, validation, span, compared, tracking))
     varying = judged.varying_regimes
     return {
         **training_summary(trained, judged),
@@ -66,22 +69,36 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         "error_over_range": judged.pooled.rms / span,
         "linear_baseline_error_over_range": judged.linear.rms / span,
         "negative_drive_share": judged.negative_share,
-        **({"negative_drive_share_signed": signed.negative_share} if signed else {}),
+        **({"negative_drive_share_signed": signed["signed"].negative_share} if signed else {}),
         **(tracking.summary() if tracking else {}),
     }
 
 
-def _signed(context: StageContext, plan: TrainingPlan) -> Judgement:
-    """Return the errors of a network of signed values, trained on the subsample only."""
+def _signed(context: StageContext, plan: TrainingPlan) -> dict[str, Judgement]:
+    """Return the errors of two short trainings on the subsample that differ in the absolute values alone."""
     from dataclasses import replace
 
     from mrpipe.networks.evaluation import judge
     from mrpipe.networks.training import train
 
     quick = plan.options.changed(starts=min(2, plan.options.starts), iterations=0)
-    spec = replace(plan.spec, absolute=False)
-    signed = train(plan.training, spec, quick, context.rng, normalisation=plan.normalisation, jobs=context.jobs)
-    return judge(signed.network, plan.training, plan.validation)
+    seed = int(context.rng.integers(2**63))
+    found = {}
+    for name, absolute in (("absolute", True), ("signed", False)):
+        spec = replace(plan.spec, absolute=absolute)
+        # the same generator for both: the same rows and the same records held out
+        rng = type(context.rng)(type(context.rng.bit_generator)(seed))
+        trained = train(plan.training, spec, quick, rng, normalisation=plan.normalisation, jobs=context.jobs)
+        found[name] = judge(trained.network, plan.training, plan.validation)
+    return found
+
+
+def _compared(signed: Mapping[str, Judgement]) -> dict[str, dict[str, float]]:
+    """Return what is kept of the two short trainings."""
+    return {
+        "nrmse": {name: item.pooled.nrmse for name, item in signed.items()},
+        "negative_share": {name: item.negative_share for name, item in signed.items()},
+    }
 
 
 STAGE = Stage(

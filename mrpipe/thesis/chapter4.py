@@ -1,301 +1,196 @@
-"""Chapter 4 and P2: limiting modes, closed forms, exact optima, stability, misprinted formulas."""
+"""Chapter 4, P2 and P3: limiting modes, closed forms, exact optima, misprinted formulas, Table 4.1 and P3's Table 1."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from mrpipe.artifacts import Artifact, FloatArray
 from mrpipe.control import exact, limits
-from mrpipe.control.calibration import CalibrationOptions, LawCalibration, calibrate
+from mrpipe.control.calibration import CalibrationOptions, calibrate
 from mrpipe.control.kalman import continuous_kalman_gains
 from mrpipe.control.linearisation import clipped_force
+from mrpipe.signals.kalman import kalman_gains, kinematic_kalman
+from mrpipe.simulation.loop import SensorNoise
 from mrpipe.structures import Frame, floor_position
-from mrpipe.thesis.claim import Claim, cannot, compare
-from mrpipe.thesis.gains import THESIS_GAINS
+from mrpipe.thesis.bench import OMEGA, Bench, LoopRun, amplitude_of, excite, run_law
+from mrpipe.thesis.claim import Missing, Outcomes, Value
+from mrpipe.thesis.entries import printed_columns, printed_gains, table_id
+
+_RATE_HZ = 1000.0
 
 
-def _limits(modes: limits.LimitingModes) -> list[Claim]:
-    return [
-        compare("B6", 4, "omega_0 [rad/s]", 8.0, modes.omega_0, 1e-3),
-        compare("B7", 4, "omega_inf; P2 prints 10.4 [rad/s]", 10.4, modes.omega_inf, 6e-3),
-        compare("B8", 4, "nu; P2 prints 1.54e-4 [m/N]", 1.54e-4, modes.nu, 2e-3),
-        compare(
-            "A4c",
-            4,
-            "omega_0, omega_inf, nu with the signs corrected (errata row 4)",
-            [8.0, 10.45, 1.5404e-4],
-            [modes.omega_0, modes.omega_inf, modes.nu],
-            2e-3,
-        ),
-    ]
-
-
-def _stability(frame: Frame, modes: limits.LimitingModes) -> list[Claim]:
+def _closed_forms(frame: Frame) -> Outcomes:
+    """Return what the printed frame gives by closed forms and by exact eigenvalues."""
+    gains = printed_gains()
+    c, k, alpha = gains["vd"]["c_n_s_m"], gains["vdns"]["k_n_m"], gains["fdns"]["alpha_n_m"]
     w = floor_position(frame.floors)
-    static = limits.static_stiffness(frame, w)
-    bare = exact.undamped(frame)
-    folded = exact.exact_damping(bare, w, modes, 250.0, -4500.0)
-    return [
-        compare(
-            "A8a",
-            4,
-            "stiffness of the structure at the damper; 9.5 kN/m is called so [N/m]",
-            9500.0,
-            static,
-            0.05,
-            "9.5 kN/m is K11; a force at the damper meets the static stiffness 1/(w'K^-1 w)",
-        ),
-        compare("A8b", 4, "static stiffness at the damper (errata row 8) [N/m]", 4123.0, static, 2e-3),
-        compare(
-            "A8c",
-            4,
-            "fastest pole of unclipped VDNS 250, -4500 (errata row 8) [rad/s]",
-            1.29,
-            folded.unstable_pole,
-            0.02,
-            "positive: -4500 N/m is unstable without clipping",
-        ),
-        compare(
-            "A8d", 4, "share of the static limit that k = -4000 N/m takes (errata row 8)", 0.97, 4000.0 / static, 5e-3
-        ),
-        compare(
-            "A8e",
-            4,
-            "limit of negative stiffness by two components, -1/nu [N/m]",
-            -1.0 / modes.nu,
-            -static,
-            0.05,
-            "the two-component reduction misses the static limit",
-        ),
-    ]
-
-
-def _viscous(law: LawCalibration, modes: limits.LimitingModes) -> list[Claim]:
-    forms = {name: gains.c_n_s_m for name, gains in law.candidates.items()}
-    return [
-        compare(
-            "A9a",
-            4,
-            "optimal c of VD by P2 (13) [N s/m]",
-            650.0,
-            forms["closed-form"],
-            0.02,
-            "P2 (13) gives 811 with its own omega_0 and nu; 650 follows from no printed formula",
-        ),
-        compare(
-            "A9b", 4, "optimal c of VD by (4.13) [N s/m]", 650.0, forms["closed-form-thesis"], 0.02, "(4.13) gives 704"
-        ),
-        compare(
-            "A9c",
-            4,
-            "optimal c of VD by the exact eigenvalue [N s/m]",
-            650.0,
-            forms["exact"],
-            0.02,
-            "the closed forms assume kappa = 1 and a small shift",
-        ),
-        compare(
-            "B9",
-            4,
-            "c by P2 (13), (4.13) and the exact optimum (errata section B) [N s/m]",
-            [811.0, 704.0, 538.0],
-            [forms["closed-form"], forms["closed-form-thesis"], forms["exact"]],
-            5e-3,
-        ),
-        compare(
-            "A11a",
-            4,
-            "attainable damping of VD, P2 (7) and (14)",
-            0.13,
-            limits.attainable_damping(modes),
-            0.025,
-            "0.133",
-        ),
-        compare("B10", 4, "the same to 1 % (errata section B)", 0.133, limits.attainable_damping(modes), 0.01),
-    ]
-
-
-def _exact_viscous(frame: Frame, modes: limits.LimitingModes, law: LawCalibration) -> list[Claim]:
-    w = floor_position(frame.floors)
-    bare = exact.undamped(frame)
-    best = law.candidates["exact"].c_n_s_m
-    ratios = [exact.exact_damping(bare, w, modes, c, 0.0).damping_ratio for c in (650.0, best)]
-    return [
-        compare(
-            "A9d", 4, "exact damping ratio at c = 650 and at the optimum (errata row 9)", [0.154, 0.160], ratios, 5e-3
-        )
-    ]
-
-
-def _negative(law: LawCalibration, modes: limits.LimitingModes) -> list[Claim]:
-    forms = {name: gains.c_n_s_m for name, gains in law.candidates.items()}
-    return [
-        compare(
-            "A10a",
-            4,
-            "optimal c of VDNS at k = -4500 by P2 (13) [N s/m]",
-            590.0,
-            forms["closed-form"],
-            0.02,
-            "the second term of (13) takes 562 N s/m off: 249, which is the 250 that was 'found by trial and error'",
-        ),
-        compare(
-            "A10b", 5, "c of VDNS 'found by trial and error' against P2 (13) [N s/m]", 250.0, forms["closed-form"], 0.01
-        ),
-        compare(
-            "A10c",
-            4,
-            "optimal c of VDNS at k = -4500 by (4.16) (errata row 10) [N s/m]",
-            141.0,
-            forms["closed-form-thesis"],
-            0.01,
-        ),
-        compare(
-            "A11b",
-            4,
-            "attainable damping of VDNS at k = -4500, P2 (14)",
-            0.433,
-            limits.attainable_damping(modes, -4500.0),
-            0.01,
-        ),
-    ]
-
-
-def _friction(frame: Frame, law: LawCalibration, modes: limits.LimitingModes) -> list[Claim]:
-    best = law.candidates["exact"].alpha_n_m
-    bare = exact.undamped(frame)
-    w = floor_position(frame.floors)
-    ratio = exact.exact_friction(bare, w, modes, best).damping_ratio
-    at_3000 = exact.exact_friction(frame, w, modes, 3000.0).damping_ratio
-    return [
-        compare(
-            "A11c", 4, "optimal alpha of FDNS, (4.25) and P2 (20) [N/m]", 4010.0, limits.optimal_friction(modes), 0.01
-        ),
-        compare(
-            "A11d", 4, "attainable damping of FDNS, P2 (21)", 0.273, limits.attainable_damping_friction(modes), 0.01
-        ),
-        compare(
-            "A11e", 4, "exact optimum of FDNS: alpha [N/m], zeta (errata row 11)", [3130.0, 0.284], [best, ratio], 0.01
-        ),
-        compare(
-            "B11",
-            5,
-            "equivalent damping of FDNS at alpha = 3000, with the frame's own (thesis: 0.26 measured, 0.30 simulated)",
-            0.288,
-            at_3000,
-            0.02,
-        ),
-        compare(
-            "T4.30",
-            4,
-            "factor of (4.30), 1.24, against twice (4.25)",
-            1.24,
-            limits.optimal_force_ratio(modes) * modes.nu,
-            5e-3,
-        ),
-    ]
-
-
-def _formulas(modes: limits.LimitingModes) -> list[Claim]:
-    right = 1.0 / modes.nu  # (omega_inf^2 - omega_0^2)/u_0^2, the right-hand form of P2 (13) for k = 0
-    phase = 2.0 * np.pi * (np.arange(2000) + 0.5) / 2000
-    x, v = 6e-3 * np.sin(phase), 6e-3 * modes.omega_0 * np.cos(phase)
-    force = 250.0 * v - 4500.0 * x
-    as_printed = np.where(force < 0.0, 0.0, force)  # the second case of (4.17)
-    active = float(np.mean(as_printed * v < -1e-12))
-    mended = float(np.mean(clipped_force(250.0, -4500.0, x, v) * v < -1e-12))
-    H = 650.0 * modes.omega_0
-    estimate = limits.damping_estimate_thesis(modes, 0.0, H)
-    # the line above P4 (16): the imaginary part of a difference of two real frequencies
-    as_written = complex(modes.omega_inf - modes.omega_0).imag / modes.omega_0
-    return [
-        compare(
-            "A12a",
-            4,
-            "right-hand form of P2 (13) over its left-hand form, k = 0",
-            1.0,
-            right * modes.nu * modes.omega_0,
-            1e-6,
-            "a factor 1/omega_0 is missing in the right-hand form",
-        ),
-        compare(
-            "A12b",
-            4,
-            "share of a cycle in which (4.17) as printed puts energy in",
-            0.0,
-            active,
-            1e-9,
-            "the second case lacks the factor of velocity: P2 (22) is used",
-        ),
-        compare("A12c", 4, "the same by P2 (22)", 0.0, mended, 1e-9),
-        compare(
-            "A12d",
-            4,
-            "damping of VD 650 by Im[omega_inf - omega_0]/|omega|, above P4 (16), against (16)",
-            estimate,
-            as_written,
-            0.05,
-            "both frequencies are real: the imaginary part of omega - omega_0 is meant",
-        ),
-    ]
-
-
-def _kalman() -> list[Claim]:
-    k, gain = continuous_kalman_gains(20e-6, 0.1)
-    # x1' = x2 + k (y - x1), x2' = l (y - x1), and the acceleration as an input of x2' where it is corrected
-    s = 8.0j
-    filter_matrix = np.array([[s + k, -1.0], [gain, s]])
-    printed = np.linalg.solve(filter_matrix, np.array([k, gain]))[1] / s
-    mended = np.linalg.solve(filter_matrix, np.array([k, gain + s * s]))[1] / s
-    return [
-        compare(
-            "A12e",
-            5,
-            "velocity of (5.3) over the true one at 8 rad/s: magnitude, phase lag [rad]",
-            [1.0, 0.0],
-            [abs(printed), -np.angle(printed)],
-            1e-6,
-            "(5.3) as printed has no acceleration input, so the velocity lags",
-        ),
-        compare("A12f", 5, "velocity of (5.3) with the acceleration input over the true one", 1.0, abs(mended), 1e-6),
-        compare(
-            "D1", 5, "k and l of (5.3) for 20 um and 0.1 m/s2 (errata section D)", [100.0, 5000.0], [k, gain], 1e-9
-        ),
-    ]
-
-
-def _table_4_1() -> list[Claim]:
-    printed = {
-        "x_damp [m]": [0.0066, 0.0038, 0.0091, 0.0044],
-        "x_top [m]": [0.030, 0.026, 0.023, 0.024],
-        "a_damp [m/s2]": [0.81, 0.91, 0.80, 0.84],
-        "a_top [m/s2]": [1.81, 1.76, 1.76, 1.79],
-    }
-    why = "the excitation amplitude is not given, and columns are mixed between Table 4.1 and P3 Table 1: trend only"
-    return [
-        cannot(f"A15{letter}", 4, f"Table 4.1, rms of {name} for VD, VDNS, FDNS, NNC", values, why)
-        for letter, (name, values) in zip("abcd", printed.items(), strict=True)
-    ]
-
-
-def chapter_4(frame: Frame) -> list[Claim]:
-    """Return the claims of chapter 4 and P2, damper between ground and first floor."""
-    position = floor_position(frame.floors)
-    calibration = calibrate(
+    found = calibrate(
         frame,
-        position,
+        w,
         CalibrationOptions(
-            source="published", published=THESIS_GAINS, positive_stiffness_n_m=2500.0, negative_stiffness_n_m=-4500.0
+            source="published",
+            published=gains,
+            positive_stiffness_n_m=gains["vdps"]["k_n_m"],
+            negative_stiffness_n_m=k,
         ),
     )
-    modes, laws = calibration.modes, calibration.laws
-    return [
-        *_limits(modes),
-        *_stability(frame, modes),
-        *_viscous(laws["vd"], modes),
-        *_exact_viscous(frame, modes, laws["vd"]),
-        *_negative(laws["vdns"], modes),
-        *_friction(frame, laws["fdns"], modes),
-        *_formulas(modes),
-        *_kalman(),
-        *_table_4_1(),
-    ]
+    modes, static = found.modes, limits.static_stiffness(frame, w)
+    bare = exact.undamped(frame)
+    vd, vdns, fdns = (dict(found.laws[law].candidates) for law in ("vd", "vdns", "fdns"))
+    best, best_alpha = vd["exact"].c_n_s_m, fdns["exact"].alpha_n_m
+    by = "printed frame with the signs of its mode matrix corrected"
+    values = {
+        "B6": modes.omega_0,
+        "B7": modes.omega_inf,
+        "B8": modes.nu,
+        "A4c": [modes.omega_0, modes.omega_inf, modes.nu],
+        "A8a": static,
+        "A8b": static,
+        "A8c": exact.exact_damping(bare, w, modes, gains["vdns"]["c_n_s_m"], k).unstable_pole,
+        "A8d": 4000.0 / static,
+        "A8e": -static,
+        "A9a": vd["closed-form"].c_n_s_m,
+        "A9b": vd["closed-form-thesis"].c_n_s_m,
+        "A9c": best,
+        "B9": [vd["closed-form"].c_n_s_m, vd["closed-form-thesis"].c_n_s_m, best],
+        "A11a": limits.attainable_damping(modes),
+        "B10": limits.attainable_damping(modes),
+        "A9d": [exact.exact_damping(bare, w, modes, value, 0.0).damping_ratio for value in (c, best)],
+        "A10a": vdns["closed-form"].c_n_s_m,
+        "A10b": vdns["closed-form"].c_n_s_m,
+        "A10c": vdns["closed-form-thesis"].c_n_s_m,
+        "A11b": limits.attainable_damping(modes, k),
+        "A11c": limits.optimal_friction(modes),
+        "A11d": limits.attainable_damping_friction(modes),
+        "A11e": [best_alpha, exact.exact_friction(bare, w, modes, best_alpha).damping_ratio],
+        "B11": exact.exact_friction(frame, w, modes, alpha).damping_ratio,
+        "P2-0.62": limits.optimal_friction(modes) * modes.nu,
+        "P2-2.06": limits.attainable_damping_friction(modes)
+        * (modes.omega_inf + modes.omega_0)
+        / (modes.omega_inf - modes.omega_0),
+        "P2-nu-k": modes.nu * k,
+        "T4.30": limits.optimal_force_ratio(modes) * modes.nu,
+    }
+    return {name: Value(value, by) for name, value in values.items()} | _formulas(modes, c, k)
+
+
+def _formulas(modes: limits.LimitingModes, c: float, k: float) -> Outcomes:
+    """Return what the misprinted formulas give."""
+    # (omega_inf^2 - omega_0^2)/u_0^2, the right-hand form of P2 (13) for k = 0, over its left-hand form
+    right = (modes.omega_inf**2 - modes.omega_0**2) / modes.u_0**2
+    left = limits.optimal_viscosity(modes)
+    phase = 2.0 * np.pi * (np.arange(2000) + 0.5) / 2000
+    x, v = 6e-3 * np.sin(phase), 6e-3 * modes.omega_0 * np.cos(phase)
+    force = 250.0 * v + k * x
+    as_printed = np.where(force < 0.0, 0.0, force)  # the second case of (4.17)
+    active = float(np.mean(as_printed * v < -1e-12))
+    corrected = float(np.mean(clipped_force(250.0, k, x, v) * v < -1e-12))
+    # the line above P4 (16): the imaginary part of a difference of two real frequencies
+    as_written = complex(modes.omega_inf - modes.omega_0).imag / modes.omega_0
+    estimate = limits.damping_estimate_thesis(modes, 0.0, c * modes.omega_0)
+    by = "the printed formula, evaluated"
+    return {
+        "A12a": Value(right / left, by),
+        "A12b": Value(active, by),
+        "A12c": Value(corrected, "P2 (22), evaluated"),
+        "A12d": Value(as_written, by, f"(16) gives {estimate:.3f}"),
+    }
+
+
+def _kalman() -> Outcomes:
+    k, gain = continuous_kalman_gains(20e-6, 0.1)
+    # x1' = x2 + k (y - x1), x2' = l (y - x1): (5.3) as printed, without the acceleration
+    s = OMEGA * 1j
+    filter_matrix = np.array([[s + k, -1.0], [gain, s]])
+    printed = np.linalg.solve(filter_matrix, np.array([k, gain]))[1] / s
+    time = np.arange(int(20.0 * _RATE_HZ)) / _RATE_HZ
+    x: FloatArray = 6e-3 * np.sin(OMEGA * time)
+    v: FloatArray = 6e-3 * OMEGA * np.cos(OMEGA * time)
+    _, estimated, _ = kinematic_kalman(x, -(OMEGA**2) * x, 1.0 / _RATE_HZ, kalman_gains(20e-6, 0.1))
+    late = time > 10.0
+    error = float(np.sqrt(np.mean((estimated - v)[late] ** 2) / np.mean(v[late] ** 2)))
+    return {
+        "A12e": Value([abs(printed), -np.angle(printed)], "transfer function of (5.3) as printed"),
+        "A12f": Value(error, "discrete Kalman filter on sinusoidal motion"),
+        "D1": Value([k, gain], "noise of 20 um and 0.1 m/s^2"),
+    }
+
+
+def cycle_peaks(run: LoopRun) -> dict[str, float]:
+    """Return the RMS over the steady cycles of the largest value of each cycle (section 4.5), by the rows of Table 4.1.
+
+    Parameters
+    ----------
+    run
+        Under harmonic excitation.
+    """
+    response, excitation = run.response, run.excitation
+    first, last = excitation.steady_s
+    period = 2.0 * np.pi / excitation.frequency_rad_s
+    cycle = np.floor((response.time_s - first) / period + 1e-9).astype(np.int64)
+    count = round((last - first) / period)
+    histories = {
+        "peak_x1_m": response.displacement[:, 0],
+        "peak_x5_m": response.displacement[:, -1],
+        "peak_a1_m_s2": response.acceleration[:, 0],
+        "peak_a5_m_s2": response.acceleration[:, -1],
+    }
+    return {
+        name: float(np.sqrt(np.mean([np.max(np.abs(values[cycle == number])) ** 2 for number in range(count)])))
+        for name, values in histories.items()
+    }
+
+
+def _tables(bench: Bench) -> Outcomes:
+    """Return Table 4.1 and Table 1 of P3 with what chapter 4 and P3 say of them."""
+    top = printed_columns("Table 4.1", "T4.1")["vd"]["peak_x5_m"]
+    rig = bench.rig
+    amplitude = amplitude_of(rig, top / np.sqrt(2.0))
+    runs = {law: run_law(rig, law, excite(amplitude), bench.seed) for law in bench.laws if law != "vdps"}
+    peaks = {law: cycle_peaks(run) for law, run in runs.items()}
+    # the viscous damper of P3 is no MR damper: its force is c times the true velocity at every instant
+    linear = replace(rig, options=replace(rig.options, tracking="continuous", noise=SensorNoise()))
+    peaks["viscous"] = cycle_peaks(run_law(linear, "vd", excite(amplitude), bench.seed))
+    by = f"closed loop of {bench.source} at {OMEGA:g} rad/s and {amplitude:.3f} m/s^2"
+    found: Outcomes = {}
+    for part, table in (("T4.1", "Table 4.1"), ("P3-T1", "P3 Table 1")):
+        for law, rows in printed_columns(table, part).items():
+            for row in rows:
+                found[table_id(part, law, row)] = (
+                    Value(peaks[law][row], by) if law in peaks else Missing("the network of nnc is part of a run only")
+                )
+    x5 = {law: rows["peak_x5_m"] for law, rows in peaks.items()}
+    x1 = {law: rows["peak_x1_m"] for law, rows in peaks.items()}
+    a5 = {law: rows["peak_a5_m_s2"] for law, rows in peaks.items()}
+    found["F4-top"] = Value([x5["vdns"] / x5["vd"], x5["fdns"] / x5["vd"]], by)
+    found["F4-damper"] = Value([x1["vdns"] / x1["vd"], x1["fdns"] / x1["vd"]], by)
+    reference = "nnc" in peaks
+    missing = Missing("the network of nnc is part of a run only")
+    laws = ("vdns", "fdns", "nnc") if reference else ("vdns", "fdns")
+    found["F4-acceleration"] = Value([a5[law] / a5["vd"] for law in laws], by)
+    found["F4-nnc"] = Value(x5["nnc"] / x5["fdns"], by) if reference else missing
+    found["P3-35"] = Value(1.0 - x1["nnc"] / x1["vd"], by) if reference else missing
+    found["P3-30"] = Value(1.0 - x5["nnc"] / x5["vd"], by) if reference else missing
+    return found
+
+
+def _calibrated(artifact: Artifact | None) -> Outcomes:
+    if artifact is None:
+        return {"R4-limits": Missing("it needs a run (reproduce.source: run)")}
+    values = [artifact.scalar(name) for name in ("omega_0", "omega_inf", "nu")]
+    return {"R4-limits": Value(values, "calibration of this run")}
+
+
+def chapter_4(bench: Bench, frame: Frame) -> Outcomes:
+    """Return the outcomes of chapter 4, P2 and P3.
+
+    Parameters
+    ----------
+    bench
+        What the closed loop is run with.
+    frame
+        The printed frame with the signs of its mode matrix corrected, for the closed forms.
+    """
+    return {**_closed_forms(frame), **_kalman(), **_calibrated(bench.artifact("calibrate")), **_tables(bench)}

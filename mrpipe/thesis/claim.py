@@ -1,58 +1,109 @@
-"""One printed figure, the recomputed value, and the verdict."""
+"""A printed figure or statement, what it comes to here, and the verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+
+from mrpipe.thesis.entries import Entry
 
 Number = float | Sequence[float] | str
 Verdict = Literal["holds", "differs", "cannot-be-recomputed"]
 
 
 @dataclass(frozen=True)
-class Claim:
-    """A printed figure and the recomputed one.
+class Value:
+    """A recomputed value.
 
     Attributes
     ----------
-    id
-        `A4b` is the second claim of row 4 in the list of errata, section A; `B…` is of section B.
-    chapter
-        Of the thesis; papers stand with the chapter that uses them.
-    what
-        What is compared, with its unit.
-    printed, recomputed
-        Numbers, lists of numbers or words; None if there is no value.
-    tolerance
-        Relative, largest over a list; None where words are compared.
-    verdict, why
-        `holds`, `differs` (why it does), `cannot-be-recomputed` (why not).
+    value
+        A number, a list of numbers, or words.
+    by
+        How it was computed: from which part of the run or from which parameter sets.
+    why
+        What explains a deviation, where the computation knows more than the entry says.
     """
 
-    id: str
-    chapter: int
-    what: str
-    printed: Any
+    value: Any
+    by: str
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """Why a value was not recomputed."""
+
+    reason: str
+
+
+Outcome = Value | Missing
+Outcomes = dict[str, Outcome]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """An entry beside the recomputed value.
+
+    Attributes
+    ----------
+    entry
+        What is compared and how.
+    recomputed
+        Number, list of numbers or words; None where there is none.
+    verdict
+        `holds`, `differs` or `cannot-be-recomputed`.
+    why
+        Why it differs, or why it cannot be recomputed; empty where it holds.
+    by
+        How it was recomputed.
+    """
+
+    entry: Entry
     recomputed: Any
-    tolerance: float | None
     verdict: Verdict
     why: str
+    by: str
+
+    @property
+    def id(self) -> str:
+        """Id of the entry."""
+        return self.entry.id
+
+    @property
+    def printed(self) -> Any:
+        """What is printed; for a statement the rule in words."""
+        return rule_text(self.entry.rule) if self.entry.rule else _plain(self.entry.printed)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the claim as `mrpipe reproduce --json` prints it."""
+        entry = self.entry
         return {
-            "id": self.id,
-            "chapter": self.chapter,
-            "what": self.what,
+            "id": entry.id,
+            "chapter": entry.chapter,
+            "kind": entry.kind,
+            "what": entry.what,
+            "place": entry.place,
             "printed": self.printed,
             "recomputed": self.recomputed,
-            "tolerance": self.tolerance,
+            "tolerance": entry.tolerance,
             "verdict": self.verdict,
             "why": self.why,
+            "by": self.by,
         }
+
+
+def rule_text(rule: Mapping[str, Any]) -> str:
+    """Return a rule in words."""
+    ((name, bound),) = rule.items()
+    if name == "between":
+        return f"between {bound[0]:g} and {bound[1]:g}"
+    if name == "one_of":
+        return " or ".join(str(item) for item in bound)
+    return f"{name} {bound:g}"
 
 
 def _plain(value: Any) -> Any:
@@ -63,41 +114,56 @@ def _plain(value: Any) -> Any:
 
 
 def deviation(printed: Any, recomputed: Any) -> float:
-    """Return the largest relative deviation of recomputed from printed numbers (infinite for unequal sizes)."""
+    """Return the largest relative deviation of recomputed from printed numbers (infinite for unequal sizes).
+
+    A printed zero is compared absolutely.
+    """
     first = np.atleast_1d(np.asarray(printed, dtype=np.float64)).ravel()
     second = np.atleast_1d(np.asarray(recomputed, dtype=np.float64)).ravel()
     if first.size != second.size or not np.all(np.isfinite(second)):
         return float("inf")
-    return float(np.max(np.abs(second - first) / np.maximum(np.abs(first), 1e-300)))
+    return float(np.max(np.abs(second - first) / np.where(first == 0.0, 1.0, np.abs(first))))
 
 
-def compare(
-    id: str, chapter: int, what: str, printed: Any, recomputed: Any, tolerance: float | None, why: str = ""
-) -> Claim:
-    """Return a claim with its verdict: `holds` where the recomputed value is within the tolerance.
+def keeps(rule: Mapping[str, Any], value: Any) -> bool:
+    """Return whether a recomputed value keeps a rule: every number of it, and no value keeps it if it is not finite."""
+    ((name, bound),) = rule.items()
+    if name == "one_of":
+        return value in bound
+    numbers = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    if not np.all(np.isfinite(numbers)):
+        return False
+    if name == "between":
+        return bool(np.all((numbers >= bound[0]) & (numbers <= bound[1])))
+    return bool(np.all(numbers < bound) if name == "below" else np.all(numbers > bound))
+
+
+def judge(entry: Entry, outcome: Outcome) -> Claim:
+    """Return the claim of an entry with its verdict.
 
     Parameters
     ----------
-    id, chapter, what
-        See :class:`Claim`.
-    printed, recomputed
-        A number, a list of numbers, or words (then compared as they are, `tolerance` None).
-    tolerance
-        Relative.
-    why
-        Why the two differ; a note where they do not. Where nothing is said the deviation stands for it.
+    entry
+        What is printed, with tolerance or rule.
+    outcome
+        What was recomputed, or why nothing was.
     """
-    if tolerance is None:
-        agrees = _plain(printed) == _plain(recomputed)
-        said = why
+    if entry.given:
+        why = "it sets the amplitude of the excitation, so that a recomputed value could not disagree"
+        return Claim(entry, None, "cannot-be-recomputed", why, "")
+    if isinstance(outcome, Missing):
+        return Claim(entry, None, "cannot-be-recomputed", outcome.reason, "")
+    value = _plain(outcome.value)
+    said = ""
+    if entry.rule:
+        agrees = keeps(entry.rule, value)
+        said = f"not {rule_text(entry.rule)}"
+    elif entry.tolerance is None:
+        agrees = value == _plain(entry.printed)
+        said = "other words"
     else:
-        apart = deviation(printed, recomputed)
-        agrees = apart <= tolerance
-        said = why or ("" if agrees else f"deviates by {100 * apart:.3g} %")
-    verdict: Verdict = "holds" if agrees else "differs"
-    return Claim(id, chapter, what, _plain(printed), _plain(recomputed), tolerance, verdict, said)
-
-
-def cannot(id: str, chapter: int, what: str, printed: Any, why: str) -> Claim:
-    """Return a claim that nothing printed or published allows to recompute."""
-    return Claim(id, chapter, what, _plain(printed), None, None, "cannot-be-recomputed", why)
+        apart = deviation(entry.printed, value)
+        agrees = apart <= entry.tolerance
+        said = f"deviates by {100 * apart:.3g} %"
+    why = "" if agrees else "; ".join(part for part in (said, outcome.why, entry.reason) if part)
+    return Claim(entry, value, "holds" if agrees else "differs", why, outcome.by)

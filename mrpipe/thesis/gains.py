@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 from mrpipe.control.gains import Gains
+from mrpipe.thesis.entries import printed_gains
 
-THESIS_GAINS: dict[str, Gains] = {
-    "vd": Gains(c_n_s_m=650.0),
-    "vdps": Gains(c_n_s_m=400.0, k_n_m=2500.0),
-    "vdns": Gains(c_n_s_m=250.0, k_n_m=-4500.0),
-    "fdns": Gains(alpha_n_m=3000.0),
-    "nnc": Gains(alpha_n_m=3000.0),
-}
+THESIS_GAINS: dict[str, Gains] = {law: Gains(**gains) for law, gains in printed_gains().items()}
 """Law -> gains. The k of vdns is that of P2; the thesis prints it with another magnitude in one place."""

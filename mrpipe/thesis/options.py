@@ -1,4 +1,4 @@
-"""Settings of `reproduce`: a section of the configuration, and the options of :mod:`mrpipe.thesis.collect`."""
+"""Settings of the stage `reproduce`: a section of the configuration."""
 
 from __future__ import annotations
 
@@ -10,12 +10,18 @@ from mrpipe.options import Section
 
 
 class ReproduceSettings(Section):
-    """Which printed figures are recomputed, and with which parameter sets."""
+    """Which results of the thesis are recomputed, and what with."""
 
-    chapters: tuple[Literal[2, 3, 4, 5, 6], ...] = Field(
-        (2, 3, 4, 5, 6), description="Chapters of the thesis whose printed figures are recomputed."
+    source: Literal["run", "sets"] = Field(
+        "run",
+        description="`run`: the frame, damper, networks and responses of this run; what is missing is built first. "
+        "`sets`: the printed frame, damper set C and its exact inverse, without a run; less can be recomputed then.",
     )
-    frame: str = Field("thesis", description="Frame of chapters 3 to 5: a set in configs/frames or a YAML file.")
-    duration_s: float = Field(
-        60.0, ge=10.0, description="Length of each closed-loop run of chapter 5; its second half is evaluated."
+    chapters: tuple[Literal[2, 3, 4, 5, 6], ...] = Field(
+        (2, 3, 4, 5, 6), min_length=1, description="Chapters of the thesis whose results are recomputed."
+    )
+    frame: str = Field(
+        "thesis",
+        description="Printed frame, from which closed forms and the checks are recomputed: a set in configs/frames or "
+        "a YAML file.",
     )

@@ -143,6 +143,21 @@ def test_inverse_table_gives_the_drive_back(speed, drive):
 
 
 @pytest.mark.property
+def test_delay_of_the_low_pass_sets_its_cut_off():
+    """Paper P5 filters the current so that it is 0.05 s late; the setting names that delay."""
+    from scipy.signal import butter, group_delay
+
+    from mrpipe.control.settings import ControllerSettings
+
+    assert ControllerSettings(low_pass_hz=60.0).cutoff_hz == 60.0
+    settings = ControllerSettings(low_pass_hz=60.0, low_pass_delay_s=0.05)
+    assert settings.cutoff_hz == pytest.approx(4.50, abs=0.01)
+    _, delay = group_delay(butter(2, settings.cutoff_hz, fs=500.0), w=[0.1], fs=500.0)
+    assert delay[0] / 500.0 == pytest.approx(0.05, rel=0.01)
+    assert ControllerSettings(low_pass_hz=None).cutoff_hz is None
+
+
+@pytest.mark.literature
 def test_switch_and_low_pass():
     _, x, a, v = motion(200.0, 4.0)
     plain = {"velocity": "measured", "low_pass_hz": None, "residual_force_n": 18.0}

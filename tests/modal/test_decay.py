@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
 
-from mrpipe.modal.decay import analyse_decay, damping_from_decrement, decay_start, modal_coordinates
+from mrpipe.modal.decay import (
+    analyse_decay,
+    damping_from_decrement,
+    decay_start,
+    linear_envelope,
+    logarithmic_envelope,
+    modal_coordinates,
+)
 from mrpipe.modal.records import FrameTest
 from mrpipe.structures import complex_modes, frame_from_parameter_set, natural_modes, shear_frame
 from mrpipe.structures.response import linear_response
@@ -19,6 +26,27 @@ def decay_of(zeta, noise=1e-3, omega=20.0, seconds=30.0, rate=500.0, seed=0):
 
 def analyse(zeta, **options):
     return analyse_decay(decay_of(zeta, **options), np.ones((1, 1)), np.array([20.0]), np.array([zeta]))
+
+
+@pytest.mark.literature
+def test_an_exponential_decay_has_an_exponential_envelope():
+    # peaks of both signs, half a period apart, of a mode with zeta = 0.01
+    omega, zeta = 20.0, 0.01
+    time = 0.3 + np.arange(30) * np.pi / (omega * np.sqrt(1 - zeta**2))
+    peak = 2.0 * np.exp(-zeta * omega * time)
+    exact, straight = logarithmic_envelope(time, peak), linear_envelope(time, peak)
+    assert exact.damping_ratio == pytest.approx(zeta, rel=1e-9)
+    assert exact.rms_error < 1e-12 < 0.01 < straight.rms_error
+    # the chord of a convex curve is flatter than its tangent at the first peak
+    assert 0.4 * zeta < straight.damping_ratio < zeta
+
+
+@pytest.mark.literature
+def test_friction_has_a_straight_envelope():
+    # dry friction takes the same height from each peak
+    time, peak = np.arange(20) * 0.2, 1.0 - 0.04 * np.arange(20)
+    assert linear_envelope(time, peak).rms_error < 1e-12 < logarithmic_envelope(time, peak).rms_error
+    assert linear_envelope(time, peak).damping_ratio == pytest.approx(damping_from_decrement(0.08), rel=1e-9)
 
 
 @pytest.mark.literature

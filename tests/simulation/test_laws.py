@@ -10,7 +10,7 @@ from mrpipe.networks.assembly import join
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
 from mrpipe.simulation import LoopOptions, SensorNoise
-from mrpipe.thesis.printed import PRINTED
+from mrpipe.thesis.entries import loop_columns
 from tests.networks.rig import bench_test
 
 LAWS = ("vd", "vdps", "vdns", "fdns", "nnc", "lqg", "passive-off", "passive-on")
@@ -36,14 +36,14 @@ def ideal(rig):
 def test_errata_rows_of_the_perfect_damper(ideal, law):
     """All four columns at once: the errata's controller samples at 500 Hz and its force is held."""
     for key in ("rms_x5_m", "rms_x1_m", "rms_a5_m_s2", "rms_a1_m_s2"):
-        assert ideal[law][key] == pytest.approx(PRINTED[law]["ideal"][key], rel=0.025), key
+        assert ideal[law][key] == pytest.approx(loop_columns(law)["ideal"][key], rel=0.025), key
 
 
 @pytest.mark.literature
 @pytest.mark.parametrize("law,share", [("vd", 0.05), ("vdps", 0.05), ("vdns", 0.15), ("fdns", 0.15)])
 def test_errata_rows_of_the_damper(rig, with_damper, law, share):
     assert rig.adjusted_amplitude == pytest.approx(0.768, rel=5e-3)
-    for key, value in PRINTED[law]["set C"].items():
+    for key, value in loop_columns(law)["set C"].items():
         assert with_damper[law][key] == pytest.approx(value, rel=share), key
 
 
