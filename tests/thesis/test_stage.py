@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mrpipe.config.model import RunSettings
+from mrpipe.config.model import config_model
 from mrpipe.stages.registry import all_stages
 from mrpipe.stages.reproduce import READ
 
@@ -19,8 +19,8 @@ SETTINGS = ["--set", "reproduce.source=sets", "--set", "reproduce.chapters=[3]"]
 @pytest.mark.property
 def test_a_run_is_read_unless_the_sets_are_wanted() -> None:
     stage = all_stages()["reproduce"]
-    assert set(stage.for_configuration(RunSettings(name="a")).inputs) == set(READ)
-    sets = RunSettings.model_validate({"name": "a", "reproduce": {"source": "sets"}})
+    assert set(stage.for_configuration(config_model()(name="a")).inputs) == set(READ)
+    sets = config_model().model_validate({"name": "a", "reproduce": {"source": "sets"}})
     assert stage.for_configuration(sets).inputs == ()
     # the order of the stages does not follow from conditional inputs
     names = list(all_stages())
