@@ -42,7 +42,7 @@ CURVE = CurveOptions(
     tolerance=5e-3,
     most_cycles=60,
     frequency_tolerance=0.01,
-    refined_share=0.95,
+    refined=("rms_x_top_m",),
 )
 """How the response curves of the ledger are measured: half a per cent is enough beside numbers of two digits."""
 
@@ -157,7 +157,7 @@ def _amplitude_at_resonance(rig: Rig, seed: int) -> float:
 
     def peak(amplitude: float) -> float:
         found = minimize_scalar(
-            lambda omega: -float(steady_values(run, amplitude, float(omega), CURVE)[0][column]),
+            lambda omega: -float(steady_values(run, amplitude, float(omega), CURVE).values[column]),
             bounds=band,
             method="bounded",
             options={"xatol": 0.01 * band[0], "maxiter": 12},
@@ -193,7 +193,7 @@ def at_resonance(rig: Rig, damper: str, seed: int, progress: Progress) -> tuple[
         curve = response_curve(run, amplitude, band_of(rig), CURVE)
         resonances[law] = curve.resonance_rad_s
         own[law] = _row_values(curve.values[int(np.argmax(curve.column("rms_x_top_m")))])
-        common[law] = _row_values(steady_values(run, amplitude, resonances["vd"], CURVE)[0])
+        common[law] = _row_values(steady_values(run, amplitude, resonances["vd"], CURVE).values)
 
     def readings(omegas: Mapping[str, float]) -> dict[str, Reading]:
         return {law: reading_of(run_law(rig, law, excite(amplitude, omegas[law]), seed)) for law in LAWS}
@@ -288,5 +288,5 @@ def peak_over_frequency(bench: Bench, law: str, gain: str, values: tuple[float, 
     for value in values:
         gains = rig.controllers.calibrated.gains_of(law).changed(**{gain: value})
         run = runner(rig, rig.controller(law, gains), np.random.default_rng(bench.seed))
-        found.append(max(float(steady_values(run, amplitude, float(omega), CURVE)[0][column]) for omega in grid))
+        found.append(max(float(steady_values(run, amplitude, float(omega), CURVE).values[column]) for omega in grid))
     return found
