@@ -14,7 +14,6 @@ from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.plant import (
-    ACCELERATION,
     DISPLACEMENT,
     FIRST,
     FORCE,
@@ -85,22 +84,6 @@ def parallel_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatA
 def parallel_spring(stiffness: float) -> Step:
     """Return a spring [N/m] parallel to the damper."""
     return Step("parallel-spring", Phase.FORCE_EFFECT, parallel_spring_step, np.array([float(stiffness)]))
-
-
-@njit(float64(float64[::1], float64[::1]), cache=True)
-def direction_of_change(wire: FloatArray, state: FloatArray) -> float:
-    """Return 1 while the velocity rises, -1 while it falls, and what it was where it does not change.
-
-    State: last velocity [m/s], direction.
-    """
-    if wire[FIRST] > 0.5:
-        state[1] = 1.0 if wire[ACCELERATION] >= 0.0 else -1.0
-    elif wire[VELOCITY] > state[0]:
-        state[1] = 1.0
-    elif wire[VELOCITY] < state[0]:
-        state[1] = -1.0
-    state[0] = wire[VELOCITY]
-    return state[1]
 
 
 @njit(float64(float64, float64, float64), cache=True)

@@ -74,6 +74,5 @@ EFFECT = Effect(
     needs=("varying-speed",),
     separated_by={
         "stribeck": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
-        "rate-dependent-yield": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
     },
 )

@@ -97,7 +97,6 @@ EFFECT = Effect(
     needs=("varying-speed",),
     separated_by={
         "quadratic-drag": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
-        "rate-dependent-yield": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
     },
     refinements=(
         EffectForm(

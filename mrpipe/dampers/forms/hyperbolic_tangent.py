@@ -12,18 +12,18 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
 from mrpipe.dampers.parameters import Parameter, Values, amplitude, shape
 from mrpipe.dampers.plant import DISPLACEMENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.dampers.viscoplastic import parallel_spring
+from mrpipe.dampers.viscoplastic import parallel_spring, rounded_sign
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def hyperbolic_tangent_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: velocity scale [m/s], shift delta [1]."""
-    side = 1.0 if wire[DISPLACEMENT] > 0.0 else (-1.0 if wire[DISPLACEMENT] < 0.0 else 0.0)
+    """Parameters: velocity scale [m/s], shift delta [1], displacement scale [m]."""
+    side = rounded_sign(wire[DISPLACEMENT], parameters[2])
     wire[HYSTERESIS] = math.tanh(wire[VELOCITY] / parameters[0] + parameters[1] * side)
 
 
 def _steps(values: Values) -> list[Step]:
-    numbers = np.array([values["velocity_scale"], values["shift"]])
+    numbers = np.array([values[name] for name in ("velocity_scale", "shift", "displacement_scale")])
     return [
         Step("hyperbolic-tangent", Phase.HYSTERESIS, hyperbolic_tangent_step, numbers),
         parallel_spring(values.get("stiffness", 0.0)),
@@ -37,11 +37,12 @@ def _post_yield(values: Values, at: Strength) -> FloatArray:
 
 FORM = BaseForm(
     name="hyperbolic-tangent",
-    summary="F_y tanh(v/v0 + delta sign x) + c0 v + k x",
+    summary="F_y tanh(v/v0 + delta tanh(x/x0)) + c0 v + k x",
     source="Kwok, Ha, Nguyen, Li, Samali 2006, Sens. Actuators A 132, 441-451",
     parameters=(
         shape("velocity_scale", "m/s", "speed over which the force reverses", "speed", 3e-3, 2.0, (0.1, 0.3, 0.03)),
         Parameter("shift", "1", "delta: width of the loop over the velocity", "one", 0.0, 6.0, (0.5, 0.0)),
+        shape("displacement_scale", "m", "over which the shift changes its sign", "stroke", 1e-4, 1.0, (0.03,)),
         amplitude("stiffness", "N/m", "spring parallel to the damper", "force/stroke", 0.0, 10.0),
     ),
     steps=_steps,

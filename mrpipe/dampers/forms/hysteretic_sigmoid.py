@@ -11,21 +11,21 @@ from numba import njit
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
 from mrpipe.dampers.parameters import Parameter, Values, shape
-from mrpipe.dampers.plant import HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.dampers.viscoplastic import direction_of_change
+from mrpipe.dampers.plant import ACCELERATION, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.viscoplastic import rounded_sign
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def hysteretic_sigmoid_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: velocity scale, hysteresis velocity [m/s]. State: last velocity, direction of its change."""
-    late = wire[VELOCITY] - parameters[1] * direction_of_change(wire, state)
+    """Parameters: velocity scale, hysteresis velocity [m/s], acceleration scale [m/s^2]."""
+    late = wire[VELOCITY] - parameters[1] * rounded_sign(wire[ACCELERATION], parameters[2])
     # (1 - e^-r)/(1 + e^-r) = tanh(r/2), the scale holds the factor 2
     wire[HYSTERESIS] = math.tanh(late / parameters[0])
 
 
 def _steps(values: Values) -> list[Step]:
-    numbers = np.array([values["velocity_scale"], values["hysteresis_velocity"]])
-    return [Step("hysteretic-sigmoid", Phase.HYSTERESIS, hysteretic_sigmoid_step, numbers, 2)]
+    numbers = np.array([values[name] for name in ("velocity_scale", "hysteresis_velocity", "acceleration_scale")])
+    return [Step("hysteretic-sigmoid", Phase.HYSTERESIS, hysteretic_sigmoid_step, numbers)]
 
 
 def _post_yield(values: Values, at: Strength) -> FloatArray:
@@ -35,11 +35,12 @@ def _post_yield(values: Values, at: Strength) -> FloatArray:
 
 FORM = BaseForm(
     name="hysteretic-sigmoid",
-    summary="F_y (1 - e^-r)/(1 + e^-r) + c0 v, r = 2 (v - v_h sign v')/v0",
+    summary="F_y (1 - e^-r)/(1 + e^-r) + c0 v, r = 2 (v - v_h tanh(v'/a0))/v0",
     source="Wang, Ma, Rakheja, Su 2004, Proc. IMechE D 218, 1235-1247; Ma, Wang, Rakheja, Su 2002",
     parameters=(
         shape("velocity_scale", "m/s", "speed over which the force reverses", "speed", 3e-3, 2.0, (0.1, 0.3, 0.03)),
         Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
+        shape("acceleration_scale", "m/s^2", "over which the branches change", "acceleration", 1e-4, 1.0, (0.02,)),
     ),
     steps=_steps,
     post_yield=_post_yield,

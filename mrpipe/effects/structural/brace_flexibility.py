@@ -26,6 +26,5 @@ EFFECT = StructuralEffect(
         "backlash": Separation(
             "slow small triangles at two currents: play is of one size, a brace stretches with the force", ("reversal",)
         ),
-        "rate-dependent-yield": Separation("a displacement sensor on the damper's rod"),
     },
 )

@@ -1,4 +1,4 @@
-"""Laws of the drive chosen again once effects are known."""
+"""Laws of the drive chosen again once base form and effects are known."""
 
 from __future__ import annotations
 
@@ -7,32 +7,36 @@ from dataclasses import replace
 from mrpipe.fitting.drive_laws import adequate_laws
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Base
+from mrpipe.fitting.start import distinct_levels, polynomial_laws
 from mrpipe.tracing.bench.select import NOTHING_MISSING, Selection
 
 
-def with_laws_again(selection: Selection, declared: Base) -> Selection:
-    """Return the selection whose chosen fit has the laws of the drive that its effects leave room for.
+def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int) -> Selection:
+    """Return the selection whose chosen fit has the laws of the drive that its base form and effects leave room for.
 
-    The baseline takes the simplest laws that cost nothing while an effect is missing. The missing effect can hide the
-    true law, so the laws are chosen again with the effects in the model. They are kept where the fit improves by a
-    material share of the noise.
+    The baseline takes the simplest laws that cost nothing while something is missing. What is missing can hide the
+    true law, so the laws are chosen again with the chosen model. They are kept where the fit improves by a material
+    share of the noise.
 
     Parameters
     ----------
     selection
-        Effects under the declared base form.
-    declared
-        The declared base form with the richest laws that the drive levels determine.
+        Chosen model.
+    yield_order, viscosity_order
+        Largest degrees of the polynomials that are tried.
     """
     chosen = selection.chosen
     base = chosen.problem.base
-    if base.form.name != declared.form.name or base.laws == declared.laws or chosen is selection.base:
+    richest = polynomial_laws(base.form, distinct_levels(chosen.problem.recordings), yield_order, viscosity_order)
+    if base.laws == richest or chosen is selection.base:
         return selection
-    rich = _with_laws(chosen, replace(base, laws=declared.laws))
+    rich = _with_laws(chosen, replace(base, laws=richest))
     found = _with_laws(rich, replace(base, laws=adequate_laws(rich)))
-    if found.chi_square < chosen.chi_square - NOTHING_MISSING * selection.noise:
-        return replace(selection, chosen=found)
-    return selection
+    if found.chi_square >= chosen.chi_square - NOTHING_MISSING * selection.noise:
+        return selection
+    if chosen is selection.ground:
+        return replace(selection, chosen=found, ground=found)
+    return replace(selection, chosen=found)
 
 
 def _with_laws(found: Fit, base: Base) -> Fit:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -31,11 +32,17 @@ PROVEN_LEAD = 1.25
 """A further effect is named where every other family leaves at least so many times what it leaves."""
 
 
-DRAFT_SAMPLES = 12_000
+DRAFT_SAMPLES = 8_000
 """Of this many samples, or a little more, the drafts of all forms are made ..."""
 
-MOST_PARTS = 3
-"""... but of no smaller share of the tests than one in three."""
+MOST_PARTS = 4
+"""... but of no smaller share of the tests than one in four."""
+
+BEGUN_STEPS = 3
+"""Iterations after which the forms that promise most are chosen ..."""
+
+CONTINUED = 8
+"""... and number of forms that are then fitted further."""
 
 CONTENDER_SHARE = 0.3
 """Forms that leave more than the best draft by this share of what the best takes are not fitted on all tests."""
@@ -182,13 +189,11 @@ def candidates_after(
     *,
     refits: int,
     jobs: int,
-    drafted: Callable[[Fit], list[Fit]] | None = None,
     progress: Progress = no_progress,
 ) -> list[Candidate]:
     """Screen all terms after a fit and refit the families that promise most; best first.
 
-    Forms are tried on a share of the tests; those that may win are fitted on all of them. `drafted` adds drafts of
-    its own, made of the fit on that share.
+    Forms are tried on a share of the tests; those that may win are fitted on all of them.
     """
     present = {term.effect.name for term in before.problem.terms}
     small = draft(before)
@@ -197,20 +202,24 @@ def candidates_after(
     for item in ranked:
         families.setdefault(item.term.effect.name, []).append(item)
     chosen = list(families)[:refits]
-    drafts = _each(lambda item: refit(small, item), [item for name in chosen for item in families[name][:2]], jobs)
+    begun = partial(refit, small, iterations=BEGUN_STEPS)
+    drafts = _each(begun, [item for name in chosen for item in families[name][:2]], jobs)
     # the families in front get all their forms: a name is judged by the form that suits it best
     front = sorted(chosen, key=lambda name: min(item.cost for item in drafts if _name(item) == name))[:3]
-    drafts += _each(lambda item: refit(small, item), [item for name in front for item in families[name][2:]], jobs)
-    if drafted is not None:
-        drafts += [item for item in drafted(small) if _name(item) in chosen]
+    drafts += _each(begun, [item for name in front for item in families[name][2:]], jobs)
+    drafts.sort(key=_penalised)
+    drafts = _each(_continued, drafts[:CONTINUED], jobs) + drafts[CONTINUED:]
     progress(0.7, f"{len(drafts)} forms tried")
     own = {name: sorted((item for item in drafts if _name(item) == name), key=_penalised) for name in chosen}
-    least = min(items[0].chi_square for items in own.values())
-    within = least + CONTENDER_SHARE * max(small.chi_square - least, 0.0)
-    contenders = [item for items in own.values() for item in items[:3] if item.chi_square <= within]
-    others = [items[0] for items in own.values() if items[0].chi_square > within]
-    fits = _each(lambda item: on_all(before, item, iterations=10), contenders, jobs)
-    fits += _each(lambda item: on_all(before, item, iterations=1), others, jobs)
+    if small is before:
+        fits = drafts
+    else:
+        least = min(items[0].chi_square for items in own.values())
+        within = least + CONTENDER_SHARE * max(small.chi_square - least, 0.0)
+        contenders = [item for items in own.values() for item in items[:3] if item.chi_square <= within]
+        others = [items[0] for items in own.values() if items[0].chi_square > within]
+        fits = _each(lambda item: on_all(before, item, iterations=10), contenders, jobs)
+        fits += _each(lambda item: on_all(before, item, iterations=1), others, jobs)
     already = share_of(base, before, noise)
     found = []
     for name in chosen:
@@ -219,6 +228,10 @@ def candidates_after(
         shares |= {_form(item): share_of(base, item, noise) for item in fits if _name(item) == name}
         found.append(Candidate(name, winner, share_of(base, winner, noise), shares))
     return sorted(found, key=lambda item: item.fit.chi_square)
+
+
+def _continued(begun: Fit) -> Fit:
+    return fit(begun.problem, begun.theta, iterations=6, tolerance=2e-3)
 
 
 def _name(found: Fit) -> str:
@@ -296,7 +309,6 @@ def forward_selection(
     refits: int = 8,
     thresholds: Thresholds = Thresholds(),
     jobs: int = 1,
-    drafted: Callable[[Fit], list[Fit]] | None = None,
     progress: Progress = no_progress,
 ) -> Selection:
     """Add effects one after another while each recovers a fair share.
@@ -314,9 +326,14 @@ def forward_selection(
         if rounds and little and _nothing_more(chosen, terms, excess, jobs):
             break
         found = candidates_after(
-            chosen, base, noise, terms, refits=refits, jobs=jobs, progress=progress,
-            drafted=None if rounds else drafted,
-        )  # fmt: skip
+            chosen,
+            base,
+            noise,
+            terms,
+            refits=refits,
+            jobs=jobs,
+            progress=progress,
+        )
         able = [item for item in found if admissible(item.fit)]
         if rounds and thresholds.lead > 1.0:
             # beside other effects a parameter that runs to its bound mends a form, and badly where motions are other

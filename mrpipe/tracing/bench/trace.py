@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
-from mrpipe.dampers.library import forms_named
 from mrpipe.effects.contract import Effect
-from mrpipe.effects.yielding_parts import with_yielding_parts
-from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import (
     MOST_JUDGED,
@@ -23,51 +19,22 @@ from mrpipe.fitting.recordings import (
     spread_tests,
 )
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import (
-    Baseline,
-    declared_base,
-    family_of,
-    fit_baseline,
-    noise_level_of,
-    with_form,
-)
-from mrpipe.tracing.bench.ceiling import flexible_chi_square
+from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline
+from mrpipe.tracing.bench.choose import REAL_THRESHOLDS, Choice, choose_model, judged_by_trees
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
-from mrpipe.tracing.bench.drive_again import with_laws_again
-from mrpipe.tracing.bench.forms import alone, cost, grounds
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
-from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
+from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
 from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.on_validation import OnValidation
-from mrpipe.tracing.bench.pairs import rounded_drafts, with_play
 from mrpipe.tracing.bench.refine import with_richer_forms
-from mrpipe.tracing.bench.select import Selection, Thresholds, forward_selection, share_of
-from mrpipe.tracing.bench.summary import FLEXIBLE_SHARE, Summary, Tracing, TracingOptions
+from mrpipe.tracing.bench.select import Selection, forward_selection, share_of
+from mrpipe.tracing.bench.summary import Summary, Tracing, TracingOptions
 from mrpipe.tracing.bench.testability import untestable
-from mrpipe.tracing.bench.verdict import (
-    Named,
-    clear_lead,
-    confidence_of,
-    parameter_table,
-    tied,
-    unnamed_reason,
-)
-from mrpipe.tracing.bench.weights import noise_scale
-
-MODEL_ERROR_CHI_SQUARE = 6.0
-"""Where the best composite leaves this many times the noise, sensors' noise is no measure: weights by force RMS."""
-
-TOO_PLAIN = 0.5
-"""But where a richer form of the same effect takes this share of it (up to thrice that) only the form was wrong."""
-
-REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25, lead=1.0)
-"""What a further effect must recover where weights go by force RMS: noise is far below any model's error.
-
-Rivals that come near are told by `tied_with`."""
+from mrpipe.tracing.bench.verdict import Named, confidence_of, parameter_table, tied, unnamed_reason
 
 CLEAR_OFFSETS = 3.0
-"""Offsets of the tests that spread by so many times what an unknown residual leaves are no part of that residual."""
+"""Ratio of the spread of the tests' offsets to the unknown residual above which the offsets are a finding."""
 
 
 def trace_campaign(
@@ -107,8 +74,6 @@ def trace_campaign(
     validation = record_tests(unseen, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects)
-    # a base form that is declared is no effect that could be missing
-    able = {name: item for name, item in able.items() if name != family_of(options.model)}
     first = _first_baseline(training, declared, options)
     found = validated(first.fit, first.fit, first, training, validation, options)
     refusal = ""
@@ -121,7 +86,8 @@ def trace_campaign(
         return _nothing_traced(
             f"{refusal}: nothing is traced", ordered, found, first, training, reasons, declared, options, jobs
         )
-    baseline, selection = _select(first, training, able, declared, options, rng, jobs, progress)
+    choice = choose_model(first, training, able, list(declared), options, rng=rng, jobs=jobs, progress=progress)
+    baseline, selection = choice.baseline, choice.selection
     window = selection.base.problem.window_share
     if not baseline.model_error:
         window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
@@ -135,13 +101,10 @@ def trace_campaign(
     offsets = offset_between_tests(
         selection.chosen, effects.get("offset"), least_ratio=CLEAR_OFFSETS if reason and selection.structured else 0.0
     )
-    named = _named(selection, gains, len(declared), options, rng)
+    named = _named(selection, choice, gains, len(declared), options, rng)
     causes = [*named[: selection.proven], *([offsets.named()] if offsets is not None else [])]
     if offsets is not None and any(item.effect.name == "offset" for item in named[: selection.proven]):
         causes.pop()
-    if baseline.model_error:
-        # the base form is a verdict of its own, and every real damper asks for this one: what else there is comes first
-        causes.sort(key=lambda item: item.effect.name == "rate-dependent-yield")
     further = named[selection.proven :]
     missing = structured(selection, baseline, training, options, bool(causes))
     found = validated(selection.base, selection.chosen, baseline, training, validation, options, offsets is not None)
@@ -184,136 +147,12 @@ def _nothing_traced(
     return report.build(options, (), (), untested, 0.0, [item.name for item in declared])
 
 
-def _select(
-    first: Baseline,
-    training: Recordings,
-    effects: Mapping[str, Effect],
-    declared: Sequence[Effect],
-    options: TracingOptions,
-    rng: np.random.Generator,
-    jobs: int,
-    progress: Progress,
-) -> tuple[Baseline, Selection]:
-    """Fit the baseline and select effects; with weights by force RMS where no composite comes near the noise."""
-    base = first.fit.problem.base
-    own = list(declared)
-    floor = options.model_error_share
-    baseline = first
-    while True:
-        if floor != options.model_error_share:
-            baseline = fit_baseline(training, base, own, model_error_share=floor)
-        progress(0.2, "candidates")
-        if floor > 0.0:
-            effects = with_yielding_parts(effects)
-            baseline = _without_nuisances(baseline, effects, options)
-        select = partial(
-            forward_selection,
-            noise=baseline.noise,
-            terms=[Term(effect, form) for effect in effects.values() for form in effect.forms],
-            most=options.most_effects,
-            refits=options.refits,
-            thresholds=REAL_THRESHOLDS if floor > 0.0 else Thresholds(),
-            jobs=jobs,
-            drafted=_drafted(baseline.fit, effects) if floor > 0.0 else None,
-        )
-        selection = select(baseline.fit)
-        if floor > 0.0:
-            return baseline, _judged_by_trees(with_play(selection, effects))
-        full = declared_base(training, options.model, options.yield_order, options.viscosity_order)
-        selection = with_laws_again(selection, full)
-        selection = _in_better_form(selection, select, options, jobs)
-        if _near_the_noise(selection, baseline.noise, len(own), options, rng, jobs):
-            return _with_noise_of(selection.chosen, baseline, selection)
-        # what is left on the force's own scale becomes the yardstick of the second pass
-        chosen = selection.chosen
-        used = chosen.problem.root_weight > 0.0
-        left = chosen.residual[used] / chosen.problem.root_weight[used]
-        floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
-
-
-def _near_the_noise(
-    selection: Selection, noise: float, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
-) -> bool:
-    """Return whether the sensors' noise is the measure, for what was chosen or for a richer form of the same effect."""
-    plain = selection.chosen.chi_square / max(noise, 1e-12)
-    if plain < MODEL_ERROR_CHI_SQUARE:
-        return True
-    # the right effect in too plain a form may leave as much as a wrong base does
-    richer = _refined(selection, declared, options, rng, jobs).chosen.chi_square / max(noise, 1e-12)
-    return richer < max(MODEL_ERROR_CHI_SQUARE, min(3.0 * MODEL_ERROR_CHI_SQUARE, (1.0 - TOO_PLAIN) * plain))
-
-
-def _drafted(base: Fit, effects: Mapping[str, Effect]) -> Callable[[Fit], list[Fit]] | None:
-    rate = effects.get("rate-dependent-yield")
-    if rate is None or any(term.effect.name == rate.name for term in base.problem.terms):
-        return None
-    return partial(rounded_drafts, rate=rate)
-
-
-def _in_better_form(
-    selection: Selection, select: Callable[[Fit], Selection], options: TracingOptions, jobs: int
-) -> Selection:
-    """Return the selection under another base form, if that leaves less than any effect under the declared form.
-
-    A damper of another published form is no damper with a missing effect: under the declared form it looks like a late
-    rise after reversal, or like friction.
-    """
-    if not selection.structured or not selection.rounds:
-        return selection
-    drafts = alone(selection.base, forms_named(options.base_forms), selection.noise, jobs=jobs)
-    best = selection
-    for ground in grounds(selection, drafts, options.rules.lead, options.rules.least_share, jobs=jobs):
-        again = select(ground)
-        if share_of(ground, again.chosen, again.noise) < options.rules.least_share:
-            again = replace(again, chosen=ground)
-        if cost(again.chosen, again.noise) < cost(best.chosen, best.noise):
-            rounds = again.rounds if again.chosen is not ground else selection.rounds[:1]
-            best = replace(again, base=selection.base, ground=ground, rounds=rounds).with_floor(again.noise)
-    return best
-
-
 def _refined(
     selection: Selection, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
 ) -> Selection:
     return with_richer_forms(
         selection, declared, folds=options.folds, draws=options.bootstrap_draws, rng=rng, jobs=jobs
     )
-
-
-def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tuple[Baseline, Selection]:
-    """Take the noise from the chosen fit: a poor model's errors do not all cancel between repeats."""
-    scale = noise_scale(chosen)
-    noise = noise_level_of(chosen, scale)
-    if noise >= baseline.noise:
-        return baseline, selection
-    return replace(baseline, noise=noise, scale=scale), selection.with_floor(noise)
-
-
-def _without_nuisances(baseline: Baseline, effects: Mapping[str, Effect], options: TracingOptions) -> Baseline:
-    """Return the baseline with a drive lag that falls otherwise than it rises, and with the records' filter, if any.
-
-    Whether the records went through a filter is judged with the yield rounded: both round the corners of a loop.
-    """
-    found = with_lag_apart(baseline.fit)
-    rate = effects.get("rate-dependent-yield")
-    present = {term.effect.name for term in found.problem.terms}
-    if options.observation_filter and rate is not None and bool(np.all(found.problem.recordings.period_s > 0.0)):
-        rounded = found if rate.name in present else with_form(found, rate, "own-dashpot")
-        share = observation_window(rounded)[0]
-        if share > 0.0:
-            found = observation_window(found, (share,))[1]
-    return replace(baseline, fit=found, model_error=True)
-
-
-def _judged_by_trees(selection: Selection) -> Selection:
-    """Judge shares by what a flexible model can recover, where the sensors' noise is far below any model's error."""
-    fits = [selection.base, selection.chosen]
-    reached = [flexible_chi_square(item) for item in fits[: 1 if fits[0] is fits[1] else 2]]
-    floor = max(selection.noise, min(*reached, selection.chosen.chi_square, selection.base.chi_square))
-    if floor > (1.0 - FLEXIBLE_SHARE) * selection.base.chi_square:
-        # the trees learn nothing that holds on other tests: repeats and sensors are the better measure
-        return selection
-    return selection.with_floor(floor)
 
 
 def _with_window(
@@ -345,7 +184,7 @@ def _with_window(
     if selection.ground is not None:
         again = replace(again, base=base, ground=ground).with_floor(noise)
     if noise < selection.noise:
-        again = _judged_by_trees(again)
+        again = judged_by_trees(again)
     if again.chosen.chi_square > filtered.chi_square:
         again = replace(again, chosen=filtered, rounds=selection.rounds)
     return share, again
@@ -376,12 +215,17 @@ def _cross_validated(
 
 
 def _named(
-    selection: Selection, gains: Sequence[Gain], declared: int, options: TracingOptions, rng: np.random.Generator
+    selection: Selection,
+    choice: Choice,
+    gains: Sequence[Gain],
+    declared: int,
+    options: TracingOptions,
+    rng: np.random.Generator,
 ) -> tuple[Named, ...]:
     chosen = selection.chosen
     named = []
     limits = intervals(chosen) if len(chosen.problem.terms) > declared else []
-    total = selection.share(chosen)
+    total = share_of(selection.without_effects, chosen, selection.noise)
     for place, index in enumerate(range(declared, len(chosen.problem.terms))):
         term = chosen.problem.terms[index]
         candidates = selection.rounds[place] if place < len(selection.rounds) else ()
@@ -389,12 +233,13 @@ def _named(
         if candidates and candidates[0].name == term.effect.name:
             rivals = tied(candidates, selection.noise, options.rules, draws=options.bootstrap_draws, rng=rng)
         gain = gains[place] if place < len(gains) else None
+        support = choice.support(term.effect.name, options, rng)
         named.append(
             Named(
                 term.effect,
                 term.form.name,
                 parameter_table(chosen, index, limits[index], options.drive_unit),
-                confidence_of(total, clear_lead(candidates, selection.noise), gain, options.rules),
+                confidence_of(total, support, gain, options.rules),
                 rivals,
                 {name: term.effect.separated_by[name].advice for name in rivals if name in term.effect.separated_by},
                 gain,

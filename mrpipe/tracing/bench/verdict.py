@@ -91,13 +91,6 @@ def left_of(found: Fit, noise: float) -> float:
     return max(found.chi_square - noise, 0.0) + 0.1 * noise
 
 
-def clear_lead(candidates: Sequence[Candidate], noise: float) -> float:
-    """Return 0..1: by how much the best leaves less than the next family does."""
-    if len(candidates) < 2:
-        return 1.0
-    return max(0.0, 1.0 - left_of(candidates[0].fit, noise) / left_of(candidates[1].fit, noise))
-
-
 def unnamed_reason(selection: Selection, rules: Rules) -> str:
     """Return why nothing may be named, or nothing where something may."""
     if not selection.structured:
@@ -106,17 +99,28 @@ def unnamed_reason(selection: Selection, rules: Rules) -> str:
         return f"no effect is named beside the base form {selection.ground.problem.base.name}"
     if not selection.rounds or selection.chosen is selection.base:
         return "no effect of the library changes the error"
-    if min(selection.share(selection.chosen), selection.proven_share) < rules.least_share:
+    if share_of(selection.without_effects, selection.chosen, selection.noise) < rules.least_share:
         return "no effect of the library recovers enough of what is recoverable"
     return ""
 
 
-def confidence_of(share: float, lead: float, gain: Gain | None, rules: Rules) -> float:
-    """Return a confidence 0..1: high for a large share, a clear lead (0..1) and a gain that holds on left-out tests."""
+def confidence_of(share: float, support: float, gain: Gain | None, rules: Rules) -> float:
+    """Return a confidence 0..1.
+
+    Parameters
+    ----------
+    share
+        Share of the recoverable residual that the chosen effects recover.
+    support
+        Share of resamples of the training tests in which the effect is needed whatever the base form.
+    gain
+        Gain on left-out tests; None if it was not computed.
+    rules
+        When a cause is named.
+    """
     proven = min(1.0, share / rules.named_share)
-    clear = min(1.0, 2.0 * lead)
     held = 1.0 if gain is None or gain.significant else 0.4
-    return round(float(proven * (0.5 + 0.5 * clear) * held * 0.99), 3)
+    return round(float(proven * support * held * 0.99), 3)
 
 
 def parameter_table(

@@ -1,0 +1,251 @@
+"""From the baseline to a base form and effects: one race with weights by noise, and where needed one by force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from mrpipe.artifacts import Progress
+from mrpipe.dampers.library import base_form, forms_named
+from mrpipe.effects.contract import Effect
+from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.problem import Term
+from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.start import fit_with_form
+from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline, noise_level_of
+from mrpipe.tracing.bench.ceiling import flexible_chi_square
+from mrpipe.tracing.bench.drive_again import with_laws_again
+from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
+from mrpipe.tracing.bench.pairs import with_play
+from mrpipe.tracing.bench.race import Model, Race, on_all_tests, race
+from mrpipe.tracing.bench.refine import with_richer_forms
+from mrpipe.tracing.bench.select import Candidate, Selection, Thresholds, forward_selection, share_of
+from mrpipe.tracing.bench.summary import FLEXIBLE_SHARE, TracingOptions
+from mrpipe.tracing.bench.weights import noise_scale
+
+MODEL_ERROR_CHI_SQUARE = 6.0
+"""If the best model leaves this many times the noise, the sensors' noise is no measure: weights go by force RMS."""
+
+TOO_PLAIN = 0.5
+"""Where a richer form of the same effect takes this share of the residual, only the plain form was wrong."""
+
+REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25, lead=1.0)
+"""What a further effect must recover where weights go by force RMS: noise is far below any model's error."""
+
+ROUNDED_FORM = "yielding-part"
+"""The filter of the records is judged with this base form, because a rounded yield rounds the corners of a loop too."""
+
+PROMOTED = 3
+"""Number of candidates of each round that are fitted to all training tests; others keep the numbers of the draft ..."""
+
+PROMOTED_STEPS = 6
+"""... and iterations of these fits."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was chosen.
+
+    Attributes
+    ----------
+    baseline
+        Baseline with the weights that were used.
+    selection
+        Base form and effects, fitted to all training tests.
+    race
+        The models that competed; None where nothing is missing.
+    winner
+        The model of the race that was chosen.
+    """
+
+    baseline: Baseline
+    selection: Selection
+    race: Race | None = None
+    winner: Model | None = None
+
+    def support(self, effect: str, options: TracingOptions, rng: np.random.Generator) -> float:
+        """Return the share of resamples of the training tests in which an effect is needed; 0 without a race."""
+        if self.race is None:
+            return 0.0
+        return self.race.support(effect, options.rules.lead, draws=options.bootstrap_draws, rng=rng)
+
+
+def choose_model(
+    first: Baseline,
+    training: Recordings,
+    effects: Mapping[str, Effect],
+    declared: list[Effect],
+    options: TracingOptions,
+    *,
+    rng: np.random.Generator,
+    jobs: int,
+    progress: Progress,
+) -> Choice:
+    """Choose base form and effects.
+
+    Parameters
+    ----------
+    first
+        Fit of the declared model with its effects.
+    training
+        Training tests.
+    effects
+        Effects that the tests can show.
+    declared
+        Effects that belong to the baseline.
+    options
+        How it is traced.
+    rng
+        Source of randomness.
+    jobs
+        Threads.
+    progress
+        Called with the share done and a text.
+    """
+    baseline, floor = first, options.model_error_share
+    if floor > 0.0:
+        baseline = _without_nuisances(baseline, options)
+    while True:
+        choice = _raced(baseline, effects, options, floor > 0.0, jobs, progress)
+        selection = choice.selection
+        if floor > 0.0:
+            return replace(choice, selection=judged_by_trees(selection))
+        if choice.race is None:
+            return choice
+        selection = with_laws_again(selection, options.yield_order, options.viscosity_order)
+        if _near_the_noise(selection, baseline.noise, len(declared), options, rng, jobs):
+            baseline, selection = _with_noise_of(selection.chosen, baseline, selection)
+            return replace(choice, baseline=baseline, selection=selection)
+        # what remains on the force's own scale becomes the yardstick of a second race
+        chosen = selection.chosen
+        used = chosen.problem.root_weight > 0.0
+        left = chosen.residual[used] / chosen.problem.root_weight[used]
+        floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
+        base = declared_base(training, options.model, options.yield_order, options.viscosity_order)
+        baseline = _without_nuisances(fit_baseline(training, base, declared, model_error_share=floor), options)
+
+
+def _near_the_noise(
+    selection: Selection, noise: float, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
+) -> bool:
+    """Return whether the sensors' noise is the measure, for what was chosen or for a richer form of the same effect."""
+    plain = selection.chosen.chi_square / max(noise, 1e-12)
+    if plain < MODEL_ERROR_CHI_SQUARE:
+        return True
+    # the right effect in too plain a form may leave as much as a wrong base form does
+    refined = with_richer_forms(
+        selection, declared, folds=options.folds, draws=options.bootstrap_draws, rng=rng, jobs=jobs
+    )
+    richer = refined.chosen.chi_square / max(noise, 1e-12)
+    return richer < max(MODEL_ERROR_CHI_SQUARE, min(3.0 * MODEL_ERROR_CHI_SQUARE, (1.0 - TOO_PLAIN) * plain))
+
+
+def _raced(
+    baseline: Baseline,
+    effects: Mapping[str, Effect],
+    options: TracingOptions,
+    model_error: bool,
+    jobs: int,
+    progress: Progress,
+) -> Choice:
+    """Run the race and fit its winner to all training tests."""
+    base, noise = baseline.fit, baseline.noise
+    nothing = Selection(base, noise, (), base)
+    if not nothing.structured:
+        return Choice(baseline, nothing)
+    search = partial(
+        forward_selection,
+        noise=noise,
+        terms=[Term(effect, form) for effect in effects.values() for form in effect.forms],
+        most=options.most_effects,
+        refits=options.refits,
+        thresholds=REAL_THRESHOLDS if model_error else Thresholds(),
+        jobs=jobs,
+    )
+    further = partial(with_play, effects=effects) if model_error else None
+    forms = forms_named(options.base_forms)
+    found = race(base, forms, search, noise, further=further, jobs=jobs, progress=progress)
+    winner = found.winner(options.rules.lead)
+    progress(0.7, "fit to all tests")
+    return Choice(baseline, promoted(found, winner, base), found, winner)
+
+
+def promoted(found: Race, winner: Model, base: Fit) -> Selection:
+    """Return the winner of a race with its rivals, fitted to all training tests.
+
+    Parameters
+    ----------
+    found
+        The race.
+    winner
+        Its chosen model.
+    base
+        Fit of the declared form to all training tests.
+    """
+    problem, noise = base.problem, found.noise
+    count = len(found.own)
+    if winner.form == found.declared:
+        ground = None
+        chosen = base if len(winner.effects) == count else on_all_tests(winner.fit, problem, found.coupled)
+    else:
+        plain = min(
+            (item for item in found.models if item.form == winner.form and item.effects == found.own),
+            key=lambda item: float(item.squares.sum()),
+        )
+        ground = on_all_tests(plain.fit, problem, found.coupled)
+        chosen = ground if len(winner.effects) == count else on_all_tests(winner.fit, problem, found.coupled)
+    rounds: list[tuple[Candidate, ...]] = []
+    search = found.searches.get(winner.form, found.searches.get(found.declared))
+    for place, candidates in enumerate((search.rounds if search else ())[: max(1, len(winner.effects) - count)]):
+        names = winner.effects[: count + place]
+        if any(tuple(term.effect.name for term in c.fit.problem.terms[:-1]) != names for c in candidates[:1]):
+            break
+        rounds.append(_on_all(candidates, found, winner, chosen, base, count + place))
+    return Selection(base, noise, tuple(rounds), chosen, proven=len(winner.effects) - count, ground=ground)
+
+
+def _on_all(
+    candidates: tuple[Candidate, ...], found: Race, winner: Model, chosen: Fit, base: Fit, place: int
+) -> tuple[Candidate, ...]:
+    """Return the candidates of a round fitted to all training tests, the chosen effect first."""
+    result = []
+    own = winner.effects[place] if place < len(winner.effects) else ""
+    for rank, item in enumerate(candidates):
+        last = item.name == own and place == len(winner.effects) - 1
+        steps = PROMOTED_STEPS if rank < PROMOTED else 0
+        fitted = chosen if last else on_all_tests(item.fit, base.problem, found.coupled, iterations=steps)
+        result.append(replace(item, fit=fitted, share=share_of(base, fitted, found.noise)))
+    return tuple(sorted(result, key=lambda item: (item.name != own, item.fit.chi_square)))
+
+
+def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tuple[Baseline, Selection]:
+    """Take the noise from the chosen fit: a poor model's errors do not all cancel between repeats."""
+    scale = noise_scale(chosen)
+    noise = noise_level_of(chosen, scale)
+    if noise >= baseline.noise:
+        return baseline, selection
+    return replace(baseline, noise=noise, scale=scale), selection.with_floor(noise)
+
+
+def _without_nuisances(baseline: Baseline, options: TracingOptions) -> Baseline:
+    """Return the baseline with a drive lag that falls otherwise than it rises, and with the records' filter, if any."""
+    found = with_lag_apart(baseline.fit)
+    if options.observation_filter and bool(np.all(found.problem.recordings.period_s > 0.0)):
+        share = observation_window(fit_with_form(found, base_form(ROUNDED_FORM), iterations=8))[0]
+        if share > 0.0:
+            found = observation_window(found, (share,))[1]
+    return replace(baseline, fit=found, model_error=True)
+
+
+def judged_by_trees(selection: Selection) -> Selection:
+    """Judge shares by what a flexible model can recover, where the sensors' noise is far below any model's error."""
+    fits = [selection.base, selection.chosen]
+    reached = [flexible_chi_square(item) for item in fits[: 1 if fits[0] is fits[1] else 2]]
+    floor = max(selection.noise, min(*reached, selection.chosen.chi_square, selection.base.chi_square))
+    if floor > (1.0 - FLEXIBLE_SHARE) * selection.base.chi_square:
+        # the trees learn nothing that holds on other tests: repeats and sensors are the better measure
+        return selection
+    return selection.with_floor(floor)

@@ -1,0 +1,323 @@
+"""The race of models: every base form alone and with the effects that it needs, compared on all training tests.
+
+Another base form and a missing effect can leave the same residual under the declared form. Therefore no effect is
+judged under one base form alone. The models are fitted to a share of the tests, the draft, because there are many of
+them, and they are compared on all training tests: on most samples a model then predicts what it was not fitted to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.dampers.form import BaseForm
+from mrpipe.fitting.engine import Fit, centred, fit, regressors, start_of, weighting
+from mrpipe.fitting.problem import Problem
+from mrpipe.fitting.start import fit_with_form
+from mrpipe.tracing.bench.select import Selection, draft
+
+CLAIM_COST = 0.02
+"""Share by which each fitted number, and three times that by which each effect, counts against a model."""
+
+FORM_LEAD = 0.1
+"""Share by which another base form must cost less than the declared one to be taken."""
+
+LEADERS = 3
+"""Number of base forms, besides the declared one, under which effects are searched."""
+
+SCREENED = 8
+"""Number of base forms, the best ones alone, that are tried with the effects found under another form."""
+
+COMPARED = 60
+"""Number of models, the best ones on the draft, that are compared on all training tests."""
+
+NOISE_SHARE = 0.1
+"""Differences below this share of the noise do not count, because the noise itself is not known better."""
+
+SUFFICIENT = 1.25**2
+"""A model that leaves at most this multiple of the noise needs nothing more: its error is 1.25 noise floors."""
+
+Search = Callable[[Fit], Selection]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A base form with effects, fitted to a share of the tests.
+
+    Attributes
+    ----------
+    fit
+        The fit on the draft.
+    squares
+        Weighted squared error on each training test, shape (tests,), an offset of each test removed.
+    """
+
+    fit: Fit
+    squares: FloatArray
+
+    @property
+    def form(self) -> str:
+        """Name of the base form."""
+        return self.fit.problem.base.name
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, in the order in which they were found."""
+        return tuple(term.effect.name for term in self.fit.problem.terms)
+
+    @property
+    def claims(self) -> int:
+        """Number of fitted numbers, and three for each effect."""
+        problem = self.fit.problem
+        return len(problem.searched) + len(problem.amplitudes) + problem.base.columns + 3 * len(problem.terms)
+
+
+@dataclass(frozen=True)
+class Race:
+    """All models of a race.
+
+    Attributes
+    ----------
+    models
+        The models compared.
+    declared
+        Name of the declared base form.
+    own
+        Names of the effects that belong to the baseline.
+    searches
+        Selection of effects under each base form that was searched, on the draft.
+    counts
+        Number of samples compared in each training test, shape (tests,).
+    noise
+        Mean squared weighted residual that noise leaves.
+    coupled
+        Names of the base forms whose steps read the laws of the drive; these laws are held during the race.
+    """
+
+    models: tuple[Model, ...]
+    declared: str
+    own: tuple[str, ...]
+    searches: Mapping[str, Selection]
+    counts: FloatArray
+    noise: float
+    coupled: frozenset[str] = frozenset()
+
+    def costs(self, weights: FloatArray | None = None) -> FloatArray:
+        """Return what each model leaves beyond what is sufficient, raised by its claims, shape (models,).
+
+        Parameters
+        ----------
+        weights
+            How often each training test counts, shape (tests,); once if None.
+        """
+        w = np.ones(len(self.counts)) if weights is None else weights
+        squares = np.stack([model.squares for model in self.models])
+        chi_square = squares @ w / max(float(self.counts @ w), 1.0)
+        left = np.maximum(chi_square - SUFFICIENT * self.noise, 0.0) + NOISE_SHARE * self.noise
+        return np.asarray(left * (1.0 + CLAIM_COST * np.array([model.claims for model in self.models])))
+
+    def winner(self, lead: float, weights: FloatArray | None = None) -> Model:
+        """Return the model with fewest effects among those that are not clearly worse than the best one.
+
+        An effect is thus named only if every model without it is clearly worse, whatever its base form.
+
+        Parameters
+        ----------
+        lead
+            Share by which a model must cost more than the best one to be clearly worse.
+        weights
+            See :meth:`costs`.
+        """
+        costs = self.costs(weights)
+        least = float(np.min(costs))
+
+        def order(place: int) -> tuple[int, float]:
+            model = self.models[place]
+            declared = model.form == self.declared
+            return len(model.effects), float(costs[place]) * (1.0 if declared else 1.0 + FORM_LEAD)
+
+        near = [place for place in range(len(self.models)) if costs[place] <= (1.0 + lead) * least]
+        return self.models[min(near, key=order)]
+
+    def tied_forms(self, winner: Model, lead: float) -> tuple[str, ...]:
+        """Return the other base forms that are not clearly worse with the same effects, the best first."""
+        costs = self.costs()
+        own = costs[self.models.index(winner)]
+        found: dict[str, float] = {}
+        for model, cost in zip(self.models, costs, strict=True):
+            if set(model.effects) == set(winner.effects) and model.form != winner.form and cost <= (1.0 + lead) * own:
+                found[model.form] = min(float(cost), found.get(model.form, np.inf))
+        return tuple(sorted(found, key=lambda name: found[name]))
+
+    def support(self, effect: str, lead: float, *, draws: int, rng: np.random.Generator) -> float:
+        """Return the share of resamples in which the winner has an effect; tests are drawn with replacement."""
+        tests = len(self.counts)
+        present = np.flatnonzero(self.counts)
+        held = 0
+        for _ in range(draws):
+            weights = np.bincount(rng.choice(present, size=len(present)), minlength=tests).astype(np.float64)
+            held += effect in self.winner(lead, weights).effects
+        return held / max(draws, 1)
+
+
+def race(
+    base: Fit,
+    forms: Mapping[str, BaseForm],
+    search: Search,
+    noise: float,
+    *,
+    further: Callable[[Fit], Sequence[Fit]] | None = None,
+    jobs: int = 1,
+    progress: Progress = no_progress,
+) -> Race:
+    """Fit every base form alone, search effects under the best ones, and try what was found under all forms.
+
+    Parameters
+    ----------
+    base
+        Fit of the declared form to all training tests.
+    forms
+        The base forms of the library.
+    search
+        Searches effects from a fit without them.
+    noise
+        Mean squared weighted residual that noise leaves.
+    further
+        Fits further models from the best one; None for none.
+    jobs
+        Threads.
+    progress
+        Called with the share done and a text.
+    """
+    small = draft(base)
+    progress(0.2, "base forms")
+    singles = {base.problem.base.name: small} | alone(small, forms, jobs=jobs)
+    coupled = frozenset(name for name, item in singles.items() if item.problem.base.form.coupled)
+    singles = {name: _held(item) if name in coupled else item for name, item in singles.items()}
+    fits = list(singles.values())
+    if min(item.chi_square for item in fits) <= SUFFICIENT * noise:
+        # a base form alone leaves no more than noise, so no effect is needed
+        return _compared(fits, base, {}, noise, coupled, jobs)
+    ordered = sorted(singles, key=lambda name: _draft_cost(singles[name], noise))
+    names = list(dict.fromkeys((base.problem.base.name, *ordered[:LEADERS])))
+    screened = [singles[name] for name in dict.fromkeys((base.problem.base.name, *ordered[:SCREENED]))]
+    searches: dict[str, Selection] = {}
+
+    def searched(name: str) -> None:
+        progress(0.25 + 0.1 * len(searches), f"effects with the base form {name}")
+        searches[name] = search(singles[name])
+        fits.extend(item.fit for candidates in searches[name].rounds for item in candidates)
+        fits.append(searches[name].chosen)
+
+    for name in names:
+        searched(name)
+    count = len(base.problem.terms)
+    best = min(fits, key=lambda item: _draft_cost(item, noise))
+    if len(best.problem.terms) > count:
+        fits += with_effects_of(best, screened, jobs=jobs)
+        rival = min(fits, key=lambda item: _draft_cost(item, noise)).problem.base.name
+        if rival not in searches:
+            searched(rival)
+        best = min(fits, key=lambda item: _draft_cost(item, noise))
+        for place in range(count, len(best.problem.terms) if len(best.problem.terms) > count + 1 else count):
+            # the effect may be needed under the best base form only
+            fits += with_effects_of(_without(best, place), screened, jobs=jobs)
+    if further is not None:
+        fits += further(best)
+    fits.sort(key=lambda item: _draft_cost(item, noise))
+    kept = {id(item): item for item in [*fits[:COMPARED], *singles.values()]}
+    return _compared(list(kept.values()), base, searches, noise, coupled, jobs)
+
+
+def _held(found: Fit) -> Fit:
+    """Return a coupled form with the laws that its steps read held: the search for effects is three times faster."""
+    base = found.problem.base
+    held = replace(base, form=replace(base.form, coupled=False))
+    return fit(replace(found.problem, base=held, reference=found.laws), found.theta, iterations=0)
+
+
+def _compared(
+    fits: Sequence[Fit],
+    base: Fit,
+    searches: Mapping[str, Selection],
+    noise: float,
+    coupled: frozenset[str],
+    jobs: int,
+) -> Race:
+    """Return the race of these models on all training tests."""
+    problem = base.problem
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        squares = pool.map(lambda item: _squares(item, problem), fits)
+        models = tuple(Model(item, value) for item, value in zip(fits, squares, strict=True))
+    used = problem.root_weight > 0.0
+    counts = np.bincount(problem.recordings.test[used], minlength=problem.recordings.tests).astype(np.float64)
+    own = tuple(term.effect.name for term in problem.terms)
+    return Race(models, problem.base.name, own, searches, counts, noise, coupled)
+
+
+def alone(small: Fit, forms: Mapping[str, BaseForm], *, jobs: int = 1) -> dict[str, Fit]:
+    """Return all base forms but that of a draft, fitted to the same tests."""
+    names = [name for name in forms if name != small.problem.base.name]
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        fits = pool.map(lambda name: fit_with_form(small, forms[name], starts=1, iterations=8), names)
+        return dict(zip(names, fits, strict=True))
+
+
+def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, jobs: int = 1) -> list[Fit]:
+    """Return base forms that were fitted alone, each with the effects of a fit, on the same tests."""
+
+    def one(drafted: Fit) -> Fit:
+        problem = replace(drafted.problem, terms=chosen.problem.terms)
+        return fit(problem, start_of(problem, drafted.base_values, chosen.term_values), iterations=8, tolerance=1e-3)
+
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        return list(pool.map(one, singles))
+
+
+def on_all_tests(drafted: Fit, problem: Problem, coupled: frozenset[str], *, iterations: int = 10) -> Fit:
+    """Return a model of the race fitted to all training tests.
+
+    Parameters
+    ----------
+    drafted
+        Fit on the draft.
+    problem
+        Problem of the baseline: its recordings and weights are taken.
+    coupled
+        See :class:`Race`: of these forms the laws that the steps read are fitted again.
+    iterations
+        Iterations of the search.
+    """
+    base = drafted.problem.base
+    if base.name in coupled:
+        base = replace(base, form=replace(base.form, coupled=True))
+    whole = replace(drafted.problem, base=base, recordings=problem.recordings, root_weight=problem.root_weight)
+    return fit(whole, drafted.theta, iterations=iterations)
+
+
+def _without(found: Fit, place: int) -> Fit:
+    terms = tuple(term for k, term in enumerate(found.problem.terms) if k != place)
+    values = [item for k, item in enumerate(found.term_values) if k != place]
+    problem = replace(found.problem, terms=terms)
+    return fit(problem, start_of(problem, found.base_values, values), iterations=1)
+
+
+def _draft_cost(found: Fit, noise: float) -> float:
+    model = Model(found, np.zeros(0))
+    left = max(found.chi_square - noise, 0.0) + NOISE_SHARE * noise
+    return left * (1.0 + CLAIM_COST * model.claims)
+
+
+def _squares(found: Fit, problem: Problem) -> FloatArray:
+    """Return the weighted squared error of a model on each test of a problem, its coefficients as they are."""
+    whole = replace(found.problem, recordings=problem.recordings, root_weight=problem.root_weight)
+    w = weighting(whole)
+    columns = regressors(whole, found.theta)[:, w.at]
+    error = problem.recordings.force[w.at] - found.linear @ columns
+    residual = centred(error[None], w)[0][0]
+    sums = np.bincount(problem.recordings.test[w.at], weights=residual**2, minlength=problem.recordings.tests)
+    return np.asarray(sums, dtype=np.float64)
