@@ -13,7 +13,7 @@ velocity of the rod, or that of an inner element which the steps put in its plac
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -80,6 +80,8 @@ class BaseForm:
         that do not hold it.
     dissipative
         Over a closed cycle the form never feeds energy, whatever its parameters within their bounds.
+    springs
+        Names of the parameters that are springs across the damper. They are what the effect `accumulator` stands for.
     """
 
     name: str
@@ -95,6 +97,15 @@ class BaseForm:
     family: str = ""
     hysteresis: Callable[[Values], tuple[float, float, float]] | None = None
     dissipative: bool = True
+    springs: tuple[str, ...] = ()
+
+    def without_springs(self) -> BaseForm:
+        """Return the form without its springs, for comparisons in which the accumulator is an effect of its own."""
+        if not self.springs:
+            return self
+        kept = tuple(item for item in self.parameters if item.name not in self.springs)
+        taps = {name: place for name, place in self.amplitude_steps.items() if name not in self.springs}
+        return replace(self, parameters=kept, amplitude_steps=taps, springs=())
 
     @property
     def blocks(self) -> tuple[str, ...]:

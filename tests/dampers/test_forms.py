@@ -157,7 +157,9 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
         "bingham": lambda: np.tanh(v / p["transition_velocity"]),
         "biviscous": lambda: np.clip(v / width, -1, 1),
         "hysteretic-biviscous": lambda: np.clip((v - late) / width, -1, 1),
-        "hyperbolic-tangent": lambda: np.tanh(v / p["velocity_scale"] + p["shift"] * np.tanh(x / p["displacement_scale"])),
+        "hyperbolic-tangent": lambda: np.tanh(
+            v / p["velocity_scale"] + p["shift"] * np.tanh(x / p["displacement_scale"])
+        ),
         "hysteretic-sigmoid": lambda: 2.0 / (1.0 + np.exp(-2.0 * (v - late) / p["velocity_scale"])) - 1.0,
         "algebraic": lambda: (v + p["frequency"] * x) / np.hypot(p["velocity_scale"], v + p["frequency"] * x),
     }

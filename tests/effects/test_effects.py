@@ -23,7 +23,6 @@ CONTRACT = [
     "asymmetry",
     "stribeck",
     "quadratic-drag",
-    "rate-dependent-yield",
     "migration",
     "remanence",
     "heating",

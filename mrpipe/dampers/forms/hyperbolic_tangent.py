@@ -48,4 +48,5 @@ FORM = BaseForm(
     steps=_steps,
     amplitude_steps={"stiffness": 1},
     post_yield=_post_yield,
+    springs=("stiffness",),
 )

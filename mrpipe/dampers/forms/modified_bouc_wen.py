@@ -47,5 +47,6 @@ FORM = BaseForm(
     post_yield=_post_yield,
     coupled=True,
     known=True,
+    springs=("k0", "k1"),
     hysteresis=bouc_wen_numbers,
 )

@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import Progress
 from mrpipe.dampers.library import base_form, forms_named
 from mrpipe.effects.contract import Effect
-from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.engine import Fit, fit
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import fit_with_form
@@ -20,14 +20,17 @@ from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.drive_again import with_laws_again
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.pairs import with_play
-from mrpipe.tracing.bench.race import Model, Race, on_all_tests, race
+from mrpipe.tracing.bench.race import Model, Race, alone, on_all_tests, race
 from mrpipe.tracing.bench.refine import with_richer_forms
-from mrpipe.tracing.bench.select import Candidate, Selection, Thresholds, forward_selection, share_of
+from mrpipe.tracing.bench.select import Candidate, Selection, Thresholds, draft, forward_selection, share_of
 from mrpipe.tracing.bench.summary import FLEXIBLE_SHARE, TracingOptions
-from mrpipe.tracing.bench.weights import noise_scale
+from mrpipe.tracing.bench.weights import force_deviation, noise_scale
 
 MODEL_ERROR_CHI_SQUARE = 6.0
 """If the best model leaves this many times the noise, the sensors' noise is no measure: weights go by force RMS."""
+
+BETTER_FORM = 0.5
+"""Noise and weights come from another base form if it leaves at most this share of what the declared form leaves."""
 
 TOO_PLAIN = 0.5
 """Where a richer form of the same effect takes this share of the residual, only the plain form was wrong."""
@@ -152,10 +155,15 @@ def _raced(
     progress: Progress,
 ) -> Choice:
     """Run the race and fit its winner to all training tests."""
-    base, noise = baseline.fit, baseline.noise
-    nothing = Selection(base, noise, (), base)
+    nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit)
     if not nothing.structured:
         return Choice(baseline, nothing)
+    forms = {name: form.without_springs() for name, form in forms_named(options.base_forms).items()}
+    progress(0.1, "base forms")
+    singles = alone(draft(baseline.fit), forms, jobs=jobs)
+    if not model_error:
+        baseline, singles = _with_noise_of_best(baseline, singles, baseline.fit.problem.recordings)
+    base, noise = baseline.fit, baseline.noise
     search = partial(
         forward_selection,
         noise=noise,
@@ -166,8 +174,7 @@ def _raced(
         jobs=jobs,
     )
     further = partial(with_play, effects=effects) if model_error else None
-    forms = forms_named(options.base_forms)
-    found = race(base, forms, search, noise, further=further, jobs=jobs, progress=progress)
+    found = race(base, singles, search, noise, further=further, jobs=jobs, progress=progress)
     winner = found.winner(options.rules.lead)
     progress(0.7, "fit to all tests")
     return Choice(baseline, promoted(found, winner, base), found, winner)
@@ -222,12 +229,47 @@ def _on_all(
 
 
 def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tuple[Baseline, Selection]:
-    """Take the noise from the chosen fit: a poor model's errors do not all cancel between repeats."""
+    """Take the noise from the chosen fit: a poor model's errors do not all cancel between repeats.
+
+    What the chosen model leaves is an upper bound of the noise.
+    """
     scale = noise_scale(chosen)
     noise = noise_level_of(chosen, scale)
     if noise >= baseline.noise:
-        return baseline, selection
+        scale, noise = baseline.scale, baseline.noise
+    excess = chosen.chi_square / max(noise, 1e-300)
+    if excess < 1.0:
+        scale, noise = replace(scale, force=excess * scale.force, motion=excess * scale.motion), chosen.chi_square
     return replace(baseline, noise=noise, scale=scale), selection.with_floor(noise)
+
+
+def _with_noise_of_best(
+    baseline: Baseline, singles: Mapping[str, Fit], training: Recordings
+) -> tuple[Baseline, dict[str, Fit]]:
+    """Return baseline and base forms with weights and noise by the best base form, if it is clearly better.
+
+    The noise of the displacement becomes noise of the force by the slope of the model, and repeated cycles show noise
+    only after a good model is subtracted.
+    """
+    base = baseline.fit
+    best = min(singles.values(), key=lambda item: item.chi_square)
+    if best.problem.base.name == base.problem.base.name or best.chi_square > BETTER_FORM * base.chi_square:
+        return baseline, dict(singles)
+    whole = replace(best.problem, recordings=base.problem.recordings, root_weight=base.problem.root_weight)
+    found = fit(whole, best.theta, iterations=4)
+    scale = noise_scale(found)
+    root = training.used / force_deviation(found, training, 0.0, scale)
+    found = replace(found, problem=replace(found.problem, root_weight=root))
+    noise = noise_level_of(found, scale)
+    base = fit(replace(base.problem, root_weight=root), base.theta, iterations=8)
+    small = draft(base)
+    again = {
+        name: fit(replace(item.problem, root_weight=small.problem.root_weight), item.theta, iterations=3)
+        for name, item in singles.items()
+        if name != base.problem.base.name
+    }
+    again[base.problem.base.name] = small
+    return replace(baseline, fit=base, noise=noise, scale=scale), again
 
 
 def _without_nuisances(baseline: Baseline, options: TracingOptions) -> Baseline:

@@ -18,7 +18,7 @@ from mrpipe.dampers.form import BaseForm
 from mrpipe.fitting.engine import Fit, centred, fit, regressors, start_of, weighting
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.start import fit_with_form
-from mrpipe.tracing.bench.select import Selection, draft
+from mrpipe.tracing.bench.select import Selection
 
 CLAIM_COST = 0.02
 """Share by which each fitted number, and three times that by which each effect, counts against a model."""
@@ -166,7 +166,7 @@ class Race:
 
 def race(
     base: Fit,
-    forms: Mapping[str, BaseForm],
+    singles: Mapping[str, Fit],
     search: Search,
     noise: float,
     *,
@@ -174,14 +174,14 @@ def race(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Race:
-    """Fit every base form alone, search effects under the best ones, and try what was found under all forms.
+    """Search effects under the best base forms, and try what was found under other forms.
 
     Parameters
     ----------
     base
         Fit of the declared form to all training tests.
-    forms
-        The base forms of the library.
+    singles
+        Every base form of the library, the declared one too, fitted without effects to the draft of `base`.
     search
         Searches effects from a fit without them.
     noise
@@ -193,9 +193,6 @@ def race(
     progress
         Called with the share done and a text.
     """
-    small = draft(base)
-    progress(0.2, "base forms")
-    singles = {base.problem.base.name: small} | alone(small, forms, jobs=jobs)
     coupled = frozenset(name for name, item in singles.items() if item.problem.base.form.coupled)
     singles = {name: _held(item) if name in coupled else item for name, item in singles.items()}
     fits = list(singles.values())
@@ -260,11 +257,12 @@ def _compared(
 
 
 def alone(small: Fit, forms: Mapping[str, BaseForm], *, jobs: int = 1) -> dict[str, Fit]:
-    """Return all base forms but that of a draft, fitted to the same tests."""
-    names = [name for name in forms if name != small.problem.base.name]
+    """Return all base forms fitted to the tests of a draft, the form of the draft as it is."""
+    own = small.problem.base.name
+    names = [name for name in forms if name != own]
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         fits = pool.map(lambda name: fit_with_form(small, forms[name], starts=1, iterations=8), names)
-        return dict(zip(names, fits, strict=True))
+        return {own: small, **dict(zip(names, fits, strict=True))}
 
 
 def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, jobs: int = 1) -> list[Fit]:

@@ -15,6 +15,9 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.tracing.rules import NoiseRules
 
+MOST_SHIFT = 3.0
+"""Numerical technique: motions that are further apart than this number of samples are not aligned by a shift in time."""
+
 SHORTEST_CYCLE = 8
 """Numerical technique: cycles of fewer samples are not compared sample by sample."""
 
@@ -107,10 +110,13 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     force, motion = noise_variances(found, recordings)
     rows, targets = [], []
     for first, second in (*repeats, *cycles):
-        both = (root[first] > 0.0) & (root[second] > 0.0)
-        a, b = first[both], second[both]
-        rows.append(np.stack([force[a] + force[b], motion[a] + motion[b]], axis=1))
-        targets.append(np.square(residual[a] - residual[b]))
+        begin, part = _aligned(recordings, first, second)
+        end = np.minimum(begin + 1, len(root) - 1)
+        both = (root[first] > 0.0) & (root[begin] > 0.0) & (root[end] > 0.0)
+        a, b, c = first[both], begin[both], end[both]
+        left, right = (1.0 - part) ** 2, part**2
+        rows.append(np.stack([values[a] + left * values[b] + right * values[c] for values in (force, motion)], axis=1))
+        targets.append(np.square(residual[a] - (1.0 - part) * residual[b] - part * residual[c]))
     if not rows or sum(map(len, targets)) < rules.least_samples:
         return AS_SHOWN
     columns, target = np.concatenate(rows), np.concatenate(targets)
@@ -123,6 +129,20 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         expected = np.maximum(columns @ factors, LEAST_EXPECTED * columns.sum(axis=1))
     force_factor, motion_factor = (max(float(factor), rules.least_factor) for factor in factors)
     return NoiseScale(force_factor, motion_factor, len(repeats), len(cycles))
+
+
+def _aligned(recordings: Recordings, first: IntArray, second: IntArray) -> tuple[IntArray, float]:
+    """Return the samples before the moments at which the second motion is where the first is, and the part beyond them.
+
+    A period is no whole number of samples. A model's error that is steep in time would not cancel otherwise.
+    """
+    dt = recordings.dt[recordings.test[second[0]]]
+    step = recordings.velocity[second] * dt
+    ahead = recordings.displacement[first] - recordings.displacement[second]
+    shift = float(ahead @ step) / max(float(step @ step), 1e-300)
+    whole = int(np.floor(shift)) if abs(shift) < MOST_SHIFT else 0
+    part = shift - whole if abs(shift) < MOST_SHIFT else 0.0
+    return np.clip(second + whole, 0, len(recordings.force) - 1), part
 
 
 def _repeats(recordings: Recordings, rules: NoiseRules) -> list[tuple[IntArray, IntArray]]:

@@ -1,0 +1,86 @@
+"""Who wins a race of base forms and effects."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrpipe.dampers.library import base_form
+from mrpipe.tracing.bench.race import Model, Race
+
+LEAD = 0.3
+TESTS = 8
+
+
+class FakeModel(Model):
+    """A model without a fit: base form, effects, number of fitted numbers."""
+
+    def __init__(self, form: str, effects: tuple[str, ...], chi_square: Any, numbers: int = 5) -> None:
+        terms = tuple(SimpleNamespace(effect=SimpleNamespace(name=name)) for name in effects)
+        problem = SimpleNamespace(
+            base=SimpleNamespace(name=form, columns=numbers), terms=terms, searched=(), amplitudes=()
+        )
+        squares = 100.0 * np.broadcast_to(np.asarray(chi_square, dtype=np.float64), TESTS)
+        super().__init__(SimpleNamespace(problem=problem), squares)  # type: ignore[arg-type]
+
+
+def race_of(*models: Model) -> Race:
+    return Race(models, "bouc-wen", (), {}, np.full(TESTS, 100.0), 1.0)
+
+
+@pytest.mark.property
+def test_an_effect_is_named_only_if_every_form_without_it_is_clearly_worse() -> None:
+    plain, wrong = FakeModel("bouc-wen", (), 30.0), FakeModel("bouc-wen", ("migration",), 4.0)
+    other = FakeModel("dahl", (), 4.2)
+    assert race_of(plain, wrong).winner(LEAD) is wrong
+    assert race_of(plain, wrong, other).winner(LEAD) is other
+
+
+@pytest.mark.property
+def test_an_effect_that_every_form_needs_is_named() -> None:
+    models = [FakeModel(form, (), 20.0) for form in ("bouc-wen", "dahl", "lugre")]
+    right = FakeModel("dahl", ("accumulator",), 3.0)
+    assert race_of(*models, right).winner(LEAD) is right
+    with_more = FakeModel("lugre", ("accumulator", "stribeck"), 2.9)
+    assert race_of(*models, right, with_more).winner(LEAD) is right
+
+
+@pytest.mark.property
+def test_a_form_within_the_noise_needs_nothing_more() -> None:
+    enough = FakeModel("dahl", (), 1.5)
+    assert race_of(enough, FakeModel("dahl", ("channel-skew",), 0.8)).winner(LEAD) is enough
+
+
+@pytest.mark.property
+def test_the_declared_form_is_kept_where_others_are_alike() -> None:
+    declared, other = FakeModel("bouc-wen", (), 5.0), FakeModel("dahl", (), 4.9)
+    race = race_of(declared, other)
+    assert race.winner(LEAD) is declared
+    assert race.tied_forms(declared, LEAD) == ("dahl",)
+
+
+@pytest.mark.property
+def test_support_is_the_share_of_resamples_that_need_the_effect() -> None:
+    rng = np.random.default_rng(2)
+    sure = race_of(FakeModel("bouc-wen", (), 30.0), FakeModel("bouc-wen", ("accumulator",), 2.0))
+    assert sure.support("accumulator", LEAD, draws=100, rng=rng) == 1.0
+    # one test alone asks for the effect: resamples without this test do not name it
+    one = np.full(TESTS, 4.0)
+    one[0] = 60.0
+    lone = race_of(FakeModel("bouc-wen", (), one), FakeModel("bouc-wen", ("end-stop",), 4.0))
+    assert lone.support("end-stop", LEAD, draws=400, rng=rng) == pytest.approx(
+        1.0 - (1.0 - 1.0 / TESTS) ** TESTS, abs=0.08
+    )
+
+
+@pytest.mark.property
+def test_springs_of_a_base_form_are_left_to_the_accumulator() -> None:
+    for name in ("modified-bouc-wen", "hyperbolic-tangent"):
+        form = base_form(name)
+        bare = form.without_springs()
+        assert {item.name for item in form.parameters} - {item.name for item in bare.parameters} == set(form.springs)
+        values = {item.name: 1.0 for item in bare.parameters}
+        assert len(bare.steps(values)) == len(form.steps({**values, **dict.fromkeys(form.springs, 0.0)}))
