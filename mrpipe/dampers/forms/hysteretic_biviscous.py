@@ -8,19 +8,18 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
-from mrpipe.dampers.parameters import Parameter, Values, constant, shape
-from mrpipe.dampers.plant import ACCELERATION, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
+from mrpipe.dampers.parameters import Parameter, Values, shape
+from mrpipe.dampers.plant import ACCELERATION, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.dampers.viscoplastic import rounded_sign
 
-NUMBERS = ("yield_velocity", "hysteresis_velocity", "acceleration_scale", "growth", "reference_force")
+NUMBERS = ("yield_velocity", "hysteresis_velocity", "acceleration_scale")
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def hysteretic_biviscous_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: yield velocity, hysteresis velocity [m/s], acceleration scale, growth, reference force [N]."""
-    width = parameters[0] * max(wire[YIELD_FORCE] / parameters[4], 1e-9) ** parameters[3]
+    """Parameters: yield velocity, hysteresis velocity [m/s], acceleration scale [m/s^2]."""
     late = wire[VELOCITY] - parameters[1] * rounded_sign(wire[ACCELERATION], parameters[2])
-    wire[HYSTERESIS] = min(max(late / width, -1.0), 1.0)
+    wire[HYSTERESIS] = min(max(late / parameters[0], -1.0), 1.0)
 
 
 def _steps(values: Values) -> list[Step]:
@@ -29,25 +28,20 @@ def _steps(values: Values) -> list[Step]:
 
 
 def _post_yield(values: Values, at: Strength) -> FloatArray:
-    late = values["hysteresis_velocity"]
-    share = np.maximum(at.yield_force / values["reference_force"], 1e-9)
-    width = values["yield_velocity"] * share ** values["growth"]
+    width, late = values["yield_velocity"], values["hysteresis_velocity"]
     both = [np.clip((at.speed - side * late) / width, -1.0, 1.0) for side in (-1.0, 1.0)]
     return rounded_sum(0.5 * (both[0] + both[1]), at)
 
 
 FORM = BaseForm(
     name="hysteretic-biviscous",
-    summary="biviscous, its branches shifted by v_h tanh(v'/a0); it yields at v_y = v_ref (F_y(u)/F_ref)^p",
+    summary="biviscous, its branches shifted by v_h tanh(v'/a0)",
     source="Wereley, Pang, Kamath 1998, J. Intell. Mater. Syst. Struct. 9, 642-649; Pang, Kamath, Wereley 1998",
     parameters=(
         shape("yield_velocity", "m/s", "speed at which it yields", "speed", 1e-3, 1.0, (0.05, 0.2)),
         Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
         shape("acceleration_scale", "m/s^2", "over which the branches change", "acceleration", 1e-4, 1.0, (0.02,)),
-        Parameter("growth", "1", "power of the yield force that v_y grows with", "one", 0.0, 1.0, (0.0, 1.0)),
-        constant("reference_force", "N", "yield force at which the yield velocity is given", "force"),
     ),
     steps=_steps,
     post_yield=_post_yield,
-    coupled=True,
 )

@@ -177,7 +177,8 @@ def _raced(
     found = race(base, singles, search, noise, further=further, jobs=jobs, progress=progress)
     winner = found.winner(options.rules.lead)
     progress(0.7, "fit to all tests")
-    return Choice(baseline, promoted(found, winner, base), found, winner)
+    tied = found.tied_forms(winner, options.rules.lead)
+    return Choice(baseline, replace(promoted(found, winner, base), tied_forms=tied), found, winner)
 
 
 def promoted(found: Race, winner: Model, base: Fit) -> Selection:

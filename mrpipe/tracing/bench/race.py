@@ -225,6 +225,8 @@ def race(
             fits += with_effects_of(_without(best, place), screened, jobs=jobs)
     if further is not None:
         fits += further(best)
+        if len(best.problem.terms) > count:
+            fits += further(singles[best.problem.base.name])
     fits.sort(key=lambda item: _draft_cost(item, noise))
     kept = {id(item): item for item in [*fits[:COMPARED], *singles.values()]}
     return _compared(list(kept.values()), base, searches, noise, coupled, jobs)

@@ -98,7 +98,9 @@ class Selection:
     proven
         How many of the rounds name a cause; terms of later rounds improve the model, their cause is not proven.
     ground
-        Fit without effects that the rounds build on: the base, or the base in the form that the tests ask for.
+        Fit without effects that the rounds build on: the base, or another base form that the tests need.
+    tied_forms
+        Other base forms that are not clearly worse with the same effects.
     """
 
     base: Fit
@@ -107,6 +109,7 @@ class Selection:
     chosen: Fit
     proven: int = 3
     ground: Fit | None = None
+    tied_forms: tuple[str, ...] = ()
 
     @property
     def without_effects(self) -> Fit:

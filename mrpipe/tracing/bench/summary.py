@@ -249,7 +249,7 @@ class Summary:
             errors[taken] = score(judged, measured, predict(ground, judged)).nrmse
             best = taken
         declared = {"name": options.model, "declared": options.model}
-        return {**declared, "best": best, "taken": taken, "tied_with": [], "nrmse": errors}
+        return {**declared, "best": best, "taken": taken, "tied_with": list(self.selection.tied_forms), "nrmse": errors}
 
 
 def _score_json(value: Score) -> dict[str, float]:

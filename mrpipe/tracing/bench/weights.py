@@ -16,7 +16,7 @@ from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.tracing.rules import NoiseRules
 
 MOST_SHIFT = 3.0
-"""Numerical technique: motions that are further apart than this number of samples are not aligned by a shift in time."""
+"""Numerical technique: motions further apart than this number of samples are not aligned by a shift in time."""
 
 SHORTEST_CYCLE = 8
 """Numerical technique: cycles of fewer samples are not compared sample by sample."""
