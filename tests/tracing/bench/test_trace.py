@@ -119,7 +119,8 @@ def test_play_under_a_rounded_yield_is_named_and_the_yield_is_the_base_form() ->
     summary = trace_campaign(tests, library, [], options, rng=np.random.default_rng(1)).summary
     assert [item["name"] for item in summary["effects"]] == ["backlash"]
     assert summary["base_form"]["taken"] in ("rounded-yield", "yielding-part")
-    assert summary["effects"][0]["parameters"]["gap"]["value"] == pytest.approx(6e-4, rel=0.1)
+    # play and roundness of the yield trade off, so the gap is known less well than the name
+    assert summary["effects"][0]["parameters"]["gap"]["value"] == pytest.approx(6e-4, rel=0.25)
 
 
 @pytest.mark.property
