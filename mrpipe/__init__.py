@@ -12,10 +12,13 @@ __version__ = "0.1.0"
 LOADS_FROM: tuple[str, ...] = ()  # the interface for notebooks is no part of any stage
 
 _INTERFACE = (
+    "NetworkRegressor",
     "design",
+    "export",
     "fit_damper",
     "identify_frame",
     "load_campaign",
+    "network_rows",
     "open_run",
     "prepare",
     "simulate",

@@ -17,22 +17,27 @@ setting of the stage's section in docs/configuration.md. Results print as text; 
 """
 
 from mrpipe.api.bench import DamperFit, PreparedTests, Traced, fit_damper, load_campaign, prepare, trace
+from mrpipe.api.exports import export
 from mrpipe.api.loop import Designed, Simulated, design, simulate
 from mrpipe.api.runs import Run, open_run
 from mrpipe.api.structure import IdentifiedFrame, identify_frame
+from mrpipe.networks.estimator import NetworkRegressor, network_rows
 
 __all__ = [
     "DamperFit",
     "Designed",
     "IdentifiedFrame",
+    "NetworkRegressor",
     "PreparedTests",
     "Run",
     "Simulated",
     "Traced",
     "design",
+    "export",
     "fit_damper",
     "identify_frame",
     "load_campaign",
+    "network_rows",
     "open_run",
     "prepare",
     "simulate",

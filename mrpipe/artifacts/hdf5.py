@@ -1,6 +1,7 @@
 """Writing and reading artifacts.
 
-Each dataset has the attributes `unit` (SI, "1" for a pure number) and `dims`; the root tells how the file came about.
+Each dataset has the attributes `unit` (SI, "1" for a pure number) and `dims`, and dimension scales for netCDF-4. The
+attributes of the root state how the file was made.
 Structured notes are kept as JSON text in datasets, never as pickles.
 """
 
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from mrpipe import __version__
 from mrpipe.artifacts.atomic import atomic_path
+from mrpipe.artifacts.dimension_scales import SCALE_ATTRIBUTES, attach_scales, is_scale
 from mrpipe.artifacts.types import FloatArray
 from mrpipe.errors import UserError
 
@@ -91,6 +93,7 @@ class ArtifactWriter:
             # a long text does not fit the 64 KiB of a compact attribute
             attributes["config"] = provenance.config[:60000]
             yield cls(handle)
+            attach_scales(handle)
 
     def put(self, name: str, values: ArrayLike, *, unit: str, dims: Sequence[str] = (), description: str = "") -> None:
         """Store an array (any path of groups as `name`), its unit and the names of its axes.
@@ -202,12 +205,13 @@ class Artifact:
     def attributes(self, group: str) -> dict[str, Any]:
         """Return the attributes of a group or dataset."""
         with self._open() as handle:
-            return {key: _plain(value) for key, value in handle[group].attrs.items()}
+            found = handle[group].attrs.items()
+            return {key: _plain(value) for key, value in found if key not in SCALE_ATTRIBUTES}
 
     def members(self, group: str = "/") -> list[str]:
         """Return the names inside a group in the order of writing (empty where there is no such group)."""
         with self._open() as handle:
-            return list(handle[group].keys()) if group in handle else []
+            return [name for name, item in handle[group].items() if not is_scale(item)] if group in handle else []
 
     def _read(self, name: str) -> Any:
         with self._open() as handle:

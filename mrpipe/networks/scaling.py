@@ -89,7 +89,8 @@ def scaling_of(
     if whitened:
         normalised = (features - shift) / scale
         values, vectors = np.linalg.eigh(normalised.T @ normalised / len(normalised))
-        floor = _SMALLEST_EIGENVALUE * values.max()
+        # features that are all zero leave no eigenvalue to compare with
+        floor = _SMALLEST_EIGENVALUE * (values.max() or 1.0)
         # the sign of an eigenvector is arbitrary; fixed here, so that the same data give the same network
         vectors = vectors * np.sign(vectors[np.argmax(np.abs(vectors), axis=0), np.arange(spec.width)])
         basis = (vectors / np.sqrt(np.maximum(values, 0.0) + floor)).T

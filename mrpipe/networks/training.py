@@ -169,10 +169,22 @@ def train(
     progress
         Called with the share done and a text.
     """
-    began = time.perf_counter()
     data = training_data(
         history, spec, options.held_out_share, rng, normalisation=normalisation, whitened=options.whitened
     )
+    return train_on(data, options, rng, jobs=jobs, progress=progress)
+
+
+def train_on(
+    data: TrainingData,
+    options: TrainingOptions,
+    rng: np.random.Generator,
+    *,
+    jobs: int = 1,
+    progress: Progress = no_progress,
+) -> Trained:
+    """Train a network on rows that are normalised and divided already; arguments as those of :func:`train`."""
+    began = time.perf_counter()
     layers = data.layers(options.hidden)
     rows = np.sort(rng.permutation(len(data.fit_rows.target))[: options.subsample_rows])
     seeds = rng.spawn(options.starts)

@@ -39,12 +39,16 @@ def digest_of_artifact(path: Path) -> str:
     import h5py
     import numpy as np
 
+    from mrpipe.artifacts.dimension_scales import SCALE_ATTRIBUTES, is_scale
+
     digest = hashlib.sha256()
 
     def visit(name: str, item: Any) -> None:
+        if is_scale(item):
+            return
         digest.update(name.encode())
         for key in sorted(item.attrs):
-            if name == "/" and key in _NOT_CONTENT:
+            if (name == "/" and key in _NOT_CONTENT) or key in SCALE_ATTRIBUTES:
                 continue
             digest.update(f"{key}={item.attrs[key]!r}".encode())
         if isinstance(item, h5py.Dataset):

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrpipe.artifacts import Artifact, atomic_path
+from mrpipe.artifacts.dimension_scales import is_scale
 from mrpipe.campaigns import describe, load_campaign
 from mrpipe.campaigns.describe import unit_of
 from mrpipe.campaigns.plausibility import judge
@@ -46,7 +47,7 @@ def _datasets(path: Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
 
     def visit(name: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset):
+        if not isinstance(item, h5py.Dataset) or is_scale(item):
             return
         row: dict[str, Any] = {"name": name, "shape": list(item.shape), "unit": str(item.attrs.get("unit", ""))}
         row["dims"] = [str(name) for name in np.atleast_1d(item.attrs.get("dims", "")) if str(name)]
@@ -105,7 +106,7 @@ def _artifact_panels(path: Path) -> list[tuple[str, Any, Any, str, str]]:
 
     def visit(name: str, item: Any) -> None:
         if len(panels) < _PANELS and isinstance(item, h5py.Dataset) and item.ndim == 1 and item.size >= 8:
-            if not np.issubdtype(item.dtype, np.number):
+            if is_scale(item) or not np.issubdtype(item.dtype, np.number):
                 return
             panels.append((name, np.arange(item.size), item[()], "index", f"[{item.attrs.get('unit', '')}]"))
 

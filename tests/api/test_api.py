@@ -78,6 +78,17 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
         _ = mrpipe.no_such_name
 
 
+@pytest.mark.oracle
+def test_models_are_exported_by_kind(tmp_path: Path) -> None:
+    damper = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    frame = frame_from_parameter_set("thesis")
+    files = mrpipe.export(damper, tmp_path / "damper", formats=["c"])
+    assert {file.name for file in files} == {"damper.c", "damper.h", "self_test.c", "vectors.csv", "README.md"}
+    assert all(file.is_file() for file in files)
+    files = mrpipe.export(frame, tmp_path / "frame", formats=["json"], floor=2)
+    assert [file.name for file in files] == ["frame.json", "vectors.csv", "README.md"]
+
+
 @pytest.mark.property
 def test_every_name_offered_exists() -> None:
     for name in mrpipe._INTERFACE:

@@ -1,0 +1,202 @@
+"""Networks with the conventions of scikit-learn: `fit`, `predict`, `score`, parameters that can be searched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted, check_random_state, validate_data
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.networks.assembly import Samples, join, samples
+from mrpipe.networks.held_out import TrainingData
+from mrpipe.networks.network import FeatureSpec, Network
+from mrpipe.networks.options import TrainingOptions
+from mrpipe.networks.scaling import NORMALISATION, Normalisation, scaling_of
+from mrpipe.networks.training import train_on
+from mrpipe.signals.prepared import PreparedTest
+
+
+class NetworkRegressor(RegressorMixin, BaseEstimator):
+    """A feed-forward network with tanh layers, trained as `mrpipe train-forward` and `train-inverse` train.
+
+    Parameters
+    ----------
+    hidden
+        Neurons of each hidden layer.
+    biases
+        Train biases; without them the estimate of zero features is zero.
+    starts, refined_starts, averaged
+        Random starts, how many of them go on with all rows, and how many of these are averaged.
+    subsample_rows, subsample_iterations, iterations
+        Rows and largest number of iterations of the first phase, and iterations with all rows.
+    held_out_share
+        Share of the rows, or of the groups, on which training stops and starts are compared.
+    weight_decay
+        Penalty on the squared weights.
+    normalisation
+        `maximum`, `range` or `standard`, see :func:`mrpipe.networks.scaling.scaling_of`.
+    features
+        Meaning of the columns, which :func:`network_rows` returns; None: columns without a meaning.
+    random_state
+        Seed; the same seed and data give the same network.
+
+    Attributes
+    ----------
+    network_
+        The trained network; `mrpipe.networks.network.Network`.
+    n_features_in_
+        Number of columns.
+    n_iter_
+        Iterations of the chosen start.
+    """
+
+    def __init__(
+        self,
+        hidden: Sequence[int] = (12, 6),
+        *,
+        biases: bool = True,
+        starts: int = 3,
+        refined_starts: int = 1,
+        averaged: int = 1,
+        subsample_rows: int = 8000,
+        subsample_iterations: int = 120,
+        iterations: int = 60,
+        held_out_share: float = 0.15,
+        weight_decay: float = 0.0,
+        normalisation: Normalisation = NORMALISATION,
+        features: FeatureSpec | None = None,
+        random_state: Any = None,
+    ) -> None:
+        self.hidden = hidden
+        self.biases = biases
+        self.starts = starts
+        self.refined_starts = refined_starts
+        self.averaged = averaged
+        self.subsample_rows = subsample_rows
+        self.subsample_iterations = subsample_iterations
+        self.iterations = iterations
+        self.held_out_share = held_out_share
+        self.weight_decay = weight_decay
+        self.normalisation = normalisation
+        self.features = features
+        self.random_state = random_state
+
+    def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
+        """Train the network.
+
+        Parameters
+        ----------
+        X, y
+            Shapes (n, R) and (n,).
+        groups
+            Test of each row, shape (n,): whole tests are held out, because rows of one test resemble each other. None:
+            single rows are held out.
+
+        Raises
+        ------
+        ValueError
+            If X or y are not finite, or do not fit each other or `features`.
+        """
+        checked = validate_data(self, X, y, dtype=np.float64, ensure_min_samples=2, y_numeric=True)
+        rows: FloatArray = checked[0]
+        target = np.asarray(checked[1], dtype=np.float64)
+        rng = np.random.default_rng(check_random_state(self.random_state).randint(2**31))
+        spec = self._spec(rows.shape[1])
+        held = self._held_out(len(target), groups, rng)
+        data = TrainingData(
+            spec,
+            _rows(rows, target, np.flatnonzero(~held)),
+            _rows(rows, target, np.flatnonzero(held)),
+            _rows(rows, target, np.arange(len(target))),
+            scaling_of(rows, target, spec, self.normalisation),
+            (),
+        )
+        trained = train_on(data, self._options(), rng)
+        self.network_: Network = trained.network
+        self.n_iter_ = trained.iterations
+        return self
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        """Return the estimates, shape (n,), of rows (n, R)."""
+        check_is_fitted(self)
+        rows = validate_data(self, X, dtype=np.float64, reset=False)
+        return self.network_.predict(rows)
+
+    def _spec(self, width: int) -> FeatureSpec:
+        if self.features is None:
+            names = getattr(self, "feature_names_in_", [f"x{place}" for place in range(width)])
+            return FeatureSpec(tuple(str(name) for name in names), 0, False, 1.0, "y")
+        if self.features.width != width:
+            raise ValueError(f"X has {width} columns, but `features` describes {self.features.width}")
+        return self.features
+
+    def _options(self) -> TrainingOptions:
+        return TrainingOptions(
+            architecture=tuple(self.hidden),
+            biases=self.biases,
+            starts=self.starts,
+            refined_starts=self.refined_starts,
+            averaged=self.averaged,
+            subsample_rows=self.subsample_rows,
+            subsample_iterations=self.subsample_iterations,
+            iterations=self.iterations,
+            held_out_share=self.held_out_share,
+            weight_decay=self.weight_decay,
+        )
+
+    def _held_out(self, count: int, groups: ArrayLike | None, rng: np.random.Generator) -> Any:
+        """Return which rows are held out, shape (n,)."""
+        of_row = np.arange(count) if groups is None else np.asarray(groups)
+        if of_row.shape != (count,):
+            raise ValueError(f"groups has shape {of_row.shape}, but X has {count} rows")
+        names = np.unique(of_row)
+        number = round(self.held_out_share * len(names))
+        # too few to hold any out without losing a condition
+        number = 0 if len(names) < 5 else number
+        return np.isin(of_row, rng.permutation(names)[:number])
+
+
+def _rows(X: FloatArray, y: FloatArray, places: IntArray) -> Samples:
+    return Samples(X[places], y[places], places, np.zeros(len(places), dtype=np.int64))
+
+
+def network_rows(
+    tests: Sequence[PreparedTest],
+    *,
+    kind: Literal["forward", "inverse"] = "forward",
+    channels: Sequence[str] | None = None,
+    past_values: int = 3,
+    cycles: int = 10,
+    sampling_rate_hz: float = 200.0,
+) -> tuple[FloatArray, FloatArray, IntArray, FeatureSpec]:
+    """Return features X, target y, test of each row, and the meaning of the columns of prepared tests.
+
+    Parameters
+    ----------
+    tests
+        Prepared tests of one sampling rate.
+    kind
+        `forward`: motion and drive to force; `inverse`: motion and force to drive, of absolute values (2.9).
+    channels
+        Inputs: `displacement`, `velocity`, `acceleration`, `drive`, `force`. None: velocity with drive or force.
+    past_values
+        Past values of each input.
+    cycles
+        Steady cycles of each periodic test.
+    sampling_rate_hz
+        Rate of the past values.
+
+    Returns
+    -------
+    X (n, R), y (n,), groups (n,) and the specification for `NetworkRegressor(features=...)`.
+    """
+    history = join(list(tests), cycles=cycles, sampling_rate_hz=sampling_rate_hz)
+    forward = kind == "forward"
+    inputs = tuple(channels or (("velocity", "drive") if forward else ("velocity", "force")))
+    spec = FeatureSpec(inputs, past_values, not forward, history.sampling_rate_hz, "force" if forward else "drive")
+    rows = samples(history, spec)
+    return rows.features, rows.target, rows.test, spec
