@@ -19,9 +19,10 @@ setting of the stage's section in docs/configuration.md. Results print as text; 
 from mrpipe.api.bench import DamperFit, PreparedTests, Traced, fit_damper, load_campaign, prepare, trace
 from mrpipe.api.exports import export
 from mrpipe.api.loop import Designed, Simulated, design, simulate
+from mrpipe.api.rows import network_rows
 from mrpipe.api.runs import Run, open_run
 from mrpipe.api.structure import IdentifiedFrame, identify_frame
-from mrpipe.networks.estimator import NetworkRegressor, network_rows
+from mrpipe.networks.estimator import NetworkRegressor
 
 __all__ = [
     "DamperFit",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,13 +11,15 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, check_random_state, validate_data
 
 from mrpipe.artifacts import FloatArray, IntArray
-from mrpipe.networks.assembly import Samples, join, samples
+from mrpipe.networks.assembly import Samples
 from mrpipe.networks.held_out import TrainingData
 from mrpipe.networks.network import FeatureSpec, Network
-from mrpipe.networks.options import TrainingOptions
+from mrpipe.networks.options import InverseTrainingOptions, TrainingOptions
 from mrpipe.networks.scaling import NORMALISATION, Normalisation, scaling_of
 from mrpipe.networks.training import train_on
-from mrpipe.signals.prepared import PreparedTest
+
+_DEFAULTS = InverseTrainingOptions()
+"""Defaults that the estimator shares with `train-inverse`."""
 
 
 class NetworkRegressor(RegressorMixin, BaseEstimator):
@@ -40,7 +42,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
     normalisation
         `maximum`, `range` or `standard`, see :func:`mrpipe.networks.scaling.scaling_of`.
     features
-        Meaning of the columns, which :func:`network_rows` returns; None: columns without a meaning.
+        Meaning of the columns, which :func:`mrpipe.network_rows` returns; None: columns without a meaning.
     random_state
         Seed; the same seed and data give the same network.
 
@@ -56,17 +58,17 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        hidden: Sequence[int] = (12, 6),
+        hidden: Sequence[int] = _DEFAULTS.hidden,
         *,
-        biases: bool = True,
-        starts: int = 3,
-        refined_starts: int = 1,
-        averaged: int = 1,
-        subsample_rows: int = 8000,
-        subsample_iterations: int = 120,
-        iterations: int = 60,
-        held_out_share: float = 0.15,
-        weight_decay: float = 0.0,
+        biases: bool = _DEFAULTS.biases,
+        starts: int = _DEFAULTS.starts,
+        refined_starts: int = _DEFAULTS.refined_starts,
+        averaged: int = _DEFAULTS.averaged,
+        subsample_rows: int = _DEFAULTS.subsample_rows,
+        subsample_iterations: int = _DEFAULTS.subsample_iterations,
+        iterations: int = _DEFAULTS.iterations,
+        held_out_share: float = _DEFAULTS.held_out_share,
+        weight_decay: float = _DEFAULTS.weight_decay,
         normalisation: Normalisation = NORMALISATION,
         features: FeatureSpec | None = None,
         random_state: Any = None,
@@ -162,41 +164,3 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
 
 def _rows(X: FloatArray, y: FloatArray, places: IntArray) -> Samples:
     return Samples(X[places], y[places], places, np.zeros(len(places), dtype=np.int64))
-
-
-def network_rows(
-    tests: Sequence[PreparedTest],
-    *,
-    kind: Literal["forward", "inverse"] = "forward",
-    channels: Sequence[str] | None = None,
-    past_values: int = 3,
-    cycles: int = 10,
-    sampling_rate_hz: float = 200.0,
-) -> tuple[FloatArray, FloatArray, IntArray, FeatureSpec]:
-    """Return features X, target y, test of each row, and the meaning of the columns of prepared tests.
-
-    Parameters
-    ----------
-    tests
-        Prepared tests of one sampling rate.
-    kind
-        `forward`: motion and drive to force; `inverse`: motion and force to drive, of absolute values (2.9).
-    channels
-        Inputs: `displacement`, `velocity`, `acceleration`, `drive`, `force`. None: velocity with drive or force.
-    past_values
-        Past values of each input.
-    cycles
-        Steady cycles of each periodic test.
-    sampling_rate_hz
-        Rate of the past values.
-
-    Returns
-    -------
-    X (n, R), y (n,), groups (n,) and the specification for `NetworkRegressor(features=...)`.
-    """
-    history = join(list(tests), cycles=cycles, sampling_rate_hz=sampling_rate_hz)
-    forward = kind == "forward"
-    inputs = tuple(channels or (("velocity", "drive") if forward else ("velocity", "force")))
-    spec = FeatureSpec(inputs, past_values, not forward, history.sampling_rate_hz, "force" if forward else "drive")
-    rows = samples(history, spec)
-    return rows.features, rows.target, rows.test, spec

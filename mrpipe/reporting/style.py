@@ -25,9 +25,18 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 _SVG = {"svg.fonttype": "none", "svg.hashsalt": "mrpipe", "path.simplify_threshold": 0.5}
 
 
+class ShownFigure(Figure):
+    """A figure that a notebook draws also where pyplot was not imported."""
+
+    def _repr_png_(self) -> bytes:
+        image = io.BytesIO()
+        self.savefig(image, format="png", dpi=90)
+        return image.getvalue()
+
+
 def figure_with_axes(rows: int = 1, columns: int = 1, *, width: float = 9.0, height: float = 3.4) -> tuple[Figure, Any]:
     """Return a figure and an object array (rows, columns) of axes; `height` is that of one row, in inches."""
-    figure = Figure(figsize=(width, height * rows), layout="constrained")
+    figure = ShownFigure(figsize=(width, height * rows), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
     for axis in axes.ravel():
         polish(axis)

@@ -28,7 +28,10 @@ def test_prepared_tests_are_a_sequence_and_a_table(tests: mrpipe.api.PreparedTes
     assert "2 tests, 1 for training and 1 for validation" in str(tests)
     table = tests.to_frame()
     assert len(table) == sum(len(test.time_s) for test in tests)
-    assert tests.plot().axes[0].get_xlabel() == "displacement [mm]"
+    figure = tests.plot()
+    assert figure.axes[0].get_xlabel() == "displacement [mm]"
+    # a notebook asks for this where pyplot was never imported
+    assert figure._repr_png_().startswith(b"\x89PNG")
 
 
 @pytest.mark.planted

@@ -10,7 +10,8 @@ from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, GroupKFold
 from sklearn.utils.estimator_checks import check_estimator
 
-from mrpipe.networks.estimator import NetworkRegressor, network_rows
+from mrpipe.api.rows import network_rows
+from mrpipe.networks.estimator import NetworkRegressor
 from mrpipe.networks.network import FeatureSpec
 from mrpipe.signals.prepared import PreparedTest
 
