@@ -47,15 +47,20 @@ def test_page_on_the_json_names_every_key_of_the_example() -> None:
     assert [key for key in keys if f"`{key}" not in table] == []
 
 
-@pytest.mark.parametrize("page", [*sorted(DOCS.glob("*.md")), *sorted(ROOT.glob("*.md"))], ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page",
+    [*sorted(DOCS.glob("*.md")), *sorted(DOCS.rglob("*.ipynb")), *sorted(ROOT.glob("*.md"))],
+    ids=lambda page: page.name,
+)
 def test_no_relative_link_is_dead(page: Path) -> None:
-    links = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", page.read_text(encoding="utf-8"))
+    links = re.findall(r"\]\((?!https?:|#|data:)([^)#\s]+)", page.read_text(encoding="utf-8"))
     assert [link for link in links if not (page.parent / link).exists()] == []
 
 
 def test_navigation_of_the_site_lists_every_page_once() -> None:
     site = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
-    assert sorted(_pages(site["nav"])) == sorted(page.name for page in DOCS.glob("*.md"))
+    pages = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
+    assert sorted(_pages(site["nav"])) == sorted(page.relative_to(DOCS).as_posix() for page in pages)
 
 
 def _pages(entry: Any) -> list[str]:
@@ -67,7 +72,8 @@ def _pages(entry: Any) -> list[str]:
 
 def test_site_builds_without_warnings(tmp_path: Path) -> None:
     pytest.importorskip("mkdocs", reason="needs the extra docs")
-    pytest.importorskip("material", reason="needs the extra docs")
+    for package in ("material", "mkdocstrings", "mkdocs_jupyter"):
+        pytest.importorskip(package, reason="needs the extra docs")
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", str(ROOT / "mkdocs.yml")]
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
     done = subprocess.run(
@@ -75,6 +81,23 @@ def test_site_builds_without_warnings(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site" / "tutorial-own-damper" / "index.html").is_file()
+    assert "fit_damper" in (tmp_path / "site" / "api" / "index.html").read_text(encoding="utf-8")
+    notebook = (tmp_path / "site" / "notebooks" / "tracing-and-loop" / "index.html").read_text(encoding="utf-8")
+    assert "accumulator" in notebook and "data:image/png" in notebook
+
+
+def test_page_on_the_command_line_is_current() -> None:
+    from mrpipe.cli.document import as_markdown
+
+    assert (DOCS / "command-line.md").read_text(encoding="utf-8") == as_markdown()
+
+
+def test_reference_of_the_interface_names_the_modules_of_every_name() -> None:
+    import mrpipe.api
+
+    text = (DOCS / "api.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^::: (\S+)$", text, re.MULTILINE))
+    assert {getattr(mrpipe.api, name).__module__ for name in mrpipe.api.__all__} <= shown
 
 
 @pytest.mark.parametrize("page", ["campaigns.md", "frame-identification.md"])

@@ -21,7 +21,7 @@ _TOKENS = re.compile(
 )
 
 CC_USAGE = """\
-Build with `cc -std=c99 -c {name}.c` and link `-lm`. Define the macro `{prefix}_SINGLE`, all in capitals, for single
+Build with `cc -std=c99 -c {name}.c` and link `-lm`. Define the macro `{upper}_SINGLE` for single
 precision (`float`); else the numbers are `double`. A compiler that contracts `a*b+c` (some do by default) changes the
 last digits, which `-ffp-contract=off` avoids.
 

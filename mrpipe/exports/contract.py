@@ -122,7 +122,8 @@ class ExportFormat:
     files
         From a subject to the files of the folder.
     usage
-        Sentences for README.md of the folder: how the files are used. `{name}` and `{prefix}` are those of the subject.
+        Sentences for README.md of the folder: how the files are used. `{name}` and `{prefix}` are those of
+        the subject, `{upper}` is the prefix in capitals.
     needs
         Package of an optional extra of the same name as the format; empty: none.
     """

@@ -92,5 +92,7 @@ def _readme(subject: Subject, chosen: Iterable[ExportFormat]) -> str:
         "computes from them. In double precision every format reproduces the outputs to 1e-9 of their largest "
         "magnitude.",
     ]
-    parts += [item.usage.format(name=subject.name, prefix=subject.prefix) for item in chosen]
+    parts += [
+        item.usage.format(name=subject.name, prefix=subject.prefix, upper=subject.prefix.upper()) for item in chosen
+    ]
     return "\n\n".join(parts) + "\n"

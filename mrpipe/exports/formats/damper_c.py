@@ -28,7 +28,8 @@ _ADVANCE = """\
         memory[1] += fabs(velocity) * dt;
         memory[2] += dt;
     }}
-    wire[{TIME}] = memory[{extra}] * dt;
+    memory[{extra} + 1] = first ? 0.0 : memory[{extra} + 1] + dt;
+    wire[{TIME}] = memory[{extra} + 1];
     wire[{FIRST}] = first ? 1.0 : 0.0;
     wire[{DISPLACEMENT}] = displacement;
     wire[{VELOCITY}] = velocity;
@@ -45,16 +46,17 @@ _ADVANCE = """\
     memory[0] += (wire[{HYSTERETIC_FORCE}] + wire[{VISCOUS_FORCE}]) * wire[{VELOCITY}] * dt;
     memory[3] = max_real(memory[3], fabs(wire[{CURRENT}]));
     memory[5] = wire[{FORCE}];
-    memory[{extra}] += 1.0;
+    memory[{extra}] = 1.0;
     return wire[{FORCE}];
 }}
 """
-"""The same arithmetic as :func:`mrpipe.dampers.plant.advance`; the number of calls stands behind its bookkeeping."""
+"""The same arithmetic as :func:`mrpipe.dampers.plant.advance`; a mark of the first call and the
+time stand behind its bookkeeping."""
 
 
 def _files(subject: Subject) -> Files:
     damper: DamperModel = subject.model
-    size = damper.chain().state_size + plant.BOOKKEEPING + 1
+    size = damper.chain().state_size + plant.BOOKKEEPING + 2
     prefix = subject.prefix
     interval = literal(subject.vectors.sample_time_s)
     return {

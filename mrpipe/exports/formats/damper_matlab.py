@@ -40,7 +40,12 @@ function [force, state] = {prefix}(state, displacement, velocity, acceleration, 
         state({at} + 2) = state({at} + 2) + abs(velocity) * dt;
         state({at} + 3) = state({at} + 3) + dt;
     end
-    wire({TIME} + 1) = state({at} + {BOOKKEEPING} + 1) * dt;
+    if first
+        state({at} + {BOOKKEEPING} + 2) = 0;
+    else
+        state({at} + {BOOKKEEPING} + 2) = state({at} + {BOOKKEEPING} + 2) + dt;
+    end
+    wire({TIME} + 1) = state({at} + {BOOKKEEPING} + 2);
     wire({FIRST} + 1) = double(first);
     wire({DISPLACEMENT} + 1) = displacement;
     wire({VELOCITY} + 1) = velocity;
@@ -58,7 +63,7 @@ function [force, state] = {prefix}(state, displacement, velocity, acceleration, 
     state({at} + 1) = state({at} + 1) + power * dt;
     state({at} + 4) = max(state({at} + 4), abs(wire({CURRENT} + 1)));
     state({at} + 6) = wire({FORCE} + 1);
-    state({at} + {BOOKKEEPING} + 1) = state({at} + {BOOKKEEPING} + 1) + 1;
+    state({at} + {BOOKKEEPING} + 1) = 1;
     force = wire({FORCE} + 1);
 end
 """
@@ -93,7 +98,7 @@ def _files(subject: Subject) -> Files:
         prefix=prefix,
         form=damper.form,
         unit=damper.drive_unit,
-        size=at + plant.BOOKKEEPING + 1,
+        size=at + plant.BOOKKEEPING + 2,
         at=at,
         calls="\n".join(calls),
     )
