@@ -12,6 +12,7 @@ from mrpipe.errors import UserError
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray
 
     from mrpipe.dampers.model import DamperModel
     from mrpipe.networks.network import Network
@@ -47,6 +48,29 @@ class Run:
             known = ", ".join(sorted(item.stem for item in self.directory.glob("*.h5"))) or "none"
             raise UserError(self.directory, path.name, "is not in this run", f"artifacts: {known}")
         return Artifact(path)
+
+    def dataset(self, name: str, group: str = "/") -> xarray.Dataset:
+        """Return a group of an artifact as an xarray dataset, with the axes and units of the artifact.
+
+        Parameters
+        ----------
+        name
+            File name of the artifact, with or without `.h5`.
+        group
+            Group inside the artifact.
+
+        Raises
+        ------
+        UserError
+            If the run has no such artifact, or xarray is not installed.
+        """
+        path = self.artifact(name).path
+        try:
+            import h5netcdf  # noqa: F401 - xarray needs it to read the file
+            import xarray
+        except ImportError as error:
+            raise UserError("dataset", str(error.name), "is not installed", "pip install 'mrpipe[xarray]'") from error
+        return xarray.load_dataset(path, engine="h5netcdf", group=group)
 
     @property
     def damper(self) -> DamperModel:

@@ -6,13 +6,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import mrpipe
-from mrpipe.artifacts import load_parameter_set
+from mrpipe.artifacts import ArtifactWriter, Provenance, load_parameter_set
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
-from mrpipe.structures import frame_from_parameter_set
+from mrpipe.structures import frame_from_parameter_set, write_frame
 from tests.campaigns.builders import campaign, motion
 
 
@@ -70,6 +71,17 @@ def test_a_run_is_opened_by_its_directory(tmp_path: Path) -> None:
     assert "no artifacts" in str(run)
     with pytest.raises(UserError, match=r"damper\.h5"):
         _ = run.damper
+
+
+@pytest.mark.oracle
+def test_an_artifact_of_a_run_is_a_dataset(tmp_path: Path) -> None:
+    pytest.importorskip("xarray", reason="needs the extra xarray")
+    frame = frame_from_parameter_set("thesis")
+    with ArtifactWriter.create(tmp_path / "frame.h5", Provenance("identify-frame")) as artifact:
+        write_frame(artifact, frame)
+    found = mrpipe.open_run(tmp_path).dataset("frame", "frame")
+    assert found["mass"].dims == ("floor", "floor_of_cause") and found["mass"].attrs["unit"] == "kg"
+    np.testing.assert_array_equal(found["stiffness"].values, frame.stiffness)
 
 
 @pytest.mark.property

@@ -15,7 +15,7 @@ from numba import njit
 
 from mrpipe.dampers.model import Addition, DamperModel
 from mrpipe.dampers.plant import FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.effects.library import damper_effects
+from mrpipe.effects.library import damper_effects, load_effect_file
 from mrpipe.errors import UserError
 from mrpipe.exports.contract import DOUBLE_LIMIT, Subject
 from mrpipe.exports.damper import damper_subject
@@ -38,12 +38,22 @@ def with_effect(effect: str, form: str) -> DamperModel:
 
 
 def dampers() -> dict[str, DamperModel]:
-    """Every base form, and one form of every effect; the benchmark of all forms takes minutes of compilation."""
+    """Every base form, one form of every effect (all of them take minutes of compilation), and an effect file."""
     found = {name: model(name) for name in NUMBERS}
     for effect in damper_effects().values():
         if not effect.sensor:
             found[effect.name] = with_effect(effect.name, effect.forms[-1].name)
-    return found
+    return {**found, "own-file": with_own_effect()}
+
+
+def with_own_effect() -> DamperModel:
+    """A damper with the effect file of the documentation."""
+    file = Path(__file__).parents[2] / "docs" / "examples" / "seal_squeeze.py"
+    effect = load_effect_file(file)
+    form = effect.forms[0]
+    values = {p.name: 0.3 * p.start_values(SCALES)[0] for p in form.parameters}
+    own = Addition(effect.name, form.name, values, {}, effect.sensor, form.steps, str(file))
+    return replace(model("bouc-wen"), effects=(own,))
 
 
 def networks() -> dict[str, Subject]:
