@@ -136,6 +136,9 @@ def simulate(
         str | None,
         typer.Option(metavar="DAMPER", help="identified, traced (by close-loop), a set of configs/dampers, or a file."),
     ] = None,
+    gains: Annotated[
+        str | None, typer.Option(metavar="GAINS", help="calibrated, or design: the best ones that design found.")
+    ] = None,
 ) -> None:
     """Run the closed loop under a control law."""
     from dataclasses import replace
@@ -149,6 +152,8 @@ def simulate(
         raise UserError("--law", law, "is not a control law", nearest(law, [*known, "all"]))
     if damper is not None:
         options = replace(options, overrides=[*options.overrides, f"simulate.damper={damper}"])
+    if gains is not None:
+        options = replace(options, overrides=[*options.overrides, f"gains.source={gains}"])
     laws = known if law == "all" else (law,)
     kinds = ("simulate", "resonance") if resonance else ("simulate",)
     build_and_print([f"{kind}-{item}" for item in laws for kind in kinds], options, together=kinds)
@@ -169,11 +174,14 @@ def export(
         list[str] | None,
         typer.Option("--format", metavar="FORMAT", help="c, json, matlab, onnx; repeatable. Default: all possible."),
     ] = None,
+    gains: Annotated[
+        str | None, typer.Option(metavar="GAINS", help="calibrated, or design: the best ones that design found.")
+    ] = None,
 ) -> None:
     """Write the calibrated controller or a model for other programs, with test vectors."""
     if what not in (*_EXPORTS, "all"):
         raise UserError("export", what, "cannot be exported", f"one of {', '.join((*_EXPORTS, 'all'))}")
-    given = {"export.law": law, "simulate.damper": damper}
+    given = {"export.law": law, "simulate.damper": damper, "gains.source": gains}
     overrides = [f"{name}={value}" for name, value in given.items() if value is not None]
     if formats:
         overrides.append(f"export.formats=[{', '.join(formats)}]")

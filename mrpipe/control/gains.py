@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Literal
 
 NAMES = ("c_n_s_m", "k_n_m", "alpha_n_m")
 """Gains with a fixed place in the compiled controller: viscosity, stiffness, friction with negative stiffness."""
+
+GainsSource = Literal["calibrated", "design"]
+"""Where the gains of the laws come from: the stage `calibrate`, or the search of the stage `design`."""
 
 
 class Gains(Mapping[str, float]):

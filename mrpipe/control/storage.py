@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 from mrpipe.control.calibration import Calibration
-from mrpipe.control.gains import NAMES, Gains
+from mrpipe.control.gains import NAMES, Gains, GainsSource
 from mrpipe.control.laws import law_named
 from mrpipe.control.limits import attainable_damping, attainable_damping_friction, optimal_force_ratio
 from mrpipe.control.lqg import Weights
@@ -135,6 +135,8 @@ class Calibrated:
         Law that could not be calibrated -> reason.
     path
         Of the file, for messages.
+    designed
+        Law -> gains of the stage `design`, which are used in place of the calibrated ones; empty: none.
     """
 
     position: FloatArray
@@ -149,6 +151,7 @@ class Calibrated:
     reference: Network | None
     skipped: Mapping[str, str] = field(default_factory=dict)
     path: str = "control.h5"
+    designed: Mapping[str, Gains] = field(default_factory=dict)
 
     def gains_of(self, law: str) -> Gains:
         """Return the gains of a law; none for a law that has nothing to calibrate.
@@ -158,6 +161,10 @@ class Calibrated:
         UserError
             If the law needs a calibration and has none.
         """
+        if law in self.designed:
+            return self.designed[law]
+        if self.designed and law_named(law).gains:
+            raise UserError("--gains", "design", f"the design has no gains of law {law}", "add it to design.laws")
         if law in self.gains:
             return self.gains[law]
         if law_named(law).calibrated:
@@ -185,3 +192,20 @@ def read_calibrated(artifact: Artifact) -> Calibrated:
         skipped=artifact.json("skipped"),
         path=str(artifact.path),
     )
+
+
+def read_calibrated_with(artifact: Callable[[str], Artifact], source: GainsSource) -> Calibrated:
+    """Return what is needed to build controllers, with the gains of a source.
+
+    Parameters
+    ----------
+    artifact
+        Opens the artifact of a stage by its name; `design` only where its gains are used.
+    source
+        Of the gains.
+    """
+    found = read_calibrated(artifact("calibrate"))
+    if source == "calibrated":
+        return found
+    design = artifact("design")
+    return replace(found, designed={law: Gains(**design.json(f"laws/{law}/gains")) for law in design.members("laws")})

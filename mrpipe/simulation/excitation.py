@@ -1,4 +1,4 @@
-"""What shakes the base: harmonic motion that may stop, a sweep, or a recorded acceleration."""
+"""What shakes the base: harmonic motion that may stop, a sweep, random motion, or a recorded acceleration."""
 
 from __future__ import annotations
 
@@ -100,6 +100,70 @@ def sweep(amplitude_m_s2: float, first_hz: float, last_hz: float, duration_s: fl
 
     return Excitation(
         duration_s, at, (0.0, duration_s), details={"kind": "sweep", "base_amplitude_m_s2": amplitude_m_s2}
+    )
+
+
+RANDOM_RATE = 40.0
+"""Samples of random motion per period of its centre frequency; it is straight between them."""
+
+
+def narrow_band(
+    rms_m_s2: float,
+    omega: float,
+    bandwidth: float,
+    rng: np.random.Generator,
+    *,
+    duration_s: float,
+    settling_s: float = 0.0,
+    ramp_s: float = 0.0,
+) -> Excitation:
+    """Return narrow-band random base acceleration: white noise through a resonant filter (wind, waves, traffic).
+
+    The record is a sum of harmonics with Gaussian amplitudes whose power spectrum is that of a filter of second order,
+    (2 zeta omega_0 omega)^2 / ((omega_0^2 - omega^2)^2 + (2 zeta omega_0 omega)^2) with 2 zeta the relative bandwidth.
+
+    Parameters
+    ----------
+    rms_m_s2
+        RMS value of the record [m/s^2].
+    omega
+        Centre frequency [rad/s].
+    bandwidth
+        Width of the spectrum at half its height, over the centre frequency [1].
+    rng
+        Generator of the record.
+    duration_s, settling_s
+        Length of the run, and the first part that is left out of the indices.
+    ramp_s
+        Length of the raised-cosine start.
+    """
+    dt = 2.0 * math.pi / (omega * RANDOM_RATE)
+    # twice the duration, because the sum of harmonics repeats itself
+    count = 2 * (math.ceil(duration_s / dt) + 2)
+    frequencies = 2.0 * math.pi * np.fft.rfftfreq(count, dt)
+    width = bandwidth * omega * frequencies
+    shape = width / np.sqrt(np.maximum((omega**2 - frequencies**2) ** 2 + width**2, 1e-300))
+    amplitudes = rng.standard_normal((2, len(frequencies)))
+    record = np.fft.irfft(shape * (amplitudes[0] + 1j * amplitudes[1]), count)[: count // 2]
+    record *= rms_m_s2 / float(np.sqrt(np.mean(record**2)))
+    clock = dt * np.arange(len(record))
+
+    def at(t: FloatArray) -> FloatArray:
+        rise = 0.5 - 0.5 * np.cos(np.pi * np.clip(t / max(ramp_s, 1e-12), 0.0, 1.0))
+        return np.asarray(rise * np.interp(t, clock, record))
+
+    return Excitation(
+        duration_s,
+        at,
+        (settling_s, duration_s),
+        details={
+            "kind": "random",
+            "base_amplitude_m_s2": math.sqrt(2.0) * rms_m_s2,
+            "base_rms_m_s2": rms_m_s2,
+            "centre_rad_s": omega,
+            "bandwidth": bandwidth,
+            "steady_s": [settling_s, duration_s],
+        },
     )
 
 

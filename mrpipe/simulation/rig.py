@@ -13,9 +13,9 @@ import numpy as np
 from mrpipe.artifacts import Artifact, FloatArray
 from mrpipe.control.assembly import ControllerFactory, inverse_network
 from mrpipe.control.controller import Controller
-from mrpipe.control.gains import Gains
+from mrpipe.control.gains import Gains, GainsSource
 from mrpipe.control.law import Law
-from mrpipe.control.storage import read_calibrated
+from mrpipe.control.storage import read_calibrated_with
 from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import Chain
 from mrpipe.effects.damper import damper_named
@@ -111,7 +111,7 @@ class Rig:
         )
 
 
-def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact]) -> Rig:
+def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact], gains: GainsSource = "calibrated") -> Rig:
     """Return the rig of a run.
 
     Parameters
@@ -120,7 +120,9 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact]) ->
         Of the simulation: which frame, damper and controller.
     artifact
         Opens the artifact of a stage by its name: `identify-frame`, `identify-damper`, `calibrate`, `train-inverse`,
-        and `close-loop` for the traced damper.
+        `close-loop` for the traced damper, and `design` for its gains.
+    gains
+        Which gains the laws have.
 
     Raises
     ------
@@ -137,7 +139,7 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact]) ->
         frame,
         # the controller knows the damper that it was designed for, not what the tracing has found since
         damper_named("identified", dampers) if settings.damper == "traced" else damper,
-        read_calibrated(artifact("calibrate")),
+        read_calibrated_with(artifact, gains),
         settings.controller,
         inverse_network(settings.controller, lambda: artifact("train-inverse")),
         settings.ideal_rounding_m_s,
@@ -212,6 +214,18 @@ def excitation_of(
         first = settings.sweep_first_hz or SWEEP[0] * free / (2.0 * np.pi)
         last = settings.sweep_last_hz or SWEEP[1] * free / (2.0 * np.pi)
         return kinds.sweep(factor * amplitude, first, last, settings.sweep_s), None
+    if settings.kind == "random":
+        period = 2.0 * np.pi / omega
+        motion = kinds.narrow_band(
+            factor * amplitude / math.sqrt(2.0),
+            omega,
+            settings.random_bandwidth,
+            np.random.default_rng(settings.random_seed),
+            duration_s=settings.random_s,
+            settling_s=min(settings.settling_cycles * period, 0.5 * settings.random_s),
+            ramp_s=settings.ramp_cycles * period,
+        )
+        return motion, None
     return harmonic(factor * amplitude), viscous
 
 
@@ -231,7 +245,8 @@ def _adjusted(
     if settings.adjust_with == "ideal" and tracking == "damper":
         tracking = "ideal"
     options = replace(rig.options, noise=SensorNoise(), fault=None, tracking=tracking)
-    gains = None if settings.reference_c_n_s_m is None else Gains(c_n_s_m=settings.reference_c_n_s_m)
+    known = rig.controllers.calibrated.gains.get("vd")
+    gains = known if settings.reference_c_n_s_m is None else Gains(c_n_s_m=settings.reference_c_n_s_m)
     viscous = rig.controllers.build("vd", gains, perfect=tracking == "ideal")
     demanded = settings.reference_rms_top_m
     amplitude, response, error = adjusted_amplitude(

@@ -13,14 +13,21 @@ from mrpipe.options import Section
 class ExcitationSettings(Section):
     """What shakes the base."""
 
-    kind: Literal["harmonic", "sweep", "recorded", "free-decay"] = Field(
-        "harmonic", description="Harmonic with a free decay after its stop, sweep, recorded, or release from a shape."
+    kind: Literal["harmonic", "sweep", "random", "recorded", "free-decay"] = Field(
+        "harmonic",
+        description="Harmonic with a free decay after its stop, sweep, narrow-band random motion, recorded motion, or "
+        "release from a shape.",
     )
     frequency_rad_s: float | None = Field(
-        None, gt=0.0, description="Of the harmonic; null: the free frequency of the calibrated mode."
+        None,
+        gt=0.0,
+        description="Of the harmonic, and centre of random motion; null: the free frequency of the calibrated mode.",
     )
     base_amplitude_m_s2: float | None = Field(
-        None, gt=0.0, description="Of harmonic or sweep; null: adjusted so that vd gives `reference_rms_top_m`."
+        None,
+        gt=0.0,
+        description="Of harmonic or sweep; random motion has the RMS of this harmonic. null: adjusted so that vd gives "
+        "`reference_rms_top_m` under the harmonic.",
     )
     adjust_with: Literal["damper", "ideal"] = Field(
         "damper", description="Whether the amplitude is adjusted with the damper in the loop or with perfect tracking."
@@ -52,6 +59,14 @@ class ExcitationSettings(Section):
         None, gt=0.0, description="Last frequency of the sweep; null: 2.4 times the free frequency."
     )
     sweep_s: float = Field(60.0, gt=0.0, description="Length of the sweep.")
+    random_s: float = Field(240.0, gt=0.0, description="Length of random motion.")
+    random_bandwidth: float = Field(
+        0.1,
+        gt=0.0,
+        le=2.0,
+        description="Width of the spectrum of random motion at half its height, over the centre frequency.",
+    )
+    random_seed: int = Field(1, ge=0, description="Seed of random motion; all laws meet the same motion.")
     file: str = Field(
         "", description="Recorded base acceleration: text or CSV of two columns, time [s] and acceleration."
     )

@@ -16,7 +16,7 @@ DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.artifacts import atomic_write_text
     from mrpipe.control.assembly import ControllerFactory, inverse_network
-    from mrpipe.control.storage import read_calibrated
+    from mrpipe.control.storage import read_calibrated_with
     from mrpipe.effects.damper import damper_named
     from mrpipe.exports.controller import controller_files
     from mrpipe.reporting import export_controller as section
@@ -32,7 +32,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     factory = ControllerFactory(
         frame,
         damper,
-        read_calibrated(context.artifact("calibrate")),
+        read_calibrated_with(context.artifact, context.settings.gains.source),
         chosen,
         inverse_network(chosen, lambda: context.artifact("train-inverse")),
     )
@@ -58,8 +58,8 @@ STAGE = Stage(
     summary="Write the calibrated controller as C and JSON, with test vectors.",
     run=_run,
     inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-    conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
-    settings=("export", "simulate.controller", "simulate.damper"),
+    conditional_inputs=(("simulate.damper", "traced", "close-loop"), ("gains.source", "design", "design")),
+    settings=("gains", "export", "simulate.controller", "simulate.damper"),
     after=("reproduce",),
     family="export",
     outputs=tuple(

@@ -16,8 +16,8 @@ def resonance_stage(law: str) -> Stage:
         summary=f"Find the resonance of the closed loop under law {law}.",
         run=lambda context: _run(context, law),
         inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-        conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
-        settings=("simulate", "resonance"),
+        conditional_inputs=(("simulate.damper", "traced", "close-loop"), ("gains.source", "design", "design")),
+        settings=("gains", "simulate", "resonance"),
         family="resonance",
         outputs=(f"resonance-{law}.h5",),
     )
@@ -29,7 +29,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     from mrpipe.simulation.rig import excitation_of, read_rig
     from mrpipe.simulation.storage import write_curves
 
-    rig = read_rig(context.settings.simulate, context.artifact)
+    rig = read_rig(context.settings.simulate, context.artifact, context.settings.gains.source)
     settings = context.settings.resonance
     excitation, _ = excitation_of(rig, context.settings.simulate.excitation)
     band = settings.band_rad_s or default_band(context.artifact("calibrate"))

@@ -16,8 +16,8 @@ def simulate_stage(law: str) -> Stage:
         summary=f"Run the closed loop under law {law}.",
         run=lambda context: _run(context, law),
         inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-        conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
-        settings=("simulate",),
+        conditional_inputs=(("simulate.damper", "traced", "close-loop"), ("gains.source", "design", "design")),
+        settings=("gains", "simulate"),
         family="simulate",
         outputs=(f"response-{law}.h5",),
     )
@@ -34,7 +34,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     from mrpipe.thesis.entries import loop_columns
 
     settings = context.settings.simulate
-    rig = read_rig(settings, context.artifact)
+    rig = read_rig(settings, context.artifact, context.settings.gains.source)
     if law in rig.controllers.calibrated.skipped:
         raise StageSkipped(f"law {law} could not be calibrated: {rig.controllers.calibrated.skipped[law]}")
     controller = rig.controller(law)
