@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
 
+from mrpipe.case_studies.lqg import SampledController
+from mrpipe.case_studies.run import Controller
 from mrpipe.errors import UserError
 
 LAWS = ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on")
@@ -20,3 +24,60 @@ def require_known(laws: Sequence[str], structure: str) -> None:
     for law in laws:
         if law not in LAWS:
             raise unknown_law(law, structure)
+
+
+class LawGains(Protocol):
+    """Gains of the laws with MR dampers."""
+
+    @property
+    def viscous(self) -> float:
+        """Viscosity of vd [N s/m]."""
+
+    @property
+    def negative_stiffness(self) -> float:
+        """Stiffness of vdns [N/m]."""
+
+    @property
+    def negative_viscous(self) -> float:
+        """Viscosity of vdns [N s/m]."""
+
+    @property
+    def friction(self) -> float:
+        """Gain of fdns [N/m]."""
+
+
+def controller_of(
+    law: str, damper: Controller, gains: LawGains, observer: SampledController, structure: str
+) -> Controller:
+    """Return the controller of a law of :data:`LAWS`.
+
+    Parameters
+    ----------
+    law
+        Its name.
+    damper
+        Controller with the MR damper and its inverse, whose law is replaced.
+    gains, observer
+        Of the laws.
+    structure
+        For messages, as in "the tower".
+
+    Raises
+    ------
+    UserError
+        If the law does not exist.
+    """
+    if law == "vd":
+        return replace(damper, viscous=gains.viscous)
+    if law == "vdns":
+        return replace(damper, viscous=gains.negative_viscous, stiffness=gains.negative_stiffness)
+    if law == "fdns":
+        return replace(damper, law="friction", friction=gains.friction)
+    if law == "lqg":
+        return Controller("lqg", "active", observer=observer)
+    if law == "lqg-clipped":
+        return replace(damper, law="lqg", observer=observer)
+    if law in ("passive-off", "passive-on"):
+        volts = 0.0 if law == "passive-off" else damper.device.highest_voltage
+        return Controller("constant", "bingham", voltage=volts, device=damper.device, dampers=damper.dampers)
+    raise unknown_law(law, structure)

@@ -313,6 +313,13 @@ def _run_numbers(
         raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
     track = parts.TRACK_DAMPER
     if options.tracking == "ideal":
+        if law_named(controller.law).output == "drive":
+            raise UserError(
+                "simulate",
+                "tracking",
+                f"law {controller.law} commands the drive, so that a perfect damper has no force to give",
+                "set tracking: damper",
+            )
         track = parts.TRACK_SAMPLED
     elif options.tracking in ("continuous", "unclipped"):
         if not law_named(controller.law).linear:

@@ -12,7 +12,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.base_isolated.design import IsolationGains, isolation_gains, isolation_lqg
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
-from mrpipe.case_studies.laws import require_known, unknown_law
+from mrpipe.case_studies.laws import controller_of, require_known
 from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
 from mrpipe.case_studies.options import LqgWeights
@@ -70,22 +70,8 @@ class IsolationStudy:
         UserError
             If the law does not exist.
         """
-        gains = self.gains
         mr = Controller("kelvin", "bingham", device=self.device, network=self.network, dampers=self.dampers)
-        if law == "vd":
-            return replace(mr, viscous=gains.viscous)
-        if law == "vdns":
-            return replace(mr, viscous=gains.negative_viscous, stiffness=gains.negative_stiffness)
-        if law == "fdns":
-            return replace(mr, law="friction", friction=gains.friction)
-        if law == "lqg":
-            return Controller("lqg", "active", observer=self.observer)
-        if law == "lqg-clipped":
-            return replace(mr, law="lqg", observer=self.observer)
-        if law in ("passive-off", "passive-on"):
-            volts = 0.0 if law == "passive-off" else self.device.highest_voltage
-            return Controller("constant", "bingham", voltage=volts, device=self.device, dampers=self.dampers)
-        raise unknown_law(law, STRUCTURE)
+        return controller_of(law, mr, self.gains, self.observer, STRUCTURE)
 
     def ideal(self, law: str) -> Controller:
         """Return the law with dampers that give any dissipative force at once."""

@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
-from mrpipe.case_studies.laws import require_known, unknown_law
+from mrpipe.case_studies.laws import controller_of, require_known
 from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
 from mrpipe.case_studies.options import LqgWeights
@@ -96,7 +96,6 @@ class WindStudy:
         UserError
             If the law does not exist.
         """
-        gains = self.gains
         mr = Controller(
             "kelvin",
             "bingham",
@@ -106,20 +105,7 @@ class WindStudy:
             filter_rate=self.filter_rate,
             fade_velocity=FADE_SHARE * self.rod_velocity_m_s,
         )
-        if law == "vd":
-            return replace(mr, viscous=gains.viscous)
-        if law == "vdns":
-            return replace(mr, viscous=gains.negative_viscous, stiffness=gains.negative_stiffness)
-        if law == "fdns":
-            return replace(mr, law="friction", friction=gains.friction)
-        if law == "lqg":
-            return Controller("lqg", "active", observer=self.observer)
-        if law == "lqg-clipped":
-            return replace(mr, law="lqg", observer=self.observer)
-        if law in ("passive-off", "passive-on"):
-            volts = 0.0 if law == "passive-off" else self.device.highest_voltage
-            return Controller("constant", "bingham", voltage=volts, device=self.device, dampers=self.dampers)
-        raise unknown_law(law, STRUCTURE)
+        return controller_of(law, mr, self.gains, self.observer, STRUCTURE)
 
     def run(self, controller: Controller, *, refine: int = 1) -> Response:
         """Run the tower with its device; `refine` shortens the step."""
