@@ -12,6 +12,9 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.control.gains import Gains
 from mrpipe.law_design.options import DesignSettings
 
+STARTS = 2
+"""Points of the coarse grid, the best ones, from which the search of several gains starts."""
+
 Value = Callable[[Gains], float]
 
 
@@ -122,25 +125,38 @@ def _search_one(
 def _search_several(
     at: Callable[[FloatArray], float], free: Sequence[FreeGain], fixed: Mapping[str, float], options: SearchOptions
 ) -> Gains:
+    """Search from several points: the largest response over frequency has kinks, where a simplex may come to rest."""
     bounds = [gain.logarithms for gain in free]
-    # three values of each gain away from its bounds: the valley of two gains is a broad diagonal one
-    axes = [np.linspace(low, high, 5)[1:4] for low, high in bounds]
+    inside = 4 if len(free) == 2 else 3
+    axes = [np.linspace(low, high, inside + 2)[1:-1] for low, high in bounds]
     starts = np.array(np.meshgrid(*axes)).reshape(len(free), -1).T
-    values = [at(start) for start in starts]
-    best = starts[int(np.argmin(values))]
+    values = np.array([at(start) for start in starts])
+    ends = [_simplex(at, starts[place], bounds, options) for place in np.argsort(values, kind="stable")[:STARTS]]
+    _, point = min([*ends, (float(values.min()), starts[int(np.argmin(values))])], key=lambda item: item[0])
+    return _gains(free, fixed, point)
+
+
+def _simplex(
+    at: Callable[[FloatArray], float],
+    start: FloatArray,
+    bounds: Sequence[tuple[float, float]],
+    options: SearchOptions,
+) -> tuple[float, FloatArray]:
+    """Return the smallest value that Nelder and Mead's simplex reaches from a point, and where."""
     steps = np.array([0.25 * (high - low) / 2.0 for low, high in bounds])
-    simplex = np.vstack([best, *(best + step * unit for step, unit in zip(steps, np.eye(len(free)), strict=True))])
+    # the simplex opens towards the middle of the range
+    towards = np.where(start < [0.5 * (low + high) for low, high in bounds], steps, -steps)
+    simplex = np.vstack([start, *(start + step * unit for step, unit in zip(towards, np.eye(len(start)), strict=True))])
     found = minimize(
         at,
-        best,
+        start,
         method="Nelder-Mead",
         bounds=bounds,
         options={
             "initial_simplex": np.clip(simplex, [low for low, _ in bounds], [high for _, high in bounds]),
             "xatol": options.tolerance,
             "fatol": 1e-3,
-            "maxfev": options.evaluations * len(free),
+            "maxfev": options.evaluations * len(start),
         },
     )
-    point = found.x if found.fun <= min(values) else best
-    return _gains(free, fixed, point)
+    return float(found.fun), np.asarray(found.x)

@@ -42,3 +42,15 @@ def test_two_gains_with_their_signs() -> None:
 @pytest.mark.property
 def test_nothing_free_is_the_start() -> None:
     assert search(lambda _: 1.0, [], {"c_n_s_m": 5.0}, SearchOptions()) == Gains(5.0)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(("c", "k"), [(40.0, -900.0), (120.0, -6000.0), (900.0, -15000.0)])
+def test_two_gains_on_a_function_with_kinks(c: float, k: float) -> None:
+    # the largest of several resonances has kinks, along which a simplex that starts badly comes to rest
+    def value(gains: Gains) -> float:
+        u, v = np.log(gains.c_n_s_m / c), np.log(gains.k_n_m / k)
+        return float(max(u + v, -(u + v), 0.5 * (u - v), -0.5 * (u - v)))
+
+    found = search(value, [VISCOSITY, STIFFNESS], {}, SearchOptions())
+    assert value(found) < 0.05
