@@ -8,7 +8,7 @@ from mrpipe.artifacts.yaml_source import read_yaml
 from mrpipe.errors import UserError
 from mrpipe.pipeline.fingerprint import flatten
 from mrpipe.pipeline.manifest import Manifest
-from mrpipe.pipeline.runner import ABSENT
+from mrpipe.pipeline.sources import ABSENT
 from mrpipe.reporting.compare import KeptRun, KeptStage
 
 _REMEDY = "name a directory that `mrpipe run` wrote, such as runs/my-rig"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from mrpipe.errors import UserError
 from mrpipe.pipeline.manifest import Manifest
 from mrpipe.pipeline.parts import read_part
-from mrpipe.pipeline.runner import CAMPAIGN_RECORDERS, Pipeline
+from mrpipe.pipeline.runner import Pipeline
+from mrpipe.pipeline.sources import CAMPAIGN_RECORDERS
 from mrpipe.reporting.facts import ReportStage, RunFacts
 
 
@@ -50,6 +51,6 @@ def run_facts(pipeline: Pipeline) -> RunFacts:
 
 def _belongs(pipeline: Pipeline, name: str, manifest: Manifest) -> bool:
     recorded = {stage: f"campaign:{rig}" for rig, stage in CAMPAIGN_RECORDERS.items()}
-    if name in recorded and pipeline.provider(recorded[name]) != name:
+    if name in recorded and pipeline.sources.provider(recorded[name]) != name:
         return False
     return not manifest.skipped or name in pipeline.loaded.config.stages

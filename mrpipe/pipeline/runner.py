@@ -1,4 +1,4 @@
-"""Runs stages in order, reuses what is up to date, says what is stale and why."""
+"""Runs stages in order, reuses those that are up to date, and reports which are stale and why."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mrpipe.artifacts import Provenance, atomic_write_text, public_data_directory
+from mrpipe.artifacts import Provenance, atomic_write_text
 from mrpipe.artifacts.plain import plain
 from mrpipe.config.loader import LoadedConfig
-from mrpipe.config.sections.campaigns import LABORATORY
 from mrpipe.errors import MrpipeError, StageFailed, StageSkipped
 from mrpipe.pipeline.code_version import code_version
 from mrpipe.pipeline.fingerprint import FileHashes, plain_settings
@@ -24,17 +23,16 @@ from mrpipe.pipeline.manifest import Manifest, StageKey, reasons_stale
 from mrpipe.pipeline.parts import PartWriter
 from mrpipe.pipeline.progress import stage_progress
 from mrpipe.pipeline.settings_view import SettingsView
+from mrpipe.pipeline.sources import ABSENT, Sources
 from mrpipe.pipeline.stage import Stage, StageContext
 
-CAMPAIGN_RECORDERS = {"bench": "record-bench", "frame": "record-frame", "closed-loop": "record-closed-loop"}
-ABSENT = "absent"
 LOG = "log.txt"
 PUBLIC_DATA = "public data"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one stage: `built`, `reused`, `skipped` or `failed`."""
+    """Result of one stage: `built`, `reused`, `skipped` or `failed`."""
 
     stage: str
     what: str
@@ -57,10 +55,10 @@ class Pipeline:
     jobs
         Processes to use.
     keep_going
-        A stage that fails does not end the run: stages that need it are left out, all others are built.
+        A stage that fails does not end the run: stages that need it are skipped, all others are built.
     campaign_given
-        The user named a campaign on the command line: what the virtual laboratory could add is then used only where
-        a stage cannot do without it, or where it is there already.
+        The user named a campaign on the command line. Data of the virtual laboratory are then used only if a stage
+        requires them, or if they exist already.
     logger
         Takes the log lines.
     quiet
@@ -68,7 +66,7 @@ class Pipeline:
     force
         Stages that are built even where nothing changed.
     outcomes
-        Stage -> what became of it in this call.
+        Stage -> its result in this call.
     errors
         Errors that ended stages in this call.
     """
@@ -89,59 +87,16 @@ class Pipeline:
         self.stages = {name: stage.for_configuration(self.loaded.config) for name, stage in self.stages.items()}
         self._manifests = self.run_directory / "manifests"
         self._hashes = FileHashes(self.run_directory / "manifests" / ".hashes.json")
-
-    # --- what a stage needs ------------------------------------------------------------------------------------------
-    def campaign_source(self, rig: str) -> str | None:
-        """Return the configured campaign of a rig: a path, `laboratory`, or None."""
-        source: str | None = getattr(self.loaded.config.campaigns, rig.replace("-", "_"))
-        return source
-
-    def provider(self, name: str) -> str | None:
-        """Return the stage that makes an input, or None where it comes from outside."""
-        if not name.startswith("campaign:"):
-            return name
-        rig = name.partition(":")[2]
-        return CAMPAIGN_RECORDERS[rig] if self.campaign_source(rig) == LABORATORY else None
-
-    def needs_laboratory(self, name: str) -> bool:
-        """Return whether an input can only be had by recording on the virtual rig, directly or further up."""
-        provider = self.provider(name)
-        if provider is None:
-            return False
-        return provider in CAMPAIGN_RECORDERS.values() or any(
-            self.needs_laboratory(item) for item in self.stages[provider].inputs
-        )
-
-    def input_path(self, name: str) -> Path | None:
-        """Return where an input is (whether built or not), or None where the configuration has none."""
-        provider = self.provider(name)
-        if provider is not None:
-            return self.run_directory / self.stages[provider].outputs[0]
-        source = self.campaign_source(name.partition(":")[2])
-        return None if source is None else Path(source)
-
-    def _digest_of_input(self, name: str, path: Path) -> str:
-        if name.startswith("campaign:"):
-            from mrpipe.campaigns import campaign_files
-
-            files = campaign_files(path)
-            base = path if path.is_dir() else path.parent
-            return self._hashes.digest_many(files, base)
-        return self._hashes.digest(path)
-
-    def _digest_of_public_data(self, folders: Sequence[str]) -> str:
-        base = public_data_directory()
-        there = [] if base is None else [base / name for name in folders if (base / name).is_dir()]
-        return self._hashes.digest_many(there, base) if base is not None and there else ABSENT
+        self.sources = Sources(self.loaded, self.stages, self.run_directory, self._hashes)
 
     # --- building ----------------------------------------------------------------------------------------------------
     def build(self, name: str) -> Outcome:
-        """Bring one stage up to date, and all that it needs before it.
+        """Bring one stage and everything that it needs up to date.
 
         Raises
         ------
         MrpipeError
-            If it fails, unless the run is to keep going: then the outcome says so.
+            If it fails and the run does not keep going; otherwise the outcome reports the failure.
         """
         if name in self.outcomes:
             return self.outcomes[name]
@@ -168,7 +123,7 @@ class Pipeline:
         return self._skip(stage, missing) if missing else self._run_or_reuse(stage)
 
     def _failed(self, stage: Stage, error: Exception) -> Outcome:
-        """Record a failure: what lies there of an earlier run stays, and counts as stale."""
+        """Record a failure: outputs of an earlier run are kept and count as stale."""
         text = " ".join(str(error).split())
         if not isinstance(error, MrpipeError | OSError | MemoryError):
             text = f"{type(error).__name__}: {text} (a fault of the program; {LOG} has the details)"
@@ -192,44 +147,38 @@ class Pipeline:
         if stage.check is not None:
             stage.check(SettingsView(self.loaded.config, stage.settings, name))
 
-    def _can_be_had(self, name: str) -> bool:
-        """Return whether the campaigns that an input hangs on are configured."""
-        provider = self.provider(name)
-        if provider is None:
-            return self.input_path(name) is not None
-        return all(self._can_be_had(item) for item in self.stages[provider].inputs)
-
     def _is_to_be_had(self, name: str) -> bool:
         """Return whether an optional input is available: with a given campaign, no other one is recorded."""
-        if not self._can_be_had(name):
+        if not self.sources.configured(name):
             return False
-        provider = self.provider(name)
-        spared = provider is not None and self.campaign_given and self.needs_laboratory(name)
+        provider = self.sources.provider(name)
+        spared = provider is not None and self.campaign_given and self.sources.needs_laboratory(name)
         return not spared or (provider is not None and self._is_fresh(provider))
 
     def _wanted(self, name: str, together: bool) -> bool:
-        """Return whether to bring an optional input up to date: they serve together, so one that lacks spares all.
+        """Return whether to bring an optional input up to date.
 
-        What is there and up to date is used in any case.
+        Optional inputs are used together: if one is not available, the others are not built either. Those that are up
+        to date are always used.
         """
-        provider = self.provider(name)
+        provider = self.sources.provider(name)
         if provider is None or provider in self.outcomes:
             return True
-        if not together or (self.campaign_given and self.needs_laboratory(name)):
+        if not together or (self.campaign_given and self.sources.needs_laboratory(name)):
             return self._is_fresh(provider)
         return True
 
     def _provide(self, name: str, required: Sequence[str] = ()) -> str:
-        """Build an input; return why it cannot be had, or nothing.
+        """Build an input; return the reason if it is not available, else an empty text.
 
         Raises
         ------
         StageFailed
             If a required input failed in this run.
         """
-        provider = self.provider(name)
+        provider = self.sources.provider(name)
         if provider is None:
-            if self.input_path(name) is None:
+            if self.sources.path(name) is None:
                 rig = name.partition(":")[2]
                 given = "the one given with --campaign is of another kind; " if self.campaign_given else ""
                 return f"there is no {rig} campaign ({given}give campaigns.{rig.replace('-', '_')}, or --campaign DIR)"
@@ -240,7 +189,7 @@ class Pipeline:
         return outcome.manifest.skipped
 
     def _provide_optional(self, name: str) -> None:
-        """Build an optional input; where that fails, the stage does without it."""
+        """Build an optional input; if that fails, the stage runs without it."""
         keep_going, self.keep_going = self.keep_going, True
         try:
             self._provide(name)
@@ -250,7 +199,7 @@ class Pipeline:
     def _is_fresh(self, name: str) -> bool:
         stage = self.stages[name]
         for item in stage.inputs:
-            provider = self.provider(item)
+            provider = self.sources.provider(item)
             if provider is not None and not self._is_fresh(provider):
                 return False
         manifest = Manifest.load(self._manifests, name)
@@ -263,7 +212,7 @@ class Pipeline:
     def _inputs_there(self, stage: Stage) -> dict[str, Path]:
         inputs = {}
         for name in (*stage.inputs, *stage.optional_inputs):
-            path = self.input_path(name)
+            path = self.sources.path(name)
             if path is None or not path.exists():
                 if name in stage.inputs and path is not None:
                     inputs[name] = path
@@ -274,8 +223,8 @@ class Pipeline:
         return inputs
 
     def _usable(self, name: str) -> bool:
-        """Return whether an optional input that lies there belongs to this configuration."""
-        provider = self.provider(name)
+        """Return whether an existing optional input belongs to this configuration."""
+        provider = self.sources.provider(name)
         if provider is None:
             return True
         if provider in self.outcomes:
@@ -283,13 +232,11 @@ class Pipeline:
         return self._is_fresh(provider)
 
     def _key(self, stage: Stage, inputs: Mapping[str, Path]) -> StageKey:
-        digests = {
-            name: self._digest_of_input(name, path) if path.exists() else ABSENT for name, path in inputs.items()
-        }
+        digests = {name: self.sources.digest(name, path) for name, path in inputs.items()}
         for name in stage.optional_inputs:
             digests.setdefault(name, ABSENT)
         if stage.public_data:
-            digests[PUBLIC_DATA] = self._digest_of_public_data(stage.public_data)
+            digests[PUBLIC_DATA] = self.sources.digest_of_public_data(stage.public_data)
         settings = plain_settings(self.loaded.config, stage.settings, self._hashes)
         code = code_version(stage.run.__module__)
         return StageKey(digests, settings, code, self.loaded.config.seed)
@@ -369,7 +316,7 @@ class Pipeline:
         """Keep the resolved configuration in the run directory."""
         atomic_write_text(self.run_directory / "config.yaml", self.loaded.as_yaml())
 
-    # --- saying what is stale ----------------------------------------------------------------------------------------
+    # --- reporting what is stale --------------------------------------------------------------------------------------
     def status(self, names: Sequence[str]) -> dict[str, list[str]]:
         """Return stage -> reasons why it would run, for the named stages and all they need; empty means up to date."""
         found: dict[str, list[str]] = {}
@@ -385,9 +332,9 @@ class Pipeline:
         stage = self.stages[name]
         reasons: list[str] = []
         for item in (*stage.inputs, *stage.optional_inputs):
-            provider = self.provider(item)
+            provider = self.sources.provider(item)
             if provider is None:
-                if item in stage.inputs and self.input_path(item) is None:
+                if item in stage.inputs and self.sources.path(item) is None:
                     found[name] = ["skipped: no " + item.partition(":")[2] + " campaign"]
                     return found[name]
             elif before := self._status_of(provider, found):
