@@ -7,13 +7,225 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 VerdictClass = Literal["noise", "explained", "partly explained", "unknown", "base form", "validation differs"]
-"""What a verdict says of the validation tests.
+"""Classes of verdicts on the validation tests.
 
 `noise`: nothing is missing. `explained`: the named effects leave no more than noise, or than an honest ceiling.
 `partly explained`: they lower the error, but less. `unknown`: something is missing and no effect explains it.
 `base form`: another base form explains what is missing. `validation differs`: the validation tests differ from the
 training tests by something that a model of the damper cannot learn from the training tests.
 """
+
+
+IntervalKind = Literal["confidence", "range", "equivalent", "point"]
+"""What an interval means.
+
+`confidence`: it contains the true value with the probability `level`. `range`: smallest and largest value over storeys
+or tests. `equivalent`: all values in it fit about as well. `point`: the uncertainty was not estimated.
+"""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An interval of a number.
+
+    Attributes
+    ----------
+    low, high
+        Its ends, in the unit of the number.
+    kind
+        What it means.
+    level
+        Probability of a confidence interval; None for other kinds.
+    """
+
+    low: float
+    high: float
+    kind: IntervalKind = "confidence"
+    level: float | None = 0.95
+
+    @classmethod
+    def point(cls, value: float) -> Interval:
+        """Return the interval of a number whose uncertainty was not estimated."""
+        return cls(value, value, "point", None)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the keys `interval`, `interval_kind` and, for a confidence interval, `interval_level`."""
+        found: dict[str, Any] = {"interval": [self.low, self.high], "interval_kind": self.kind}
+        return found if self.level is None else {**found, "interval_level": self.level}
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter of an effect.
+
+    Attributes
+    ----------
+    value, unit
+        Its value, and the unit of it.
+    interval
+        Its interval.
+    by_storey
+        Values of all storeys, lowest first, if it differs between them.
+    """
+
+    value: float
+    unit: str
+    interval: Interval
+    by_storey: tuple[float, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the parameter as JSON."""
+        found = {"value": self.value, "unit": self.unit, **self.interval.as_json()}
+        return {**found, "by_storey": list(self.by_storey)} if self.by_storey else found
+
+
+@dataclass(frozen=True)
+class LeftOutGain:
+    """Share of the squared error that an effect removes on left-out tests, with its interval."""
+
+    share: float
+    interval: Interval
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the gain as JSON."""
+        return {"share": self.share, **self.interval.as_json()}
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that a verdict names, of a damper, a structure or a controller.
+
+    Attributes
+    ----------
+    name, form
+        Effect, and the form of it that fits best.
+    parameters
+        Parameter -> estimate.
+    confidence
+        Calibrated probability that the effect is present.
+    physics, remedy, source
+        Texts of the effect.
+    corrected_in
+        `plant`, `prepare`, `structure` or `controller`.
+    place
+        Storey, floor or part; empty for an effect of a damper on a bench.
+    tied_with
+        Effects that these tests do not separate from it.
+    separating_tests
+        Rival -> advice on tests that separate it.
+    gain
+        Gain on left-out tests; None if it was not estimated.
+    """
+
+    name: str
+    form: str
+    parameters: Mapping[str, Estimate]
+    confidence: float
+    physics: str
+    remedy: str
+    source: str
+    corrected_in: str
+    place: str = ""
+    tied_with: tuple[str, ...] = ()
+    separating_tests: Mapping[str, str] = field(default_factory=dict)
+    gain: LeftOutGain | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the effect as docs/close-loop-json.md describes it."""
+        found: dict[str, Any] = {"name": self.name, "form": self.form}
+        if self.place:
+            found["place"] = self.place
+        found |= {
+            "parameters": {name: item.as_json() for name, item in self.parameters.items()},
+            "confidence": self.confidence,
+            "tied_with": list(self.tied_with),
+            "physics": self.physics,
+            "remedy": self.remedy,
+            "source": self.source,
+            "corrected_in": self.corrected_in,
+        }
+        if self.separating_tests:
+            found["separating_tests"] = dict(self.separating_tests)
+        if self.gain is not None:
+            found["cross_validated_gain"] = self.gain.as_json()
+        return found
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that was tried.
+
+    Attributes
+    ----------
+    name, form
+        Effect, and the form of it that fits best.
+    nrmse
+        NRMSE on the validation tests with it.
+    evidence
+        Gain of the log-likelihood, or the ratio of errors before and after.
+    share
+        Share of the recoverable residual that it explains.
+    forms
+        Form -> share, of all forms that were tried.
+    at_bound
+        Parameters that end at a bound.
+    lag_s
+        Lag of a late controller [s]; None for other effects.
+    """
+
+    name: str
+    form: str
+    nrmse: float
+    evidence: float
+    share: float
+    forms: Mapping[str, float] = field(default_factory=dict)
+    at_bound: tuple[str, ...] = ()
+    lag_s: float | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the candidate as JSON."""
+        found: dict[str, Any] = {
+            "name": self.name, "form": self.form, "nrmse": self.nrmse, "evidence": self.evidence, "share": self.share,
+        }  # fmt: skip
+        if self.forms:
+            found["forms"] = dict(self.forms)
+        if self.lag_s is not None:
+            found["lag_s"] = self.lag_s
+        return {**found, "at_bound": list(self.at_bound)}
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What remains after the named effects.
+
+    Attributes
+    ----------
+    structured
+        Whether more than noise remains.
+    share
+        Its share of the squared residual before.
+    depends_on
+        (state, share of the residual's variance that it explains), largest first.
+    whiteness_p_value
+        Probability of its autocorrelation by chance; None if it was not tested.
+    tests
+        Validation tests on which it remains, the worst first; None if they were not judged one by one.
+    """
+
+    structured: bool
+    share: float = 0.0
+    depends_on: tuple[tuple[str, float], ...] = ()
+    whiteness_p_value: float | None = None
+    tests: tuple[str, ...] | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as JSON."""
+        found: dict[str, Any] = {"structured": self.structured, "share_of_residual": self.share}
+        if self.whiteness_p_value is not None:
+            found["whiteness_p_value"] = self.whiteness_p_value
+        if self.tests is not None:
+            found["tests"] = list(self.tests)
+        return {**found, "depends_on": [{"state": name, "share": share} for name, share in self.depends_on]}
 
 
 @dataclass(frozen=True)
@@ -110,9 +322,13 @@ class Verdict:
     comparable: Comparable | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
 
+    def sentence_as_json(self) -> dict[str, Any]:
+        """Return sentence, class and share, without the comparison of the validation tests."""
+        return {"verdict": self.sentence, "verdict_class": self.kind, "share_explained": self.share}
+
     def as_json(self) -> dict[str, Any]:
         """Return the keys of the summary that hold the verdict."""
-        found: dict[str, Any] = {"verdict": self.sentence, "verdict_class": self.kind, "share_explained": self.share}
+        found = self.sentence_as_json()
         found["validation"] = {
             "differences": [item.as_json() for item in self.differences],
             "comparable": self.comparable.as_json() if self.comparable is not None else None,

@@ -17,6 +17,15 @@ from mrpipe.tracing.rules import BraceRules, DelayRules, TracingRules
 from mrpipe.tracing.structure.damper import BraceFinding, find_brace, prepared_loops, trace_damper
 from mrpipe.tracing.structure.delay import DelayFinding, drive_lag, law_lag
 from mrpipe.tracing.structure.loop import bench_of, loop_signals
+from mrpipe.tracing.verdict import Candidate, Estimate, Interval, NamedEffect, Unexplained, Verdict
+
+MOST_CONFIDENCE = 0.99
+"""Numerical technique: largest confidence that is reported, because a finite number of tests proves nothing."""
+
+OF_PART = (
+    "model", "quantity", "verdict", "verdict_class", "noise_floor_nrmse", "before", "after", "effects", "candidates"
+)  # fmt: skip
+"""Keys of a part that the joint verdict repeats under `parts`."""
 
 COMMAND_QUANTITY = (
     "drive from desired force and motion, or desired force from motion, whichever is late, over its spread"
@@ -72,28 +81,24 @@ def command_part(
 
 def _command_summary(worst: DelayFinding, found: Sequence[DelayFinding], effect: StructuralEffect) -> dict[str, Any]:
     share = 1.0 - (worst.after / max(worst.before, 1e-12)) ** 2
-    named: list[dict[str, Any]] = []
+    named: list[NamedEffect] = []
     if worst.late:
         half = 0.5 * (worst.interval_s[1] - worst.interval_s[0])
+        interval = Interval(max(0.0, worst.delay_s - half), worst.delay_s + half)
         named.append(
-            {
-                "name": effect.name,
-                "form": worst.part,
-                "place": "controller",
-                "parameters": {
-                    "time": {
-                        "value": worst.delay_s, "unit": "s",
-                        "interval": [max(0.0, worst.delay_s - half), worst.delay_s + half],
-                    }
-                },
-                "confidence": round(float(np.clip(share, 0.0, 0.99)), 3),
-                "tied_with": [],
-                "physics": effect.physics,
-                "remedy": effect.remedy,
-                "source": effect.source,
-                "corrected_in": "controller",
-            }
-        )  # fmt: skip
+            NamedEffect(
+                effect.name,
+                worst.part,
+                {"time": Estimate(worst.delay_s, "s", interval)},
+                round(float(np.clip(share, 0.0, MOST_CONFIDENCE)), 3),
+                effect.physics,
+                effect.remedy,
+                effect.source,
+                "controller",
+                "controller",
+            )
+        )
+    sentence = f"{effect.name}: explains what is missing" if named else "command and motion agree"
     return {
         "model": "controller-as-declared",
         "quantity": COMMAND_QUANTITY,
@@ -106,20 +111,19 @@ def _command_summary(worst: DelayFinding, found: Sequence[DelayFinding], effect:
             "nrmse": {"controller-as-declared": worst.before},
         },
         "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
-        "effects": named,
-        "verdict": f"{effect.name}: explains what is missing" if named else "command and motion agree",
-        "candidates": [
-            {
-                "name": effect.name, "form": item.part, "nrmse": item.after, "evidence": item.before / item.after,
-                "share": 1.0 - (item.after / max(item.before, 1e-12)) ** 2, "lag_s": item.lag_s, "at_bound": [],
-            }
-            for item in found
-        ],
+        "effects": [item.as_json() for item in named],
+        **Verdict("explained" if named else "noise", sentence).sentence_as_json(),
+        "candidates": [_candidate(item, effect).as_json() for item in found],
         "after": _score(worst.after if named else worst.before),
         "ceiling": {"nrmse": worst.after, "recovered": 1.0 if named else 0.0},
-        "unexplained": {"structured": False, "share_of_residual": 0.0, "depends_on": []},
+        "unexplained": Unexplained(False).as_json(),
         "tests": [],
     }  # fmt: skip
+
+
+def _candidate(item: DelayFinding, effect: StructuralEffect) -> Candidate:
+    share = 1.0 - (item.after / max(item.before, 1e-12)) ** 2
+    return Candidate(effect.name, item.part, item.after, item.before / item.after, share, lag_s=item.lag_s)
 
 
 def damper_part(
@@ -161,9 +165,10 @@ def damper_part(
 def _nothing_that_matters(summary: dict[str, Any]) -> None:
     """Change a verdict to: nothing is missing, because the error exceeds that of noise by too little to matter."""
     if summary["residual"]["structured"]:
-        summary["verdict"] = "what stands out of the noise is too little to matter: nothing is missing"
+        sentence = "the residual exceeds the noise by too little to matter: nothing is missing"
+        summary |= Verdict("noise", sentence).sentence_as_json()
     summary["residual"] = {**summary["residual"], "structured": False}
-    summary["unexplained"] = {"structured": False, "share_of_residual": 0.0, "depends_on": []}
+    summary["unexplained"] = Unexplained(False).as_json()
 
 
 def _with_brace(
@@ -176,10 +181,7 @@ def _with_brace(
     """Add the brace to the candidates, and name it if it explains more than any effect within the damper."""
     rules = options.rules
     share = float(np.clip(found.share, 0.0, 1.0)) if found.compliance_m_n > 0.0 else 0.0
-    entry = {
-        "name": effect.name, "form": "spring", "nrmse": found.nrmse_after, "evidence": found.rigid / found.chi_square,
-        "share": share, "at_bound": [],
-    }  # fmt: skip
+    entry = Candidate(effect.name, "spring", found.nrmse_after, found.rigid / found.chi_square, share).as_json()
     summary["candidates"] = sorted([*summary["candidates"], entry], key=lambda item: -item["share"])
     better = found.nrmse_after < min([summary["after"]["nrmse"], brace_rules.better * found.nrmse_before])
     if not summary["residual"]["structured"] or share < rules.least_share or not better:
@@ -187,27 +189,25 @@ def _with_brace(
     rivals = [
         item["name"] for item in summary["candidates"] if item is not entry and item["share"] > share - rules.lead
     ]
-    summary["effects"] = [
-        {
-            "name": effect.name,
-            "form": "spring",
-            "place": "damper",
-            "parameters": {
-                "compliance": {"value": found.compliance_m_n, "unit": "m/N", "interval": list(found.interval)}
-            },
-            "confidence": round(0.99 * min(1.0, share / rules.named_share) * (0.5 if rivals else 1.0), 3),
-            "tied_with": rivals,
-            "physics": effect.physics,
-            "remedy": effect.remedy,
-            "source": effect.source,
-            "corrected_in": "plant",
-        }
-    ]
-    summary["verdict"] = f"{effect.name}: explains {'' if share >= rules.named_share else 'part of '}what is missing"
+    interval = Interval(*found.interval, "equivalent", None)
+    named = NamedEffect(
+        effect.name,
+        "spring",
+        {"compliance": Estimate(found.compliance_m_n, "m/N", interval)},
+        round(MOST_CONFIDENCE * min(1.0, share / rules.named_share) * (0.5 if rivals else 1.0), 3),
+        effect.physics,
+        effect.remedy,
+        effect.source,
+        "plant",
+        "damper",
+        tuple(rivals),
+    )
+    summary["effects"] = [named.as_json()]
+    whole = share >= rules.named_share
+    sentence = f"{effect.name}: explains {'' if whole else 'part of '}what is missing"
+    summary |= Verdict("explained" if whole else "partly explained", sentence, share).sentence_as_json()
     summary["before"], summary["after"] = _score(found.nrmse_before), _score(found.nrmse_after)
-    summary["unexplained"] = {
-        "structured": share < rules.named_share, "share_of_residual": 1.0 - share, "depends_on": []
-    }  # fmt: skip
+    summary["unexplained"] = Unexplained(not whole, 1.0 - share).as_json()
 
 
 def _score(nrmse: float) -> dict[str, float]:
@@ -225,11 +225,5 @@ def merged(parts: Sequence[Part]) -> dict[str, Any]:
     if not first.named:
         open_part = next((part for part in order if part.unexplained), first)
         summary["unexplained"] = open_part.summary["unexplained"]
-    summary["parts"] = {
-        part.name: {
-            key: part.summary[key]
-            for key in ("model", "quantity", "verdict", "noise_floor_nrmse", "before", "after", "effects", "candidates")
-        }
-        for part in parts
-    }
+    summary["parts"] = {part.name: {key: part.summary[key] for key in OF_PART} for part in parts}
     return summary

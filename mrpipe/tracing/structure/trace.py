@@ -19,6 +19,7 @@ from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.records import FrameData
 from mrpipe.tracing.structure.scores import FrameScore, dependence, flexible_score, frame_score, noise_floor
 from mrpipe.tracing.structure.select import FrameCandidate, FrameSelection, select
+from mrpipe.tracing.verdict import Candidate, Estimate, Interval, LeftOutGain, NamedEffect, Unexplained, Verdict
 
 QUANTITY = (
     "shear force of every storey (mass times absolute acceleration, summed from the top) from the measured motion, "
@@ -159,22 +160,16 @@ def _summary(
             "nrmse": {selection.base: scores[0].nrmse},
         },
         "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
-        "effects": named,
-        "verdict": reason or _verdict(named, share, rules),
-        "candidates": ranking(selection, problem),
+        "effects": [item.as_json() for item in named],
+        **_verdict(selection, named, share, rules, reason).sentence_as_json(),
+        "candidates": [item.as_json() for item in ranking(selection, problem)],
         "after": _json(scores[1]),
         "ceiling": {"nrmse": best, "recovered": float(np.clip(recovered, 0.0, 1.0))},
-        "unexplained": {
-            "structured": bool(still),
-            "share_of_residual": float(np.clip(1.0 - share, 0.0, 1.0)) if structured else 0.0,
-            "depends_on": [
-                {"state": f"{name} of storey {worst + 1}", "share": value}
-                for name, value in dependence(after, problem.training, worst)[:LISTED]
-                if value > problem.rules.listed
-            ]
-            if still
-            else [],
-        },
+        "unexplained": Unexplained(
+            bool(still),
+            float(np.clip(1.0 - share, 0.0, 1.0)) if structured else 0.0,
+            _depends_on(after, problem, worst) if still else (),
+        ).as_json(),
         "tests": [
             {"name": name, "nrmse_before": value, "nrmse_after": scores[1].by_test[name]}
             for name, value in scores[0].by_test.items()
@@ -185,6 +180,11 @@ def _summary(
             "band_hz": [problem.band.low_hz, problem.band.high_hz],
         },
     }
+
+
+def _depends_on(after: FrameModel, problem: FrameProblem, storey: int) -> tuple[tuple[str, float], ...]:
+    found = dependence(after, problem.training, storey)[:LISTED]
+    return tuple((f"{name} of storey {storey + 1}", value) for name, value in found if value > problem.rules.listed)
 
 
 def _json(value: FrameScore) -> dict[str, float]:
@@ -211,7 +211,7 @@ def _worst_storey(selection: FrameSelection) -> int:
     return int(np.argmax(np.bincount(selection.groups.storey, weights=over)))
 
 
-def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[dict[str, Any]]:
+def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[NamedEffect]:
     found, first = [], 0
     total = selection.share(selection.residual)
     for place, item in enumerate(selection.chosen):
@@ -225,24 +225,23 @@ def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[d
         rivals = [other.name for other in candidates[1:] if other.share > candidates[0].share - rules.lead]
         gain = selection.gains[place - selection.declared] if selection.gains else None
         effect = item.placed.effect
-        entry: dict[str, Any] = {
-            "name": effect.name,
-            "form": item.placed.form.name,
-            "place": place_in_words(item, own, selection.rules.acting),
-            "parameters": parameters_of(item, own, selection.rules.acting),
-            "confidence": confidence_of(total, lead, None, rules),
-            "tied_with": rivals,
-            "physics": effect.physics,
-            "remedy": effect.remedy,
-            "source": effect.source,
-            "corrected_in": "structure",
-        }
-        tests = {name: effect.separated_by[name].advice for name in rivals if name in effect.separated_by}
-        if tests:
-            entry["separating_tests"] = tests
-        if gain is not None:
-            entry["cross_validated_gain"] = {"share": gain.share, "interval": list(gain.interval)}
-        found.append(entry)
+        interval = None if gain is None else LeftOutGain(gain.share, Interval(*gain.interval))
+        found.append(
+            NamedEffect(
+                effect.name,
+                item.placed.form.name,
+                parameters_of(item, own, selection.rules.acting),
+                confidence_of(total, lead, None, rules),
+                effect.physics,
+                effect.remedy,
+                effect.source,
+                "structure",
+                place_in_words(item, own, selection.rules.acting),
+                tuple(rivals),
+                {name: effect.separated_by[name].advice for name in rivals if name in effect.separated_by},
+                interval,
+            )
+        )
     return found
 
 
@@ -274,7 +273,7 @@ def place_in_words(item: Fitted, amplitudes: FloatArray, acting: float) -> str:
     return "storey " + ", ".join(str(k + 1) for k in strong)
 
 
-def parameters_of(item: Fitted, amplitudes: FloatArray, acting: float) -> dict[str, dict[str, Any]]:
+def parameters_of(item: Fitted, amplitudes: FloatArray, acting: float) -> dict[str, Estimate]:
     """Return value and unit of every parameter; amplitudes of several storeys by storey, with their median as value.
 
     Parameters
@@ -286,19 +285,19 @@ def parameters_of(item: Fitted, amplitudes: FloatArray, acting: float) -> dict[s
     acting
         Share of the largest amplitude below which a storey does not count in the median.
     """
-    found: dict[str, dict[str, Any]] = {}
-    for parameter, value in zip(item.placed.form.searched, item.numbers, strict=True):
-        found[parameter.name] = {"value": float(value), "unit": parameter.unit, "interval": [float(value)] * 2}
+    found = {
+        parameter.name: Estimate(float(value), parameter.unit, Interval.point(float(value)))
+        for parameter, value in zip(item.placed.form.searched, item.numbers, strict=True)
+    }
     kinds = len(item.placed.form.amplitudes)
     for k, parameter in enumerate(item.placed.form.amplitudes):
         own = amplitudes[k::kinds]
         value = float(np.max(own)) if len(own) < BY_STOREY else _typical(own, acting)
-        found[parameter.name] = {"value": value, "unit": parameter.unit}
-        found[parameter.name]["interval"] = [float(np.min(own)), float(np.max(own))]
-        if len(own) > 1:
-            found[parameter.name]["by_storey"] = [float(value) for value in own]
+        interval = Interval(float(np.min(own)), float(np.max(own)), "range", None)
+        storeys = tuple(float(number) for number in own) if len(own) > 1 else ()
+        found[parameter.name] = Estimate(value, parameter.unit, interval if storeys else Interval.point(value), storeys)
     if item.placed.floor:
-        found["floor"] = {"value": item.placed.floor, "unit": "1", "interval": [item.placed.floor] * 2}
+        found["floor"] = Estimate(item.placed.floor, "1", Interval.point(item.placed.floor))
     return found
 
 
@@ -307,29 +306,33 @@ def _typical(values: FloatArray, acting: float) -> float:
     return float(np.median(strong))
 
 
-def ranking(selection: FrameSelection, problem: FrameProblem) -> list[dict[str, Any]]:
-    """Return the ranking of the first round: share, evidence, error on validation records, forms tried."""
+def ranking(selection: FrameSelection, problem: FrameProblem) -> list[Candidate]:
+    """Return the candidates of the first round, best first, with their errors on validation records."""
     if not selection.rounds:
         return []
     return [_ranked(item, selection, problem) for item in selection.rounds[0]]
 
 
-def _ranked(item: FrameCandidate, selection: FrameSelection, problem: FrameProblem) -> dict[str, Any]:
-    design = selection.design
-    model = model_of(design, (*selection.chosen[: selection.declared], item.outcome.fitted), selection.about)
-    return {
-        "name": item.name,
-        "form": item.outcome.fitted.placed.form.name,
-        "nrmse": frame_score(model, problem.validation).nrmse,
-        "evidence": 0.5 * (design.chi_square - item.outcome.solved.chi_square) * design.size,
-        "share": item.share,
-        "forms": item.forms,
-        "at_bound": list(item.outcome.fitted.at_bound),
-    }
+def _ranked(item: FrameCandidate, selection: FrameSelection, problem: FrameProblem) -> Candidate:
+    design, fitted = selection.design, item.outcome.fitted
+    model = model_of(design, (*selection.chosen[: selection.declared], fitted), selection.about)
+    return Candidate(
+        item.name,
+        fitted.placed.form.name,
+        frame_score(model, problem.validation).nrmse,
+        0.5 * (design.chi_square - item.outcome.solved.chi_square) * design.size,
+        item.share,
+        item.forms,
+        tuple(fitted.at_bound),
+    )
 
 
-def _verdict(named: Sequence[dict[str, Any]], share: float, rules: Rules) -> str:
-    names = " and ".join(f"{item['name']} ({item['place']})" for item in named)
+def _verdict(
+    selection: FrameSelection, named: Sequence[NamedEffect], share: float, rules: Rules, reason: str
+) -> Verdict:
+    if reason:
+        return Verdict("unknown" if selection.structured else "noise", reason)
+    names = " and ".join(f"{item.name} ({item.place})" for item in named)
     if share >= rules.named_share:
-        return f"{names}: explains what is missing"
-    return f"{names}: explains part of what is missing, its form is not proven"
+        return Verdict("explained", f"{names}: explains what is missing", share)
+    return Verdict("partly explained", f"{names}: explains part of what is missing, its form is not proven", share)
