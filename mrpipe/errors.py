@@ -37,7 +37,7 @@ class UserError(MrpipeError):
 
 
 class CheckFailed(MrpipeError):
-    """The program ran, but a check that was asked for failed (exit status 1)."""
+    """The program ran, but a requested check failed (exit status 1)."""
 
 
 class StageSkipped(MrpipeError):

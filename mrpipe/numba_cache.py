@@ -163,7 +163,7 @@ def _point_numba_to(folder: Path | None) -> None:
 
 @contextmanager
 def cache_for(name: str) -> Iterator[None]:
-    """Keep what is compiled within this block in a folder of its own.
+    """Keep the code that is compiled within this block in a separate folder.
 
     numba itself compares size and time of change of a file only, and both stay the same when a file is restored from a
     backup: the name of the folder of a user's own file is to contain a hash of its content.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """What a run directory holds; everything is read when it is asked for.
+    """Contents of a run directory; everything is read when it is used.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ from pathlib import Path
 
 @contextmanager
 def atomic_path(final: Path) -> Iterator[Path]:
-    """Yield a temporary path beside `final` that replaces it on success and vanishes on failure.
+    """Yield a temporary path in the folder of `final`; it replaces `final` on success and is removed on failure.
 
     The data are flushed to the disk before the rename, so that a crash of the machine leaves a whole file too.
     """

@@ -23,7 +23,7 @@ def config_directory() -> Path:
 
 
 def public_data_directory() -> Path | None:
-    """Return the folder of the public measurements: $MRPIPE_DATA, else ../shared/data beside the project.
+    """Return the folder of the public measurements: $MRPIPE_DATA, else ../shared/data next to the project.
 
     Returns None where neither exists; the caller says so.
     """
@@ -88,7 +88,7 @@ def load_parameter_set(kind: str, name: str | Path) -> ParameterSet:
     try:
         content: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
     except yaml.YAMLError as error:
-        raise UserError(path, "", f"not valid YAML ({error})", "mend the syntax") from error
+        raise UserError(path, "", f"not valid YAML ({error})", "correct the syntax") from error
     values: dict[str, FloatArray] = {}
     units: dict[str, str] = {}
     for key, entry in content["parameters"].items():

@@ -13,7 +13,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class Progress(Protocol):
-    """Told how far a long computation has come; domain code knows nothing of terminals."""
+    """Called with the progress of a long computation, so that domain code does not depend on a terminal."""
 
     def __call__(self, fraction: float, text: str = "") -> None:
         """Report `fraction` (0 to 1) done, with a short `text`."""

@@ -167,7 +167,7 @@ def parse(text: str, source: str | Path) -> tuple[Any, Any]:
         node = yaml.compose(text, Loader=_Loader)
         if node is not None:
             _require_measure(node, source)
-        # construction changes the tree where it merges mappings, so it gets a tree of its own
+        # construction changes the tree when it merges mappings, so it gets a copy of the tree
         content = yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)

@@ -160,7 +160,7 @@ def _names(headers: list[list[str]], keep: list[int]) -> list[str]:
 
 
 def _numbers(path: Path, column: Any, name: str, first: int) -> FloatArray:
-    """Return a column as floats; text in it that is no time stamp is reported with its line."""
+    """Return a column as floats; text that is not a time stamp is reported with its line."""
     if column.dtype.kind in "fiub":
         return np.asarray(column, dtype=np.float64)
     filled = column.dropna()

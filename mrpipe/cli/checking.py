@@ -144,7 +144,7 @@ def require_known_laws(header: CampaignHeader) -> None:
         if law not in law_names():
             place = ("tests", index, "law")
             raise source.error(
-                place, f"unknown control law {law!r}", f"{nearest(law, set(law_names()))}; leave out a law of your own"
+                place, f"unknown control law {law!r}", f"{nearest(law, set(law_names()))}; leave out your own law"
             )
         known = {item.name for item in law_named(law).gains}
         for name in gains:

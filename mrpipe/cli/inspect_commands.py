@@ -119,7 +119,7 @@ def _shortest(path: Path) -> Path:
 
 
 def _shown(value: Any) -> str | None:
-    """Return a single value as text; sections have none of their own."""
+    """Return a single value as text; sections have no value."""
     import json
 
     if hasattr(value, "model_dump"):

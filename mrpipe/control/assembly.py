@@ -200,7 +200,7 @@ class ControllerFactory:
 
 
 def inverse_network(settings: ControllerSettings, trained: Callable[[], Artifact]) -> Network | None:
-    """Return the trained inverse network where the settings ask for it, else None.
+    """Return the trained inverse network if the settings require it, else None.
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ class ControllerOptions:
         Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.
     inverse_request
         What the past values of an inverse network are: `steady`, the present ones, that is the drive that would hold
-        this force at this speed; or `history`, what was asked for before. A network has learned from measured forces,
+        this force at this speed; or `history`, the forces desired before. A network has learned from measured forces,
         which build up over the yield displacement after a reversal. A desired force jumps there.
     residual_force_n
         Switch P2 (24): below it the drive is 0; 0 leaves the switch out.

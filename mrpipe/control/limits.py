@@ -18,7 +18,7 @@ FRICTION_RATIO = 4.0 / math.pi
 
 @dataclass(frozen=True)
 class LimitingModes:
-    """Free and locked mode of the target, and what the reduction makes of them.
+    """Free and locked mode of the target, and the reduced model that follows from them.
 
     Attributes
     ----------

@@ -42,7 +42,7 @@ _REGULATOR, _CONTROLLER = RegulatorSettings(), ControllerSettings()
 
 @dataclass(frozen=True)
 class Weights:
-    """What LQG weighs and what noise it reckons with.
+    """Weights of LQG and the noise that it assumes.
 
     Attributes
     ----------
@@ -132,9 +132,9 @@ def _sampled(frame: Frame, position: FloatArray, dt: float) -> tuple[FloatArray,
 def lqg_observer(frame: Frame, position: FloatArray, weights: Weights, dt: float) -> Observer:
     """Return the sampled observer and its regulator for :func:`~mrpipe.control.controller.build_controller`.
 
-    The observer predicts from the measured ground acceleration and the force it asked for, and corrects with the
+    The observer predicts from the measured ground acceleration and the desired force, and corrects with the
     damper displacement and the floors' absolute accelerations. The desired damper force, positive where it resists as
-    in (4.1), is minus the force on the structure that the regulator asks for.
+    in (4.1), is minus the force on the structure that the regulator demands.
     """
     Ad, Bd, C, D = _sampled(frame, position, dt)
     L = observer_gain(frame, position, weights, dt)

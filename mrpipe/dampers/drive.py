@@ -121,7 +121,7 @@ def command_place(chain: Chain) -> int:
 
 
 def driver_lag_apart(rise: float, fall: float) -> Step:
-    """Return the driver's lag with rates [1/s] of their own where the effective drive rises and where it falls."""
+    """Return the driver's lag with separate rates [1/s] for rising and falling effective drive."""
     return Step("driver-lag", Phase.CURRENT, lag_apart_step, np.array([float(rise), float(fall)]), state_size=2)
 
 

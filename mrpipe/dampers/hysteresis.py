@@ -65,7 +65,7 @@ def _advance_general(y: float, path: float, exponent: float, unloading: float) -
 
 @njit(float64(float64, float64, float64), cache=True)
 def _advance_square(y: float, path: float, unloading: float) -> float:
-    # unloading branch up to y = 0, then the loading branch with what is left of the path
+    # unloading branch up to y = 0, then the loading branch with the rest of the path
     if y < 0.0:
         root = math.sqrt(abs(unloading))
         if root < 1e-9:

@@ -1,4 +1,4 @@
-"""A user's own Python file, run as a module with a cache of its own for compiled code."""
+"""A user's own Python file, run as a module with a separate cache for compiled code."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class EffectForm:
     parameters
         Its numbers.
     steps
-        (values) -> steps of the chain. Every amplitude has a step of its own, at the place of `amplitude_steps`.
+        (values) -> steps of the chain. Every amplitude has one step, at the place of `amplitude_steps`.
     amplitude_steps
         Amplitude -> index in what `steps` returns.
     dissipative

@@ -1,4 +1,4 @@
-"""Load cell offset that goes with the drive (what changes from test to test is told by the fit of the records)."""
+"""Load cell offset that depends on the drive; the fit of the records finds an offset that changes between tests."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations

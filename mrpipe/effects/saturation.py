@@ -72,7 +72,7 @@ def _knee(values: Values) -> list[Step]:
 
 
 def _command(values: Values) -> list[Step]:
-    # before the lag of the base: what the driver never asks for
+    # before the lag of the base: currents that the driver never demands
     return [Step("command-limit", Phase.MOTION, command_limit_step, np.array([values["inverse_limit"]]))]
 
 

@@ -33,7 +33,7 @@ def network_subject(network: Network, name: str, prefix: str = "mrpipe", **detai
 def network_vectors(network: Network, drive_unit: str) -> Vectors:
     """Return feature rows over the range of the training data, and the estimates of the network.
 
-    Each feature runs over its range with a frequency of its own, so that the rows hold all combinations of small and
+    Each feature runs over its range with another frequency, so that the rows hold all combinations of small and
     large values. The first row is zero.
     """
     spec = network.features

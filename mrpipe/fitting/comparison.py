@@ -32,7 +32,7 @@ DRAFT_SAMPLES = 12_000
 """Forms are ranked on about so many samples; only those that may win are fitted to all."""
 
 MOST_FITTED = 5
-"""Of the forms near the best so many are fitted to all samples, besides those that are asked for."""
+"""Number of forms near the best that are fitted to all samples, in addition to the requested ones."""
 
 COUPLED_SAMPLES = 20_000
 """Forms that are solved several times over are fitted on about so many samples of the motion."""
@@ -91,7 +91,7 @@ class JudgedFit:
         Pooled figures; not a number where there are no tests of the role.
     cross_validated_nrmse, left_out_nrmse
         NRMSE over training tests left out in turn, pooled and of each test (of each stretch where there are few
-        tests); None and empty where not asked for.
+        tests); None and empty if not requested.
     """
 
     fit: FormFit
@@ -129,7 +129,7 @@ class Comparison:
     drafts
         NRMSE of every form on a share of the samples.
     laws
-        The choice of the laws of the drive; None where it was not asked for.
+        The choice of the laws of the drive; None if it was not requested.
     """
 
     judged: tuple[JudgedFit, ...]

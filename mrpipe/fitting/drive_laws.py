@@ -4,7 +4,7 @@ At given steps of the base form the force is linear in F_y(u) and c0(u). Sums of
 of drive therefore hold all that any law needs, and hundreds of fits take milliseconds.
 
 A law is judged by its error on levels that its fit has not seen. Only levels inside the range are left out: the ends
-would ask for extrapolation, which no law of the drive supports. Of laws that predict alike the one with fewest numbers
+would require extrapolation, which no law of the drive supports. Of laws that predict alike the one with fewest numbers
 is taken. A law may have at most as many numbers as there are levels; one with as many numbers as levels cannot be
 judged in this way and is taken only where every simpler law misses the levels themselves.
 """

@@ -162,7 +162,7 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
     recordings
         The tests.
     tapped
-        Places in the chain, rising: the force that each of these steps adds is recorded in a row of its own.
+        Places in the chain, rising: the force that each of these steps adds is recorded in a separate row.
 
     Returns
     -------

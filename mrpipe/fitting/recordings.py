@@ -320,7 +320,7 @@ def steady_noise(values: FloatArray, rate_hz: float) -> float:
 
 
 def resolution(values: FloatArray) -> float:
-    """Return the step of a quantised channel, in its unit; 0 if every sample has a value of its own.
+    """Return the step of a quantised channel, in its unit; 0 if all samples differ.
 
     Rounding to steps of q adds noise of q / sqrt(12) (Widrow and Kollar, Quantization Noise, 2008).
     """
@@ -334,6 +334,6 @@ def displacement_cutoff(test: PreparedTest) -> float:
     """Return the cut-off [Hz] of the displacement: where it sinks into its noise, at most a quarter of the rate."""
     raw, rate = test.displacement_raw_m, test.sampling_rate_hz
     found = cutoff_by_criterion(raw, rate, velocity_share=0.9995, margin=CUTOFF_MARGIN)
-    # noise let through is differentiated twice where an effect asks for the acceleration
+    # remaining noise is differentiated twice if an effect needs the acceleration
     found = min(found, CUTOFF_MARGIN * signal_end(raw, rate))
     return float(min(max(found, 12.0), 0.25 * test.sampling_rate_hz, 250.0))

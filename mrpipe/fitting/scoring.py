@@ -15,7 +15,7 @@ from mrpipe.signals.prepared import PreparedTest
 
 @dataclass(frozen=True)
 class TestScore:
-    """One test: sums from which pooled figures follow, and the figures of its own.
+    """One test: sums from which pooled figures follow, and the figures of the test.
 
     Attributes
     ----------

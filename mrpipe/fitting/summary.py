@@ -94,7 +94,7 @@ def _judged_error(row: dict[str, Any]) -> float:
 
 
 def correlation_rows(fit: FormFit, limit: float = 0.95) -> list[dict[str, Any]]:
-    """Return pairs of parameters that the data hardly tell apart (correlation above `limit`)."""
+    """Return pairs of parameters that the data hardly separate (correlation above `limit`)."""
     return [
         {"parameters": [first, second], "correlation": correlation}
         for first, second, correlation in fit.correlated(limit)
@@ -125,7 +125,7 @@ def findings(fit: FormFit) -> list[str]:
             f"eta = {fit.model.parameters['eta']:g} 1/s is assumed"
         )
     lines += [f"{fit.form.name}: {note}" for note in fit.notes]
-    # a parameter that a note mentions needs no line of its own
+    # a parameter that a note mentions needs no separate line
     silent = [name for name in fit.at_bound if not any(name in note for note in fit.notes)]
     lines += [f"{fit.form.name}: {name} ended at its bound, the data do not determine it" for name in silent]
     levels = distinct_levels(problem.recordings)

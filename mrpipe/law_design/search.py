@@ -78,7 +78,7 @@ def search(value: Value, free: Sequence[FreeGain], fixed: Mapping[str, float], o
     Parameters
     ----------
     value
-        Objective of a set of gains; the same gains are not asked for twice.
+        Objective of a set of gains; the same gains are not evaluated twice.
     free, fixed
         Gains to search, and the others.
     options

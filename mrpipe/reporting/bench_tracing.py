@@ -193,7 +193,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     effects = [item for item in summary["effects"] if item["name"] != "unattributed"]
     flexible = len(effects) < len(summary["effects"])
     added = (
-        f" As asked for, a flexible model is added as the effect `unattributed`, with which the error is "
+        f" As requested, a flexible model is added as the effect `unattributed`, with which the error is "
         f"{_percent(after)}: it stands for no physics and does not run in the closed loop."
         if flexible
         else ""
@@ -259,7 +259,7 @@ def _unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
         else ("lower the error and are part of it, but are not proven")
     )
     rivals = sorted({name for item in terms for name in item["tied_with"]})
-    return f" Beside that {names} {rest}{f' against {_listed(rivals)}' if rivals else ''}."
+    return f" In addition, {names} {rest}{f' against {_listed(rivals)}' if rivals else ''}."
 
 
 def _effect_in_words(effect: Mapping[str, Any]) -> str:

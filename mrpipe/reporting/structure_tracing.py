@@ -69,7 +69,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         f"compared ({summary['quantity']}); sensor noise alone is {100 * summary['noise_floor_nrmse']:.2g} %."
     )
     if not summary["residual"]["structured"]:
-        return f"{start} What is left is noise: nothing is missing."
+        return f"{start} The rest is noise: nothing is missing."
     if not summary["effects"]:
         depends = ", ".join(item["state"] for item in summary["unexplained"]["depends_on"][:3])
         return f"{start} Something is missing, but no known effect explains it." + (

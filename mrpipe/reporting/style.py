@@ -1,4 +1,4 @@
-"""The look that all figures share: one colour scheme that colour-blind readers can tell apart, and vector graphics.
+"""The look that all figures share: one colour scheme that colour-blind readers can distinguish, and vector graphics.
 
 The colours are those of Okabe and Ito, "Color Universal Design" (2008).
 """

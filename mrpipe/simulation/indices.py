@@ -24,7 +24,7 @@ QUICK = 0.55
 within a period: what follows swings about the place where the damper stuck, and the first half period counts."""
 
 LEAST_ENERGY = 0.02
-"""What is left of the energy below this share is no decay any more."""
+"""Below this share of the energy the motion is not a decay any more."""
 
 SMALLEST_FITTED_PEAK = 0.15
 """Peaks below this share of the first are no decay under control any more: residual force or a locked damper."""

@@ -160,7 +160,7 @@ def run_loop(
     after = np.zeros(size + 4)
     velocities = after[n:size]
     drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
-    # the plain chain in numbers of its own: reading arrays through its function pointers takes longer than its sums
+    # the plain chain in separate numbers: reading arrays through its function pointers takes longer than its sums
     u, yielding, viscous, zeta, hysteretic, rod, rod_end = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     eta_dt, yield_displacement, gamma_share, exponent = 0.0, 1.0, 0.5, 2.0
     y0, y1, y2, y3, v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

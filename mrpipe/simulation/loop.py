@@ -135,7 +135,7 @@ class Response:
     damper_displacement, damper_velocity
         Across the damper.
     force, drive, desired_force
-        Damper force [N], drive at the damper [A or V], force the controller asked for [N].
+        Damper force [N], drive at the damper [A or V], force desired by the controller [N].
     ground_acceleration
         Of the base.
     work_in, work_damper, work_frame, energy

@@ -180,7 +180,7 @@ def excitation_of(
     rig, settings
         What is shaken, and how.
     warn
-        Told where the adjustment does not reach a response that the settings do not demand.
+        Called with a message if the adjustment does not reach a response that the settings do not demand.
 
     Raises
     ------

@@ -77,7 +77,7 @@ def _before(stage: Stage, known: Mapping[str, Stage]) -> set[str]:
     for item in (*stage.inputs, *stage.optional_inputs):
         name = RECORDERS.get(item, item)
         if name not in known and item not in RECORDERS:
-            raise ValueError(f"stage {stage.name} reads {name}, which is no stage")
+            raise ValueError(f"stage {stage.name} reads {name}, which is not a stage")
         names.add(name)
     for item in stage.after:
         names |= {item} | {other.name for other in known.values() if other.family == item}

@@ -136,7 +136,7 @@ def test_order_follows_inputs_and_after() -> None:
     [
         ([Stage("a", "", _nothing, inputs=("b",)), Stage("b", "", _nothing, inputs=("a",))], "wait for each other"),
         ([Stage("a", "", _nothing), Stage("a", "", _nothing)], "two stages have the name a"),
-        ([Stage("a", "", _nothing, inputs=("b",))], "reads b, which is no stage"),
+        ([Stage("a", "", _nothing, inputs=("b",))], "reads b, which is not a stage"),
     ],
 )
 def test_an_order_that_cannot_be_is_refused(stages: list[Stage], message: str) -> None:

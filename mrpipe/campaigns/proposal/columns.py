@@ -223,7 +223,7 @@ def _guess(column: Column, quantity: str) -> Guess:
         return Guess(column.name, header.unit)
     unit, why = unit_by_size(column.values, quantity)
     if header.unit:
-        why = f"the header gives {header.unit}, which is no unit of {quantity}: give scale and unit of the sensor"
+        why = f"the header gives {header.unit}, which is not a unit of {quantity}: give scale and unit of the sensor"
     return Guess(column.name, unit, why)
 
 

@@ -14,7 +14,7 @@ from mrpipe.campaigns.schema import TextEntry
 
 
 def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
-    """Return the datasets of an HDF5 file; the fields of a compound dataset are columns of their own."""
+    """Return the datasets of an HDF5 file; each field of a compound dataset is one column."""
     names: list[str] = []
 
     def note(name: str, item: Any) -> None:

@@ -123,7 +123,7 @@ class WindSettings(Section):
     model: str | None = Field(
         None,
         description="Path of the published matrices (M76, C76, K76); `published` for those of the public data; null: "
-        "the surrogate of our own.",
+        "the surrogate model.",
     )
     surrogate: str = Field(
         "wind-surrogate", description="Parameter set in configs/structures (or YAML file) of the surrogate."

@@ -26,7 +26,7 @@ class CloseLoopSettings(Section):
     most_effects: int = Field(3, ge=0, le=3, description="Most effects that are named together.")
     candidates: tuple[str, ...] = Field((), description="Effects to consider; empty for all of the library.")
     effect_files: tuple[Path, ...] = Field(
-        (), description="Python files of your own, each of which defines one more effect as EFFECT."
+        (), description="Your Python files, each of which defines one more effect as EFFECT."
     )
     base_forms: tuple[str, ...] = Field(
         (), description="Base forms that are tried in addition to the declared one; empty for all of the library."

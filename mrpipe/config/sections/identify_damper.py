@@ -16,7 +16,7 @@ class IdentifyDamperSettings(DamperFitSettings):
     """Which parametric damper is fitted to the bench tests, and how."""
 
     form_files: tuple[Path, ...] = Field(
-        (), description="Python files of your own, each of which defines one more base form as FORM."
+        (), description="Your Python files, each of which defines one more base form as FORM."
     )
     form: str = Field(
         "bouc-wen",

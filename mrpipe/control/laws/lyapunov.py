@@ -34,7 +34,7 @@ def lyapunov_observer(frame: Frame, position: FloatArray, weights: Weights, dt: 
     Raises
     ------
     UserError
-        If the structure has no damping of its own: then no P exists.
+        If the structure has no damping, because then no P exists.
     """
     _check_damped(frame)
     space = state_space(frame, position)

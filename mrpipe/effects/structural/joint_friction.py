@@ -18,7 +18,7 @@ def slipping_step(
 ) -> None:
     """Springs in parallel that slip at their limits (Iwan); parameters: slip displacement [m], number of springs.
 
-    Limits of several springs are 1/2, 1, 2, 4 of it, so that slip comes by and by. `state` is the drift of the step
+    Limits of several springs are 1/2, 1, 2, 4 of it, so that slip sets in gradually. `state` is the drift of the step
     before and the deflection of each spring.
     """
     moved = position - state[0]

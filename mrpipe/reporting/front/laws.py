@@ -164,16 +164,16 @@ def answer(facts: RunFacts) -> str:
         else (f"**{best.law}** is the best law {motion}")
     )
     text += f": RMS top displacement {_millimetres(best.rms_top_m)}"
-    beside = []
+    compared = []
     if bare is not None:
-        beside.append(f"{_millimetres(bare.rms_top_m)} without a damper ({_change(best.rms_top_m, bare.rms_top_m)})")
+        compared.append(f"{_millimetres(bare.rms_top_m)} without a damper ({_change(best.rms_top_m, bare.rms_top_m)})")
     for rival in laws:
         if rival.law == "passive-off" and rival is not best:
-            beside.append(
+            compared.append(
                 f"{_millimetres(rival.rms_top_m)} with the damper switched off "
                 f"({_change(best.rms_top_m, rival.rms_top_m)})"
             )
-    text += f", compared with {listed(beside)}." if beside else "."
+    text += f", compared with {listed(compared)}." if compared else "."
     if np.isfinite(best.damping_ratio):
         text += f" Its damping ratio in free decay is {percent(best.damping_ratio)}."
     detuned = [run for run in laws if run not in damps and run.rms_top_m < best.rms_top_m]
@@ -208,8 +208,8 @@ def doubts(facts: RunFacts) -> list[str]:
     far = sorted(((share, law) for law, share in shares.items() if share > 0.01), reverse=True)
     found = []
     if far:
-        told = listed([f"{law} ({percent(share)} of the time)" for share, law in far])
-        found.append(f"The damper model is extrapolated beyond its bench tests under {told}.")
+        named = listed([f"{law} ({percent(share)} of the time)" for share, law in far])
+        found.append(f"The damper model is extrapolated beyond its bench tests under {named}.")
     loop = facts.summary("close-loop").get("closed_loop") or {}
     grows = [
         row["law"]

@@ -111,7 +111,7 @@ def _rows_of(base: Base, spectra: Sequence[Spectra], storey: int, width: int) ->
     rows, target = [], []
     for item in spectra:
         own = base_rows(base, item, storey)
-        # records without a damper or a shaker have no such load: their columns are nought
+        # records without a damper or a shaker have no such load: their columns are zero
         full = np.zeros((width, own.shape[1]), dtype=np.complex128)
         full[: len(own)] = own
         rows.append(stacked(full * item.weight[storey]))
@@ -145,7 +145,7 @@ class Solved:
     Attributes
     ----------
     amplitudes
-        Shape (k,), none below nought.
+        Shape (k,), none negative.
     residual
         Shape (n, 2 b).
     chi_square
