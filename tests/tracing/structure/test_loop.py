@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from mrpipe.campaigns.model import Recording
 from mrpipe.effects.library import damper_effects
 from mrpipe.tracing.bench.summary import TracingOptions
+from mrpipe.tracing.rules import DelayRules
 from mrpipe.tracing.structure.damper import find_brace, prepared_loops, trace_damper
 from mrpipe.tracing.structure.delay import LoopSignals, drive_lag, law_lag
 from mrpipe.tracing.structure.loop import bench_of, damper_motion, motion_noise
@@ -55,6 +57,31 @@ def test_a_late_law_is_found(delay: float) -> None:
     assert found is not None
     assert found.late == (delay > 0.0)
     assert found.lag_s == pytest.approx(delay, abs=0.0031)
+
+
+@pytest.mark.property
+def test_a_declared_filter_and_the_rules_decide_what_is_late() -> None:
+    late = drive_lag(loop(0.012))
+    assert late is not None and late.late
+    # a second-order filter at 20 Hz delays by 11 ms
+    filtered = drive_lag([replace(item, command_filter_hz=20.0) for item in loop(0.012)])
+    assert filtered is not None and not filtered.late
+    assert filtered.granted_s == pytest.approx(0.0113, abs=1e-4)
+    generous = drive_lag(loop(0.012), DelayRules(least_periods=0.05))
+    assert generous is not None and not generous.late
+
+
+@pytest.mark.property
+def test_lags_are_judged_by_the_period_of_the_motion() -> None:
+    slow, fast = ([replace(item, rate_hz=item.rate_hz * factor) for item in loop(0.012)] for factor in (0.5, 1.0))
+    # the same samples on a clock of half the rate: all times are doubled
+    found = [
+        drive_lag([replace(item, velocity=item.velocity * item.rate_hz / RATE) for item in tests])
+        for tests in (slow, fast)
+    ]
+    assert found[0] is not None and found[1] is not None
+    assert found[0].lag_s == pytest.approx(2.0 * found[1].lag_s, rel=1e-6)
+    assert found[0].late == found[1].late
 
 
 def recordings(effect: str, compliance: float = 0.0, training: int = 5) -> list[Recording]:
