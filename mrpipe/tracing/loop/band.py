@@ -30,7 +30,7 @@ from mrpipe.tracing.loop.comparison import (
 from mrpipe.tracing.rules import LoopRules
 
 OPTIONS = CurveOptions(points=11, tolerance=1e-2, most_cycles=60, frequency_tolerance=5e-3, refined=("rms_x_top_m",))
-"""Response curves of the ranking: peaks are accurate to about half a percent, which is less than `rules.alike`."""
+"""Numerical technique: response curves of the ranking, whose peaks are accurate to half of `rules.alike`."""
 
 
 @dataclass(frozen=True)
