@@ -20,7 +20,7 @@ SCALE_ATTRIBUTES = frozenset({"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST
 
 
 def is_scale(item: Any) -> bool:
-    """Return whether an object of a file is a dimension without values, which is no result."""
+    """Return whether an object of a file is a dimension without values, which is not a result."""
     if not isinstance(item, h5py.Dataset):
         return False
     name = item.attrs.get("NAME", b"")

@@ -14,7 +14,7 @@ _HEAD = """\
 Every command with its arguments and options. `mrpipe COMMAND --help` prints the same. This page is written by
 `python -m mrpipe.cli.document > docs/command-line.md`.
 
-Exit status: 0 done; 1 a check that was asked for failed; 2 the input is wrong, and one line says what and where; 130
+Exit status: 0 done; 1 a requested check failed; 2 the input is wrong, and one line says what and where; 130
 interrupted.
 """
 _COMMON_HEAD = """

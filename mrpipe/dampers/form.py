@@ -100,7 +100,7 @@ class BaseForm:
     springs: tuple[str, ...] = ()
 
     def without_springs(self) -> BaseForm:
-        """Return the form without its springs, for comparisons in which the accumulator is an effect of its own."""
+        """Return the form without its springs, for comparisons in which the accumulator is a separate effect."""
         if not self.springs:
             return self
         kept = tuple(item for item in self.parameters if item.name not in self.springs)

@@ -1,4 +1,4 @@
-"""The ledger: every result and statement of the thesis beside what this program computes.
+"""The ledger: every result and statement of the thesis, compared with what this program computes.
 
 The names below are imported at first use, because the configuration needs the settings of this package only.
 """

@@ -163,7 +163,7 @@ def _residual(run: LoopRun, drive_limit: float) -> float | None:
 
 
 def _loop(bench: Bench) -> Outcomes:
-    """Return what needs runs of its own: clipping, residual force, delay of the filter."""
+    """Return the claims that need separate runs: clipping, residual force, delay of the filter."""
     rig = bench.rig
     amplitude = amplitude_of(rig, reference_rms_top_m())
     runs = {law: run_law(rig, law, excite(amplitude), bench.seed) for law in LAWS}

@@ -46,7 +46,7 @@ Outcomes = dict[str, Outcome]
 
 @dataclass(frozen=True)
 class Claim:
-    """An entry beside the recomputed value.
+    """An entry and the recomputed value.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The page and the figures of `reproduce`: what the thesis prints beside what is recomputed."""
+"""The page and the figures of `reproduce`: printed and recomputed figures."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def markdown(ledger: Ledger) -> str:
     claims = ledger.claims
     by_table, by_kind = counts_by_table(claims), counts_by_kind(claims)
     lines = [
-        "# The thesis beside this run",
+        "# The thesis and this run",
         "",
         "A recomputed value comes from a computation that could have disagreed. A number that sets a condition of the "
         "computation has no verdict. Printed figures and the checks of this project are kept apart.",
@@ -166,7 +166,7 @@ def deviations(claims: Sequence[Claim]) -> np.ndarray[Any, np.dtype[np.float64]]
 
 
 def deviation_figure(claims: Sequence[Claim]) -> Figure:
-    """Draw the deviation of every number that was recomputed, by verdict, beside its tolerance."""
+    """Draw the deviation of every number that was recomputed, by verdict, and its tolerance."""
     chosen = [claim for claim in claims if claim.entry.tolerance is not None and claim.recomputed is not None]
     values = np.clip(deviations(chosen), _SMALLEST, _LARGEST)
     figure, axes = figure_with_axes(1, 1, height=max(3.0, 0.16 * len(chosen)))

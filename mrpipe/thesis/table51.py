@@ -1,4 +1,4 @@
-"""Table 5.1 explained: both printed columns beside the loop at one frequency, at its resonance, and with other dampers.
+"""Table 5.1 explained: both printed columns, the loop at one frequency, at its resonance, and with other dampers.
 
 The thesis takes its measured values at the "actual resonance frequency of the excited first mode" (end of 5.5.1). The
 top acceleration over the top displacement of vd is the frequency squared: 8.1 rad/s in the simulated column and 8.6
@@ -44,7 +44,7 @@ CURVE = CurveOptions(
     frequency_tolerance=0.01,
     refined=("rms_x_top_m",),
 )
-"""How the response curves of the ledger are measured: half a per cent is enough beside numbers of two digits."""
+"""How the response curves of the ledger are measured: half a per cent is enough for numbers of two digits."""
 
 BAND = (0.9, 1.02)
 """Band of the search: over the free frequency, and over the frequency with a locked damper."""

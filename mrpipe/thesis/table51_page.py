@@ -119,7 +119,7 @@ def words(cases: Mapping[str, Case]) -> list[str]:
 
 
 def figure(cases: Mapping[str, Case]) -> Figure:
-    """Draw both printed columns beside the cases: a row for each column of Table 5.1, a panel for each index."""
+    """Draw both printed columns and the cases: a row for each column of Table 5.1, a panel for each index."""
     made, axes = figure_with_axes(2, 4, height=3.2, width=14.0)
     for line, (part, name, chosen) in enumerate(_PARTS):
         printed = printed_columns("Table 5.1", part)
@@ -161,7 +161,7 @@ def describe(sink: Sink, cases: Mapping[str, Case]) -> None:
     """Write the part of the report."""
     for text in words(cases):
         sink.text(text)
-    sink.figure("table-5-1", figure(cases), "Table 5.1: both printed columns beside the closed loop.")
-    sink.table("table-5-1-values", pd.DataFrame(value_rows(cases)), "Table 5.1 beside the closed loop.")
+    sink.figure("table-5-1", figure(cases), "Table 5.1: both printed columns and the closed loop.")
+    sink.table("table-5-1-values", pd.DataFrame(value_rows(cases)), "Table 5.1 and the closed loop.")
     sink.table("table-5-1-errors", pd.DataFrame(error_rows(cases)), "Mean log errors against the printed columns.")
     sink.table("table-5-1-damping", pd.DataFrame(damping_rows(cases)), "Free-decay damping ratios.")

@@ -14,7 +14,10 @@ from mrpipe.tracing.rules import DelayRules, TracingRules
 pytestmark = pytest.mark.property
 
 PACKAGE = Path(__file__).resolve().parents[2] / "mrpipe" / "tracing"
-OPEN = [f"bench/{name}.py" for name in ("trace", "forms", "select", "pairs", "refine", "crossvalidation", "summary")]
+OPEN = [
+    f"bench/{name}.py"
+    for name in ("trace", "race", "choose", "select", "pairs", "refine", "crossvalidation", "summary")
+]
 """Modules whose thresholds are not rules yet."""
 
 NEUTRAL = {0.0, 1.0, 2.0, 0.5}
