@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.decay import DecayResult, Estimate, analyse_decay
+from mrpipe.modal.decay import DecayMethod, DecayResult, Estimate, analyse_decay
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.records import FrameTest, FrameTests, Place
 
@@ -60,7 +60,11 @@ def pooled(first: Estimate, second: Estimate) -> Estimate:
 
 
 def choose_damping(
-    sweep: tuple[Estimate, ...], decays: dict[int, DecayResult], damping_from: str, other: str
+    sweep: tuple[Estimate, ...],
+    decays: dict[int, DecayResult],
+    damping_from: str,
+    other: str,
+    method: DecayMethod = "exponential-fit",
 ) -> tuple[tuple[Estimate, ...], tuple[str, ...], list[str]]:
     """Choose the damping ratio of each mode.
 
@@ -74,6 +78,8 @@ def choose_damping(
         `decay` to prefer free decays; otherwise the fit counts.
     other
         Name of the tests of the fit, for the source and for messages.
+    method
+        How the damping ratio is read from a decay.
 
     Returns
     -------
@@ -84,11 +90,11 @@ def choose_damping(
     findings: list[str] = []
     for mode, second in enumerate(sweep, start=1):
         decay = decays.get(mode)
-        first = decay.exponential_fit if decay else None
+        first = decay.damping_ratio(method) if decay else None
         if first is None or damping_from != "decay":
             chosen.append(second)
             sources.append(other)
-        elif first.half_width <= _WIDEST_DECAY_INTERVAL * first.value:
+        elif first.half_width <= _WIDEST_DECAY_INTERVAL * first.value or method != "exponential-fit":
             chosen.append(first)
             sources.append("decay")
         else:

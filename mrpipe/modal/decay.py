@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy import signal
@@ -43,6 +44,10 @@ class Estimate:
         return {"value": float(self.value), "low": float(self.low), "high": float(self.high)}
 
 
+DecayMethod = Literal["exponential-fit", "logarithmic-decrement", "point-to-point", "linear-fit"]
+"""How the damping ratio is read from a decay."""
+
+
 @dataclass(frozen=True)
 class DecayResult:
     """What one decay test says of its mode.
@@ -79,6 +84,17 @@ class DecayResult:
     fitted: FloatArray
     filtered: bool
 
+    def damping_ratio(self, method: DecayMethod) -> Estimate:
+        """Return the damping ratio by one of the methods."""
+        if method == "linear-fit":
+            return linear_envelope(self.peak_time_s, self.peak).estimate
+        readings = {
+            "exponential-fit": self.exponential_fit,
+            "logarithmic-decrement": self.logarithmic_decrement,
+            "point-to-point": self.point_to_point,
+        }
+        return readings[method]
+
 
 @dataclass(frozen=True)
 class Envelope:
@@ -88,12 +104,20 @@ class Envelope:
     ----------
     damping_ratio
         By the decay rate of the curve at its start [1].
+    standard_error
+        Of the damping ratio, by the scatter of the peaks about the curve.
     rms_error
         Of the peaks, in their unit.
     """
 
     damping_ratio: float
+    standard_error: float
     rms_error: float
+
+    @property
+    def estimate(self) -> Estimate:
+        """The damping ratio with its interval."""
+        return Estimate.of(self.damping_ratio, self.standard_error)
 
 
 def linear_envelope(peak_time_s: FloatArray, peak: FloatArray) -> Envelope:
@@ -109,19 +133,24 @@ def linear_envelope(peak_time_s: FloatArray, peak: FloatArray) -> Envelope:
     peak
         Their heights, positive, shape (k,).
     """
-    slope, level = np.polyfit(peak_time_s - peak_time_s[0], peak, 1)
+    clock = peak_time_s - peak_time_s[0]
+    (slope, level), covariance = np.polyfit(clock, peak, 1, cov=True)
     period = 2.0 * float(np.mean(np.diff(peak_time_s)))
-    error = peak - (level + slope * (peak_time_s - peak_time_s[0]))
-    return Envelope(damping_from_decrement(-slope / level * period), float(np.sqrt(np.mean(error**2))))
+    error = peak - (level + slope * clock)
+    ratio = damping_from_decrement(-slope / level * period)
+    relative = float(np.sqrt(covariance[0, 0])) / abs(slope)
+    return Envelope(ratio, abs(ratio) * relative, float(np.sqrt(np.mean(error**2))))
 
 
 def logarithmic_envelope(peak_time_s: FloatArray, peak: FloatArray) -> Envelope:
     """Fit an exponential to the peaks of a decay by a straight line through their logarithms; arguments as above."""
     clock = peak_time_s - peak_time_s[0]
-    slope, level = np.polyfit(clock, np.log(peak), 1, w=peak)
+    (slope, level), covariance = np.polyfit(clock, np.log(peak), 1, w=peak, cov=True)
     period = 2.0 * float(np.mean(np.diff(peak_time_s)))
     error = peak - np.exp(level + slope * clock)
-    return Envelope(damping_from_decrement(-slope * period), float(np.sqrt(np.mean(error**2))))
+    ratio = damping_from_decrement(-slope * period)
+    relative = float(np.sqrt(covariance[0, 0])) / abs(slope)
+    return Envelope(ratio, abs(ratio) * relative, float(np.sqrt(np.mean(error**2))))
 
 
 def damping_from_decrement(decrement: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -19,6 +20,7 @@ from mrpipe.modal.decay import Estimate
 from mrpipe.modal.identification import FrameIdentification, GivenShapes
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
+from mrpipe.modal.peak_picking import pick_peaks
 from mrpipe.modal.records import FrameTests
 from mrpipe.modal.search import ModeSearch, check_channels
 from mrpipe.modal.selection import (
@@ -162,6 +164,9 @@ def _identify(
         chosen, clocks = with_clocks(chosen, tests, layout, options)
         findings += _clock_findings(clocks)
         chosen = ChosenTests(without_complex(chosen.search), chosen.tests)
+    if options.modes_from == "peak-picking" and chosen.tests:
+        picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)
+        chosen = replace(chosen, search=replace(chosen.search, fit=picked))
     fit = chosen.search.fit
     findings += _check_coherence(fit, tests) if forced else []
     progress(0.5, "decays")
@@ -171,7 +176,9 @@ def _identify(
     error = np.sqrt(np.diag(fit.covariance))
     frequencies = tuple(Estimate.of(w, w * e) for w, e in zip(fit.angular_frequencies, error[:modes], strict=True))
     sweep = tuple(Estimate.of(z, z * e) for z, e in zip(fit.damping_ratios, error[modes:], strict=True))
-    damping, sources, notes = choose_damping(sweep, decays, options.damping_from, "sweep" if forced else "ambient")
+    damping, sources, notes = choose_damping(
+        sweep, decays, options.damping_from, "sweep" if forced else "ambient", options.decay_method
+    )
     findings += notes
     progress(0.6, "matrices")
     zeta = np.array([item.value for item in damping])

@@ -24,6 +24,17 @@ class IdentificationOptions(BaseModel):
         "decay",
         description="Damping ratios that go into C: `decay` (where a mode has such a test, else the sweep) or `sweep`.",
     )
+    decay_method: Literal["exponential-fit", "logarithmic-decrement", "point-to-point", "linear-fit"] = Field(
+        "exponential-fit",
+        description="How the damping ratio is read from a decay (section 3.2.2): exponential fit to the motion, "
+        "logarithmic decrement (3.1), mean from peak to peak, or a straight line through the peaks. Of the last three "
+        "the value counts as it is; an uncertain exponential fit is pooled with the sweep.",
+    )
+    modes_from: Literal["fit", "peak-picking"] = Field(
+        "fit",
+        description="Frequencies and shapes: multi-mode fit of all forced tests, or as the thesis: magnitude and phase "
+        "at the peaks of the transfer functions (3.4). Peaks need a measured excitation.",
+    )
     stiffness_form: Literal["modal", "tridiagonal"] = Field(
         "modal", description="K from the modes, (3.14) to (3.16), or the tri-diagonal shear frame nearest to them."
     )

@@ -1,11 +1,13 @@
 """Levenberg-Marquardt with the stopping rules of MATLAB's trainlm.
 
-Three methods share the rules: scipy's `least_squares` on the exactly compressed problem, and our own loop with the
-damping mu I of trainlm or mu diag(J'J) of Marquardt.
+Four methods share the rules: scipy's `least_squares` with a trust region on the exactly compressed problem, the same
+function with MINPACK's method `lm` on all rows, and a loop of this program with the damping mu I of trainlm or
+mu diag(J'J) of Marquardt.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,7 +19,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.networks.problem import Problem
 from mrpipe.networks.stopping import StoppingRules
 
-Method = Literal["least-squares", "mu-identity", "mu-diagonal"]
+Method = Literal["least-squares", "minpack", "mu-identity", "mu-diagonal"]
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,8 @@ def fit(
     start
         Initial parameters, shape (P,).
     method
-        `least-squares` (scipy, trust region, scaled by the Jacobian), `mu-identity` (trainlm) or `mu-diagonal`.
+        `least-squares` (scipy, trust region, scaled by the Jacobian), `minpack` (scipy's `least_squares` with method
+        `lm` on all rows), `mu-identity` (trainlm) or `mu-diagonal`.
     rules
         When to stop.
     held_out
@@ -112,6 +115,8 @@ def fit(
     watch = _Watch(held_out, rules or StoppingRules())
     if method == "least-squares":
         return watch.result(_scipy_loop(problem, start, watch))
+    if method == "minpack":
+        return watch.result(_minpack_loop(problem, start, watch))
     return watch.result(_own_loop(problem, start, watch, identity=method == "mu-identity"))
 
 
@@ -148,6 +153,42 @@ def _scipy_loop(problem: Problem, start: FloatArray, watch: _Watch) -> str:
     except _Stop as stop:
         return str(stop)
     return "step" if outcome.status in {2, 3, 4} else "evaluations"
+
+
+def _minpack_loop(problem: Problem, start: FloatArray, watch: _Watch) -> str:
+    """Run MINPACK's lmder on the residuals of all rows; it evaluates the Jacobian once for each accepted step."""
+    root = 1.0 / math.sqrt(problem.rows)
+    penalty = math.sqrt(problem.weight_decay)
+
+    def residual(parameters: FloatArray) -> FloatArray:
+        rows = root * problem.residual(parameters)
+        return np.concatenate([rows, penalty * parameters]) if penalty > 0.0 else rows
+
+    def jacobian(parameters: FloatArray) -> FloatArray:
+        matrix = root * problem.jacobian(parameters)
+        if penalty > 0.0:
+            matrix = np.vstack([matrix, penalty * np.eye(problem.size)])
+        error = residual(parameters)
+        reason = watch.accepted(parameters, float(error @ error), 2.0 * matrix.T @ error)
+        if reason:
+            raise _Stop(reason)
+        return matrix
+
+    try:
+        outcome = least_squares(
+            residual,
+            start,
+            jac=jacobian,
+            method="lm",
+            x_scale="jac",
+            ftol=1e-12,
+            xtol=1e-10,
+            gtol=1e-12,
+            max_nfev=20 * watch.rules.iterations,
+        )
+    except _Stop as stop:
+        return str(stop)
+    return "evaluations" if outcome.status == 0 else "step"
 
 
 def _own_loop(problem: Problem, start: FloatArray, watch: _Watch, *, identity: bool) -> str:

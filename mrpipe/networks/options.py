@@ -64,7 +64,7 @@ class SweepOptions(Section):
     held_out_failures: int = Field(
         10, ge=1, description="Consecutive iterations without gain on the held-out records that end a fit."
     )
-    method: Literal["mu-identity", "mu-diagonal", "least-squares"] = Field(
+    method: Literal["mu-identity", "mu-diagonal", "least-squares", "minpack"] = Field(
         "mu-identity", description="Levenberg-Marquardt as for training."
     )
     initial: Literal["random", "perceptron"] = Field(
@@ -95,9 +95,10 @@ class TrainingOptions(Section):
     )
     starts: int = Field(10, ge=1, description="Random starts; the best on held-out records is kept.")
     refined_starts: int = Field(2, ge=1, description="How many of the starts go on with all rows.")
-    method: Literal["mu-identity", "mu-diagonal", "least-squares"] = Field(
+    method: Literal["mu-identity", "mu-diagonal", "least-squares", "minpack"] = Field(
         "mu-identity",
-        description="Levenberg-Marquardt with damping mu I (trainlm), mu diag(J'J), or scipy's least_squares.",
+        description="Levenberg-Marquardt with damping mu I (trainlm), mu diag(J'J), scipy's least_squares with a trust "
+        "region, or `minpack`: scipy's least_squares with method `lm`.",
     )
     whitened: bool = Field(
         True, description="Train in the basis in which the inputs are uncorrelated; the network is the same form."

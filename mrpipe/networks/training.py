@@ -97,10 +97,7 @@ def initial_parameters(
         tol=1e-9,
         random_state=int(rng.integers(2**31)),
     )
-    with warnings.catch_warnings():
-        # it is meant to stop early: the start is not the end
-        warnings.simplefilter("ignore")
-        perceptron.fit(problem.inputs[:, ::stride].T, problem.target[::stride])
+    perceptron.fit(problem.inputs[:, ::stride].T, problem.target[::stride])
     weights = [np.asarray(matrix, dtype=np.float64).T for matrix in perceptron.coefs_]
     return pack(weights, [np.asarray(item, dtype=np.float64) for item in perceptron.intercepts_], problem.biases)
 
@@ -197,9 +194,13 @@ def train_on(
         rules = _limited(options.rules, options.subsample_iterations)
         return fit(small, guess, method=options.method, rules=rules, held_out=monitor), time.perf_counter() - started
 
-    early: list[tuple[FitResult, float]] = list(
-        in_parallel(first, options.starts, jobs, lambda f, t="": progress(0.6 * f, t), "start")  # type: ignore[arg-type]
-    )
+    # filters of warnings belong to the process, so they are set here and not in the threads
+    with warnings.catch_warnings():
+        # a perceptron is meant to stop early, because it is only a start
+        warnings.filterwarnings("ignore", message="lbfgs failed to converge")
+        early: list[tuple[FitResult, float]] = list(
+            in_parallel(first, options.starts, jobs, lambda f, t="": progress(0.6 * f, t), "start")  # type: ignore[arg-type]
+        )
     order = np.argsort([_judged(outcome) for outcome, _ in early], kind="stable")
     chosen = [int(index) for index in order[: max(1, options.refined_starts)]]
     late: list[tuple[FitResult, float]] = []

@@ -85,7 +85,7 @@ def test_compressed_least_squares_takes_the_path_of_the_plain_one(method: str) -
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("method", ["least-squares", "mu-identity", "mu-diagonal"])
+@pytest.mark.parametrize("method", ["least-squares", "minpack", "mu-identity", "mu-diagonal"])
 def test_all_methods_solve_a_linear_problem_as_the_normal_equations_do(method: str) -> None:
     problem = common_problem(layers=(4, 1))
     outcome = fit(problem, np.zeros(problem.size), method=method, rules=StoppingRules(iterations=60))  # type: ignore[arg-type]
@@ -95,7 +95,7 @@ def test_all_methods_solve_a_linear_problem_as_the_normal_equations_do(method: s
 
 
 @pytest.mark.property
-@pytest.mark.parametrize("method", ["least-squares", "mu-identity", "mu-diagonal"])
+@pytest.mark.parametrize("method", ["least-squares", "minpack", "mu-identity", "mu-diagonal"])
 def test_the_error_never_rises_along_the_path(method: str) -> None:
     problem = common_problem()
     start = np.random.default_rng(4).uniform(-0.5, 0.5, problem.size)
@@ -139,7 +139,7 @@ def test_every_rule_can_end_training(rules: StoppingRules, reason: str) -> None:
 
 
 @pytest.mark.oracle
-@pytest.mark.parametrize("method", ["least-squares", "mu-identity"])
+@pytest.mark.parametrize("method", ["least-squares", "minpack", "mu-identity"])
 def test_weight_decay_is_ridge_regression_where_the_network_is_linear(method: str) -> None:
     from dataclasses import replace
 
@@ -149,3 +149,15 @@ def test_weight_decay_is_ridge_regression_where_the_network_is_linear(method: st
     outcome = fit(problem, np.zeros(problem.size), method=method, rules=StoppingRules(gradient=1e-12))  # type: ignore[arg-type]
     oracle = Ridge(alpha=0.3 * problem.rows, fit_intercept=False).fit(problem.inputs.T, problem.target)
     np.testing.assert_allclose(outcome.parameters, oracle.coef_, atol=1e-6)
+
+
+@pytest.mark.oracle
+def test_minpack_is_the_method_lm_of_scipy() -> None:
+    """Started close to a minimum, so that no rule of ours ends the fit before MINPACK does."""
+    problem = common_problem(200, layers=(4, 2, 1))
+    near = fit(problem, np.random.default_rng(3).uniform(-0.5, 0.5, problem.size), method="mu-identity").parameters
+    rules = StoppingRules(iterations=500, gradient=0.0, improvement=0.0)
+    ours = fit(problem, near + 1e-3, method="minpack", rules=rules)
+    plain = least_squares(problem.residual, near + 1e-3, jac=problem.jacobian, method="lm", x_scale="jac")
+    assert ours.mean_square == pytest.approx(2.0 * plain.cost / problem.rows, rel=1e-8)
+    assert ours.reason == "step"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -149,6 +151,7 @@ def test_the_second_phase_can_learn_the_held_out_records_and_average_starts() ->
     assert errors["every"] < errors["fitted"]
 
 
+@pytest.mark.filterwarnings("ignore:lbfgs failed to converge")
 @pytest.mark.oracle
 @pytest.mark.parametrize("biases", [False, True])
 def test_a_start_from_scikit_learn_is_its_network(biases: bool) -> None:
@@ -184,3 +187,23 @@ def test_the_training_range_is_kept_with_the_network() -> None:
 
     faster = join([bench_test("fast", 6.0, 2.0)], cycles=3, sampling_rate_hz=200.0)
     assert trained.network.outside_training_range(samples(faster, FORWARD).features) > 0.5
+
+
+@pytest.mark.property
+def test_a_perceptron_that_stops_early_gives_no_warning() -> None:
+    """Filters of warnings that a thread sets do not hold for the others, so that scikit-learn's warning got out."""
+    options = QUICK.changed(initial="perceptron", starts=2, refined_starts=1, subsample_iterations=2, iterations=0)
+    with warnings.catch_warnings(record=True) as given:
+        warnings.simplefilter("always")
+        train(bench_history(), FORWARD, options, np.random.default_rng(6), jobs=2)
+    assert [str(item.message)[:60] for item in given] == []
+
+
+@pytest.mark.golden
+def test_the_route_of_the_thesis_learns_the_bench() -> None:
+    """A perceptron of scikit-learn, then MINPACK's Levenberg-Marquardt; two layers of six, without biases."""
+    options = QUICK.changed(initial="perceptron", method="minpack", biases=False, starts=2, refined_starts=1)
+    trained = train(bench_history(), FORWARD, options, np.random.default_rng(1))
+    judged = judge(trained.network, bench_history(), bench_history("validation", (1.2,)))
+    assert trained.network.architecture == "8-6-6-1" and not trained.network.has_biases
+    assert judged.pooled.nrmse < 0.15 < 0.4 < judged.linear.nrmse
