@@ -41,7 +41,8 @@ def transfer_functions(test: FrameTest, band_hz: tuple[float, float]) -> tuple[F
     factors = np.where(np.asarray(test.is_displacement)[None, :], -(spectrum.omega[:, None] ** 2), 1.0)
     cross = np.conj(excitation)[:, None] * spectrum.responses * factors
     averaged = np.apply_along_axis(lambda column: np.convolve(column, kernel, mode="same"), 0, cross)
-    return spectrum.omega, averaged / np.maximum(auto, np.finfo(float).tiny)[:, None]
+    response = averaged / np.maximum(auto, np.finfo(float).tiny)[:, None]
+    return spectrum.omega, np.asarray(response, dtype=np.complex128)
 
 
 def pick_peaks(tests: Sequence[FrameTest], fit: MultiModeFit, band_hz: tuple[float, float]) -> MultiModeFit:
