@@ -176,9 +176,12 @@ def _raced(
     further = partial(with_play, effects=effects) if model_error else None
     found = race(base, singles, search, noise, further=further, jobs=jobs, progress=progress)
     winner = found.winner(options.rules.lead)
+    # where a model's error outweighs the noise, further terms improve the model although their cause is not proven
+    model = found.extended(winner) if model_error and len(winner.effects) > len(found.own) else winner
     progress(0.7, "fit to all tests")
+    proven = len(winner.effects) - len(found.own)
     tied = found.tied_forms(winner, options.rules.lead)
-    return Choice(baseline, replace(promoted(found, winner, base), tied_forms=tied), found, winner)
+    return Choice(baseline, replace(promoted(found, model, base), proven=proven, tied_forms=tied), found, winner)
 
 
 def promoted(found: Race, winner: Model, base: Fit) -> Selection:

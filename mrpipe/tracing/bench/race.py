@@ -44,7 +44,7 @@ SUFFICIENT = 1.25**2
 Search = Callable[[Fit], Selection]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Model:
     """A base form with effects, fitted to a share of the tests.
 
@@ -152,6 +152,17 @@ class Race:
             if set(model.effects) == set(winner.effects) and model.form != winner.form and cost <= (1.0 + lead) * own:
                 found[model.form] = min(float(cost), found.get(model.form, np.inf))
         return tuple(sorted(found, key=lambda name: found[name]))
+
+    def extended(self, winner: Model) -> Model:
+        """Return the cheapest model of the winner's form that holds its effects and further ones; else the winner."""
+        costs = self.costs()
+        count = len(winner.effects)
+        able = [
+            place
+            for place, model in enumerate(self.models)
+            if model.form == winner.form and model.effects[:count] == winner.effects
+        ]
+        return self.models[min(able, key=lambda place: float(costs[place]))]
 
     def support(self, effect: str, lead: float, *, draws: int, rng: np.random.Generator) -> float:
         """Return the share of resamples in which the winner has an effect; tests are drawn with replacement."""

@@ -60,6 +60,17 @@ def test_the_declared_form_is_kept_where_others_are_alike() -> None:
     race = race_of(declared, other)
     assert race.winner(LEAD) is declared
     assert race.tied_forms(declared, LEAD) == ("dahl",)
+    assert race.tied_forms(other, LEAD) == ("bouc-wen",)
+
+
+@pytest.mark.property
+def test_further_terms_extend_the_winner_in_its_own_form() -> None:
+    right = FakeModel("dahl", ("accumulator",), 9.0)
+    more = FakeModel("dahl", ("accumulator", "stribeck"), 8.0)
+    other = FakeModel("lugre", ("accumulator", "stribeck"), 7.5)
+    race = race_of(FakeModel("dahl", (), 60.0), right, more, other)
+    assert race.winner(LEAD) is right
+    assert race.extended(right) is more
 
 
 @pytest.mark.property
