@@ -114,11 +114,12 @@ def choose_model(
     while True:
         choice = _raced(baseline, effects, options, floor > 0.0, jobs, progress)
         selection = choice.selection
+        if choice.race is not None:
+            selection = with_laws_again(selection, options.yield_order, options.viscosity_order)
         if floor > 0.0:
             return replace(choice, selection=judged_by_trees(selection))
         if choice.race is None:
             return choice
-        selection = with_laws_again(selection, options.yield_order, options.viscosity_order)
         if _near_the_noise(selection, baseline.noise, len(declared), options, rng, jobs):
             baseline, selection = _with_noise_of(selection.chosen, baseline, selection)
             return replace(choice, baseline=baseline, selection=selection)

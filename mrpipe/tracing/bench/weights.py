@@ -24,6 +24,9 @@ SHORTEST_CYCLE = 8
 AVERAGED_S = 0.02
 """Numerical technique: time [s] over which the simulated variance of the noise is averaged."""
 
+TOP = 0.9
+"""Numerical technique: quantile above which a part of the noise counts as large."""
+
 LEAST_EXPECTED = 0.05
 """Numerical technique: least expected variance in the regression of the factors, as a share of the first guess."""
 
@@ -127,8 +130,18 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
         factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
         expected = np.maximum(columns @ factors, LEAST_EXPECTED * columns.sum(axis=1))
-    force_factor, motion_factor = (max(float(factor), rules.least_factor) for factor in factors)
-    return NoiseScale(force_factor, motion_factor, len(repeats), len(cycles))
+    # no part can be larger than all of the difference where this part is largest
+    most = [columns[:, k] >= np.quantile(columns[:, k], TOP) for k in range(2)]
+    largest = [float(np.sum(target[at])) / max(float(np.sum(columns[at, k])), 1e-300) for k, at in enumerate(most)]
+    force_factor, motion_factor = (
+        max(min(float(factor), limit), rules.least_factor) for factor, limit in zip(factors, largest, strict=True)
+    )
+    # and noise is no larger than what the model leaves
+    used = root > 0.0
+    variance = (force_factor * force + motion_factor * motion)[used]
+    left = float(np.sum(residual[used] ** 2)) / max(float(np.sum(variance)), 1e-300)
+    limit = min(1.0, left)
+    return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles))
 
 
 def _aligned(recordings: Recordings, first: IntArray, second: IntArray) -> tuple[IntArray, float]:
