@@ -61,7 +61,7 @@ class Recordings:
         Test of each sample, shape (n,).
     used
         Samples at which forces are compared, shape (n,).
-    displacement_noise, velocity_noise, force_noise
+    displacement_noise, velocity_noise, force_noise, force_rounding
         Standard deviation of what the sensors add after filtering, shape (tests,); m, m/s, N.
     force_offset
         Offset that prepare found, shape (tests,) [N].
@@ -86,6 +86,7 @@ class Recordings:
     displacement_noise: FloatArray
     velocity_noise: FloatArray
     force_noise: FloatArray
+    force_rounding: FloatArray
     force_offset: FloatArray
     period_s: FloatArray
     cutoff_hz: FloatArray
@@ -132,6 +133,7 @@ class Recordings:
             displacement_noise=self.displacement_noise[chosen],
             velocity_noise=self.velocity_noise[chosen],
             force_noise=self.force_noise[chosen],
+            force_rounding=self.force_rounding[chosen],
             force_offset=self.force_offset[chosen],
             period_s=self.period_s[chosen],
             cutoff_hz=self.cutoff_hz[chosen],
@@ -217,6 +219,7 @@ def record_tests(
         displacement_noise=numbers("displacement_noise"),
         velocity_noise=numbers("velocity_noise"),
         force_noise=numbers("force_noise"),
+        force_rounding=numbers("force_rounding"),
         force_offset=numbers("force_offset"),
         period_s=numbers("period_s"),
         cutoff_hz=numbers("cutoff_hz"),
@@ -295,6 +298,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: floa
         "displacement_noise": noise,
         "velocity_noise": noise * 2.0 * np.pi * band / np.sqrt(3.0),
         "force_noise": steady_noise(test.force_raw_n, rate),
+        "force_rounding": resolution(test.force_raw_n) / np.sqrt(12.0),
         "force_offset": test.force_offset_n,
         "period_s": float(np.median(periods)) / rate if len(periods) else 0.0,
         "cutoff_hz": cutoff,

@@ -81,6 +81,7 @@ def bench_recordings(
         displacement_noise=zeros,
         velocity_noise=zeros,
         force_noise=zeros,
+        force_rounding=zeros,
         force_offset=zeros,
         period_s=zeros,
         cutoff_hz=zeros,

@@ -130,12 +130,16 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
         factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
         expected = np.maximum(columns @ factors, LEAST_EXPECTED * columns.sum(axis=1))
-    # no part can be larger than all of the difference where this part is largest
-    most = [columns[:, k] >= np.quantile(columns[:, k], TOP) for k in range(2)]
-    largest = [float(np.sum(target[at])) / max(float(np.sum(columns[at, k])), 1e-300) for k, at in enumerate(most)]
+    # no part exceeds the difference: the force overall, the motion where its own part is largest
+    most = columns[:, 1] >= np.quantile(columns[:, 1], TOP)
+    parts = ((target, columns[:, 0]), (target[most], columns[most, 1]))
+    largest = [float(np.sum(all_)) / max(float(np.sum(part)), 1e-300) for all_, part in parts]
     force_factor, motion_factor = (
         max(min(float(factor), limit), rules.least_factor) for factor, limit in zip(factors, largest, strict=True)
     )
+    # repeated motion repeats the rounding of the force too, so their difference does not show it
+    rounding = recordings.force_rounding[recordings.test] ** 2
+    force_factor = max(force_factor, float(np.sum(rounding)) / max(float(np.sum(force)), 1e-300))
     # and noise is no larger than what the model leaves
     used = root > 0.0
     variance = (force_factor * force + motion_factor * motion)[used]
