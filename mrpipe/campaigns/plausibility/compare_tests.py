@@ -7,10 +7,15 @@ from itertools import chain
 
 import numpy as np
 
-from mrpipe.campaigns.plausibility.channels import find_spikes, find_stuck, is_dead
+from mrpipe.campaigns.plausibility.channels import find_spikes, is_dead
 from mrpipe.campaigns.plausibility.duplicates import find_overlaps
 from mrpipe.campaigns.plausibility.finding import Finding, TestArrays
-from mrpipe.campaigns.plausibility.odd_tests import find_exchanged_columns, find_odd_tests
+from mrpipe.campaigns.plausibility.odd_tests import (
+    find_exchanged_columns,
+    find_odd_tests,
+    find_unrelated_force,
+)
+from mrpipe.campaigns.plausibility.stuck import find_stuck_displacement, find_stuck_force
 
 
 def compare_tests(tests: Sequence[TestArrays]) -> tuple[Finding, ...]:
@@ -38,6 +43,9 @@ def compare_tests(tests: Sequence[TestArrays]) -> tuple[Finding, ...]:
     sound = [test for test in tests if not any(item.severity == "error" for item in single[test.name])]
     found = [item for items in single.values() for item in items]
     found += same_records(tests)
+    unrelated = find_unrelated_force(sound)
+    if unrelated:
+        return (*found, *unrelated)
     return (*found, *find_odd_tests(sound), *find_exchanged_columns(sound))
 
 
@@ -64,8 +72,10 @@ def _dead(test: TestArrays) -> list[Finding]:
 def _stuck(test: TestArrays) -> list[Finding]:
     findings = []
     for name, values in _channels(test).items():
-        company = test.force_n if name == "displacement" else test.displacement_m
-        stuck = find_stuck(values, company)
+        if name == "displacement":
+            stuck = find_stuck_displacement(values, test.force_n)
+        else:
+            stuck = find_stuck_force(values, test.displacement_m, test.drive)
         if stuck is None:
             continue
         duration = stuck.samples / test.rate_hz

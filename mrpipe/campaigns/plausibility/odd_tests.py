@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy import stats
+from scipy.signal import detrend
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.plausibility.agreement import Agreement, agreement, delay, fit
@@ -34,6 +36,9 @@ EXCHANGED = 1.05
 """Mean frequency of displacement over that of force above which the two look exchanged."""
 
 FACTORS = (1000.0, 1e-3)
+
+UNRELATED = 0.3
+"""Correlation with the predicted force below which a force is unrelated to the motion."""
 
 
 def find_odd_tests(arrays: Sequence[TestArrays]) -> list[Finding]:
@@ -70,6 +75,42 @@ def find_exchanged_columns(arrays: Sequence[TestArrays]) -> list[Finding]:
             numbers={"frequency_ratio": float(np.median(ratios))},
         )
     ]
+
+
+def find_unrelated_force(arrays: Sequence[TestArrays]) -> list[Finding]:
+    """Return a finding where the force follows the motion in no test of a campaign.
+
+    A flexible map from motion and drive to force is fitted to the first half of all tests and compared with their
+    second halves. The force of a damper correlates with it; that of a load cell that shows noise does not.
+    """
+    tests = [slow_down(test) for test in arrays if _moves(test)]
+    if not tests:
+        return []
+    halves = [_without_drift(test.part(0.0, 0.5)) for test in tests]
+    halves += [_without_drift(test.part(0.5, 1.0)) for test in tests]
+    reference = ReferenceMap(halves)
+    coefficients = reference.coefficients(range(len(tests), len(halves)))
+    correlations = [fit(part, coefficients)[1] for part in reference.parts[len(tests) :]]
+    highest = max(correlations)
+    if highest > UNRELATED:
+        return []
+    return [
+        Finding(
+            name="force-unrelated",
+            severity="error",
+            channel="force",
+            sentence=f"force follows the motion in no test: its correlation with what displacement, velocity and drive "
+            f"predict is {highest:.2f} at most",
+            remedy="check the load cell, its cable and amplifier, and the columns of force and displacement",
+            numbers={"highest_correlation": highest, "tests": float(len(tests))},
+        )
+    ]
+
+
+def _without_drift(test: Slow) -> Slow:
+    """Return the test without the linear trend of its force, where the motion has at least one cycle to show."""
+    cycles = test.frequency_hz * test.interval_s * test.force.size
+    return replace(test, force=np.asarray(detrend(test.force))) if cycles >= 1.0 else test
 
 
 def _moves(test: TestArrays) -> bool:

@@ -79,6 +79,18 @@ class Slow:
             drive=self.drive * drive,
         )
 
+    def part(self, begin: float, end: float) -> Slow:
+        """Return the part of the test between two shares of its length."""
+        size = self.force.size
+        chosen = slice(int(begin * size), int(end * size))
+        return replace(
+            self,
+            displacement=self.displacement[chosen],
+            velocity=self.velocity[chosen],
+            drive=self.drive[chosen],
+            force=self.force[chosen],
+        )
+
     def exchanged(self, travel: float) -> Slow:
         """Return the test with displacement and force exchanged; the displacement is scaled to an RMS of `travel`."""
         displacement = self.force - np.mean(self.force)

@@ -149,6 +149,19 @@ def test_columns_exchanged_in_all_tests() -> None:
     assert "channels-exchanged" in {item.name for item in compare_tests(turned)}
 
 
+@pytest.mark.planted
+@pytest.mark.parametrize("count", [1, 2, 10])
+@pytest.mark.parametrize("drift", [0.0, 2.0])
+def test_a_load_cell_that_shows_noise_in_every_test(count: int, drift: float) -> None:
+    rng = np.random.default_rng(4)
+    tests = [
+        replace(item, force_n=37.0 + drift * item.time_s + 0.5 * rng.standard_normal(item.time_s.size))
+        for item in _sound(count, False)
+    ]
+    (found,) = compare_tests(tests)
+    assert (found.name, found.severity, found.test, found.channel) == ("force-unrelated", "error", "", "force")
+
+
 @pytest.mark.property
 def test_a_finding_is_one_line_with_its_place_and_plain_numbers() -> None:
     (found,) = _with_fault(lambda test: replace(test, force_n=-test.force_n), 6)
