@@ -29,6 +29,13 @@ def require_finite(file: DataFile, values: FloatArray, first: int, channel: str,
     if bad.size:
         row = file.first_row + first + int(bad[0])
         value = values[bad[0]]
+        if bad.size == 1 and bad[0] == values.size - 1 and np.isnan(value):
+            raise UserError(
+                file.path,
+                f"{where}, {channel}, row {row}",
+                "is missing in the last row, as where a recording was cut off",
+                "delete this row, or end the test before it with segments_s",
+            )
         kind = (
             "NaN (no number)" if np.isnan(value) else "infinite" if np.isinf(value) else f"{value:.3g}, no measurement"
         )

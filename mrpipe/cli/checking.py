@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from mrpipe.campaigns.header import CampaignHeader
     from mrpipe.campaigns.plausibility import Finding
     from mrpipe.config.loader import LoadedConfig
+    from mrpipe.config.model import RunSettings
 
 RIGS = {"bench": "damper-bench", "frame": "shear-frame", "closed_loop": "shear-frame"}
 """Key of `campaigns` -> rig that it takes."""
@@ -55,6 +57,8 @@ class CheckResult:
 def check_stages(loaded: LoadedConfig) -> None:
     """Check the settings of every stage of the configuration.
 
+    Effect files are read and not run, because the configuration may be somebody else's.
+
     Raises
     ------
     UserError
@@ -63,10 +67,41 @@ def check_stages(loaded: LoadedConfig) -> None:
     from mrpipe.pipeline.settings_view import SettingsView
     from mrpipe.stages.registry import stage_named
 
+    config = _without_own_effects(loaded)
     for name in loaded.config.stages:
         stage = None if name == "report" else stage_named(name)
         if stage is not None and stage.check is not None:
-            stage.check(SettingsView(loaded.config, stage.settings, name))
+            stage.check(SettingsView(config, stage.settings, name))
+
+
+def own_effects(loaded: LoadedConfig) -> set[str]:
+    """Return the names of the effects in the user's files, read without running them.
+
+    Raises
+    ------
+    UserError
+        If a file is missing, is not Python, or defines no EFFECT.
+    """
+    from mrpipe.pipeline.settings_view import setting_named
+
+    files = setting_named(loaded.config, "close_loop.effect_files")
+    if not files:
+        return set()
+    from mrpipe.effects.file_reading import name_in_file
+
+    return {name_in_file(Path(path)) for path in files}
+
+
+def _without_own_effects(loaded: LoadedConfig) -> RunSettings:
+    """Return the configuration without effect files, and without candidates that they may define."""
+    own = own_effects(loaded)
+    if not own:
+        return loaded.config
+    section: Any = loaded.config.close_loop  # type: ignore[attr-defined]
+    known = known_effects()
+    candidates = tuple(name for name in section.candidates if name in known or not (name in own or "" in own))
+    changed = section.model_copy(update={"effect_files": (), "candidates": candidates})
+    return loaded.config.model_copy(update={"close_loop": changed})
 
 
 def measured_campaigns(loaded: LoadedConfig) -> dict[str, Path]:
@@ -87,7 +122,6 @@ def check_headers(loaded: LoadedConfig) -> None:
     """
     from mrpipe.campaigns import campaign_files
     from mrpipe.campaigns.header import read_header
-    from mrpipe.pipeline.settings_view import setting_named
 
     for key, path in measured_campaigns(loaded).items():
         header = read_header(path)
@@ -99,7 +133,7 @@ def check_headers(loaded: LoadedConfig) -> None:
                 f"names a {header.rig} campaign ({header.file}), but takes a {RIGS[key]} campaign",
                 f"name it under campaigns.{right}",
             )
-        require_known_effects(header, setting_named(loaded.config, "close_loop.effect_files"))
+        require_known_effects(header, own_effects(loaded))
         require_known_laws(header)
         for file in campaign_files(path):
             if not file.is_file():
@@ -107,8 +141,15 @@ def check_headers(loaded: LoadedConfig) -> None:
                 raise UserError(file, "", "data file not found", remedy)
 
 
-def require_known_effects(header: CampaignHeader, effect_files: tuple[Path, ...] = ()) -> None:
+def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> None:
     """Refuse effects that a campaign declares and nobody knows.
+
+    Parameters
+    ----------
+    header
+        Head of the campaign.
+    own
+        Names of the user's own effects; an empty name stands for one that is only known when its file is run.
 
     Raises
     ------
@@ -119,7 +160,9 @@ def require_known_effects(header: CampaignHeader, effect_files: tuple[Path, ...]
         return
     from mrpipe.artifacts.yaml_source import nearest, read_yaml
 
-    known = known_effects(effect_files)
+    if "" in own:
+        return
+    known = known_effects() | set(own)
     for index, name in enumerate(header.declared_effects):
         if name not in known:
             source = read_yaml(header.file)
@@ -153,13 +196,12 @@ def require_known_laws(header: CampaignHeader) -> None:
                 raise source.error(("tests", index, "gains"), f"law {law} has no gain {name!r}", remedy)
 
 
-def known_effects(effect_files: tuple[Path, ...] = ()) -> set[str]:
-    """Return the names of all effects, those of the user's files included."""
-    from mrpipe.effects.library import all_effects, effect_of_file
+def known_effects() -> set[str]:
+    """Return the names of all effects of the library."""
+    from mrpipe.effects.library import all_effects
     from mrpipe.effects.structural.library import all_structural_effects
 
-    own = [getattr(effect_of_file(path), "name", "") for path in effect_files]
-    return {*all_effects(), *all_structural_effects(), *own}
+    return {*all_effects(), *all_structural_effects()}
 
 
 def check_campaigns(loaded: LoadedConfig) -> CheckResult:

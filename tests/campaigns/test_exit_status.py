@@ -15,6 +15,17 @@ BACKWARDS = motion() | {"t": motion()["t"][::-1]}
 
 
 @pytest.mark.golden
+def test_a_file_that_ends_within_a_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = campaign(tmp_path)
+    text = (folder / "one.csv").read_text()
+    (folder / "one.csv").write_text(text[: text.rstrip().rindex(",")])
+    assert run(["show", str(folder)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "test one, force, row 4001: is missing in the last row, as where a recording was cut off" in line
+    assert "delete this row" in line
+
+
+@pytest.mark.golden
 @pytest.mark.parametrize(
     ("columns", "changes", "expected"),
     [

@@ -226,3 +226,19 @@ def test_a_structure_without_masses_is_not_traced_and_the_rest_goes_on(
     )
     with pytest.raises(StageSkipped, match=r"masses of the floors are not given.*write frame: \{floor_masses_kg"):
         close_loop_frame.variant(load_config(config).config).run(context)  # type: ignore[union-attr, arg-type]
+
+
+@pytest.mark.property
+def test_effect_files_are_read_and_not_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = project(tmp_path, declared_effects=["squeeze"])
+    config.write_text(config.read_text().replace("identify-damper", "identify-damper, close-loop"), encoding="utf-8")
+    own = tmp_path / "squeeze.py"
+    own.write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\nEFFECT = Effect(name='squeeze')\n", encoding="utf-8")
+    arguments = (str(config), "--set", f"close_loop.effect_files=[{own}]", "--set", "close_loop.candidates=[squeeze]")
+    status, out, err = checked(capsys, *arguments)
+    assert (status, err) == (0, "") and "valid" in out
+    assert not (tmp_path / "ran").exists()
+    for content, expected in (("def (", "line 1: is not Python"), ("x = 1", "EFFECT: is missing")):
+        own.write_text(content, encoding="utf-8")
+        status, _, err = checked(capsys, *arguments)
+        assert status == 2 and expected in err and err.count("\n") == 1

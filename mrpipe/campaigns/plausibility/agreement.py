@@ -10,6 +10,9 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.plausibility.reference import Normal, ReferenceMap, Slow
 
+SHAPE_COUNTS = 0.5
+"""Correlation from which the shape of a test's force takes part in the estimate of its own gain."""
+
 
 @dataclass(frozen=True)
 class Agreement:
@@ -39,6 +42,15 @@ class Agreement:
         return float(np.log(max(self.gain, 1e-12)))
 
 
+def log_gain_of(reference: ReferenceMap, index: int, without: Collection[int]) -> float:
+    """Return the logarithm of the gain of a test against all tests but those in `without`."""
+    part = reference.parts[index]
+    gain, correlation = fit(part, reference.coefficients(without))
+    if correlation > SHAPE_COUNTS:
+        gain = float(reference.joint_gains(part, without, np.array([gain]), jackknife=False)[0])
+    return float(np.log(max(gain, 1e-12)))
+
+
 def agreement(reference: ReferenceMap, part: Normal, without: Collection[int]) -> Agreement:
     """Compare a test, given by its normal equations, with the prediction of all tests but those in `without`."""
     gain, correlation = fit(part, reference.coefficients(without))
@@ -46,8 +58,11 @@ def agreement(reference: ReferenceMap, part: Normal, without: Collection[int]) -
     if len(others) < 2:
         return Agreement(gain, correlation, float("inf"), correlation)
     trials = [fit(part, coefficients) for coefficients in reference.jackknife(without)]
-    gains = np.array([item[0] for item in trials])
     correlations = np.array([item[1] for item in trials])
+    gains = np.array([item[0] for item in trials])
+    if correlation > SHAPE_COUNTS:
+        gain = float(reference.joint_gains(part, without, np.array([gain]), jackknife=False)[0])
+        gains = reference.joint_gains(part, without, gains, jackknife=True)
     if gain <= 0.0 or np.any(gains <= 0.0):
         error = float("inf")
     else:

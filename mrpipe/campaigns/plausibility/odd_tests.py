@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.signal import detrend
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.campaigns.plausibility.agreement import Agreement, agreement, delay, fit
+from mrpipe.campaigns.plausibility.agreement import Agreement, agreement, delay, fit, log_gain_of
 from mrpipe.campaigns.plausibility.finding import Finding, TestArrays
 from mrpipe.campaigns.plausibility.reference import ReferenceMap, Slow, slow_down
 
@@ -36,6 +36,9 @@ EXCHANGED = 1.05
 """Mean frequency of displacement over that of force above which the two look exchanged."""
 
 FACTORS = (1000.0, 1e-3)
+
+LOOKED_AT = 4
+"""So many tests with the most deviating gains are judged; the oddest is among them."""
 
 UNRELATED = 0.3
 """Correlation with the predicted force below which a force is unrelated to the motion."""
@@ -194,24 +197,48 @@ def _oddest(reference: ReferenceMap, tests: Sequence[Slow], odd: Sequence[int]) 
     kept = [index for index in range(len(reference.parts)) if index not in odd]
     items = {index: agreement(reference, reference.parts[index], {*odd, index}) for index in kept}
     scores: dict[int, float] = {}
+    distances: dict[int, float] = {}
     for index, item in items.items():
-        related = [other for other in kept if other != index]
-        correlations = [items[other].correlation for other in related]
+        correlations = [items[other].correlation for other in kept if other != index]
         if item.highest_correlation < 0.3 and float(np.median(correlations)) > 0.8:
             scores[index] = 100.0 * (1.0 - item.highest_correlation)
-            continue
-        gains = np.array([items[other].log_gain for other in related if items[other].correlation > 0.5])
-        if item.correlation < 0.5 or gains.size < 2:
-            continue
-        by = abs(item.log_gain - float(np.median(gains)))
-        error = item.log_gain_error
-        if gains.size < 3 or not np.isfinite(error) or not _covered(index, related, tests):
-            # too little to judge a gain, but decades show in any case
-            error = 1.0
-        score = by / limit_of(gains, GAIN_SCATTER, len(kept), error)
+        elif item.correlation >= 0.5:
+            related = [items[other].log_gain for other in _related(items, index)]
+            distances[index] = abs(item.log_gain - float(np.median(related))) if len(related) > 1 else 0.0
+    for index in sorted(distances, key=lambda index: -distances[index])[:LOOKED_AT]:
+        score = _score(reference, tests, items, index, odd)
         if score > 1.0:
             scores[index] = score
     return max(scores, key=lambda index: scores[index]) if scores else None
+
+
+def _related(items: Mapping[int, Agreement], index: int) -> list[int]:
+    return [other for other, item in items.items() if other != index and item.correlation > 0.5]
+
+
+def _score(
+    reference: ReferenceMap, tests: Sequence[Slow], items: Mapping[int, Agreement], index: int, odd: Sequence[int]
+) -> float:
+    """Return the deviation of a test's gain over the largest that chance explains.
+
+    The gains of the others are taken without this test, so that an odd test does not widen the scatter by which it is
+    judged (externally studentised deviation).
+    """
+    related = _related(items, index)
+    if len(related) < 2:
+        return 0.0
+    gains = np.array([log_gain_of(reference, other, {*odd, index, other}) for other in related])
+    item = items[index]
+    error = item.log_gain_error
+    if gains.size < 3 or not np.isfinite(error) or not _covered(index, _all_but(items, index), tests):
+        # too little to judge a gain, but decades show in any case
+        error = 1.0
+    by = abs(item.log_gain - float(np.median(gains)))
+    return by / limit_of(gains, GAIN_SCATTER, len(items), error)
+
+
+def _all_but(items: Mapping[int, Agreement], index: int) -> list[int]:
+    return [other for other in items if other != index]
 
 
 def _covered(index: int, others: Sequence[int], tests: Sequence[Slow]) -> bool:

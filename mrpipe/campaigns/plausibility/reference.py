@@ -25,6 +25,9 @@ SAMPLES_PER_CYCLE = 60
 RIDGE = 1e-4
 """Ridge parameter over the mean diagonal element of the normal equations."""
 
+ROUNDS = 12
+"""Turns in which a gain and the coefficients are found together."""
+
 YIELD_DISPLACEMENTS = (0.02, 0.15, 0.6)
 """Yield displacements of the elastic-plastic elements over the typical RMS displacement of the tests."""
 
@@ -171,6 +174,33 @@ class ReferenceMap:
         kept = [index for index in range(len(self.parts)) if index not in without]
         matrices = self._matrices[kept].sum(axis=0) - self._matrices[kept]
         return self._solved(matrices, self._vectors[kept].sum(axis=0) - self._vectors[kept])
+
+    def joint_gains(self, part: Normal, without: Collection[int], gains: FloatArray, *, jackknife: bool) -> FloatArray:
+        """Return the gain of a test, with coefficients that are fitted to it and to the tests but `without` together.
+
+        The test enters the fit with its gain free, so its shape helps to determine the coefficients, and its size does
+        not. Gain and coefficients are found by turns.
+
+        Parameters
+        ----------
+        part
+            Normal equations of the test, which is one of `without`.
+        gains
+            First estimates, shape (m,); one for each test but `without` if `jackknife`, else one.
+        """
+        kept = [index for index in range(len(self.parts)) if index not in without]
+        matrices, vectors = self._matrices[kept].sum(axis=0)[None], self._vectors[kept].sum(axis=0)[None]
+        if jackknife:
+            matrices, vectors = matrices - self._matrices[kept], vectors - self._vectors[kept]
+        weight = 1.0 / (part.power + (0.1 * self._force) ** 2)
+        for _ in range(ROUNDS):
+            size = np.clip(gains, 1e-3, 1e3)
+            # a test of gain g is compared as force over g, so that its weight is that of a test of gain 1
+            found = self._solved(matrices + weight * part.matrix, vectors + weight * part.vector / size[:, None])
+            product = found @ part.vector
+            power = np.einsum("ij,jk,ik->i", found, part.matrix, found)
+            gains = np.where(power > 0.0, product / np.where(power > 0.0, power, 1.0), 0.0)
+        return gains
 
     def _solved(self, matrices: FloatArray, vectors: FloatArray) -> FloatArray:
         size = matrices.shape[-1]

@@ -77,7 +77,8 @@ def find_stuck_force(force: FloatArray, displacement: FloatArray, drive: FloatAr
     """Return the longest stretch in which the force repeats one value although the motion calls for other values.
 
     A coarsely resolved force repeats one value on every plateau of a friction force. It is stuck only where it differs
-    from every force that the same test shows elsewhere at nearly the same displacement, velocity and drive. Stretches shorter than a tenth of a cycle are left out, because they harm no fit.
+    from every force that the same test shows elsewhere at nearly the same displacement, velocity and drive. Stretches
+    shorter than a tenth of a cycle are left out, because they harm no fit.
 
     Parameters
     ----------

@@ -106,6 +106,15 @@ def test_the_gain_of_one_test_against_the_others(gain: float) -> None:
 
 
 @pytest.mark.planted
+def test_a_gain_of_any_one_test_is_found() -> None:
+    found = []
+    for index in range(10):
+        (item,) = _with_fault(lambda test: replace(test, force_n=1.3 * test.force_n), index)
+        found.append((item.test, item.name))
+    assert found == [(f"T{index}", "gain-differs") for index in range(10)]
+
+
+@pytest.mark.planted
 def test_a_force_that_is_recorded_late_in_one_test() -> None:
     def late(test: TestArrays) -> TestArrays:
         return replace(test, force_n=np.interp(test.time_s - 0.04, test.time_s, test.force_n))
