@@ -128,7 +128,7 @@ def _states(displacement: FloatArray, drive: FloatArray) -> tuple[FloatArray, fl
     centred = displacement - np.mean(displacement)
     width = max(1, centred.size // 200)
     signs = uniform_filter1d(centred, width) > 0.0
-    cycle = 2.0 * centred.size / max(np.count_nonzero(signs[1:] != signs[:-1]), 1)
+    cycle = 2.0 * centred.size / max(int(np.count_nonzero(np.diff(signs))), 1)
     velocity = uniform_filter1d(np.gradient(centred), max(3, int(cycle / 60.0)))
     columns = [centred, velocity, drive - np.mean(drive)]
     spreads = [float(np.std(column)) for column in columns]
