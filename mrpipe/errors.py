@@ -50,3 +50,8 @@ class StageFailed(MrpipeError):
 
 class DivergedError(MrpipeError):
     """A fit or a simulation diverged; the message says where and what to try."""
+
+
+def install_extra(extra: str) -> str:
+    """Return how to install an optional extra of mrpipe, for the remedy of an error."""
+    return f"pip install 'mrpipe[{extra}]', in a checkout pip install -e '.[{extra}]'"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import mrpipe.exports.formats
 from mrpipe.artifacts import atomic_path
-from mrpipe.errors import UserError
+from mrpipe.errors import UserError, install_extra
 from mrpipe.exports.contract import ExportFormat, Subject
 
 LOADS_FROM = ("mrpipe.exports.formats",)
@@ -47,7 +47,7 @@ def chosen_formats(kind: str, names: Iterable[str]) -> list[ExportFormat]:
             raise UserError("--format", name, f"is no format of a {kind}", f"one of {', '.join(known)}")
         needs = known[name].needs
         if needs and not importlib.util.find_spec(needs):
-            raise UserError("--format", name, f"needs the package {needs}", f"pip install 'mrpipe[{name}]'")
+            raise UserError("--format", name, f"needs the package {needs}", install_extra(name))
     return [known[name] for name in named]
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.errors import UserError
+from mrpipe.errors import UserError, install_extra
 from mrpipe.modal.lscf import PoleCandidate
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.records import FrameTest
@@ -284,7 +284,7 @@ def find_ambient_modes(
         import pyoma2  # noqa: F401
     except ImportError as error:
         place = f"tests.{tests[0].name}"
-        raise UserError(source, place, "ambient tests need pyOMA2", "pip install 'mrpipe[ambient]'") from error
+        raise UserError(source, place, "ambient tests need pyOMA2", install_extra("ambient")) from error
     if len({(test.sensors, test.sampling_rate_hz) for test in tests}) > 1:
         problem = "ambient tests differ in sensors or sampling rate"
         raise UserError(source, "tests", problem, "identify each set-up by itself, or give all the same sensors")

@@ -86,6 +86,8 @@ def ranking_in_words(found: Mapping[str, Any]) -> str:
             f" Under the recorded motions the measured order is {', '.join(found['recorded_ranking']['measured'])}; "
             f"the model agrees with it {words.get((agrees['before'], agrees['after']), 'neither before nor after')}."
         )
+        if agrees["before"] != agrees["after"] and not found["ranking_changes"]:
+            said += " So under these motions, unlike over the whole band, the effect changes the predicted order."
     return said
 
 

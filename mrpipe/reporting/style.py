@@ -60,12 +60,26 @@ def label(axis: Axes, x: str, y: str, title: str = "") -> None:
         axis.set_title(title, fontsize=9)
 
 
+MOST_POINTS = 20_000
+"""Points of a figure up to which the best place of a legend is searched; the search is slow for more."""
+
+
+def place_legends(figure: Figure) -> None:
+    """Put the legends of figures with very many points into the upper right corner."""
+    for axis in figure.axes:
+        legend = axis.get_legend()
+        points = sum(len(line.get_xdata(orig=False)) for line in axis.lines)
+        if legend is not None and points > MOST_POINTS:
+            legend.set_loc("upper right")
+
+
 def as_svg(figure: Figure) -> str:
     """Return a figure as an SVG element without time stamp, so that the same figure is the same text.
 
     Texts stay texts (searchable, small); coordinates are rounded to a hundredth of a point.
     """
     buffer = io.StringIO()
+    place_legends(figure)
     with matplotlib.rc_context(_SVG):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     text = buffer.getvalue()

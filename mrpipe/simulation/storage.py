@@ -28,6 +28,21 @@ _HISTORIES = {
 }
 
 
+COMMANDS = (
+    ("drive", ""),
+    ("desired_force", "N"),
+    ("desired_force_before_clipping", "N"),
+    ("estimated_displacement", "m"),
+    ("estimated_velocity", "m/s"),
+    ("amplitude", "m"),
+    ("is_clipped", "1"),
+    ("is_switched_off", "1"),
+    ("drive_of_inverse", ""),
+    ("fault", "1"),
+)
+"""Name and unit of the controller's signals in the order of :mod:`mrpipe.control.kernel`; no unit: that of the drive."""
+
+
 def write_response(artifact: ArtifactWriter, response: Response, drive_unit: str) -> None:
     """Write the histories of a response."""
     for name, unit in _HISTORIES.items():
@@ -35,7 +50,11 @@ def write_response(artifact: ArtifactWriter, response: Response, drive_unit: str
     for name, unit in _FLOORS.items():
         artifact.put(name, getattr(response, name), unit=unit, dims=("time", "floor"))
     artifact.put("drive", response.drive, unit=drive_unit, dims=("time",))
-    artifact.put("commands", response.commands, unit="see mrpipe.control.kernel", dims=("sample", "command"))
+    columns = [{"name": name, "unit": unit or drive_unit} for name, unit in COMMANDS]
+    artifact.put(
+        "commands", response.commands[:, : len(columns)], unit="see command_columns", dims=("sample", "command")
+    )
+    artifact.put_json("command_columns", columns)
     artifact.put("command_time", response.command_time_s, unit="s", dims=("sample",))
 
 

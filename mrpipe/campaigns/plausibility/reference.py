@@ -185,8 +185,12 @@ class ReferenceMap:
         ----------
         part
             Normal equations of the test, which is one of `without`.
+        without
+            Indices of the tests that are left out.
         gains
-            First estimates, shape (m,); one for each test but `without` if `jackknife`, else one.
+            First estimates, shape (m,).
+        jackknife
+            Whether one gain is wanted for each further test left out; otherwise m is 1.
         """
         kept = [index for index in range(len(self.parts)) if index not in without]
         matrices, vectors = self._matrices[kept].sum(axis=0)[None], self._vectors[kept].sum(axis=0)[None]

@@ -13,7 +13,7 @@ import numpy as np
 
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.schema import TextEntry
-from mrpipe.errors import UserError
+from mrpipe.errors import UserError, install_extra
 
 LOADS_FROM: tuple[str, ...] = ()
 """Only packages of other makers are imported by name here, none of mrpipe."""
@@ -54,7 +54,7 @@ def optional(module: str, package: str, extra: str, path: Path) -> ModuleType:
     except ImportError:
         kind = path.suffix or "such"
         problem = f"{kind} files need the package {package}, which is not installed"
-        raise UserError(path, "", problem, f"pip install 'mrpipe[{extra}]'") from None
+        raise UserError(path, "", problem, install_extra(extra)) from None
 
 
 def require_size(path: Path, claimed: int, stored: int) -> None:
