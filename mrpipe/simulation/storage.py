@@ -40,7 +40,10 @@ COMMANDS = (
     ("drive_of_inverse", ""),
     ("fault", "1"),
 )
-"""Name and unit of the controller's signals in the order of :mod:`mrpipe.control.kernel`; no unit: that of the drive."""
+"""Name and unit of the controller's signals in the order of :mod:`mrpipe.control.kernel`.
+
+An empty unit stands for that of the drive.
+"""
 
 
 def write_response(artifact: ArtifactWriter, response: Response, drive_unit: str) -> None:
