@@ -10,6 +10,7 @@ import re
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -68,7 +69,7 @@ def place_legends(figure: Figure) -> None:
     """Put the legends of figures with very many points into the upper right corner."""
     for axis in figure.axes:
         legend = axis.get_legend()
-        points = sum(len(line.get_xdata(orig=False)) for line in axis.lines)
+        points = sum(np.size(line.get_xdata(orig=False)) for line in axis.lines)
         if legend is not None and points > MOST_POINTS:
             legend.set_loc("upper right")
 
