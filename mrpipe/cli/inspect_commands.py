@@ -33,7 +33,15 @@ def show(
         )
     if plot is not None and plot.suffix.lower() not in {".png", ".svg", ".pdf"}:
         raise UserError("--plot", str(plot), "is no picture", "end it in .png, .svg or .pdf")
-    description = describe_any(file)
+    try:
+        description = describe_any(file)
+    except (OSError, RuntimeError, KeyError) as error:
+        # the library that reads HDF5 does not name the file
+        of_system = isinstance(error, OSError) and error.errno is not None
+        if of_system or file.suffix.lower() not in {".h5", ".hdf5"}:
+            raise
+        problem = f"is damaged ({' '.join(str(error).split())[:120]})"
+        raise UserError(file, "", problem, "build it again with --force") from error
     if plot is not None:
         from mrpipe.reporting.contents import plot_file
 

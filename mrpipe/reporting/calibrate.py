@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,6 @@ def describe(
     frame: Frame,
     calibration: Calibration,
     summary: Mapping[str, Any],
-    warnings: Sequence[str],
     amplitude_m: float,
     map_points: int,
 ) -> None:
@@ -34,8 +33,6 @@ def describe(
         Of the report.
     frame, calibration, summary
         What was calibrated, and its summary as `--json` prints it.
-    warnings
-        Of the stage.
     amplitude_m
         Damper amplitude of the loops that are shown.
     map_points
@@ -62,8 +59,6 @@ def describe(
         pd.DataFrame(sources),
         "Gains as the thesis ran them, by closed form, and of best exact damping.",
     )
-    for warning in warnings:
-        sink.text(f"Warning: {warning}.")
     _maps(sink, frame, calibration, map_points)
     _loops(sink, calibration, amplitude_m)
 

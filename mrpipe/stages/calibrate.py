@@ -71,7 +71,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         "residual_force_n": float(forces[0]),
         "largest_force_n": float(forces[1]),
     }
-    report.describe(context.report, frame, calibration, summary, context.warnings, amplitude, settings.map_points)
+    report.describe(context.report, frame, calibration, summary, amplitude, settings.map_points)
     return summary
 
 

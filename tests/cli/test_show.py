@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mrpipe.artifacts.hdf5 import ArtifactWriter, Provenance
@@ -90,3 +91,19 @@ def test_a_run_directory_lists_its_stages(tmp_path: Path, capsys: pytest.Capture
     assert lines[0] == f"run directory {tmp_path / 'run'}"
     assert any(line.split()[:1] == ["prepare"] and "prepared.h5" in line for line in lines)
     assert lines[-1] == f"next: mrpipe status {tmp_path / 'run'}"
+
+
+@pytest.mark.property
+def test_a_damaged_artifact_is_one_line_with_its_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "prepared.h5"
+    with ArtifactWriter.create(path, Provenance("prepare")) as artifact:
+        for number in range(10):
+            artifact.put(f"x{number}", np.zeros(200), unit="m", dims=("time",))
+    content, found = path.read_bytes(), 0
+    for place in range(500, len(content), len(content) // 9):
+        path.write_bytes(content[:place] + b"\xff" * 64 + content[place + 64 :])
+        if run(["show", str(path)]) == 2:
+            (line,) = capsys.readouterr().err.splitlines()
+            assert line.startswith(f"mrpipe: {path}")
+            found += 1
+    assert found > 0

@@ -306,27 +306,31 @@ def _unit_finding(test: Slow, channel: str, factor: float, evidence: str, number
 
 
 def _decades(tests: Sequence[Slow]) -> list[Finding]:
-    """Return tests whose stroke, force or drive lies decades away from that of all others.
+    """Return tests whose stroke, force or drive lies decades away from that of most others.
 
-    A drive can be zero in a test, so only a drive that is far larger than all others is suspected.
+    The tests are parted at the widest gap between their sizes. If it spans decades, the smaller group is named; of
+    groups of equal size the larger values are named, because which of them are wrong cannot be known. A drive can be
+    zero in a test, so only a drive that is far larger than all others is suspected.
     """
     findings = []
     for channel, decades in (("displacement", 3.0 * DECADES), ("force", DECADES), ("drive", DECADES)):
-        sizes = [float(np.sqrt(np.mean(getattr(test, channel) ** 2))) for test in tests]
-        for index, size in enumerate(sizes):
-            others = [other for position, other in enumerate(sizes) if position != index]
-            if size <= 0.0 or not max(others) > 0.0:
-                continue
-            ratio = size / max(others)
-            # of two tests, the larger one is named, because which of them is wrong cannot be known
-            small = channel != "drive" and len(tests) > 2 and min(others) > 0.0
-            ratio = ratio if ratio > 1.0 else min(size / min(others), 1.0) if small else 1.0
-            # a drive near zero is noise, so ratios alone say nothing
-            suspect = channel != "drive" or size > LARGE_DRIVE
-            if suspect and (ratio > decades or ratio < 1.0 / decades):
-                evidence = f"its RMS is {ratio:.3g} times that of any other test"
-                factor = 1e-3 if ratio > 1.0 else 1e3
-                findings.append(_unit_finding(tests[index], channel, factor, evidence, {"ratio": ratio}))
+        sizes = np.array([float(np.sqrt(np.mean(getattr(test, channel) ** 2))) for test in tests])
+        order = [index for index in np.argsort(sizes) if sizes[index] > 0.0]
+        if len(order) < 2:
+            continue
+        ratios = sizes[order[1:]] / sizes[order[:-1]]
+        cut = int(np.argmax(ratios)) + 1
+        ratio = float(ratios[cut - 1])
+        large = channel == "drive" or len(order) - cut <= cut
+        named = order[cut:] if large else order[:cut]
+        # a drive near zero is noise, so ratios alone say nothing
+        suspect = channel != "drive" or (sizes[order[cut]] > LARGE_DRIVE and len(order) - cut <= cut)
+        if not suspect or ratio <= decades:
+            continue
+        times = ratio if large else 1.0 / ratio
+        evidence = f"the RMS is {times:.3g} times that of the nearest of the {len(order) - len(named)} others"
+        for index in sorted(named):
+            findings.append(_unit_finding(tests[index], channel, 1e-3 if large else 1e3, evidence, {"ratio": times}))
     return findings
 
 

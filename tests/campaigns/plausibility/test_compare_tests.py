@@ -159,6 +159,16 @@ def test_columns_exchanged_in_all_tests() -> None:
 
 
 @pytest.mark.planted
+@pytest.mark.parametrize(("channel", "factor"), [("force_n", 1e3), ("force_n", 1e-3), ("displacement_m", 1e3)])
+def test_a_wrong_unit_of_several_tests(channel: str, factor: float) -> None:
+    tests = list(_sound(10, False))
+    for index in (3, 4, 8):
+        tests[index] = replace(tests[index], **{channel: factor * getattr(tests[index], channel)})
+    found = compare_tests(tests)
+    assert [(item.test, item.name) for item in found] == [(f"T{index}", "unit-decades") for index in (3, 4, 8)]
+
+
+@pytest.mark.planted
 @pytest.mark.parametrize("count", [1, 2, 10])
 @pytest.mark.parametrize("drift", [0.0, 2.0])
 def test_a_load_cell_that_shows_noise_in_every_test(count: int, drift: float) -> None:
