@@ -190,7 +190,7 @@ def traced(case: Case, campaign: Campaign, truth: dict[str, Any]) -> dict[str, A
     """Trace a campaign and judge the verdict."""
     from mrpipe.effects.library import damper_effects
     from mrpipe.effects.structural.library import all_structural_effects
-    from mrpipe.tracing.bench.summary import TracingOptions
+    from mrpipe.tracing.options import TracingOptions
     from mrpipe.tracing.structure.verdict import trace_structure
 
     options = TracingOptions(refits=4, observation_filter=False, drive_unit=campaign.drive_unit or "A")

@@ -107,8 +107,8 @@ def trace(campaign: Path, seed: int) -> dict[str, Any]:
     from mrpipe.laboratory.sealing import sealed_path
     from mrpipe.signals.options import PreparationOptions
     from mrpipe.signals.preparation import prepare_campaign
-    from mrpipe.tracing.bench.summary import TracingOptions
     from mrpipe.tracing.bench.trace import trace_campaign
+    from mrpipe.tracing.options import TracingOptions
 
     tests = [item.test for item in prepare_campaign(load_campaign(campaign), PreparationOptions()).tests]
     damper_effects()

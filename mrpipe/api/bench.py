@@ -275,9 +275,9 @@ def trace(tests: PreparedTests, *, seed: int = 2011, jobs: int = 1, **settings: 
     """
     from mrpipe.config.sections.close_loop import CloseLoopSettings
     from mrpipe.effects.library import damper_effects, effects_named, load_effect_file
-    from mrpipe.tracing.bench.settings import tracing_options
     from mrpipe.tracing.bench.trace import trace_campaign
     from mrpipe.tracing.loop.augmented import traced_damper
+    from mrpipe.tracing.options import tracing_options
 
     chosen = settings_of(CloseLoopSettings, "close_loop", settings)
     known = damper_effects()

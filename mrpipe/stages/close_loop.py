@@ -29,8 +29,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.effects.library import damper_effects, effects_named
     from mrpipe.reporting import close_loop as section
     from mrpipe.signals.prepared import read_prepared
-    from mrpipe.tracing.bench.settings import tracing_options
     from mrpipe.tracing.bench.trace import trace_campaign
+    from mrpipe.tracing.options import tracing_options
 
     settings = context.settings.close_loop
     campaign = load_campaign(context.inputs["campaign:bench"])

@@ -6,7 +6,6 @@ Takes the place of the stage on a bench campaign where the user gives a campaign
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import StageSkipped
@@ -22,7 +21,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.effects.library import damper_effects
     from mrpipe.effects.structural.library import all_structural_effects, structural_effects
     from mrpipe.reporting import close_loop_frame as section
-    from mrpipe.tracing.bench.settings import tracing_options
+    from mrpipe.tracing.options import tracing_options
     from mrpipe.tracing.structure.verdict import trace_structure
 
     settings = context.settings.close_loop
@@ -43,13 +42,12 @@ def _run(context: StageContext) -> Mapping[str, Any]:
             context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
     asked = tracing_options(settings, campaigns[0].drive_unit)
     # few long tests: fewer forms are refitted, and nothing filtered their force
-    options = replace(asked, refits=min(settings.refits, 4), observation_filter=False, unattributed=False)
+    options = asked.changed(refits=min(settings.refits, 4), observation_filter=False, unattributed=False)
     traced = trace_structure(
         campaigns,
         structural_effects(settings.candidates, settings.effect_files),
         damper_effects(),
         options,
-        settings.rules,
         rng=context.rng,
         jobs=context.jobs,
         progress=context.progress,

@@ -173,6 +173,11 @@ class OffsetRules(Section):
         description="One common offset must raise the chi-square by this share, else the tests do not require separate "
         "ones.",
     )
+    clear: float = Field(
+        3.0,
+        gt=0.0,
+        description="With an unexplained residual, offsets are named only if they spread by this multiple of its RMS.",
+    )
     confidence: float = Field(
         0.97,
         gt=0.0,
@@ -253,6 +258,169 @@ class LocationRules(Section):
         0.05,
         gt=0.0,
         description="The drive rises or falls where its rate exceeds this share of the largest drive in a second.",
+    )
+
+
+class SelectionRules(Section):
+    """When forward selection adds an effect, and when it is named. All numbers are dimensionless."""
+
+    nothing_missing: float = Field(
+        0.2,
+        ge=0.0,
+        description="Nothing is missing if the chi-square exceeds that of the noise by less than this share of it; the "
+        "noise is known to about a fifth.",
+    )
+    gain: float = Field(
+        0.05, ge=0.0, description="A further effect must recover this share of what the base model lacks."
+    )
+    term_share: float = Field(
+        0.25,
+        ge=0.0,
+        description="A term that recovers this share of the remaining residual is kept, because it improves the model.",
+    )
+    named_share: float = Field(
+        0.5,
+        ge=0.0,
+        description="A further term is named as an effect if it recovers this share of the remaining residual.",
+    )
+    lead: float = Field(
+        1.25,
+        ge=1.0,
+        description="It is named only if every other family leaves at least this multiple of what it leaves.",
+    )
+    contender_share: float = Field(
+        0.3,
+        ge=0.0,
+        description="Forms that leave more than the best draft by this share of its gain are not fitted to all tests.",
+    )
+    further: float = Field(
+        0.15,
+        ge=0.0,
+        description="If less than this share remains, and less than the noise, a further effect must promise its share "
+        "in screening.",
+    )
+    better_optimum: float = Field(
+        0.03,
+        ge=0.0,
+        description="A fit that leaves less than another fit of the same terms by this share shows that the other had "
+        "not converged.",
+    )
+    main_part: float = Field(
+        0.2,
+        ge=0.0,
+        description="The main part of a form with corrections of either sign must be this share of the largest one.",
+    )
+    per_parameter: float = Field(
+        0.01,
+        ge=0.0,
+        description="Penalty on the chi-square for each parameter of a form, relative, so that the simpler of two "
+        "forms that fit alike is taken.",
+    )
+    same: float = Field(
+        0.05,
+        ge=0.0,
+        description="Differences below this share of the noise do not separate the families of one round.",
+    )
+
+
+BY_FORCE = SelectionRules(gain=0.02, term_share=0.06, named_share=0.25, lead=1.0)
+"""Numerical technique: defaults where weights go by the RMS force, because the error of any model exceeds the noise."""
+
+
+class RaceRules(Section):
+    """How base forms with and without effects are compared. All numbers are dimensionless."""
+
+    claim_cost: float = Field(
+        0.02,
+        ge=0.0,
+        description="Share by which each fitted number counts against a model; an effect counts three times.",
+    )
+    form_lead: float = Field(
+        0.1,
+        ge=0.0,
+        description="Share by which another base form must cost less than the declared one to be taken.",
+    )
+    noise_share: float = Field(
+        0.1,
+        ge=0.0,
+        description="Differences below this share of the noise do not count, because the noise is not known better.",
+    )
+    sufficient: float = Field(
+        1.25,
+        ge=1.0,
+        description="A model whose error is at most this multiple of the noise floor needs nothing more; the floor is "
+        "known to within a quarter.",
+    )
+    listed_lead: float = Field(
+        0.05,
+        ge=0.0,
+        description="Share by which another base form must fit better than the declared one to be reported as best.",
+    )
+
+
+class ModelErrorRules(Section):
+    """When the sensors' noise is not the measure of a residual. All numbers are dimensionless."""
+
+    chi_square: float = Field(
+        6.0,
+        gt=1.0,
+        description="If the best model leaves this multiple of the noise, the noise is not the measure: weights go by "
+        "the RMS force.",
+    )
+    better_form: float = Field(
+        0.5,
+        gt=0.0,
+        lt=1.0,
+        description="Noise and weights come from another base form if it leaves at most this share of what the "
+        "declared form leaves.",
+    )
+    too_plain: float = Field(
+        0.5,
+        gt=0.0,
+        lt=1.0,
+        description="If a richer form of the same effect removes this share of the residual, only the plain form was "
+        "wrong.",
+    )
+    most: float = Field(
+        3.0,
+        ge=1.0,
+        description="Such a form may leave up to this multiple of `chi_square`.",
+    )
+    flexible_share: float = Field(
+        0.15,
+        gt=0.0,
+        lt=1.0,
+        description="A flexible model that recovers less than this share of the residual finds no structure in it.",
+    )
+
+
+class RefinementRules(Section):
+    """When a richer form of a named effect is taken. All numbers are dimensionless."""
+
+    worth_a_try: float = Field(
+        0.1,
+        ge=0.0,
+        description="The plain form is sufficient if the chi-square exceeds that of the noise by less than this share.",
+    )
+    least_gain: float = Field(
+        0.05,
+        ge=0.0,
+        description="A richer form must lower the squared error on left-out tests by this share.",
+    )
+
+
+class RemainderRules(Section):
+    """When something remains unexplained, and what is said of it. All numbers are dimensionless."""
+
+    of_excess: float = Field(
+        0.1,
+        ge=0.0,
+        description="With named effects, something remains if it is this share of the residual before them.",
+    )
+    listed: float = Field(
+        0.01,
+        ge=0.0,
+        description="A state is listed under `depends_on` if it explains this share of the residual's variance.",
     )
 
 
@@ -510,6 +678,14 @@ class TracingRules(Section):
     validation: ValidationRules = Field(
         ValidationRules(), description="How errors on the validation tests decide the class of the verdict."
     )
+    selection: SelectionRules = Field(SelectionRules(), description="When forward selection adds and names an effect.")
+    selection_by_force: SelectionRules = Field(
+        BY_FORCE, description="The same where weights go by the RMS force, because any model's error exceeds the noise."
+    )
+    race: RaceRules = Field(RaceRules(), description="How base forms with and without effects are compared.")
+    model_error: ModelErrorRules = Field(ModelErrorRules(), description="When the sensors' noise is not the measure.")
+    refinement: RefinementRules = Field(RefinementRules(), description="When a richer form of an effect is taken.")
+    remainder: RemainderRules = Field(RemainderRules(), description="When something remains unexplained.")
     noise: NoiseRules = Field(NoiseRules(), description="How the noise of a bench campaign is estimated.")
     offsets: OffsetRules = Field(OffsetRules(), description="When a moving zero of the load cell is named.")
     nuisances: NuisanceRules = Field(NuisanceRules(), description="When gains of sessions and filters are real.")

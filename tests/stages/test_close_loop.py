@@ -29,8 +29,9 @@ from mrpipe.stages.close_loop import closed_loop
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
 from mrpipe.thesis.gains import THESIS_GAINS
-from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing, TracingOptions
+from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.options import TracingOptions
 from tests.tracing.bench.rig import campaign
 
 LAWS = ("vd", "vdns", "fdns", "nnc", "lqg", "bang-bang", "passive-on")

@@ -6,75 +6,24 @@ from pathlib import Path
 
 from pydantic import Field, field_validator
 
-from mrpipe.artifacts.yaml_source import nearest
-from mrpipe.config.section import Section
 from mrpipe.control.laws import known_law
-from mrpipe.dampers.forms import form_names
-from mrpipe.tracing.rules import TracingRules
+from mrpipe.tracing.options import TracingSettings
 
 
-class CloseLoopSettings(Section):
+class CloseLoopSettings(TracingSettings):
     """From the residual of a model to the effect that it lacks."""
 
-    model: str = Field(
-        "bouc-wen",
-        description="Declared base form, any of mrpipe/dampers/forms; rate-dependent-yield stands for yielding-part, "
-        "the form of this family that suits most recordings. Other base forms are compared with it.",
-    )
-    yield_order: int = Field(3, ge=0, le=3, description="Degree of the yield force in the drive.")
-    viscosity_order: int = Field(1, ge=0, le=3, description="Degree of the viscosity in the drive.")
-    most_effects: int = Field(3, ge=0, le=3, description="Most effects that are named together.")
     candidates: tuple[str, ...] = Field((), description="Effects to consider; empty for all of the library.")
     effect_files: tuple[Path, ...] = Field(
         (), description="Your Python files, each of which defines one more effect as EFFECT."
-    )
-    base_forms: tuple[str, ...] = Field(
-        (), description="Base forms that are tried in addition to the declared one; empty for all of the library."
-    )
-    fit_rate_hz: float = Field(250.0, gt=0.0, description="Rate at which candidates are fitted [Hz].")
-    displacement_cutoff_hz: float = Field(
-        0.0, ge=0.0, description="Zero-phase low-pass of the displacement [Hz]; 0 chooses it for each test."
-    )
-    refits: int = Field(8, ge=1, description="How many of the screened families are refitted jointly.")
-    folds: int = Field(3, ge=2, description="Folds of the cross-validation over whole training tests.")
-    bootstrap_draws: int = Field(400, ge=50, description="Draws of the block bootstrap.")
-    named_share: float = Field(0.9, gt=0.5, le=1.0, description="Share of the recoverable residual that proves a name.")
-    least_share: float = Field(
-        0.5, gt=0.0, lt=1.0, description="Share of the recoverable residual below which the cause is unknown."
-    )
-    lead: float = Field(
-        0.3,
-        ge=0.0,
-        description="Families that leave at most this share more than the best one leaves are tied with it.",
-    )
-    record_gain: bool = Field(False, description="Fit a gain for each record of the validation tests (weak sessions).")
-    observation_filter: bool = Field(
-        True, description="Look for a moving average that the records went through, in shares of a period."
-    )
-    model_error_share: float = Field(
-        0.0,
-        ge=0.0,
-        lt=1.0,
-        description="Model error to weigh by, as a share of the force RMS, where it is known to outweigh the sensors' "
-        "noise, as on real dampers; 0 finds out by a first pass, for twice the time.",
     )
     laws: tuple[str, ...] = Field(
         (),
         description="Laws that the closed loop compares in addition to the recorded ones; empty: those that `stages` "
         "simulates, or all that are calibrated where it simulates none.",
     )
-    rules: TracingRules = Field(TracingRules(), description="Thresholds of the decisions.")
-    unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")
 
     @field_validator("laws")
     @classmethod
     def _laws_are_known(cls, laws: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(known_law(law) for law in laws)
-
-    @field_validator("model")
-    @classmethod
-    def _model_is_known(cls, value: str) -> str:
-        known = (*form_names(), "rate-dependent-yield")
-        if value not in known:
-            raise ValueError(f"no base form {value!r}; {nearest(value, known)}")
-        return value

@@ -22,30 +22,19 @@ from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.pairs import with_play
 from mrpipe.tracing.bench.race import Model, Race, alone, on_all_tests, race
 from mrpipe.tracing.bench.refine import with_richer_forms
-from mrpipe.tracing.bench.select import Candidate, Selection, Thresholds, draft, forward_selection, share_of
-from mrpipe.tracing.bench.summary import FLEXIBLE_SHARE, TracingOptions
+from mrpipe.tracing.bench.select import Candidate, Selection, draft, forward_selection, share_of
 from mrpipe.tracing.bench.weights import force_deviation, noise_scale
-
-MODEL_ERROR_CHI_SQUARE = 6.0
-"""If the best model leaves this many times the noise, the sensors' noise is no measure: weights go by force RMS."""
-
-BETTER_FORM = 0.5
-"""Noise and weights come from another base form if it leaves at most this share of what the declared form leaves."""
-
-TOO_PLAIN = 0.5
-"""Where a richer form of the same effect takes this share of the residual, only the plain form was wrong."""
-
-REAL_THRESHOLDS = Thresholds(gain=0.02, term_share=0.06, named_share=0.25, lead=1.0)
-"""What a further effect must recover where weights go by force RMS: noise is far below any model's error."""
+from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
 
 ROUNDED_FORM = "yielding-part"
 """The filter of the records is judged with this base form, because a rounded yield rounds the corners of a loop too."""
 
 PROMOTED = 3
-"""Number of candidates of each round that are fitted to all training tests; others keep the numbers of the draft ..."""
+"""Numerical technique: candidates of a round that are fitted to all training tests; the others keep the draft ..."""
 
 PROMOTED_STEPS = 6
-"""... and iterations of these fits."""
+"""Numerical technique: ... and iterations of these fits."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +62,7 @@ class Choice:
         """Return the share of resamples of the training tests in which an effect is needed; 0 without a race."""
         if self.race is None:
             return 0.0
-        return self.race.support(effect, options.rules.lead, draws=options.bootstrap_draws, rng=rng)
+        return self.race.support(effect, options.lead, draws=options.bootstrap_draws, rng=rng)
 
 
 def choose_model(
@@ -117,11 +106,11 @@ def choose_model(
         if choice.race is not None:
             selection = with_laws_again(selection, options.yield_order, options.viscosity_order)
         if floor > 0.0:
-            return replace(choice, selection=judged_by_trees(selection))
+            return replace(choice, selection=judged_by_trees(selection, options.rules.model_error))
         if choice.race is None:
             return choice
         if _near_the_noise(selection, baseline.noise, len(declared), options, rng, jobs):
-            baseline, selection = _with_noise_of(selection.chosen, baseline, selection)
+            baseline, selection = _with_noise_of(selection.chosen, baseline, selection, options.rules.noise)
             return replace(choice, baseline=baseline, selection=selection)
         # what remains on the force's own scale becomes the yardstick of a second race
         chosen = selection.chosen
@@ -129,7 +118,9 @@ def choose_model(
         left = chosen.residual[used] / chosen.problem.root_weight[used]
         floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
         base = declared_base(training, options.model, options.yield_order, options.viscosity_order)
-        baseline = _without_nuisances(fit_baseline(training, base, declared, model_error_share=floor), options)
+        baseline = _without_nuisances(
+            fit_baseline(training, base, declared, model_error_share=floor, rules=options.rules.noise), options
+        )
 
 
 def _near_the_noise(
@@ -137,14 +128,21 @@ def _near_the_noise(
 ) -> bool:
     """Return whether the sensors' noise is the measure, for what was chosen or for a richer form of the same effect."""
     plain = selection.chosen.chi_square / max(noise, 1e-12)
-    if plain < MODEL_ERROR_CHI_SQUARE:
+    rules = options.rules.model_error
+    if plain < rules.chi_square:
         return True
     # the right effect in too plain a form may leave as much as a wrong base form does
     refined = with_richer_forms(
-        selection, declared, folds=options.folds, draws=options.bootstrap_draws, rng=rng, jobs=jobs
+        selection,
+        declared,
+        folds=options.folds,
+        draws=options.bootstrap_draws,
+        rng=rng,
+        jobs=jobs,
+        rules=options.rules.refinement,
     )
     richer = refined.chosen.chi_square / max(noise, 1e-12)
-    return richer < max(MODEL_ERROR_CHI_SQUARE, min(3.0 * MODEL_ERROR_CHI_SQUARE, (1.0 - TOO_PLAIN) * plain))
+    return richer < max(rules.chi_square, min(rules.most * rules.chi_square, (1.0 - rules.too_plain) * plain))
 
 
 def _raced(
@@ -156,14 +154,16 @@ def _raced(
     progress: Progress,
 ) -> Choice:
     """Run the race and fit its winner to all training tests."""
-    nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit)
+    rules = options.rules.selection_by_force if model_error else options.rules.selection
+    least = options.rules.selection.nothing_missing
+    nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=least)
     if not nothing.structured:
         return Choice(baseline, nothing)
     forms = {name: form.without_springs() for name, form in forms_named(options.base_forms).items()}
     progress(0.1, "base forms")
     singles = alone(draft(baseline.fit), forms, jobs=jobs)
     if not model_error:
-        baseline, singles = _with_noise_of_best(baseline, singles, baseline.fit.problem.recordings)
+        baseline, singles = _with_noise_of_best(baseline, singles, baseline.fit.problem.recordings, options.rules)
     base, noise = baseline.fit, baseline.noise
     search = partial(
         forward_selection,
@@ -171,18 +171,19 @@ def _raced(
         terms=[Term(effect, form) for effect in effects.values() for form in effect.forms],
         most=options.most_effects,
         refits=options.refits,
-        thresholds=REAL_THRESHOLDS if model_error else Thresholds(),
+        rules=rules,
         jobs=jobs,
     )
     further = partial(with_play, effects=effects) if model_error else None
-    found = race(base, singles, search, noise, further=further, jobs=jobs, progress=progress)
-    winner = found.winner(options.rules.lead)
+    found = race(base, singles, search, noise, further=further, rules=options.rules.race, jobs=jobs, progress=progress)
+    winner = found.winner(options.lead)
     # where a model's error outweighs the noise, further terms improve the model although their cause is not proven
     model = found.extended(winner) if model_error and len(winner.effects) > len(found.own) else winner
     progress(0.7, "fit to all tests")
     proven = len(winner.effects) - len(found.own)
-    tied = found.tied_forms(winner, options.rules.lead)
-    return Choice(baseline, replace(promoted(found, model, base), proven=proven, tied_forms=tied), found, winner)
+    tied = found.tied_forms(winner, options.lead)
+    selection = replace(promoted(found, model, base), proven=proven, tied_forms=tied, nothing_missing=least)
+    return Choice(baseline, selection, found, winner)
 
 
 def promoted(found: Race, winner: Model, base: Fit) -> Selection:
@@ -233,12 +234,14 @@ def _on_all(
     return tuple(sorted(result, key=lambda item: (item.name != own, item.fit.chi_square)))
 
 
-def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tuple[Baseline, Selection]:
+def _with_noise_of(
+    chosen: Fit, baseline: Baseline, selection: Selection, rules: NoiseRules
+) -> tuple[Baseline, Selection]:
     """Take the noise from the chosen fit: a poor model's errors do not all cancel between repeats.
 
     What the chosen model leaves is an upper bound of the noise.
     """
-    scale = noise_scale(chosen)
+    scale = noise_scale(chosen, rules)
     noise = noise_level_of(chosen, scale)
     if noise >= baseline.noise:
         scale, noise = baseline.scale, baseline.noise
@@ -249,7 +252,7 @@ def _with_noise_of(chosen: Fit, baseline: Baseline, selection: Selection) -> tup
 
 
 def _with_noise_of_best(
-    baseline: Baseline, singles: Mapping[str, Fit], training: Recordings
+    baseline: Baseline, singles: Mapping[str, Fit], training: Recordings, rules: TracingRules
 ) -> tuple[Baseline, dict[str, Fit]]:
     """Return baseline and base forms with weights and noise by the best base form, if it is clearly better.
 
@@ -258,12 +261,15 @@ def _with_noise_of_best(
     """
     base = baseline.fit
     best = min(singles.values(), key=lambda item: item.chi_square)
-    if best.problem.base.name == base.problem.base.name or best.chi_square > BETTER_FORM * base.chi_square:
+    if (
+        best.problem.base.name == base.problem.base.name
+        or best.chi_square > rules.model_error.better_form * base.chi_square
+    ):
         return baseline, dict(singles)
     whole = replace(best.problem, recordings=base.problem.recordings, root_weight=base.problem.root_weight)
     found = fit(whole, best.theta, iterations=4)
-    scale = noise_scale(found)
-    root = training.used / force_deviation(found, training, 0.0, scale)
+    scale = noise_scale(found, rules.noise)
+    root = training.used / force_deviation(found, training, 0.0, scale, rules.noise)
     found = replace(found, problem=replace(found.problem, root_weight=root))
     noise = noise_level_of(found, scale)
     base = fit(replace(base.problem, root_weight=root), base.theta, iterations=8)
@@ -279,20 +285,22 @@ def _with_noise_of_best(
 
 def _without_nuisances(baseline: Baseline, options: TracingOptions) -> Baseline:
     """Return the baseline with a drive lag that falls otherwise than it rises, and with the records' filter, if any."""
-    found = with_lag_apart(baseline.fit)
+    found = with_lag_apart(baseline.fit, options.rules.nuisances)
     if options.observation_filter and bool(np.all(found.problem.recordings.period_s > 0.0)):
-        share = observation_window(fit_with_form(found, base_form(ROUNDED_FORM), iterations=8))[0]
+        share = observation_window(
+            fit_with_form(found, base_form(ROUNDED_FORM), iterations=8), rules=options.rules.nuisances
+        )[0]
         if share > 0.0:
             found = observation_window(found, (share,))[1]
     return replace(baseline, fit=found, model_error=True)
 
 
-def judged_by_trees(selection: Selection) -> Selection:
+def judged_by_trees(selection: Selection, rules: ModelErrorRules) -> Selection:
     """Judge shares by what a flexible model can recover, where the sensors' noise is far below any model's error."""
     fits = [selection.base, selection.chosen]
     reached = [flexible_chi_square(item) for item in fits[: 1 if fits[0] is fits[1] else 2]]
     floor = max(selection.noise, min(*reached, selection.chosen.chi_square, selection.base.chi_square))
-    if floor > (1.0 - FLEXIBLE_SHARE) * selection.base.chi_square:
+    if floor > (1.0 - rules.flexible_share) * selection.base.chi_square:
         # the trees learn nothing that holds on other tests: repeats and sensors are the better measure
         return selection
     return selection.with_floor(floor)

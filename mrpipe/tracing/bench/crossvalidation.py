@@ -15,7 +15,7 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.residual_structure import BLOCK_S
 
 BEYOND = 0.01
-"""Share of its range by which a state may leave what a fit has seen before it counts as unknown to it."""
+"""Numerical technique: tolerance at the ends of the range that a fit has seen, as a share of the range."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from mrpipe.fitting.drive_laws import adequate_laws
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Base
 from mrpipe.fitting.start import distinct_levels, polynomial_laws
-from mrpipe.tracing.bench.select import NOTHING_MISSING, Selection
+from mrpipe.tracing.bench.select import Selection
 
 
 def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int) -> Selection:
@@ -32,7 +32,7 @@ def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int
         return selection
     rich = _with_laws(chosen, replace(base, laws=richest))
     found = _with_laws(rich, replace(base, laws=adequate_laws(rich)))
-    if found.chi_square >= chosen.chi_square - NOTHING_MISSING * selection.noise:
+    if found.chi_square >= chosen.chi_square - selection.nothing_missing * selection.noise:
         return selection
     if chosen is selection.ground:
         return replace(selection, chosen=found, ground=found)

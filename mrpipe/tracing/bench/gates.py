@@ -17,9 +17,9 @@ from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, judge, on_validation
 from mrpipe.tracing.bench.residual_structure import states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
-from mrpipe.tracing.bench.summary import FLEXIBLE_SHARE, TracingOptions
 from mrpipe.tracing.bench.validation import compare, training_agreements
 from mrpipe.tracing.bench.verdict import Named
+from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import ValidationRules
 
 
@@ -34,7 +34,7 @@ def validated(
 ) -> OnValidation:
     """Return the errors on the validation tests by the options of the tracing."""
     return on_validation(
-        base, chosen, baseline, training, validation, options.validation,
+        base, chosen, baseline, training, validation, options.rules.validation,
         own_offsets=own_offsets, record_gain=options.record_gain,
     )  # fmt: skip
 
@@ -55,7 +55,7 @@ def predicts(
     jobs: int,
 ) -> bool:
     """Return whether the base model predicts the comparable part of the validation tests at all."""
-    rules = options.validation
+    rules = options.rules.validation
     if found.nrmse(found.before) <= rules.failed:
         return True
     trained = training_agreements(baseline.fit, options.folds, rules, jobs=jobs)
@@ -78,7 +78,7 @@ def judged(
     """Return the verdict on the validation tests by the options of the tracing."""
     taken = selection.ground.problem.base.name if selection.ground is not None else ""
     return judge(
-        found, selection.base, selection.chosen, training, options.validation,
+        found, selection.base, selection.chosen, training, options.rules.validation,
         names=[item.effect.name for item in causes], base_taken=taken,
         structured=missing or bool(causes), reason=reason, faults=ordered.faults, folds=options.folds, jobs=jobs,
     )  # fmt: skip
@@ -96,8 +96,8 @@ def structured(
         return selection.structured
     # without repeats coloured noise looks like an excess: it is one only where something can be learnt of it
     base = selection.base
-    learnt = flexible_chi_square(base) < (1.0 - FLEXIBLE_SHARE) * base.chi_square
-    return learnt or structure_p_value(base.residual, states_of(base, training)) < options.validation.whiteness
+    learnt = flexible_chi_square(base) < (1.0 - options.rules.model_error.flexible_share) * base.chi_square
+    return learnt or structure_p_value(base.residual, states_of(base, training)) < options.rules.validation.whiteness
 
 
 def held(item: Named, judgement: Judgement) -> Named:

@@ -16,13 +16,13 @@ from mrpipe.fitting.problem import Term
 from mrpipe.fitting.start import best_starts
 
 GAPS = (0.01, 0.03, 0.08)
-"""Starts of the gap, as shares of the stroke."""
+"""Numerical technique: starts of the gap, as shares of the stroke."""
 
 FORM_STARTS = 3
-"""Number of starting points of the base form, besides its fitted one."""
+"""Numerical technique: number of starting points of the base form, in addition to its fitted one."""
 
 FOLLOWED = 3
-"""Number of trials that are fitted further."""
+"""Numerical technique: number of trials that are fitted further."""
 
 
 def with_play(found: Fit, effects: Mapping[str, Effect]) -> list[Fit]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,27 +19,16 @@ from mrpipe.fitting.engine import Fit, centred, fit, regressors, start_of, weigh
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.start import fit_with_form
 from mrpipe.tracing.bench.select import Selection
-
-CLAIM_COST = 0.02
-"""Share by which each fitted number, and three times that by which each effect, counts against a model."""
-
-FORM_LEAD = 0.1
-"""Share by which another base form must cost less than the declared one to be taken."""
+from mrpipe.tracing.rules import RaceRules
 
 LEADERS = 3
-"""Number of base forms, besides the declared one, under which effects are searched."""
+"""Numerical technique: base forms, in addition to the declared one, under which effects are searched."""
 
 SCREENED = 8
-"""Number of base forms, the best ones alone, that are tried with the effects found under another form."""
+"""Numerical technique: base forms, the best ones alone, that are tried with the effects of another form."""
 
 COMPARED = 60
-"""Number of models, the best ones on the draft, that are compared on all training tests."""
-
-NOISE_SHARE = 0.1
-"""Differences below this share of the noise do not count, because the noise itself is not known better."""
-
-SUFFICIENT = 1.25**2
-"""A model that leaves at most this multiple of the noise needs nothing more: its error is 1.25 noise floors."""
+"""Numerical technique: models, the best ones on the draft, that are compared on all training tests."""
 
 Search = Callable[[Fit], Selection]
 
@@ -96,6 +85,8 @@ class Race:
         Mean squared weighted residual that noise leaves.
     coupled
         Names of the base forms whose steps read the laws of the drive; these laws are held during the race.
+    rules
+        Decision thresholds.
     """
 
     models: tuple[Model, ...]
@@ -105,6 +96,7 @@ class Race:
     counts: FloatArray
     noise: float
     coupled: frozenset[str] = frozenset()
+    rules: RaceRules = field(default_factory=RaceRules)
 
     def costs(self, weights: FloatArray | None = None) -> FloatArray:
         """Return what each model leaves beyond what is sufficient, raised by its claims, shape (models,).
@@ -117,8 +109,8 @@ class Race:
         w = np.ones(len(self.counts)) if weights is None else weights
         squares = np.stack([model.squares for model in self.models])
         chi_square = squares @ w / max(float(self.counts @ w), 1.0)
-        left = np.maximum(chi_square - SUFFICIENT * self.noise, 0.0) + NOISE_SHARE * self.noise
-        return np.asarray(left * (1.0 + CLAIM_COST * np.array([model.claims for model in self.models])))
+        left = np.maximum(chi_square - self.rules.sufficient**2 * self.noise, 0.0) + self.rules.noise_share * self.noise
+        return np.asarray(left * (1.0 + self.rules.claim_cost * np.array([model.claims for model in self.models])))
 
     def winner(self, lead: float, weights: FloatArray | None = None) -> Model:
         """Return the model with fewest effects among those that are not clearly worse than the best one.
@@ -138,7 +130,7 @@ class Race:
         def order(place: int) -> tuple[int, float]:
             model = self.models[place]
             declared = model.form == self.declared
-            return len(model.effects), float(costs[place]) * (1.0 if declared else 1.0 + FORM_LEAD)
+            return len(model.effects), float(costs[place]) * (1.0 if declared else 1.0 + self.rules.form_lead)
 
         near = [place for place in range(len(self.models)) if costs[place] <= (1.0 + lead) * least]
         return self.models[min(near, key=order)]
@@ -182,6 +174,7 @@ def race(
     noise: float,
     *,
     further: Callable[[Fit], Sequence[Fit]] | None = None,
+    rules: RaceRules | None = None,
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Race:
@@ -199,18 +192,21 @@ def race(
         Mean squared weighted residual that noise leaves.
     further
         Fits further models from the best one; None for none.
+    rules
+        Decision thresholds; their defaults if None.
     jobs
         Threads.
     progress
         Called with the share done and a text.
     """
+    rules = rules or RaceRules()
     coupled = frozenset(name for name, item in singles.items() if item.problem.base.form.coupled)
     singles = {name: _held(item) if name in coupled else item for name, item in singles.items()}
     fits = list(singles.values())
-    if min(item.chi_square for item in fits) <= SUFFICIENT * noise:
+    if min(item.chi_square for item in fits) <= rules.sufficient**2 * noise:
         # a base form alone leaves no more than noise, so no effect is needed
-        return _compared(fits, base, {}, noise, coupled, jobs)
-    ordered = sorted(singles, key=lambda name: _draft_cost(singles[name], noise))
+        return _compared(fits, base, {}, noise, coupled, rules, jobs)
+    ordered = sorted(singles, key=lambda name: _draft_cost(singles[name], noise, rules))
     names = list(dict.fromkeys((base.problem.base.name, *ordered[:LEADERS])))
     screened = [singles[name] for name in dict.fromkeys((base.problem.base.name, *ordered[:SCREENED]))]
     searches: dict[str, Selection] = {}
@@ -224,13 +220,13 @@ def race(
     for name in names:
         searched(name)
     count = len(base.problem.terms)
-    best = min(fits, key=lambda item: _draft_cost(item, noise))
+    best = min(fits, key=lambda item: _draft_cost(item, noise, rules))
     if len(best.problem.terms) > count:
         fits += with_effects_of(best, screened, jobs=jobs)
-        rival = min(fits, key=lambda item: _draft_cost(item, noise)).problem.base.name
+        rival = min(fits, key=lambda item: _draft_cost(item, noise, rules)).problem.base.name
         if rival not in searches:
             searched(rival)
-        best = min(fits, key=lambda item: _draft_cost(item, noise))
+        best = min(fits, key=lambda item: _draft_cost(item, noise, rules))
         for place in range(count, len(best.problem.terms) if len(best.problem.terms) > count + 1 else count):
             # the effect may be needed under the best base form only
             fits += with_effects_of(_without(best, place), screened, jobs=jobs)
@@ -238,9 +234,9 @@ def race(
         fits += further(best)
         if len(best.problem.terms) > count:
             fits += further(singles[best.problem.base.name])
-    fits.sort(key=lambda item: _draft_cost(item, noise))
+    fits.sort(key=lambda item: _draft_cost(item, noise, rules))
     kept = {id(item): item for item in [*fits[:COMPARED], *singles.values()]}
-    return _compared(list(kept.values()), base, searches, noise, coupled, jobs)
+    return _compared(list(kept.values()), base, searches, noise, coupled, rules, jobs)
 
 
 def _held(found: Fit) -> Fit:
@@ -256,6 +252,7 @@ def _compared(
     searches: Mapping[str, Selection],
     noise: float,
     coupled: frozenset[str],
+    rules: RaceRules,
     jobs: int,
 ) -> Race:
     """Return the race of these models on all training tests."""
@@ -266,7 +263,7 @@ def _compared(
     used = problem.root_weight > 0.0
     counts = np.bincount(problem.recordings.test[used], minlength=problem.recordings.tests).astype(np.float64)
     own = tuple(term.effect.name for term in problem.terms)
-    return Race(models, problem.base.name, own, searches, counts, noise, coupled)
+    return Race(models, problem.base.name, own, searches, counts, noise, coupled, rules)
 
 
 def alone(small: Fit, forms: Mapping[str, BaseForm], *, jobs: int = 1) -> dict[str, Fit]:
@@ -317,10 +314,10 @@ def _without(found: Fit, place: int) -> Fit:
     return fit(problem, start_of(problem, found.base_values, values), iterations=1)
 
 
-def _draft_cost(found: Fit, noise: float) -> float:
+def _draft_cost(found: Fit, noise: float, rules: RaceRules) -> float:
     model = Model(found, np.zeros(0))
-    left = max(found.chi_square - noise, 0.0) + NOISE_SHARE * noise
-    return left * (1.0 + CLAIM_COST * model.claims)
+    left = max(found.chi_square - noise, 0.0) + rules.noise_share * noise
+    return left * (1.0 + rules.claim_cost * model.claims)
 
 
 def _squares(found: Fit, problem: Problem) -> FloatArray:

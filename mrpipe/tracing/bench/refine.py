@@ -18,16 +18,18 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.select import Selection, draft
-
-WORTH_A_TRY = 0.1
-"""Excess over the noise, in units of it, below which the plain form is good enough."""
-
-LEAST_GAIN = 0.05
-"""A richer form must lower the squared error on tests left out by this share."""
+from mrpipe.tracing.rules import RefinementRules
 
 
 def with_richer_forms(
-    selection: Selection, declared: int, *, folds: int, draws: int, rng: np.random.Generator, jobs: int = 1
+    selection: Selection,
+    declared: int,
+    *,
+    folds: int,
+    draws: int,
+    rng: np.random.Generator,
+    jobs: int = 1,
+    rules: RefinementRules | None = None,
 ) -> Selection:
     """Return the selection with the forms of its named effects refined where tests left out are predicted better.
 
@@ -43,20 +45,23 @@ def with_richer_forms(
         Source of randomness.
     jobs
         Processes; the result does not depend on their number.
+    rules
+        Decision thresholds; their defaults if None.
     """
+    rules = rules or RefinementRules()
     chosen = selection.chosen
     unseen: FloatArray | None = None
     for place in range(declared, min(declared + selection.proven, len(chosen.problem.terms))):
-        if chosen.chi_square < (1.0 + WORTH_A_TRY) * selection.noise:
+        if chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
             break
         richer = _richest(chosen, place)
-        if richer is None or richer.chi_square > (1.0 - LEAST_GAIN) * chosen.chi_square:
+        if richer is None or richer.chi_square > (1.0 - rules.least_gain) * chosen.chi_square:
             continue
         if unseen is None:
             unseen = left_out_residual(chosen, folds, jobs=jobs)
         trial = left_out_residual(richer, folds, jobs=jobs)
         gain = gain_of(unseen, trial, chosen.problem, draws=draws, rng=rng)
-        if gain.significant and gain.share > LEAST_GAIN:
+        if gain.significant and gain.share > rules.least_gain:
             chosen, unseen = richer, trial
     return replace(selection, chosen=chosen)
 

@@ -15,48 +15,19 @@ from mrpipe.fitting.engine import Fit, fit, solve, start_of, weighting
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.crossvalidation import folds_of
 from mrpipe.tracing.bench.screen import Screened, screen
-
-NOTHING_MISSING = 0.2
-"""Excess of the chi-square over the noise, in units of the noise, below which nothing is missing."""
-
-SECOND_GAIN = 0.05
-"""A further effect must recover at least this share of what the base lacked ..."""
-
-SECOND_SHARE = 0.5
-"""... and at least this share of what the effects before it left."""
-
-TERM_SHARE = 0.25
-"""A term that recovers this share of what is left improves the model; unless it is proven, no cause is named for it."""
-
-PROVEN_LEAD = 1.25
-"""A further effect is named where every other family leaves at least so many times what it leaves."""
-
+from mrpipe.tracing.rules import SelectionRules
 
 DRAFT_SAMPLES = 8_000
-"""Of this many samples, or a little more, the drafts of all forms are made ..."""
+"""Numerical technique: samples, or slightly more, on which all forms are drafted ..."""
 
 MOST_PARTS = 4
-"""... but of no smaller share of the tests than one in four."""
+"""Numerical technique: ... but at least this part of the tests."""
 
 BEGUN_STEPS = 3
-"""Iterations after which the forms that promise most are chosen ..."""
+"""Numerical technique: iterations after which the most promising forms are chosen ..."""
 
 CONTINUED = 8
-"""... and number of forms that are then fitted further."""
-
-CONTENDER_SHARE = 0.3
-"""Forms that leave more than the best draft by this share of what the best takes are not fitted on all tests."""
-
-FURTHER = 0.15
-"""Where less than this share is left, and less than the noise, a further effect must promise its share in screening."""
-
-
-BETTER_OPTIMUM = 0.03
-"""A fit that leaves less than another of the same terms by this share shows that the other had not arrived."""
-
-
-MAIN_PART = 0.2
-"""Of a form with corrections of either sign the main part must be at least this share of the largest of them."""
+"""Numerical technique: ... and number of forms that are then fitted further."""
 
 _Item = TypeVar("_Item")
 
@@ -101,6 +72,8 @@ class Selection:
         Fit without effects that the rounds build on: the base, or another base form that the tests need.
     tied_forms
         Other base forms that are not clearly worse with the same effects.
+    nothing_missing
+        Excess of the chi-square over the noise, in units of the noise, below which nothing is missing.
     """
 
     base: Fit
@@ -110,6 +83,7 @@ class Selection:
     proven: int = 3
     ground: Fit | None = None
     tied_forms: tuple[str, ...] = ()
+    nothing_missing: float = SelectionRules().nothing_missing
 
     @property
     def without_effects(self) -> Fit:
@@ -130,7 +104,7 @@ class Selection:
     @property
     def structured(self) -> bool:
         """Whether anything is missing at all."""
-        return self.recoverable > NOTHING_MISSING * self.noise
+        return self.recoverable > self.nothing_missing * self.noise
 
     def with_floor(self, floor: float) -> Selection:
         """Return the same with another estimate of what cannot be recovered; shares follow."""
@@ -191,6 +165,7 @@ def candidates_after(
     terms: Sequence[Term],
     *,
     refits: int,
+    rules: SelectionRules | None = None,
     jobs: int,
     progress: Progress = no_progress,
 ) -> list[Candidate]:
@@ -198,6 +173,8 @@ def candidates_after(
 
     Forms are tried on a share of the tests; those that may win are fitted on all of them.
     """
+    rules = rules or SelectionRules()
+    penalised = partial(_penalised, share=rules.per_parameter)
     present = {term.effect.name for term in before.problem.terms}
     small = draft(before)
     ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
@@ -210,15 +187,15 @@ def candidates_after(
     # the families in front get all their forms: a name is judged by the form that suits it best
     front = sorted(chosen, key=lambda name: min(item.cost for item in drafts if _name(item) == name))[:3]
     drafts += _each(begun, [item for name in front for item in families[name][2:]], jobs)
-    drafts.sort(key=_penalised)
+    drafts.sort(key=penalised)
     drafts = _each(_continued, drafts[:CONTINUED], jobs) + drafts[CONTINUED:]
     progress(0.7, f"{len(drafts)} forms tried")
-    own = {name: sorted((item for item in drafts if _name(item) == name), key=_penalised) for name in chosen}
+    own = {name: sorted((item for item in drafts if _name(item) == name), key=penalised) for name in chosen}
     if small is before:
         fits = drafts
     else:
         least = min(items[0].chi_square for items in own.values())
-        within = least + CONTENDER_SHARE * max(small.chi_square - least, 0.0)
+        within = least + rules.contender_share * max(small.chi_square - least, 0.0)
         contenders = [item for items in own.values() for item in items[:3] if item.chi_square <= within]
         others = [items[0] for items in own.values() if items[0].chi_square > within]
         fits = _each(lambda item: on_all(before, item, iterations=10), contenders, jobs)
@@ -226,7 +203,7 @@ def candidates_after(
     already = share_of(base, before, noise)
     found = []
     for name in chosen:
-        winner = min((item for item in fits if _name(item) == name), key=_penalised)
+        winner = min((item for item in fits if _name(item) == name), key=penalised)
         shares = {_form(item): already + (1.0 - already) * share_of(small, item, noise) for item in own[name]}
         shares |= {_form(item): share_of(base, item, noise) for item in fits if _name(item) == name}
         found.append(Candidate(name, winner, share_of(base, winner, noise), shares))
@@ -245,10 +222,10 @@ def _form(found: Fit) -> str:
     return found.problem.terms[-1].form.name
 
 
-def _penalised(found: Fit) -> float:
-    # of forms that fit alike the simpler one
+def _penalised(found: Fit, share: float) -> float:
+    # prefer the simpler of two forms that fit alike
     searched = sum(len(term.form.parameters) for term in found.problem.terms)
-    return found.chi_square * (1.0 + 0.01 * searched)
+    return found.chi_square * (1.0 + share * searched)
 
 
 def _each(work: Callable[[_Item], Fit], items: Sequence[_Item], jobs: int) -> list[Fit]:
@@ -256,14 +233,14 @@ def _each(work: Callable[[_Item], Fit], items: Sequence[_Item], jobs: int) -> li
         return list(pool.map(work, items))
 
 
-def _nothing_more(before: Fit, terms: Sequence[Term], excess: float, jobs: int) -> bool:
+def _nothing_more(before: Fit, terms: Sequence[Term], least: float, jobs: int) -> bool:
     present = {term.effect.name for term in before.problem.terms}
     small = draft(before)
     ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
-    return ranked[0].gain * small.chi_square < SECOND_GAIN * excess
+    return ranked[0].gain * small.chi_square < least
 
 
-def admissible(found: Fit) -> bool:
+def admissible(found: Fit, main_part: float = SelectionRules().main_part) -> bool:
     """Return whether the last term of a fit may be named: it does something and no strength sits at a bound."""
     term, values = found.problem.terms[-1], found.term_values[-1]
     for item in term.form.parameters:
@@ -273,7 +250,7 @@ def admissible(found: Fit) -> bool:
     if len(amplitudes) > 1 and amplitudes[0].lower == 0.0 and all(item.lower < 0.0 for item in amplitudes[1:]):
         # without the part of definite sign only its corrections are left: a spring of no stiffness is no spring
         main, *corrections = (abs(values[p.name]) / found.problem.scales.of(p.scale) for p in amplitudes)
-        if main <= MAIN_PART * max(corrections):
+        if main <= main_part * max(corrections):
             return False
     return any(values[item.name] != 0.0 for item in term.form.parameters if item.role != "shape")
 
@@ -289,20 +266,6 @@ def stuck(found: Fit) -> set[str]:
     return set(found.at_bound) - absent
 
 
-@dataclass(frozen=True)
-class Thresholds:
-    """What a further effect must recover: of what the base lacked, and of what is left.
-
-    To be named it must recover `named_share` of what is left, and every other family must leave `lead` times what it
-    leaves.
-    """
-
-    gain: float = SECOND_GAIN
-    term_share: float = TERM_SHARE
-    named_share: float = SECOND_SHARE
-    lead: float = PROVEN_LEAD
-
-
 def forward_selection(
     base: Fit,
     noise: float,
@@ -310,7 +273,7 @@ def forward_selection(
     *,
     most: int = 3,
     refits: int = 8,
-    thresholds: Thresholds = Thresholds(),
+    rules: SelectionRules | None = None,
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Selection:
@@ -319,14 +282,15 @@ def forward_selection(
     A further term is a cause of its own only where it recovers much of what is left and leads the other families;
     else it may as well mend the form of the effect before it, and so may all that follow.
     """
+    rules = rules or SelectionRules()
     rounds: list[tuple[Candidate, ...]] = []
     chosen, proven, sure, again = base, 0, True, False
     excess = max(base.chi_square - noise, 0.0)
-    if excess <= NOTHING_MISSING * noise or most == 0:
-        return Selection(base, noise, (), base)
+    if excess <= rules.nothing_missing * noise or most == 0:
+        return Selection(base, noise, (), base, nothing_missing=rules.nothing_missing)
     while len(rounds) < most:
-        little = chosen.chi_square - noise < min(FURTHER * excess, noise)
-        if rounds and little and _nothing_more(chosen, terms, excess, jobs):
+        little = chosen.chi_square - noise < min(rules.further * excess, noise)
+        if rounds and little and _nothing_more(chosen, terms, rules.gain * excess, jobs):
             break
         found = candidates_after(
             chosen,
@@ -334,20 +298,21 @@ def forward_selection(
             noise,
             terms,
             refits=refits,
+            rules=rules,
             jobs=jobs,
             progress=progress,
         )
-        able = [item for item in found if admissible(item.fit)]
-        if rounds and thresholds.lead > 1.0:
+        able = [item for item in found if admissible(item.fit, rules.main_part)]
+        if rounds and rules.lead > 1.0:
             # beside other effects a parameter that runs to its bound mends a form, and badly where motions are other
             able = [item for item in able if stuck(item.fit) <= stuck(chosen)]
         ordered = tuple(able + [item for item in found if item not in able])
         gain = chosen.chi_square - able[0].fit.chi_square if able else 0.0
         left = chosen.chi_square - noise
-        if not able or (rounds and (gain < thresholds.gain * excess or gain < thresholds.term_share * left)):
+        if not able or (rounds and (gain < rules.gain * excess or gain < rules.term_share * left)):
             rounds.append(ordered)
             break
-        nearer = chosen if not rounds or again else _nearer(chosen, able[0].fit)
+        nearer = chosen if not rounds or again else _nearer(chosen, able[0].fit, rules.better_optimum)
         again = nearer is not chosen
         if again:
             # the term had only shown the way to a better optimum of the others: look again from there
@@ -356,26 +321,26 @@ def forward_selection(
             continue
         rounds.append(ordered)
         if len(rounds) > 1:
-            sure = sure and gain >= thresholds.named_share * left and _leads(ordered, noise, thresholds.lead)
+            sure = sure and gain >= rules.named_share * left and _leads(ordered, noise, rules)
         proven += int(sure)
         chosen = able[0].fit
-        if chosen.chi_square - noise < max(NOTHING_MISSING * noise, SECOND_GAIN * excess):
+        if chosen.chi_square - noise < max(rules.nothing_missing * noise, rules.gain * excess):
             break
-    return Selection(base, noise, tuple(rounds), chosen, proven)
+    return Selection(base, noise, tuple(rounds), chosen, proven, nothing_missing=rules.nothing_missing)
 
 
-def _nearer(chosen: Fit, best: Fit) -> Fit:
+def _nearer(chosen: Fit, best: Fit, share: float) -> Fit:
     """Return the fit without the last term of `best`, begun where that ended, if it is clearly better than before."""
     trial = fit(chosen.problem, best.theta[: len(chosen.theta)], iterations=6)
-    return trial if trial.chi_square < (1.0 - BETTER_OPTIMUM) * chosen.chi_square else chosen
+    return trial if trial.chi_square < (1.0 - share) * chosen.chi_square else chosen
 
 
 def _with_fit(item: Candidate, old: Fit, new: Fit, base: Fit, noise: float) -> Candidate:
     return replace(item, fit=new, share=share_of(base, new, noise)) if item.fit is old else item
 
 
-def _leads(candidates: Sequence[Candidate], noise: float, lead: float) -> bool:
+def _leads(candidates: Sequence[Candidate], noise: float, rules: SelectionRules) -> bool:
     if len(candidates) < 2:
         return True
-    best, second = (max(item.fit.chi_square - noise, 0.0) + 0.05 * noise for item in candidates[:2])
-    return second >= lead * best
+    best, second = (max(item.fit.chi_square - noise, 0.0) + rules.same * noise for item in candidates[:2])
+    return second >= rules.lead * best

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,9 @@ from mrpipe.tracing.bench.offsets import OffsetFinding
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, open_tests
 from mrpipe.tracing.bench.residual_structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
-from mrpipe.tracing.bench.verdict import Named, Rules, ranking
-from mrpipe.tracing.rules import ValidationRules
+from mrpipe.tracing.bench.verdict import Named, ranking
+from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.rules import TracingRules
 
 UNATTRIBUTED: dict[str, Any] = {
     "name": "unattributed",
@@ -34,32 +35,6 @@ UNATTRIBUTED: dict[str, Any] = {
     "remedy": "Make the tests that `next_tests` lists.",
     "corrected_in": "nowhere: it is a model of the record and cannot run in a loop",
 }
-
-FLEXIBLE_SHARE = 0.15
-"""A flexible model that recovers less than this share of the excess finds no structure in it."""
-
-
-@dataclass(frozen=True)
-class TracingOptions:
-    """How a campaign is traced; the fields are those of the stage's settings, see there."""
-
-    model: str = "bouc-wen"
-    yield_order: int = 3
-    viscosity_order: int = 1
-    most_effects: int = 3
-    fit_rate_hz: float = 250.0
-    displacement_cutoff_hz: float = 0.0
-    refits: int = 8
-    folds: int = 3
-    bootstrap_draws: int = 400
-    rules: Rules = field(default_factory=Rules)
-    record_gain: bool = False
-    observation_filter: bool = True
-    model_error_share: float = 0.0
-    unattributed: bool = False
-    drive_unit: str = "A"
-    base_forms: tuple[str, ...] = ()
-    validation: ValidationRules = field(default_factory=ValidationRules)
 
 
 @dataclass(frozen=True)
@@ -123,9 +98,9 @@ class Summary:
             "noise_components_nrmse": found.noise_components,
             "noise_from": self.baseline.scale.source,
             "before": _score_json(score_before),
-            "residual": self._residual(states),
+            "residual": self._residual(states, options.rules),
             "base_form": self._ladder(options, found.measured),
-            "nuisances": self._nuisances(named, window),
+            "nuisances": self._nuisances(named, window, options.rules),
             "effects": effects_found,
             "further_terms": [item.as_json() for item in further],
             **self._verdict(),
@@ -137,7 +112,7 @@ class Summary:
                 "interval": list(self.judgement.ceiling_interval),
                 "recovered": recovered(score_before.nrmse, found.nrmse(found.after), self.judgement.ceiling),
             },
-            "unexplained": self._unexplained(options.validation),
+            "unexplained": self._unexplained(options.rules),
             "tests": [
                 {"name": name, "nrmse_before": score_before.by_test[name], "nrmse_after": score_after.by_test[name]}
                 for name in score_before.by_test
@@ -155,9 +130,9 @@ class Summary:
             found["verdict"] = f"{first}; {found['verdict']}"
         return {**found, "findings": self.sorted_tests.as_json()}
 
-    def _residual(self, states: States) -> dict[str, Any]:
+    def _residual(self, states: States, rules: TracingRules) -> dict[str, Any]:
         base = self.selection.base
-        places = location(base.residual, base, self.training, states)
+        places = location(base.residual, base, self.training, states, rules.location)
         return {
             "structured": self.judgement.evidence.structured,
             "p_value": structure_p_value(base.residual, states),
@@ -167,10 +142,16 @@ class Summary:
             "chi_square_of_noise": self.selection.noise,
         }
 
-    def _nuisances(self, named: Sequence[Named], window: float) -> dict[str, Any]:
+    def _nuisances(self, named: Sequence[Named], window: float, rules: TracingRules) -> dict[str, Any]:
         found, training = self.found, self.training
         session = session_gain(
-            found.recorded, found.measured, found.after, self._training_gains(), mean_drives(training)
+            found.recorded,
+            found.measured,
+            found.after,
+            self._training_gains(),
+            mean_drives(training),
+            rules.nuisances,
+            rules.validation,
         )
         offsets = zip(training.names, self.selection.chosen.test_offsets, strict=True)
         return {
@@ -186,14 +167,16 @@ class Summary:
             else "the training tests",
         }
 
-    def _unexplained(self, rules: ValidationRules) -> dict[str, Any]:
+    def _unexplained(self, rules: TracingRules) -> dict[str, Any]:
         """Return what remains in the training tests and in the validation tests, and what it varies with."""
         selection, structured = self.selection, self.judgement.evidence.structured
         left = max(selection.chosen.chi_square - selection.noise, 0.0)
         excess = max(selection.base.chi_square - selection.noise, 1e-12)
         better = selection.chosen is not selection.base
-        still = structured and left > max(0.2 * selection.noise, 0.1 * excess if better else 0.0)
-        remains, share, p_value = self.found.unexplained(rules)
+        still = structured and left > max(
+            rules.selection.nothing_missing * selection.noise, rules.remainder.of_excess * excess if better else 0.0
+        )
+        remains, share, p_value = self.found.unexplained(rules.validation)
         kind = self.judgement.verdict.kind
         in_training = float(min(1.0, left / excess)) if structured and self.offsets is None else 0.0
         states = states_of(selection.chosen, self.training)
@@ -201,11 +184,11 @@ class Summary:
             "structured": bool(still or remains) and kind != "noise",
             "share_of_residual": max(in_training, share if remains else 0.0),
             "whiteness_p_value": p_value,
-            "tests": list(open_tests(self.judgement, rules)) if remains else [],
+            "tests": list(open_tests(self.judgement, rules.validation)) if remains else [],
             "depends_on": [
                 {"state": name, "share": part}
                 for name, part in dependence(selection.chosen.residual, states)[:6]
-                if part > 0.01
+                if part > rules.remainder.listed
             ]
             if still or remains
             else [],
@@ -241,7 +224,8 @@ class Summary:
         if options.model not in errors:
             errors[options.model] = errors[next(iter(fits))]
         # decided on the training tests, reported on the validation tests; a form must earn its parameters
-        best = min(fits, key=lambda name: fits[name].chi_square * (1.0 if name == base.problem.base.name else 1.05))
+        lead = 1.0 + options.rules.race.listed_lead
+        best = min(fits, key=lambda name: fits[name].chi_square * (1.0 if name == base.problem.base.name else lead))
         ground = self.selection.ground
         taken = options.model
         if ground is not None:

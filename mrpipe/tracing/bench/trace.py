@@ -20,7 +20,7 @@ from mrpipe.fitting.recordings import (
 )
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline
-from mrpipe.tracing.bench.choose import REAL_THRESHOLDS, Choice, choose_model, judged_by_trees
+from mrpipe.tracing.bench.choose import Choice, choose_model, judged_by_trees
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
 from mrpipe.tracing.bench.nuisances import observation_window
@@ -29,12 +29,10 @@ from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.on_validation import OnValidation
 from mrpipe.tracing.bench.refine import with_richer_forms
 from mrpipe.tracing.bench.select import Selection, forward_selection, share_of
-from mrpipe.tracing.bench.summary import Summary, Tracing, TracingOptions
+from mrpipe.tracing.bench.summary import Summary, Tracing
 from mrpipe.tracing.bench.testability import untestable
 from mrpipe.tracing.bench.verdict import Named, confidence_of, parameter_table, tied, unnamed_reason
-
-CLEAR_OFFSETS = 3.0
-"""Ratio of the spread of the tests' offsets to the unknown residual above which the offsets are a finding."""
+from mrpipe.tracing.options import TracingOptions
 
 
 def trace_campaign(
@@ -67,17 +65,18 @@ def trace_campaign(
         Called with the share done and a text.
     """
     rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
-    ordered = sort_tests(tests)
+    rules = options.rules
+    ordered = sort_tests(tests, rules.validation)
     usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))
     training = record_tests(usable, rate_hz=rate, cutoff_hz=cutoff)
     unseen = [t for t in ordered.tests if t.role == "validation"]
     validation = record_tests(unseen, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
-    able, reasons = untestable(training, effects)
+    able, reasons = untestable(training, effects, rules.testability)
     first = _first_baseline(training, declared, options)
     found = validated(first.fit, first.fit, first, training, validation, options)
     refusal = ""
-    if never_yields(first.fit, options.validation):
+    if never_yields(first.fit, options.rules.validation):
         refusal = "the damper does not yield within the stroke of the training tests"
     elif not predicts(found, first, training, options, ordered.faults, jobs):
         error = found.nrmse(found.before)
@@ -92,14 +91,17 @@ def trace_campaign(
     if not baseline.model_error:
         window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
-    reason = unnamed_reason(selection, options.rules)
+    reason = unnamed_reason(selection, options)
     if reason:
         selection = replace(selection, chosen=selection.without_effects)
     elif not baseline.model_error:
         selection = _refined(selection, len(declared), options, rng, jobs)
     progress(0.85, "ceiling")
     offsets = offset_between_tests(
-        selection.chosen, effects.get("offset"), least_ratio=CLEAR_OFFSETS if reason and selection.structured else 0.0
+        selection.chosen,
+        effects.get("offset"),
+        rules=rules.offsets,
+        least_ratio=rules.offsets.clear if reason and selection.structured else 0.0,
     )
     named = _named(selection, choice, gains, len(declared), options, rng)
     causes = [*named[: selection.proven], *([offsets.named()] if offsets is not None else [])]
@@ -113,7 +115,7 @@ def trace_campaign(
         # what does not lower the error on the validation tests is not named
         selection = replace(selection, chosen=selection.without_effects)
         causes, further, offsets = [], (), None
-        reason = "the effects that the training tests ask for do not lower the error on the validation tests"
+        reason = "the effects that the training tests require do not lower the error on the validation tests"
         found = validated(selection.base, selection.chosen, baseline, training, validation, options)
         judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
     causes = [held(item, judgement) for item in causes]
@@ -123,7 +125,9 @@ def trace_campaign(
 
 def _first_baseline(training: Recordings, declared: Sequence[Effect], options: TracingOptions) -> Baseline:
     base = declared_base(training, options.model, options.yield_order, options.viscosity_order)
-    return fit_baseline(training, base, declared, model_error_share=options.model_error_share)
+    return fit_baseline(
+        training, base, declared, model_error_share=options.model_error_share, rules=options.rules.noise
+    )
 
 
 def _nothing_traced(
@@ -138,7 +142,9 @@ def _nothing_traced(
     jobs: int,
 ) -> Tracing:
     """Return the tracing of a base model on which no effect can be judged."""
-    selection = Selection(baseline.fit, baseline.noise, (), baseline.fit)
+    selection = Selection(
+        baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=options.rules.selection.nothing_missing
+    )
     judgement = judged(found, selection, training, options, (), True, reason, ordered, jobs)
     if reason not in judgement.verdict.sentence:
         words = f"{reason}; {judgement.verdict.sentence}"
@@ -151,7 +157,13 @@ def _refined(
     selection: Selection, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
 ) -> Selection:
     return with_richer_forms(
-        selection, declared, folds=options.folds, draws=options.bootstrap_draws, rng=rng, jobs=jobs
+        selection,
+        declared,
+        folds=options.folds,
+        draws=options.bootstrap_draws,
+        rng=rng,
+        jobs=jobs,
+        rules=options.rules.refinement,
     )
 
 
@@ -165,9 +177,13 @@ def _with_window(
 ) -> tuple[float, Selection]:
     """Look for a moving average that the records went through, where something is left to explain."""
     left = selection.chosen.chi_square - noise
-    if not options.observation_filter or left < 0.2 * noise or not bool(np.all(training.period_s > 0.0)):
+    if (
+        not options.observation_filter
+        or left < options.rules.selection.nothing_missing * noise
+        or not bool(np.all(training.period_s > 0.0))
+    ):
         return 0.0, selection
-    share, filtered = observation_window(selection.chosen)
+    share, filtered = observation_window(selection.chosen, rules=options.rules.nuisances)
     if share == 0.0:
         return 0.0, selection
     base, ground = (observation_window(item, (share,))[1] for item in (selection.base, selection.without_effects))
@@ -178,13 +194,13 @@ def _with_window(
         terms,
         most=options.most_effects,
         refits=options.refits,
-        thresholds=REAL_THRESHOLDS,
+        rules=options.rules.selection_by_force,
         jobs=jobs,
     )
     if selection.ground is not None:
         again = replace(again, base=base, ground=ground).with_floor(noise)
     if noise < selection.noise:
-        again = judged_by_trees(again)
+        again = judged_by_trees(again, options.rules.model_error)
     if again.chosen.chi_square > filtered.chi_square:
         again = replace(again, chosen=filtered, rounds=selection.rounds)
     return share, again
@@ -231,7 +247,7 @@ def _named(
         candidates = selection.rounds[place] if place < len(selection.rounds) else ()
         rivals: tuple[str, ...] = ()
         if candidates and candidates[0].name == term.effect.name:
-            rivals = tied(candidates, selection.noise, options.rules, draws=options.bootstrap_draws, rng=rng)
+            rivals = tied(candidates, selection.noise, options, draws=options.bootstrap_draws, rng=rng)
         gain = gains[place] if place < len(gains) else None
         support = choice.support(term.effect.name, options, rng)
         named.append(
@@ -239,7 +255,7 @@ def _named(
                 term.effect,
                 term.form.name,
                 parameter_table(chosen, index, limits[index], options.drive_unit),
-                confidence_of(total, support, gain, options.rules),
+                confidence_of(total, support, gain, options),
                 rivals,
                 {name: term.effect.separated_by[name].advice for name in rivals if name in term.effect.separated_by},
                 gain,

@@ -12,25 +12,7 @@ from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of
 from mrpipe.tracing.bench.select import Candidate, Selection, share_of
-
-
-@dataclass(frozen=True)
-class Rules:
-    """When a cause is named.
-
-    Attributes
-    ----------
-    named_share
-        Share of the recoverable residual that proves a name.
-    least_share
-        Share below which the cause is unknown.
-    lead
-        A family that leaves at most this share more than the best leaves is tied with it.
-    """
-
-    named_share: float = 0.9
-    least_share: float = 0.5
-    lead: float = 0.3
+from mrpipe.tracing.options import NamingRules
 
 
 @dataclass(frozen=True)
@@ -66,19 +48,20 @@ class Named:
 
 
 def tied(
-    candidates: Sequence[Candidate], noise: float, rules: Rules, *, draws: int, rng: np.random.Generator
+    candidates: Sequence[Candidate], noise: float, rules: NamingRules, *, draws: int, rng: np.random.Generator
 ) -> tuple[str, ...]:
-    """Return the families that cannot be told from the best of a round.
+    """Return the families that these tests do not separate from the best one of a round.
 
-    Told apart is one that leaves clearly more than the best does (see :class:`Rules`), in a difference that holds when
-    the blocks of the residual are drawn again, in pairs.
+    A family is separated if it leaves clearly more than the best one does, and if the difference holds when the blocks
+    of the residual are drawn again, in pairs. See :class:`~mrpipe.tracing.options.NamingRules`.
     """
     if not candidates:
         return ()
     best = candidates[0].fit
     rivals = []
     for item in candidates[1:]:
-        alike = left_of(item.fit, noise) <= (1.0 + rules.lead) * left_of(best, noise)
+        least = left_of(best, noise, rules.noise_share)
+        alike = left_of(item.fit, noise, rules.noise_share) <= (1.0 + rules.lead) * least
         if not alike:
             alike = not gain_of(item.fit.residual, best.residual, best.problem, draws=draws, rng=rng).significant
         if alike:
@@ -86,12 +69,12 @@ def tied(
     return tuple(rivals)
 
 
-def left_of(found: Fit, noise: float) -> float:
-    """Return the excess of the chi-square over noise, and a tenth of the noise: differences below it tell nothing."""
-    return max(found.chi_square - noise, 0.0) + 0.1 * noise
+def left_of(found: Fit, noise: float, share: float) -> float:
+    """Return the excess of the chi-square over the noise, plus a share of the noise that does not separate fits."""
+    return max(found.chi_square - noise, 0.0) + share * noise
 
 
-def unnamed_reason(selection: Selection, rules: Rules) -> str:
+def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
     """Return why nothing may be named, or nothing where something may."""
     if not selection.structured:
         return "the residual is noise: nothing is missing"
@@ -104,7 +87,7 @@ def unnamed_reason(selection: Selection, rules: Rules) -> str:
     return ""
 
 
-def confidence_of(share: float, support: float, gain: Gain | None, rules: Rules) -> float:
+def confidence_of(share: float, support: float, gain: Gain | None, rules: NamingRules) -> float:
     """Return a confidence 0..1.
 
     Parameters
@@ -119,8 +102,8 @@ def confidence_of(share: float, support: float, gain: Gain | None, rules: Rules)
         When a cause is named.
     """
     proven = min(1.0, share / rules.named_share)
-    held = 1.0 if gain is None or gain.significant else 0.4
-    return round(float(proven * support * held * 0.99), 3)
+    held = 1.0 if gain is None or gain.significant else rules.doubtful
+    return round(float(proven * support * held * rules.most_confidence), 3)
 
 
 def parameter_table(

@@ -21,8 +21,9 @@ from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.summary import Tracing, TracingOptions
+from mrpipe.tracing.bench.summary import Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import BraceRules
 
 STRETCH_HARMONICS = 30.0

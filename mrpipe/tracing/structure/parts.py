@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,12 @@ from mrpipe.artifacts import Progress
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.structural.contract import StructuralEffect
-from mrpipe.tracing.bench.summary import TracingOptions
+from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import BraceRules, DelayRules, TracingRules
 from mrpipe.tracing.structure.damper import BraceFinding, find_brace, prepared_loops, trace_damper
 from mrpipe.tracing.structure.delay import DelayFinding, drive_lag, law_lag
 from mrpipe.tracing.structure.loop import bench_of, loop_signals
 from mrpipe.tracing.verdict import Candidate, Estimate, Interval, NamedEffect, Unexplained, Verdict
-
-MOST_CONFIDENCE = 0.99
-"""Numerical technique: largest confidence that is reported, because a finite number of tests proves nothing."""
 
 OF_PART = (
     "model", "quantity", "verdict", "verdict_class", "noise_floor_nrmse", "before", "after", "effects", "candidates"
@@ -64,6 +61,7 @@ def command_part(
     effects: Mapping[str, StructuralEffect],
     declared: Sequence[str],
     rules: DelayRules | None = None,
+    most_confidence: float = NamingRules().most_confidence,
 ) -> Part | None:
     """Return the verdict on the controller's command; None if no test records desired force, drive and motion."""
     effect = effects.get("controller-delay")
@@ -76,10 +74,12 @@ def command_part(
         return None
     late = [item for item in found if item.late]
     worst = max(late or found, key=lambda item: item.before / max(item.after, 1e-12))
-    return Part("command", _command_summary(worst, found, effect))
+    return Part("command", _command_summary(worst, found, effect, most_confidence))
 
 
-def _command_summary(worst: DelayFinding, found: Sequence[DelayFinding], effect: StructuralEffect) -> dict[str, Any]:
+def _command_summary(
+    worst: DelayFinding, found: Sequence[DelayFinding], effect: StructuralEffect, most: float
+) -> dict[str, Any]:
     share = 1.0 - (worst.after / max(worst.before, 1e-12)) ** 2
     named: list[NamedEffect] = []
     if worst.late:
@@ -90,7 +90,7 @@ def _command_summary(worst: DelayFinding, found: Sequence[DelayFinding], effect:
                 effect.name,
                 worst.part,
                 {"time": Estimate(worst.delay_s, "s", interval)},
-                round(float(np.clip(share, 0.0, MOST_CONFIDENCE)), 3),
+                round(float(np.clip(share, 0.0, most)), 3),
                 effect.physics,
                 effect.remedy,
                 effect.source,
@@ -151,7 +151,8 @@ def damper_part(
     if found is not None and found.strong(rules.brace):
         # with a rigid brace the residual is far above the noise: weigh rival effects, one at a time, by what the
         # flexible brace leaves
-        options = replace(options, model_error_share=max(options.model_error_share, found.nrmse_after), most_effects=1)
+        share = max(options.model_error_share, found.nrmse_after)
+        options = options.changed(model_error_share=share, most_effects=1)
     summary = dict(trace_damper(tests, effects, declared, options, rng=rng, jobs=jobs, progress=progress).summary)
     summary["quantity"] = DAMPER_QUANTITY
     most = (1.0 + rules.frame.of_floor) * summary["noise_floor_nrmse"]
@@ -179,7 +180,7 @@ def _with_brace(
     brace_rules: BraceRules,
 ) -> None:
     """Add the brace to the candidates, and name it if it explains more than any effect within the damper."""
-    rules = options.rules
+    rules = options
     share = float(np.clip(found.share, 0.0, 1.0)) if found.compliance_m_n > 0.0 else 0.0
     entry = Candidate(effect.name, "spring", found.nrmse_after, found.rigid / found.chi_square, share).as_json()
     summary["candidates"] = sorted([*summary["candidates"], entry], key=lambda item: -item["share"])
@@ -194,7 +195,7 @@ def _with_brace(
         effect.name,
         "spring",
         {"compliance": Estimate(found.compliance_m_n, "m/N", interval)},
-        round(MOST_CONFIDENCE * min(1.0, share / rules.named_share) * (0.5 if rivals else 1.0), 3),
+        round(rules.most_confidence * min(1.0, share / rules.named_share) * (0.5 if rivals else 1.0), 3),
         effect.physics,
         effect.remedy,
         effect.source,

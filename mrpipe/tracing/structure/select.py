@@ -12,7 +12,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.tracing.bench.crossvalidation import Gain
-from mrpipe.tracing.bench.verdict import Rules
+from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, ladder
 from mrpipe.tracing.structure.candidates import Fitted, Outcome, Placed, Surroundings, columns_of, search
@@ -189,7 +189,7 @@ def _projected(design: Design, chosen: Sequence[Fitted], about: Surroundings) ->
 def select(
     problem: FrameProblem,
     effects: Sequence[StructuralEffect],
-    rules: Rules,
+    rules: NamingRules,
     *,
     most: int = 3,
     declared: Sequence[StructuralEffect] = (),
@@ -271,7 +271,7 @@ def _rocking(
     free: FrameSelection,
     forms: Sequence[Placed],
     about: Surroundings,
-    rules: Rules,
+    rules: NamingRules,
     jobs: int,
 ) -> FrameSelection | None:
     """Return the shear frame on a rocking base if it explains the residual of a shear frame as well as a linear frame.

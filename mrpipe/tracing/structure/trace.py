@@ -11,7 +11,8 @@ from scipy import stats
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
-from mrpipe.tracing.bench.verdict import Rules, confidence_of
+from mrpipe.tracing.bench.verdict import confidence_of
+from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.candidates import Fitted
@@ -51,7 +52,7 @@ def trace_frame(
     data: FrameData,
     effects: Sequence[StructuralEffect],
     declared: Sequence[StructuralEffect],
-    rules: Rules,
+    rules: NamingRules,
     frame_rules: FrameRules | None = None,
     *,
     most: int = 3,
@@ -99,7 +100,7 @@ def trace_frame(
     return FrameTracing(summary, problem, selection, before, after)
 
 
-def _unnamed(selection: FrameSelection, rules: Rules) -> str:
+def _unnamed(selection: FrameSelection, rules: NamingRules) -> str:
     if not selection.structured:
         return "the residual is noise: nothing is missing"
     if len(selection.chosen) <= selection.declared:
@@ -115,7 +116,7 @@ def _summary(
     before: FrameModel,
     after: FrameModel,
     declared: Sequence[StructuralEffect],
-    rules: Rules,
+    rules: NamingRules,
     reason: str,
 ) -> dict[str, Any]:
     scores = frame_score(before, problem.validation), frame_score(after, problem.validation)
@@ -211,7 +212,7 @@ def _worst_storey(selection: FrameSelection) -> int:
     return int(np.argmax(np.bincount(selection.groups.storey, weights=over)))
 
 
-def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[NamedEffect]:
+def _named(selection: FrameSelection, after: FrameModel, rules: NamingRules) -> list[NamedEffect]:
     found, first = [], 0
     total = selection.share(selection.residual)
     for place, item in enumerate(selection.chosen):
@@ -231,7 +232,7 @@ def _named(selection: FrameSelection, after: FrameModel, rules: Rules) -> list[N
                 effect.name,
                 item.placed.form.name,
                 parameters_of(item, own, selection.rules.acting),
-                confidence_of(total, lead, None, rules),
+                confidence_of(total, 0.5 + 0.5 * min(1.0, 2.0 * lead), None, rules),
                 effect.physics,
                 effect.remedy,
                 effect.source,
@@ -328,7 +329,7 @@ def _ranked(item: FrameCandidate, selection: FrameSelection, problem: FrameProbl
 
 
 def _verdict(
-    selection: FrameSelection, named: Sequence[NamedEffect], share: float, rules: Rules, reason: str
+    selection: FrameSelection, named: Sequence[NamedEffect], share: float, rules: NamingRules, reason: str
 ) -> Verdict:
     if reason:
         return Verdict("unknown" if selection.structured else "noise", reason)

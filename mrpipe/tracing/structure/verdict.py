@@ -13,8 +13,7 @@ from mrpipe.campaigns.model import Campaign
 from mrpipe.effects.contract import Effect
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
-from mrpipe.tracing.bench.summary import TracingOptions
-from mrpipe.tracing.rules import TracingRules
+from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.structure.parts import Part, command_part, damper_part, merged
 from mrpipe.tracing.structure.records import FASTEST_HZ, FrameData, frame_data
 from mrpipe.tracing.structure.scores import residual_in_time
@@ -60,7 +59,6 @@ def trace_structure(
     effects: Mapping[str, StructuralEffect],
     damper_effects: Mapping[str, Effect],
     options: TracingOptions,
-    rules: TracingRules | None = None,
     *,
     rng: np.random.Generator,
     jobs: int = 1,
@@ -76,8 +74,6 @@ def trace_structure(
         The libraries of effects of a structure and of a damper.
     options
         How it is traced.
-    rules
-        Decision thresholds; their defaults if None.
     rng
         Source of randomness.
     jobs
@@ -85,7 +81,7 @@ def trace_structure(
     progress
         Called with the share done and a text.
     """
-    rules = rules or TracingRules()
+    rules = options.rules
     data, campaign = joined_data(campaigns, options.fit_rate_hz), campaigns[0]
     findings = [f"test {name} does not record every floor: it is not used for the frame" for name in data.left_out]
     names = campaign.declared_effects
@@ -94,12 +90,12 @@ def trace_structure(
     if any(item.role != "validation" for item in data.records):
         library = [item for item in effects.values() if item not in declared]
         frame = trace_frame(
-            data, library, declared, options.rules, rules.frame, most=options.most_effects,
+            data, library, declared, options, rules.frame, most=options.most_effects,
             draws=options.bootstrap_draws, rng=rng, jobs=jobs, progress=progress,
         )  # fmt: skip
         parts.append(Part("frame", frame.summary))
     found = [
-        command_part(data.loops, effects, names, rules.delay),
+        command_part(data.loops, effects, names, rules.delay, options.most_confidence),
         damper_part(
             data.loops, campaign, damper_effects, effects.get("brace-flexibility"), options, rules, rng=rng, jobs=jobs,
             progress=progress,

@@ -22,8 +22,9 @@ from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench import extra_tests
 from mrpipe.tracing.bench.extra_tests import Range, kinds_between, wanted_tests
-from mrpipe.tracing.bench.summary import Tracing, TracingOptions
+from mrpipe.tracing.bench.summary import Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.options import TracingOptions
 
 SPAN = Range(stroke_m=0.01, speed_m_s=0.08, drive=4.0, frequency_hz=1.0, duration_s=5.0)
 

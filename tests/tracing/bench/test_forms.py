@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mrpipe.effects.library import damper_effects
-from mrpipe.tracing.bench.summary import TracingOptions
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.options import TracingOptions
 from tests.tracing.bench.sines import sines
 
 

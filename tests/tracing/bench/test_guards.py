@@ -12,7 +12,8 @@ from mrpipe.fitting.recordings import record_tests
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
 from mrpipe.tracing.bench.select import Candidate
-from mrpipe.tracing.bench.verdict import Rules, tied
+from mrpipe.tracing.bench.verdict import tied
+from mrpipe.tracing.options import NamingRules
 from tests.tracing.bench.sines import harmed, scaled, sines
 
 
@@ -65,5 +66,5 @@ def test_rivals_that_leave_as_much_are_tied_and_others_are_not() -> None:
     rng = np.random.default_rng(1)
     noise = rng.standard_normal(1600)
     field = (candidate("stribeck", 1.05 * noise), candidate("migration", 1.06 * noise), candidate("inertia", 2 * noise))
-    assert tied(field, 1.0, Rules(), draws=100, rng=rng) == ("migration",)
-    assert tied(field[::2], 1.0, Rules(), draws=100, rng=rng) == ()
+    assert tied(field, 1.0, NamingRules(), draws=100, rng=rng) == ("migration",)
+    assert tied(field[::2], 1.0, NamingRules(), draws=100, rng=rng) == ()

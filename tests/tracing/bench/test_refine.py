@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from mrpipe.effects.library import damper_effects
-from mrpipe.tracing.bench.summary import Tracing, TracingOptions
+from mrpipe.tracing.bench.summary import Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.options import TracingOptions
 from tests.tracing.bench.rig import campaign
 
 

@@ -12,7 +12,8 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.select import Candidate, Selection, admissible
-from mrpipe.tracing.bench.verdict import Rules, unnamed_reason
+from mrpipe.tracing.bench.verdict import unnamed_reason
+from mrpipe.tracing.options import NamingRules
 
 SCALES = EffectScales(stroke=0.01, speed=0.12, acceleration=1.5, drive=4.0, force=120.0, time=5.0)
 
@@ -46,5 +47,5 @@ def selected(share: float, ground: float = 101.0) -> Selection:
 @pytest.mark.parametrize("ground", [101.0, 11.0])
 def test_an_effect_must_recover_half_of_what_the_base_form_leaves(ground: float) -> None:
     # what another base form recovers is not counted for the effect
-    assert unnamed_reason(selected(0.45, ground), Rules()) != ""
-    assert unnamed_reason(selected(0.55, ground), Rules()) == ""
+    assert unnamed_reason(selected(0.45, ground), NamingRules()) != ""
+    assert unnamed_reason(selected(0.55, ground), NamingRules()) == ""

@@ -12,8 +12,9 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, family_of
-from mrpipe.tracing.bench.summary import Tracing, TracingOptions
+from mrpipe.tracing.bench.summary import Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.options import TracingOptions
 from tests.tracing.bench.rig import campaign
 
 FORMS = ("bouc-wen", "dahl", "hyperbolic-tangent")

@@ -11,8 +11,8 @@ import pytest
 
 from mrpipe.effects.library import damper_effects
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.summary import TracingOptions
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.options import TracingOptions
 from tests.tracing.bench.rig import RATE
 from tests.tracing.bench.sines import (
     cut,

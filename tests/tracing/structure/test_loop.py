@@ -10,7 +10,7 @@ import pytest
 
 from mrpipe.campaigns.model import Recording
 from mrpipe.effects.library import damper_effects
-from mrpipe.tracing.bench.summary import TracingOptions
+from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import DelayRules
 from mrpipe.tracing.structure.damper import find_brace, prepared_loops, trace_damper
 from mrpipe.tracing.structure.delay import LoopSignals, drive_lag, law_lag

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mrpipe.effects.structural.library import all_structural_effects
-from mrpipe.tracing.bench.verdict import Rules
+from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.records import frame_data
 from mrpipe.tracing.structure.trace import FrameTracing, trace_frame
 from tests.tracing.structure.rig import frame_campaign
@@ -19,7 +19,7 @@ from tests.tracing.structure.rig import frame_campaign
 def traced(effect: str) -> FrameTracing:
     library = list(all_structural_effects().values())
     rng = np.random.default_rng(1)
-    return trace_frame(frame_data(frame_campaign(effect)), library, [], Rules(), most=1, draws=60, rng=rng)
+    return trace_frame(frame_data(frame_campaign(effect)), library, [], NamingRules(), most=1, draws=60, rng=rng)
 
 
 def summary(effect: str) -> dict[str, Any]:

@@ -1,0 +1,98 @@
+"""Options of a tracing: the section `close_loop` of the settings, and the options of the domain's functions."""
+
+from __future__ import annotations
+
+from pydantic import Field, field_validator
+
+from mrpipe.artifacts.yaml_source import nearest
+from mrpipe.dampers.forms import form_names
+from mrpipe.options import Section
+from mrpipe.tracing.rules import TracingRules
+
+
+class NamingRules(Section):
+    """When an effect is named, and with what confidence. All numbers are dimensionless."""
+
+    named_share: float = Field(0.9, gt=0.5, le=1.0, description="Share of the recoverable residual that proves a name.")
+    least_share: float = Field(
+        0.5, gt=0.0, lt=1.0, description="Share of the recoverable residual below which the cause is unknown."
+    )
+    lead: float = Field(
+        0.3,
+        ge=0.0,
+        description="Families that leave at most this share more than the best one leaves are tied with it.",
+    )
+    doubtful: float = Field(
+        0.4,
+        ge=0.0,
+        le=1.0,
+        description="Factor on the confidence of an effect whose gain on left-out tests is not significant.",
+    )
+    most_confidence: float = Field(
+        0.99,
+        gt=0.0,
+        lt=1.0,
+        description="Largest confidence that is reported, because a finite number of tests proves nothing.",
+    )
+    noise_share: float = Field(
+        0.1,
+        ge=0.0,
+        description="Differences below this share of the noise do not separate two families, because the noise itself "
+        "is not known better.",
+    )
+
+
+class TracingSettings(NamingRules):
+    """From the residual of a model to the effect that it lacks."""
+
+    model: str = Field(
+        "bouc-wen",
+        description="Declared base form, any of mrpipe/dampers/forms; rate-dependent-yield stands for yielding-part, "
+        "the form of this family that suits most recordings. Other base forms are compared with it.",
+    )
+    yield_order: int = Field(3, ge=0, le=3, description="Degree of the yield force in the drive.")
+    viscosity_order: int = Field(1, ge=0, le=3, description="Degree of the viscosity in the drive.")
+    most_effects: int = Field(3, ge=0, le=3, description="Most effects that are named together.")
+    base_forms: tuple[str, ...] = Field(
+        (), description="Base forms that are tried in addition to the declared one; empty for all of the library."
+    )
+    fit_rate_hz: float = Field(250.0, gt=0.0, description="Rate at which candidates are fitted [Hz].")
+    displacement_cutoff_hz: float = Field(
+        0.0, ge=0.0, description="Zero-phase low-pass of the displacement [Hz]; 0 chooses it for each test."
+    )
+    refits: int = Field(8, ge=1, description="How many of the screened families are refitted jointly.")
+    folds: int = Field(3, ge=2, description="Folds of the cross-validation over whole training tests.")
+    bootstrap_draws: int = Field(400, ge=50, description="Draws of the block bootstrap.")
+    record_gain: bool = Field(False, description="Fit a gain for each record of the validation tests (weak sessions).")
+    observation_filter: bool = Field(
+        True, description="Look for a moving average that the records went through, in shares of a period."
+    )
+    model_error_share: float = Field(
+        0.0,
+        ge=0.0,
+        lt=1.0,
+        description="Model error to weigh by, as a share of the force RMS, where it is known to outweigh the sensors' "
+        "noise, as on real dampers; 0 finds out by a first pass, for twice the time.",
+    )
+    rules: TracingRules = Field(TracingRules(), description="Thresholds of the decisions.")
+    unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")
+
+    @field_validator("model")
+    @classmethod
+    def _model_is_known(cls, value: str) -> str:
+        known = (*form_names(), "rate-dependent-yield")
+        if value not in known:
+            raise ValueError(f"no base form {value!r}; {nearest(value, known)}")
+        return value
+
+
+class TracingOptions(TracingSettings):
+    """How a campaign is traced: the settings, and the unit of the drive."""
+
+    drive_unit: str = Field("A", description="Unit of the drive, A or V.")
+
+
+def tracing_options(settings: TracingSettings, drive_unit: str) -> TracingOptions:
+    """Return the options of a tracing, on a bench or of a structure."""
+    values = {name: getattr(settings, name) for name in TracingSettings.model_fields}
+    return TracingOptions(**values, drive_unit=drive_unit or "A")
