@@ -10,6 +10,7 @@ from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit, fit
 from mrpipe.tracing.bench.verdict import Named
 from mrpipe.tracing.rules import OffsetRules
+from mrpipe.tracing.verdict import Estimate, Interval
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class OffsetFinding:
 
     def named(self) -> Named:
         """Return it as an effect of the verdict."""
-        table = {"spread": {"value": self.spread_n, "unit": "N", "interval": list(self.interval)}}
+        table = {"spread": Estimate(self.spread_n, "N", Interval(*self.interval))}
         return Named(self.effect, "per-test", table, self.confidence)
 
 

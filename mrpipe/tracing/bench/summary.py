@@ -24,6 +24,7 @@ from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.verdict import Named, ranking
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import TracingRules
+from mrpipe.tracing.verdict import Unexplained
 
 UNATTRIBUTED: dict[str, Any] = {
     "name": "unattributed",
@@ -35,6 +36,10 @@ UNATTRIBUTED: dict[str, Any] = {
     "remedy": "Make the tests that `next_tests` lists.",
     "corrected_in": "nowhere: it is a model of the record and cannot run in a loop",
 }
+
+
+LISTED = 6
+"""Numerical technique: most states that are listed under `depends_on`."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +109,7 @@ class Summary:
             "effects": effects_found,
             "further_terms": [item.as_json() for item in further],
             **self._verdict(),
-            "candidates": ranking(selection, self._candidate_errors(found.measured)),
+            "candidates": [item.as_json() for item in ranking(selection, self._candidate_errors(found.measured))],
             "untestable": dict(untested),
             "after": _score_json(score_after),
             "ceiling": {
@@ -180,19 +185,14 @@ class Summary:
         kind = self.judgement.verdict.kind
         in_training = float(min(1.0, left / excess)) if structured and self.offsets is None else 0.0
         states = states_of(selection.chosen, self.training)
-        return {
-            "structured": bool(still or remains) and kind != "noise",
-            "share_of_residual": max(in_training, share if remains else 0.0),
-            "whiteness_p_value": p_value,
-            "tests": list(open_tests(self.judgement, rules.validation)) if remains else [],
-            "depends_on": [
-                {"state": name, "share": part}
-                for name, part in dependence(selection.chosen.residual, states)[:6]
-                if part > rules.remainder.listed
-            ]
-            if still or remains
-            else [],
-        }
+        found = dependence(selection.chosen.residual, states)[:LISTED] if still or remains else []
+        return Unexplained(
+            bool(still or remains) and kind != "noise",
+            max(in_training, share if remains else 0.0),
+            tuple((name, part) for name, part in found if part > rules.remainder.listed),
+            p_value,
+            tuple(open_tests(self.judgement, rules.validation)) if remains else (),
+        ).as_json()
 
     def _flexible(self) -> FloatArray:
         """Return what a flexible model of the training tests' residual predicts on the validation tests [N]."""
@@ -243,5 +243,5 @@ def _score_json(value: Score) -> dict[str, float]:
 def _value(named: Sequence[Named], effect: str, parameter: str) -> float:
     for item in named:
         if item.effect.name == effect:
-            return float(item.parameters[parameter]["value"])
+            return item.parameters[parameter].value
     return 0.0

@@ -13,38 +13,43 @@ from mrpipe.fitting.engine import Fit
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of
 from mrpipe.tracing.bench.select import Candidate, Selection, share_of
 from mrpipe.tracing.options import NamingRules
+from mrpipe.tracing.verdict import Candidate as RankedCandidate
+from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
 
 
 @dataclass(frozen=True)
 class Named:
-    """One effect of the verdict."""
+    """One effect of the verdict, with its definition."""
 
     effect: Effect
     form: str
-    parameters: dict[str, dict[str, Any]]
+    parameters: Mapping[str, Estimate]
     confidence: float
     tied_with: tuple[str, ...] = ()
     separating_tests: dict[str, str] = field(default_factory=dict)
     gain: Gain | None = None
 
+    @property
+    def typed(self) -> NamedEffect:
+        """The effect as all tracings report it."""
+        effect = self.effect
+        return NamedEffect(
+            effect.name,
+            self.form,
+            self.parameters,
+            self.confidence,
+            effect.physics,
+            effect.remedy,
+            effect.source,
+            "prepare" if effect.sensor else "plant",
+            tied_with=self.tied_with,
+            separating_tests=self.separating_tests,
+            gain=None if self.gain is None else LeftOutGain(self.gain.share, Interval(*self.gain.interval)),
+        )
+
     def as_json(self) -> dict[str, Any]:
-        """Return it as docs/close-loop-json.md describes it."""
-        found: dict[str, Any] = {
-            "name": self.effect.name,
-            "form": self.form,
-            "parameters": self.parameters,
-            "confidence": self.confidence,
-            "tied_with": list(self.tied_with),
-            "physics": self.effect.physics,
-            "remedy": self.effect.remedy,
-            "source": self.effect.source,
-            "corrected_in": "prepare" if self.effect.sensor else "plant",
-        }
-        if self.separating_tests:
-            found["separating_tests"] = self.separating_tests
-        if self.gain is not None:
-            found["cross_validated_gain"] = {"share": self.gain.share, "interval": list(self.gain.interval)}
-        return found
+        """Return the effect as docs/close-loop-json.md describes it."""
+        return self.typed.as_json()
 
 
 def tied(
@@ -108,33 +113,34 @@ def confidence_of(share: float, support: float, gain: Gain | None, rules: Naming
 
 def parameter_table(
     found: Fit, index: int, limits: Mapping[str, tuple[float, float]], drive_unit: str
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, Estimate]:
     """Return value, unit and interval of every parameter of one effect."""
     term, values = found.problem.terms[index], found.term_values[index]
-    return {
-        item.name: {
-            "value": float(values[item.name]),
-            "unit": item.unit.replace("drive", drive_unit),
-            "interval": [float(edge) for edge in limits.get(item.name, (values[item.name], values[item.name]))],
-        }
-        for item in term.form.parameters
-    }
+    result = {}
+    for item in term.form.parameters:
+        value = float(values[item.name])
+        interval = Interval.point(value)
+        if item.name in limits:
+            low, high = limits[item.name]
+            interval = Interval(float(low), float(high))
+        result[item.name] = Estimate(value, item.unit.replace("drive", drive_unit), interval)
+    return result
 
 
-def ranking(selection: Selection, errors: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Return the whole ranking of the first round: error on validation tests, evidence, share, forms tried."""
+def ranking(selection: Selection, errors: Mapping[str, float]) -> list[RankedCandidate]:
+    """Return the candidates of the first round, best first, with their errors on the validation tests."""
     if not selection.rounds:
         return []
     base, noise = selection.base, selection.noise
     return [
-        {
-            "name": item.name,
-            "form": item.fit.problem.terms[-1].form.name,
-            "nrmse": float(errors.get(item.name, float("nan"))),
-            "evidence": float(0.5 * (base.cost - item.fit.cost) / max(noise, 1e-12)),
-            "share": float(share_of(base, item.fit, noise)),
-            "forms": {name: float(value) for name, value in item.forms.items()},
-            "at_bound": list(item.fit.at_bound),
-        }
+        RankedCandidate(
+            item.name,
+            item.fit.problem.terms[-1].form.name,
+            float(errors.get(item.name, float("nan"))),
+            float(0.5 * (base.cost - item.fit.cost) / max(noise, 1e-12)),
+            float(share_of(base, item.fit, noise)),
+            {name: float(value) for name, value in item.forms.items()},
+            tuple(item.fit.at_bound),
+        )
         for item in selection.rounds[0]
     ]
