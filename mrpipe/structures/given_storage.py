@@ -12,6 +12,7 @@ from mrpipe.campaigns.files import open_data_file
 from mrpipe.errors import UserError
 from mrpipe.structures.dynamics import modal_assurance, natural_modes, normalise_to_largest
 from mrpipe.structures.frame import Frame, write_frame
+from mrpipe.structures.opensees import opensees_matrices
 from mrpipe.structures.reduction import Reduced
 
 
@@ -25,6 +26,11 @@ def read_matrix(file: Path, name: str) -> Any:
     """
     if not file.is_file():
         raise UserError(file, "", "file of the structure not found", "correct `file` in the section `structure`")
+    if file.suffix == ".py":
+        matrices = opensees_matrices(file)
+        if name not in matrices:
+            raise UserError(file, name, "is no matrix of an OpenSees model", "M, C or K")
+        return matrices[name]
     found = open_data_file(file)
     if name:
         key = found.aliases.get(name, name)
