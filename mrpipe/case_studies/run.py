@@ -66,7 +66,7 @@ class Controller:
         `active` (the force as asked), `semi-active` (an ideal damper: clipped to resisting forces), `bingham` (the
         damper of P4 (6) under a voltage), `chain` (a damper as a chain of steps, one position only).
     viscous, stiffness, friction, voltage
-        Gains c [N s/m], k_d [N/m], alpha [N/m] and constant voltage [V]; of each position.
+        Gains c [N s/m], k_d [N/m], alpha [N/m] and constant voltage [V]; one for all positions, or one for each.
     capacity
         Largest force at a position of the ideal realisations [N].
     dampers
@@ -92,10 +92,10 @@ class Controller:
 
     law: Law = "none"
     realisation: Realisation = "active"
-    viscous: float = 0.0
-    stiffness: float = 0.0
-    friction: float = 0.0
-    voltage: float = 0.0
+    viscous: float | tuple[float, ...] = 0.0
+    stiffness: float | tuple[float, ...] = 0.0
+    friction: float | tuple[float, ...] = 0.0
+    voltage: float | tuple[float, ...] = 0.0
     capacity: float = 1e30
     dampers: float = 1.0
     filter_rate: float = 0.0
@@ -225,8 +225,8 @@ def _classical_reaction(modal: ModalModel, dt: float) -> FloatArray:
 
 
 def _control(controller: Controller, devices: int, dt: float) -> tuple[tuple[FloatArray, ...], int]:
-    row = [controller.viscous, controller.stiffness, controller.friction, controller.voltage]
-    gains = np.tile(row, (devices, 1))
+    columns = (controller.viscous, controller.stiffness, controller.friction, controller.voltage)
+    gains = np.stack([np.broadcast_to(np.asarray(item, dtype=np.float64), devices) for item in columns], axis=1)
     observer = controller.observer
     if controller.law != "lqg" or observer is None:
         return (gains, *(np.zeros((1, 1)) for _ in range(7))), max(1, round(controller.interval_s / dt))

@@ -15,7 +15,7 @@ from mrpipe.errors import CheckFailed, UserError
 if TYPE_CHECKING:
     from mrpipe.pipeline.runner import Outcome, Pipeline
 
-_EXPORTS = ("controller", "damper", "frame", "forward", "inverse")
+_EXPORTS = ("controller", "damper", "frame", "forward", "inverse", "opensees")
 _RIGS = ("bench", "frame", "closed-loop")
 
 
@@ -125,6 +125,14 @@ def record(
     build_and_print([f"record-{name}" for name in rigs], options)
 
 
+def _several_dampers(options: CommonOptions) -> bool:
+    """Return whether the configuration gives the dampers of the structure one by one."""
+    from mrpipe.cli.session import load
+
+    structure = getattr(load(options).config, "structure", None)
+    return structure is not None and bool(structure.dampers)
+
+
 @with_common_options()
 def simulate(
     options: CommonOptions,
@@ -146,6 +154,16 @@ def simulate(
     from mrpipe.artifacts.yaml_source import nearest
 
     known = law_names()
+    if _several_dampers(options):
+        if law is not None or resonance or damper is not None:
+            raise UserError(
+                "simulate",
+                "--law, --resonance or --damper",
+                "does not suit the configuration, because each damper of structure.dampers has its own model and law",
+                "leave the option out; mrpipe design gives the response over frequency",
+            )
+        build_and_print(["simulate-dampers"], options)
+        return
     if law is None:
         raise UserError("--law", "", "is missing", f"one of {', '.join((*known, 'all'))}")
     if law != "all" and law not in known:

@@ -44,6 +44,17 @@ class RegulatorSettings(Section):
         description="Difference of the damper's force from the desired one, as a noise; null: its residual force.",
     )
 
+    def known(self) -> dict[str, float]:
+        """Return the weights and noises that are given, with the names of :class:`~mrpipe.control.lqg.Weights`."""
+        given = {
+            "energy": self.energy_weight,
+            "top_displacement": self.top_displacement_weight,
+            "force": self.force_weight,
+            "ground_noise_m_s2": self.ground_noise_m_s2,
+            "force_noise_n": self.force_noise_n,
+        }
+        return {key: item for key, item in given.items() if item is not None}
+
 
 class CalibrationSettings(Section):
     """What the laws are calibrated for, and the gains they run with."""

@@ -176,7 +176,16 @@ class Calibrated:
 
 
 def read_calibrated(artifact: Artifact) -> Calibrated:
-    """Read what is needed to build controllers."""
+    """Read what is needed to build controllers.
+
+    Raises
+    ------
+    UserError
+        If the calibration is that of several dampers.
+    """
+    if "dampers" in artifact.members():
+        remedy = "use mrpipe simulate without --law, or mrpipe design; or leave structure.dampers out"
+        raise UserError(artifact.path, "dampers", "holds the calibration of several dampers", remedy)
     trained = "nnc" in artifact.members()
     return Calibrated(
         position=artifact.array("position"),

@@ -255,9 +255,9 @@ def simulate_law(
     commands = np.zeros((samples, COMMAND_SIZE))
     record = np.zeros((steps // every + 1, 3 * n + parts.T_SIZE))
     z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
-    noise = _noise(options.noise, samples, n, rng)
+    noise = sensor_noise(options.noise, samples, n, rng)
     if options.fault is not None:
-        _add_fault(noise, options.fault, rng)
+        add_fault(noise, options.fault, rng)
     matrices = [np.ascontiguousarray(item) for item in (frame.mass, frame.damping, frame.stiffness, w)]
     plant = _plant(frame, w, dt)
     memory = controller.new_state()
@@ -340,7 +340,7 @@ def _run_numbers(
     return counts, run
 
 
-def _noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generator | None) -> FloatArray:
+def sensor_noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generator | None) -> FloatArray:
     """Return sensor noise, shape (samples, 5 + n); the damper's acceleration is a difference of two sensors."""
     result = np.zeros((samples, MEASURED_FLOORS + floors))
     if noise.displacement_m > 0.0 or noise.acceleration_m_s2 > 0.0:
@@ -354,7 +354,7 @@ def _noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generat
     return result
 
 
-def _add_fault(noise: FloatArray, fault: SensorFault, rng: np.random.Generator | None) -> None:
+def add_fault(noise: FloatArray, fault: SensorFault, rng: np.random.Generator | None) -> None:
     """Mark the faulty readings in the noise; the first sample is good."""
     if rng is None:
         raise ValueError("a sensor fault needs a generator")

@@ -187,37 +187,46 @@ def excitation_of(
     UserError
         If a recorded motion cannot be read, or no amplitude gives the demanded response.
     """
+    free = rig.controllers.calibrated.omega_0
+    amplitude, viscous = settings.base_amplitude_m_s2, None
+    if amplitude is None and settings.kind in ADJUSTED:
+        amplitude, viscous = _adjusted(rig, settings, lambda tried: harmonic_excitation(settings, free, tried), warn)
+        viscous = viscous if settings.factor == 1.0 and settings.kind == "harmonic" else None
+    return excitation_at(settings, free, amplitude or 0.0), viscous
+
+
+def excitation_at(settings: ExcitationSettings, free_rad_s: float, amplitude_m_s2: float) -> Excitation:
+    """Return the excitation for a known amplitude of harmonic motion or sweep.
+
+    Parameters
+    ----------
+    settings
+        What shakes the base.
+    free_rad_s
+        Free frequency of the target mode.
+    amplitude_m_s2
+        Of the base acceleration, before `settings.factor`; not used by other kinds of motion.
+
+    Raises
+    ------
+    UserError
+        If a recorded motion cannot be read.
+    """
     factor = settings.factor
     if settings.kind == "recorded":
         time_s, acceleration = read_ground_record(Path(settings.file), settings.file_unit)
-        return kinds.recorded(time_s, acceleration, scale=factor), None
+        return kinds.recorded(time_s, acceleration, scale=factor)
     if settings.kind == "free-decay":
-        return kinds.at_rest(settings.decay_s), None
-    free = rig.controllers.calibrated.omega_0
-    omega = settings.frequency_rad_s or free
-
-    def harmonic(amplitude: float) -> Excitation:
-        return kinds.harmonic(
-            amplitude,
-            omega,
-            cycles=settings.cycles,
-            settling_cycles=min(settings.settling_cycles, settings.cycles - 1),
-            ramp_cycles=settings.ramp_cycles,
-            decay_s=settings.decay_s,
-        )
-
-    amplitude, viscous = settings.base_amplitude_m_s2, None
-    if amplitude is None:
-        amplitude, viscous = _adjusted(rig, settings, harmonic, warn)
-        viscous = viscous if factor == 1.0 and settings.kind == "harmonic" else None
+        return kinds.at_rest(settings.decay_s)
     if settings.kind == "sweep":
-        first = settings.sweep_first_hz or SWEEP[0] * free / (2.0 * np.pi)
-        last = settings.sweep_last_hz or SWEEP[1] * free / (2.0 * np.pi)
-        return kinds.sweep(factor * amplitude, first, last, settings.sweep_s), None
+        first = settings.sweep_first_hz or SWEEP[0] * free_rad_s / (2.0 * np.pi)
+        last = settings.sweep_last_hz or SWEEP[1] * free_rad_s / (2.0 * np.pi)
+        return kinds.sweep(factor * amplitude_m_s2, first, last, settings.sweep_s)
     if settings.kind == "random":
+        omega = settings.frequency_rad_s or free_rad_s
         period = 2.0 * np.pi / omega
-        motion = kinds.narrow_band(
-            factor * amplitude / math.sqrt(2.0),
+        return kinds.narrow_band(
+            factor * amplitude_m_s2 / math.sqrt(2.0),
             omega,
             settings.random_bandwidth,
             np.random.default_rng(settings.random_seed),
@@ -225,8 +234,19 @@ def excitation_of(
             settling_s=min(settings.settling_cycles * period, 0.5 * settings.random_s),
             ramp_s=settings.ramp_cycles * period,
         )
-        return motion, None
-    return harmonic(factor * amplitude), viscous
+    return harmonic_excitation(settings, free_rad_s, factor * amplitude_m_s2)
+
+
+def harmonic_excitation(settings: ExcitationSettings, free_rad_s: float, amplitude_m_s2: float) -> Excitation:
+    """Return harmonic base motion of this amplitude; arguments as in :func:`excitation_at`."""
+    return kinds.harmonic(
+        amplitude_m_s2,
+        settings.frequency_rad_s or free_rad_s,
+        cycles=settings.cycles,
+        settling_cycles=min(settings.settling_cycles, settings.cycles - 1),
+        ramp_cycles=settings.ramp_cycles,
+        decay_s=settings.decay_s,
+    )
 
 
 def expected_top(rig: Rig) -> float:

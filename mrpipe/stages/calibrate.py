@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.config.sections.calibrate import CalibrateSettings, RegulatorSettings
+    from mrpipe.config.sections.calibrate import CalibrateSettings
     from mrpipe.control.calibration import Calibration, CalibrationOptions
-    from mrpipe.control.limits import LimitingModes
     from mrpipe.control.lqg import Weights
     from mrpipe.control.neural import ReferenceNetwork
     from mrpipe.structures import Frame
@@ -29,7 +28,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     import numpy as np
 
     from mrpipe.control.assembly import expected_amplitude
-    from mrpipe.control.calibration import calibrate, validity_warnings
+    from mrpipe.control.calibration import balanced_weights, calibrate, validity_warnings
     from mrpipe.control.limits import limiting_modes
     from mrpipe.control.storage import calibration_to_json, write_calibration
     from mrpipe.dampers.model import read_tested
@@ -49,7 +48,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         tested = read_tested(context.artifact("identify-damper")) if "identify-damper" in context.inputs else {}
         amplitude = expected_amplitude(damper, tested, modes)
     speed = amplitude * modes.omega_0
-    weights = _weights(settings.regulator, modes, float(damper.quasi_static_force(speed, 0.0)))
+    weights = balanced_weights(modes, float(damper.quasi_static_force(speed, 0.0)), **settings.regulator.known())
     calibration = calibrate(frame, position, _options(settings, weights))
     for law, reason in calibration.skipped.items():
         context.warn(f"law {law} was skipped: {reason}")
@@ -100,19 +99,6 @@ def _options(settings: CalibrateSettings, weights: Weights) -> CalibrationOption
         overrides=overrides,
         weights=weights,
     )
-
-
-def _weights(regulator: RegulatorSettings, modes: LimitingModes, residual_force_n: float) -> Weights:
-    from mrpipe.control.calibration import balanced_weights
-
-    given = {
-        "energy": regulator.energy_weight,
-        "top_displacement": regulator.top_displacement_weight,
-        "force": regulator.force_weight,
-        "ground_noise_m_s2": regulator.ground_noise_m_s2,
-        "force_noise_n": regulator.force_noise_n,
-    }
-    return balanced_weights(modes, residual_force_n, **{key: item for key, item in given.items() if item is not None})
 
 
 def _networks(calibration: Calibration) -> bool:

@@ -31,6 +31,42 @@ class MatrixEntry(Section):
     unit: str = Field("", description="Unit of the entries, such as kg, t, kN/m; empty: SI.")
 
 
+class DamperSettings(Section):
+    """One damper of a structure: where it sits, what it is, and which law drives it."""
+
+    name: str = Field("", description="Name in tables and files; empty: `damper 1` and so on.")
+    between: tuple[str | int, str | int] = Field(
+        ...,
+        description="The two degrees of freedom that it connects, by name or number from 1; `ground` for the ground.",
+    )
+    brace_stiffness_n_m: float | None = Field(
+        None, gt=0.0, description="Stiffness of the brace in series with the damper; null: rigid."
+    )
+    damper: str = Field(
+        "", description="Damper model, as in `calibrate.damper`; empty: the damper of `calibrate.damper`."
+    )
+    law: str = Field(
+        "vd",
+        description="Control law. All dampers with `lqg` share one regulator and one observer; every other law reads "
+        "the sensors of its own damper.",
+    )
+    gains: dict[str, float] = Field(
+        {}, description="Gains of the law by name, such as {c_n_s_m: 250}; gains that are left out are calibrated."
+    )
+    target_mode: int | None = Field(
+        None, ge=1, description="Mode that this damper is calibrated for; null: `calibrate.target_mode`."
+    )
+    expected_amplitude_m: float | None = Field(
+        None, gt=0.0, description="Expected amplitude of this damper; null: `calibrate.expected_amplitude_m`."
+    )
+    sensors: tuple[Literal["displacement", "acceleration", "velocity"], ...] = Field(
+        ("displacement", "acceleration"),
+        min_length=1,
+        description="Sensors at this damper. `displacement` and `acceleration` feed the Kalman filter, `displacement` "
+        "alone gives the velocity by differences, and `velocity` is a velocity sensor.",
+    )
+
+
 class ReductionSettings(Section):
     """Reduction of a large structure to few degrees of freedom."""
 
@@ -50,7 +86,10 @@ class ReductionSettings(Section):
 class StructureSettings(Section):
     """A linear structure from a file, a storey table or modes; without any of them `identify-frame` identifies it."""
 
-    file: str = Field("", description="File that holds the matrices (.mat, .csv, .h5, .json).")
+    file: str = Field(
+        "",
+        description="File of the matrices (.mat, .csv, .h5, .json), or an openseespy script (.py), which is run.",
+    )
     mass: MatrixEntry = Field(MatrixEntry(name="M", unit="kg"), description="Mass matrix.")
     stiffness: MatrixEntry = Field(MatrixEntry(name="K", unit="N/m"), description="Stiffness matrix.")
     damping: MatrixEntry = Field(
@@ -72,6 +111,16 @@ class StructureSettings(Section):
         "or a direction across the motion has 0.",
     )
     reduction: ReductionSettings = Field(ReductionSettings(), description="Reduction of a large structure.")
+    dampers: tuple[DamperSettings, ...] = Field(
+        (),
+        description="Dampers of the structure, each with its own law. Without any, the structure has the one damper of "
+        "the section `calibrate`.",
+    )
+    accelerometers: tuple[str | int, ...] = Field(
+        (),
+        description="Degrees of freedom with an accelerometer that the observer of `lqg` reads, with `dampers`; "
+        "empty: all.",
+    )
 
     @property
     def given(self) -> bool:

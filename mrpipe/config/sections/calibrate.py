@@ -36,6 +36,11 @@ class _Fixed(CalibrationSettings):
         description="Speed over which the friction of fdns and nnc changes its sign, over the damper's peak speed at "
         "the expected amplitude; 0: the jump of (4.18).",
     )
+    together: bool = Field(
+        True,
+        description="With `structure.dampers`: search the gains of all dampers together for the largest damping of the "
+        "target modes; else each damper has the gains that it would have alone.",
+    )
     map_points: int = Field(25, ge=5, le=200, description="Points along each axis of the damping maps.")
     neural: NeuralReferenceSettings = Field(NeuralReferenceSettings(), description="The neural reference controller.")
     regulator: RegulatorSettings = Field(RegulatorSettings(), description="Clipped LQG.")

@@ -1,0 +1,142 @@
+"""One regulator and one observer for several dampers, with the sensors that are there (LQG, thesis appendix E)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy.linalg import LinAlgError, solve_continuous_are, solve_discrete_are
+
+from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.control.kernel import LAW_SIGNATURE, S_REQUEST
+from mrpipe.control.law import Law
+from mrpipe.control.lqg import Weights, state_weight
+from mrpipe.errors import UserError
+from mrpipe.structures import Frame, discretise_zero_order, state_space
+
+MODEL_NOISE_SHARE = 0.05
+"""Noise on the velocity of every degree of freedom over that of the ground. It keeps the observer awake in modes that
+the ground hardly excites."""
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the observer reads besides the ground acceleration.
+
+    Attributes
+    ----------
+    accelerometers
+        Indices (from 0) of the degrees of freedom with an accelerometer.
+    dampers
+        Indices (from 0) of the dampers of the regulator whose displacement is measured.
+    """
+
+    accelerometers: tuple[int, ...]
+    dampers: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class CentralRegulator:
+    """z+ = F z + G f + H y and desired forces -K z, with y = [ground, damper displacements, accelerations].
+
+    Attributes
+    ----------
+    transition, force_input, innovation, gain
+        F (2n, 2n), G (2n, k), H (2n, 1 + p), K (k, 2n); k dampers, p further sensors.
+    sensors
+        Order of the readings after the ground acceleration: displacements of the dampers, then accelerometers.
+    sample_time_s
+        Interval that it was made for [s].
+    """
+
+    transition: FloatArray
+    force_input: FloatArray
+    innovation: FloatArray
+    gain: FloatArray
+    sensors: Sensors
+    sample_time_s: float
+
+
+def central_regulator(
+    frame: Frame, positions: FloatArray, weights: Sequence[Weights], sensors: Sensors, dt: float
+) -> CentralRegulator:
+    """Return the sampled LQG regulator of several dampers.
+
+    The dampers resist with forces f, so that M x'' + C x' + K x = -W f - M r x_g''. The weights of energy and of the
+    top displacement, and the noise, are those of the first damper; each damper has its own weight of the force.
+
+    Parameters
+    ----------
+    frame
+        The structure, with the linear equivalents of other dampers.
+    positions
+        W, shape (n, k).
+    weights
+        Of each damper.
+    sensors
+        What is measured.
+    dt
+        Sampling interval [s].
+
+    Raises
+    ------
+    UserError
+        If there is no sensor, or a Riccati equation has no solution.
+    """
+    n, k = positions.shape
+    if not sensors.accelerometers and not sensors.dampers:
+        raise UserError(
+            "structure", "accelerometers", "lqg has no sensor", "give accelerometers or damper displacements"
+        )
+    first = weights[0]
+    space = state_space(frame, -positions)
+    Ad, Bd = discretise_zero_order(space.A, space.B, dt)
+    acceleration_C, acceleration_D = space.absolute_acceleration()
+    rows = list(sensors.accelerometers)
+    C = np.vstack([np.hstack([positions.T[list(sensors.dampers)], np.zeros((len(sensors.dampers), n))]),
+                   acceleration_C[rows]])  # fmt: skip
+    D = np.vstack([np.zeros((len(sensors.dampers), 1 + k)), acceleration_D[rows]])
+    force_noise = np.array([item.force_noise_n for item in weights])
+    W = first.ground_noise_m_s2**2 * np.outer(Bd[:, 0], Bd[:, 0])
+    W += Bd[:, 1:] @ np.diag(force_noise**2) @ Bd[:, 1:].T
+    W[n:, n:] += (MODEL_NOISE_SHARE * first.ground_noise_m_s2 * dt) ** 2 * np.eye(n)
+    V = np.diag([first.displacement_noise_m**2] * len(sensors.dampers) + [first.acceleration_noise_m_s2**2] * len(rows))
+    # an accelerometer beside a damper reads the error of its force at once
+    V += np.diag(np.sum((D[:, 1:] * force_noise) ** 2, axis=1))
+    try:
+        R = np.diag([item.force for item in weights])
+        P = solve_continuous_are(space.A, space.B[:, 1:], state_weight(frame, first), R)
+        # the columns of B hold the sign of a resisting force, so that u = -K z is the force of the dampers
+        gain = np.linalg.solve(R, space.B[:, 1:].T @ P)
+        covariance = solve_discrete_are(Ad.T, C.T, W, V)
+    except (LinAlgError, ValueError) as error:
+        raise UserError(
+            "control law", "lqg", f"no regulator ({error})", "give positive weights, or more sensors"
+        ) from error
+    L = Ad @ covariance @ C.T @ np.linalg.inv(C @ covariance @ C.T + V)
+    return CentralRegulator(
+        transition=Ad - L @ C,
+        force_input=Bd[:, 1:] - L @ D[:, 1:],
+        innovation=np.column_stack([Bd[:, 0] - L @ D[:, 0], L]),
+        gain=np.asarray(gain),
+        sensors=sensors,
+        sample_time_s=dt,
+    )
+
+
+@njit(LAW_SIGNATURE, cache=True)
+def requested_force(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:  # noqa: ARG001
+    """Return the force that the central regulator asked this damper for."""
+    return state[S_REQUEST]
+
+
+CENTRAL = Law(
+    name="lqg",
+    summary="linear-quadratic regulator of several dampers",
+    source="thesis appendix E",
+    force=requested_force,
+    c_body="    return state[S_REQUEST];\n",
+)
+"""The law of one damper under a central regulator, which writes the desired force into the controller's state."""

@@ -1,0 +1,225 @@
+"""Calibration of several dampers: each alone by its law's own route, then all together by exact complex eigenvalues."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control import exact
+from mrpipe.control.calibration import (
+    Calibration,
+    CalibrationOptions,
+    LawCalibration,
+    calibrate_law,
+    plant_of,
+    validity_warnings,
+)
+from mrpipe.control.gains import Gains
+from mrpipe.control.law import Law
+from mrpipe.control.laws import law_named
+from mrpipe.control.limits import LimitingModes
+from mrpipe.control.lqg import Weights
+from mrpipe.control.together import LinearDevice, TogetherDamping, damping_together, linear_device
+from mrpipe.errors import UserError
+from mrpipe.structures import Frame
+
+LARGEST_FACTOR = 8.0
+"""Largest factor on a gain, and the inverse of the smallest, in the search for the gains of all dampers together."""
+
+CENTRAL_LAW = "lqg"
+"""Law whose dampers share one regulator; it has no gains to calibrate here."""
+
+
+@dataclass(frozen=True)
+class PlacedDamper:
+    """A damper in a structure, with the law that drives it.
+
+    Attributes
+    ----------
+    name
+        For tables.
+    position
+        Connectivity vector w, shape (n,).
+    law
+        Name of its law.
+    mode
+        Target mode, from 1.
+    gains
+        Gains that the user gives; the others are calibrated.
+    brace_n_m
+        Stiffness of the brace in series with it [N/m]; infinite: rigid.
+    """
+
+    name: str
+    position: FloatArray
+    law: str
+    mode: int = 1
+    gains: Mapping[str, float] | None = None
+    brace_n_m: float = math.inf
+
+
+@dataclass(frozen=True)
+class PlacedCalibration:
+    """Gains of one damper.
+
+    Attributes
+    ----------
+    damper
+        What was calibrated.
+    modes
+        Limiting modes of its target, all other dampers off, with a rigid brace.
+    static_stiffness_n_m
+        Of the structure at the damper.
+    alone, together
+        Gains for the largest damping of the target mode with this damper alone, and with all dampers.
+    law
+        The law's own calibration without a brace; None for a law without gains.
+    weights
+        Of laws that are designed by an optimum.
+    """
+
+    damper: PlacedDamper
+    modes: LimitingModes
+    static_stiffness_n_m: float
+    alone: Gains
+    together: Gains
+    law: LawCalibration | None
+    weights: Weights
+
+    def device(self, gains: Gains) -> LinearDevice | None:
+        """Return the linear equivalent at these gains; None where the law has none."""
+        damper = self.damper
+        return linear_device(law_named(damper.law), gains, damper.position, self.modes.omega_0, 1.0, damper.brace_n_m)
+
+
+def calibrate_placed(
+    frame: Frame, dampers: Sequence[PlacedDamper], options: CalibrationOptions, *, together: bool = True
+) -> list[PlacedCalibration]:
+    """Calibrate every damper alone, and then all of them together.
+
+    Together, the gains are multiplied by factors that give the largest damping ratio of the target modes; where there
+    are several target modes, the one that gained least over the gains of single dampers counts. The equivalents of
+    nonlinear laws are used, and the structure's own damping is left out, as in the calibration of one damper.
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    dampers
+        What is calibrated.
+    options
+        Source of the gains and further options; the target mode is that of each damper.
+    together
+        Whether gains are searched for all dampers together.
+
+    Raises
+    ------
+    UserError
+        If a damper cannot be calibrated.
+    """
+    alone = [_alone(frame, damper, options) for damper in dampers]
+    if not together or options.source != "exact":
+        return alone
+    places = [place for place, item in enumerate(alone) if _is_tunable(item)]
+    if len(alone) < 2 or not places:
+        return alone
+    bare = exact.undamped(frame)
+    modes = sorted({item.damper.mode for item in alone})
+
+    def devices(factors: FloatArray) -> list[LinearDevice]:
+        gains = [item.alone for item in alone]
+        for place, factor in zip(places, factors, strict=True):
+            gains[place] = law_named(alone[place].damper.law).scaled(gains[place], float(factor))
+        found = (item.device(values) for item, values in zip(alone, gains, strict=True))
+        return [item for item in found if item is not None]
+
+    start = np.ones(len(places))
+    reference = np.maximum(damping_together(bare, devices(start), modes).damping_ratios, 1e-6)
+    factors = _largest(
+        lambda tried: float(np.min(damping_together(bare, devices(tried), modes).damping_ratios / reference)),
+        len(places),
+    )
+    result = list(alone)
+    for place, factor in zip(places, factors, strict=True):
+        item = alone[place]
+        result[place] = replace(item, together=law_named(item.damper.law).scaled(item.alone, float(factor)))
+    return result
+
+
+def modes_together(
+    frame: Frame, calibrated: Sequence[PlacedCalibration], modes: Sequence[int], *, alone: bool = False
+) -> TogetherDamping:
+    """Return the target modes with all dampers that have a linear equivalent, at their gains together (or alone)."""
+    found = [item.device(item.alone if alone else item.together) for item in calibrated]
+    return damping_together(frame, [item for item in found if item is not None], modes)
+
+
+def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> PlacedCalibration:
+    law = law_named(damper.law)
+    where = f"structure.dampers: {damper.name}"
+    if "network" in law.needs:
+        raise UserError(where, law.name, "needs a network, which is trained for one damper", "choose another law")
+    own = replace(options, mode=damper.mode, overrides={law.name: dict(damper.gains or {})})
+    plant = plant_of(frame, damper.position, own)
+    calibrated = None
+    gains = Gains()
+    if law.calibrated and law.name != CENTRAL_LAW:
+        calibrated = calibrate_law(plant, law, own)
+        gains = calibrated.gains
+    found = PlacedCalibration(damper, plant.modes, plant.static_stiffness_n_m, gains, gains, calibrated, plant.weights)
+    own_route = math.isinf(damper.brace_n_m) and not damper.gains
+    if own_route or not _is_tunable(found) or options.source != "exact":
+        return found
+
+    # the law's own calibration knows neither a brace nor the gains that the user gives
+    def ratio(factors: FloatArray) -> float:
+        device = found.device(law.scaled(gains, float(factors[0])))
+        return float(damping_together(plant.bare, [device] if device else [], [damper.mode]).damping_ratios[0])
+
+    best = law.scaled(gains, float(_largest(ratio, 1)[0]))
+    return replace(found, alone=best, together=best)
+
+
+def _is_tunable(item: PlacedCalibration) -> bool:
+    """Return whether the law has a gain to search and an equivalent, and the user has not given this gain."""
+    law: Law = law_named(item.damper.law)
+    given = item.damper.gains or {}
+    return bool(law.tuned_gain) and law.tuned_gain not in given and item.device(item.alone) is not None
+
+
+def _largest(value: Callable[[FloatArray], float], count: int) -> FloatArray:
+    """Return the factors, shape (count,), within 1/LARGEST_FACTOR to LARGEST_FACTOR, of the largest value."""
+    limit = math.log(LARGEST_FACTOR)
+    simplex = np.vstack([np.zeros(count), 0.4 * np.eye(count)])
+    found = minimize(
+        lambda logarithms: -value(np.exp(logarithms)),
+        np.zeros(count),
+        method="Nelder-Mead",
+        bounds=[(-limit, limit)] * count,
+        options={"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-9, "maxfev": 150 * count},
+    )
+    return np.asarray(np.exp(found.x))
+
+
+def placed_warnings(
+    item: PlacedCalibration, *, amplitude_m: float, residual_force_n: float, largest_force_n: float
+) -> list[str]:
+    """Return what the user should know about one damper, a sentence each; arguments as in `validity_warnings`."""
+    if item.law is None:
+        return []
+    calibration = Calibration(
+        item.modes,
+        item.static_stiffness_n_m,
+        {item.damper.law: replace(item.law, gains=item.together)},
+        np.zeros(0),
+        item.damper.position,
+    )
+    lines = validity_warnings(
+        calibration, amplitude_m=amplitude_m, residual_force_n=residual_force_n, largest_force_n=largest_force_n
+    )
+    return [f"{item.damper.name}: {line}" for line in lines]

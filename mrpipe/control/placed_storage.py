@@ -1,0 +1,189 @@
+"""Several dampers: from the settings to what is calibrated, and the calibration in control.h5 and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import Artifact, ArtifactWriter
+from mrpipe.control.gains import Gains
+from mrpipe.control.laws import law_named, law_names
+from mrpipe.control.lqg import Weights
+from mrpipe.control.placed import PlacedCalibration, PlacedDamper
+from mrpipe.control.storage import Calibrated, finite
+from mrpipe.control.together import TogetherDamping
+from mrpipe.errors import UserError
+from mrpipe.structures import Frame, natural_modes
+from mrpipe.structures.given import degree_of_freedom, device_position
+from mrpipe.structures.options import DamperSettings
+
+GROUP = "dampers"
+"""Entry of control.h5 that holds the calibration of several dampers."""
+
+
+def damper_name(settings: DamperSettings, place: int) -> str:
+    """Return the name of the damper at this place (from 0) of the list."""
+    return settings.name or f"damper {place + 1}"
+
+
+def placed_dampers(frame: Frame, entries: Sequence[DamperSettings], target_mode: int) -> list[PlacedDamper]:
+    """Return the dampers that the settings describe.
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    entries
+        Section `structure.dampers`.
+    target_mode
+        Of dampers that name none.
+
+    Raises
+    ------
+    UserError
+        If a law, a degree of freedom or a sensor is not known, or two dampers have the same name.
+    """
+    result: list[PlacedDamper] = []
+    for place, entry in enumerate(entries):
+        where = f"structure.dampers[{place}]"
+        if entry.law not in law_names():
+            raise UserError(where, f"law: {entry.law}", "is not a control law", f"one of {', '.join(law_names())}")
+        if "displacement" not in entry.sensors:
+            raise UserError(where, "sensors", "lack the displacement of the damper", "add displacement")
+        name = damper_name(entry, place)
+        if any(item.name == name for item in result):
+            raise UserError(where, f"name: {name}", "occurs more than once", "give different names")
+        result.append(
+            PlacedDamper(
+                name=name,
+                position=device_position(frame, *entry.between, where=f"{where}.between"),
+                law=entry.law,
+                mode=entry.target_mode or target_mode,
+                gains=entry.gains,
+                brace_n_m=entry.brace_stiffness_n_m or math.inf,
+            )
+        )
+    return result
+
+
+def accelerometers_of(frame: Frame, names: Sequence[str | int]) -> tuple[int, ...]:
+    """Return the indices (from 0) of the degrees of freedom with an accelerometer; all where none is named."""
+    if not names:
+        return tuple(range(frame.floors))
+    return tuple(degree_of_freedom(frame, name, "structure.accelerometers") for name in names)
+
+
+@dataclass(frozen=True)
+class KnownDamper:
+    """One damper in control.h5.
+
+    Attributes
+    ----------
+    name, law
+        Of the damper.
+    brace_n_m
+        Stiffness of its brace [N/m]; infinite: rigid.
+    omega_inf
+        Frequency of its target mode with this damper locked and the others off [rad/s].
+    calibrated
+        In the form that builds its controller.
+    """
+
+    name: str
+    law: str
+    brace_n_m: float
+    omega_inf: float
+    calibrated: Calibrated
+
+
+def damper_as_json(
+    item: PlacedCalibration, amplitude_m: float, residual_force_n: float, rounding_m_s: float
+) -> dict[str, Any]:
+    """Return what `mrpipe calibrate --json` prints for one of several dampers.
+
+    Parameters
+    ----------
+    item
+        What was calibrated.
+    amplitude_m, residual_force_n, rounding_m_s
+        Expected amplitude, force without drive at that amplitude, and speed over which friction changes its sign.
+    """
+    law = law_named(item.damper.law)
+    return {
+        "name": item.damper.name,
+        "law": law.name,
+        "position": item.damper.position.tolist(),
+        "brace_stiffness_n_m": finite(item.damper.brace_n_m),
+        "target_mode": item.damper.mode,
+        "omega_0": item.modes.omega_0,
+        "omega_inf": item.modes.omega_inf,
+        "static_stiffness_n_m": item.static_stiffness_n_m,
+        "gains_alone": law.gains_as_json(item.alone),
+        "gains": law.gains_as_json(item.together),
+        "expected_amplitude_m": amplitude_m,
+        "residual_force_n": residual_force_n,
+        "friction_rounding_m_s": rounding_m_s,
+    }
+
+
+def together_as_json(frame: Frame, found: TogetherDamping, modes: Sequence[int]) -> dict[str, Any]:
+    """Return frequencies and damping ratios of modes with all dampers, by exact complex eigenvalues."""
+    omega = natural_modes(frame).angular_frequencies
+    return {
+        "modes": list(modes),
+        "omega_free": [float(omega[mode - 1]) for mode in modes],
+        "omega": np.abs(found.poles).tolist(),
+        "damping_ratios": found.damping_ratios.tolist(),
+        "stable": found.stable,
+    }
+
+
+def write_placed(
+    artifact: ArtifactWriter,
+    calibrated: Sequence[PlacedCalibration],
+    weights: Sequence[Weights],
+    summary: Mapping[str, Any],
+) -> None:
+    """Write everything that building the controllers needs; `summary` is that of the stage."""
+    rows = [
+        {
+            **row,
+            "u_0": item.modes.u_0,
+            "top_0": float(item.modes.shape_0[-1]),
+            "all_gains": dict(item.together),
+            "weights": asdict(weight),
+        }
+        for item, weight, row in zip(calibrated, weights, summary["dampers"], strict=True)
+    ]
+    artifact.put_json(GROUP, rows)
+    artifact.put_json("together", summary["together"])
+
+
+def read_placed(artifact: Artifact) -> list[KnownDamper]:
+    """Read what :func:`write_placed` wrote."""
+    return [
+        KnownDamper(
+            name=row["name"],
+            law=row["law"],
+            brace_n_m=row["brace_stiffness_n_m"] or math.inf,
+            omega_inf=row["omega_inf"],
+            calibrated=Calibrated(
+                position=np.array(row["position"]),
+                omega_0=row["omega_0"],
+                u_0=row["u_0"],
+                top_0=row["top_0"],
+                amplitude_m=row["expected_amplitude_m"],
+                residual_force_n=row["residual_force_n"],
+                friction_rounding_m_s=row["friction_rounding_m_s"],
+                weights=Weights(**row["weights"]),
+                gains={row["law"]: Gains(**row["all_gains"])},
+                reference=None,
+                path=str(artifact.path),
+            ),
+        )
+        for row in artifact.json(GROUP)
+    ]

@@ -1,0 +1,198 @@
+"""Exact complex eigenvalues of a structure with several linear devices, each perhaps behind a brace."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control.gains import Gains
+from mrpipe.control.law import Law
+from mrpipe.control.linearisation import clipped_linear_stiffness, equivalent_stiffness
+from mrpipe.structures import Frame, natural_modes
+
+ComplexArray = NDArray[np.complex128]
+
+CONTINUATION_STEPS = 24
+"""Steps in which all devices are faded in together to follow the eigenvalues of the target modes."""
+
+
+@dataclass(frozen=True)
+class LinearDevice:
+    """A device f = c v + (k + H) x, where x is its own displacement without that of its brace.
+
+    Attributes
+    ----------
+    position
+        Connectivity vector w of brace and device together, shape (n,).
+    viscosity, stiffness
+        c [N s/m] and k [N/m].
+    equivalent
+        H [N/m], a complex stiffness that does not depend on frequency.
+    brace_n_m
+        Stiffness of the brace in series with the device [N/m]; infinite: rigid.
+    """
+
+    position: FloatArray
+    viscosity: float = 0.0
+    stiffness: float = 0.0
+    equivalent: complex = 0.0
+    brace_n_m: float = math.inf
+
+    @property
+    def has_state(self) -> bool:
+        """Whether its displacement is a state of the loop, because brace and viscosity are in series."""
+        return self.viscosity > 0.0 and not math.isinf(self.brace_n_m)
+
+    def scaled(self, share: float) -> LinearDevice:
+        """Return the device with this share of its force and the same brace."""
+        return replace(
+            self,
+            viscosity=share * self.viscosity,
+            stiffness=share * self.stiffness,
+            equivalent=share * self.equivalent,
+        )
+
+    def dynamic_stiffness(self, s: complex) -> complex:
+        """Return the complex stiffness of device and brace at the Laplace variable s [rad/s]; [N/m]."""
+        own = self.stiffness + self.equivalent + s * self.viscosity
+        return own if math.isinf(self.brace_n_m) else own * self.brace_n_m / (own + self.brace_n_m)
+
+
+def linear_device(
+    law: Law, gains: Gains, position: FloatArray, omega: float, amplitude_m: float, brace_n_m: float = math.inf
+) -> LinearDevice | None:
+    """Return the linear equivalent of a device under a law; None where the law has none.
+
+    A linear law without negative stiffness is its own equivalent. A clipped law is described by its first harmonic at
+    `omega`, and so is every other law with a known force in harmonic motion of amplitude `amplitude_m`.
+
+    Parameters
+    ----------
+    law, gains
+        Of the device.
+    position
+        Connectivity vector, shape (n,).
+    omega, amplitude_m
+        Of the harmonic motion [rad/s], [m].
+    brace_n_m
+        Stiffness of the brace [N/m].
+    """
+    if law.linear and gains.k_n_m >= 0.0:
+        return LinearDevice(position, gains.c_n_s_m, gains.k_n_m, brace_n_m=brace_n_m)
+    if law.linear:
+        equivalent = clipped_linear_stiffness(gains.c_n_s_m, gains.k_n_m, omega)
+        return LinearDevice(position, equivalent=equivalent, brace_n_m=brace_n_m)
+    if law.harmonic_force is None:
+        return None
+    force = law.harmonic_force
+    equivalent = equivalent_stiffness(lambda x, v: force(gains, x, v, amplitude_m), amplitude_m, omega)
+    return LinearDevice(position, equivalent=equivalent, brace_n_m=brace_n_m)
+
+
+def loop_matrix(frame: Frame, devices: Sequence[LinearDevice]) -> ComplexArray:
+    """Return A of z' = A z, z = [x, v] and the displacement of each device that has viscosity behind a brace.
+
+    With a brace of stiffness k_b the force is k_b (w'x - x_d) = c x_d' + (k + H) x_d. A device without viscosity is in
+    series with its brace, so that its stiffness is (k + H) k_b/(k + H + k_b).
+    """
+    n = frame.floors
+    stiffness = frame.stiffness.astype(np.complex128)
+    damping = frame.damping.copy()
+    hidden = [item for item in devices if item.has_state]
+    for item in devices:
+        outer = np.outer(item.position, item.position)
+        if item.has_state:
+            stiffness = stiffness + item.brace_n_m * outer
+        else:
+            stiffness = stiffness + item.dynamic_stiffness(0.0) * outer
+            damping = damping + item.viscosity * outer
+    size = 2 * n + len(hidden)
+    inverse = np.linalg.inv(frame.mass)
+    A = np.zeros((size, size), dtype=np.complex128)
+    A[:n, n : 2 * n] = np.eye(n)
+    A[n : 2 * n, :n] = -inverse @ stiffness
+    A[n : 2 * n, n : 2 * n] = -inverse @ damping
+    for row, item in enumerate(hidden, start=2 * n):
+        A[n : 2 * n, row] = inverse @ item.position * item.brace_n_m
+        A[row, :n] = item.brace_n_m * item.position / item.viscosity
+        A[row, row] = -(item.brace_n_m + item.stiffness + item.equivalent) / item.viscosity
+    return A
+
+
+@dataclass(frozen=True)
+class TogetherDamping:
+    """Target modes of a structure with all its devices.
+
+    Attributes
+    ----------
+    poles
+        s of each target mode, shape (m,) [rad/s].
+    growth_1_s
+        Largest real part of all eigenvalues [1/s].
+    """
+
+    poles: ComplexArray
+    growth_1_s: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether no mode grows."""
+        return self.growth_1_s < 1e-9
+
+    @property
+    def damping_ratios(self) -> FloatArray:
+        """-Re s/|s| of each target mode, shape (m,); -1 for all where a mode grows."""
+        ratios = np.asarray(-self.poles.real / np.maximum(np.abs(self.poles), 1e-300))
+        return ratios if self.stable else np.full(ratios.shape, -1.0)
+
+
+def damping_together(frame: Frame, devices: Sequence[LinearDevice], modes: Sequence[int]) -> TogetherDamping:
+    """Follow the eigenvalues of the target modes while all devices are faded in together.
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    devices
+        With positions of shape (n,).
+    modes
+        Numbers of the target modes, from 1.
+    """
+    omega = natural_modes(frame).angular_frequencies
+    poles = 1j * omega[np.asarray(modes, dtype=np.int64) - 1]
+    eigenvalues = poles
+    # the equivalents hold for positive frequencies, so that only eigenvalues of the upper half plane count
+    for share in np.linspace(0.0, 1.0, CONTINUATION_STEPS + 1)[1:]:
+        eigenvalues = np.linalg.eigvals(loop_matrix(frame, [item.scaled(float(share)) for item in devices]))
+        upper = eigenvalues[eigenvalues.imag >= -1e-9 * np.abs(eigenvalues)]
+        poles = np.array([upper[np.argmin(np.abs(upper - pole))] for pole in poles])
+    upper = eigenvalues[eigenvalues.imag >= -1e-9 * np.abs(eigenvalues)]
+    return TogetherDamping(np.asarray(poles, dtype=np.complex128), float(np.max(upper.real)))
+
+
+def ground_response(frame: Frame, devices: Sequence[LinearDevice], omega: float) -> tuple[ComplexArray, ComplexArray]:
+    """Return displacements of the floors (n,) and of the devices (k,) for a ground acceleration of 1 m/s^2; [m].
+
+    Parameters
+    ----------
+    frame, devices
+        The structure with its devices.
+    omega
+        Frequency of the harmonic ground motion [rad/s].
+    """
+    s = 1j * omega
+    dynamic = frame.stiffness + s * frame.damping - omega**2 * frame.mass
+    stiffness = [item.dynamic_stiffness(s) for item in devices]
+    for item, value in zip(devices, stiffness, strict=True):
+        dynamic = dynamic + value * np.outer(item.position, item.position)
+    floors = np.linalg.solve(dynamic, -(frame.mass @ frame.ground_influence).astype(np.complex128))
+    strokes = [
+        item.position @ floors * (1.0 if math.isinf(item.brace_n_m) else 1.0 - value / item.brace_n_m)
+        for item, value in zip(devices, stiffness, strict=True)
+    ]
+    return np.asarray(floors), np.asarray(strokes, dtype=np.complex128)

@@ -1,0 +1,167 @@
+"""Design of several dampers: factors on the gains of all dampers with the smallest largest response."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control.gains import Gains
+from mrpipe.control.laws import law_named
+from mrpipe.law_design.objective import Evaluation, Limits, Load, Objective, RunOf, evaluate
+from mrpipe.law_design.options import DesignSettings
+from mrpipe.law_design.search import FreeGain
+from mrpipe.law_design.study import COARSE, Designed, LawUnderDesign, reference_evaluation
+from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.loop import Response
+from mrpipe.simulation.response_curve import CurveOptions, Run
+from mrpipe.simulation.several_rig import DampersRig
+
+TOGETHER = "dampers"
+"""Name under which all dampers with their laws stand in the place of a single law."""
+
+FACTORS = (0.1, 10.0)
+"""Smallest and largest factor on the calibrated gain of a damper."""
+
+FIRST_STEP = -0.5
+"""First step of the logarithm of a factor. It is downwards, because a real damper saturates above."""
+
+
+@dataclass(frozen=True)
+class DampersDesign:
+    """What a design of several dampers found.
+
+    Attributes
+    ----------
+    designed
+        Best and calibrated evaluation; their gains are factors by the names of the dampers.
+    reference
+        Calibrated evaluation that scales the objective.
+    """
+
+    designed: Designed
+    reference: Evaluation
+
+
+def design_dampers(
+    rig: DampersRig, settings: DesignSettings, load: Load, *, absolute: bool, seed: int
+) -> DampersDesign:
+    """Search factors on the tuned gains of all dampers together.
+
+    The objective is that of a single law: the weighted largest responses over band, amplitudes and motions, relative to
+    those at the calibrated gains. The stroke is that of the damper with the largest RMS displacement.
+
+    Parameters
+    ----------
+    rig, settings, load
+        What is designed, and for what.
+    absolute
+        Whether accelerations are absolute.
+    seed
+        Of the sensor noise, which is the same in all runs.
+
+    Raises
+    ------
+    DivergedError
+        If the loop is unstable at the calibrated gains.
+    """
+    free = tuple(
+        FreeGain(item.known.name, *FACTORS)
+        for item in rig.dampers
+        if law_named(item.known.law).tuned_gain and any(item.gains.values())
+    )
+    start = Gains(**{gain.name: 1.0 for gain in free})
+    final = CurveOptions(points=15, tolerance=5e-3, most_cycles=80, absolute=absolute)
+    run_of = _runs(rig, seed)
+    reference = reference_evaluation(run_of, TOGETHER, start, load, final)
+    limits = Limits() if settings.stroke_limit_m is None else Limits(settings.stroke_limit_m)
+    objective = Objective(settings.weights, reference.peaks, limits)
+    entry = LawUnderDesign(TOGETHER, start, free, TOGETHER)
+    tried: list[Evaluation] = []
+    coarse = replace(COARSE, absolute=absolute)
+    searched = replace(load, amplitudes_m_s2=(max(load.amplitudes_m_s2),))
+
+    def value(logarithms: FloatArray) -> float:
+        factors = {gain.name: float(part) for gain, part in zip(free, np.exp(logarithms), strict=True)}
+        tried.append(evaluate(run_of, TOGETHER, Gains(**factors), searched, objective, coarse))
+        return tried[-1].value
+
+    calibrated = replace(reference, value=objective.value(reference.peaks))
+    best = calibrated
+    if free:
+        _search(value, len(free), settings.evaluations)
+        found = min(tried, key=lambda item: item.value)
+        best = evaluate(run_of, TOGETHER, found.gains, load, objective, final)
+    # the accurate curves decide; the search saw the coarse ones
+    best = min(best, calibrated, key=lambda item: item.value)
+    return DampersDesign(Designed(entry, best, calibrated, tuple(tried)), reference)
+
+
+def _search(value: Callable[[FloatArray], float], count: int, evaluations: int) -> None:
+    """Minimise a function of the logarithms of the factors, from the calibrated gains on.
+
+    The calibration is the joint optimum of the linear equivalents, so that no grid is needed before the local search; a
+    grid would grow with a power of the number of dampers.
+    """
+    low, high = np.log(FACTORS)
+    simplex = np.vstack([np.zeros(count), FIRST_STEP * np.eye(count)])
+    minimize(
+        value,
+        np.zeros(count),
+        method="Nelder-Mead",
+        bounds=[(low, high)] * count,
+        options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 1e-3, "maxfev": evaluations * count},
+    )
+
+
+def _runs(rig: DampersRig, seed: int) -> RunOf:
+    def run_of(_: str, factors: Gains) -> Run:
+        dampers = rig.loop_dampers(factors)
+
+        def run(excitation: Excitation) -> Response:
+            return rig.run(excitation, dampers, rng=np.random.default_rng(seed)).largest_stroke
+
+        return run
+
+    return run_of
+
+
+def design_as_json(rig: DampersRig, found: DampersDesign) -> dict[str, Any]:
+    """Return what `mrpipe design --json` prints for several dampers."""
+    best, calibrated = found.designed.best, found.designed.calibrated
+    dampers: dict[str, Mapping[str, Any]] = {}
+    for item, gains in zip(rig.dampers, rig.gains(best.gains), strict=True):
+        law = law_named(item.known.law)
+        dampers[item.known.name] = {
+            "law": law.name,
+            "factor": best.gains.get(item.known.name, 1.0),
+            "gains": law.gains_as_json(gains),
+            "calibrated_gains": law.gains_as_json(item.gains),
+        }
+    return {
+        "dampers": dampers,
+        "best": _evaluation(best),
+        "calibrated": _evaluation(calibrated),
+        "improvement": 1.0 - best.value / calibrated.value,
+        "evaluations": len(found.designed.tried),
+        "curves": {
+            name: {
+                "frequency_rad_s": item.curves[-1].frequency_rad_s.tolist(),
+                "rms_x_top_m": item.curves[-1].column("rms_x_top_m").tolist(),
+            }
+            for name, item in (("best gains", best), ("calibrated gains", calibrated))
+        },
+    }
+
+
+def _evaluation(item: Evaluation) -> dict[str, Any]:
+    return {
+        **{f"peak_{name}": value for name, value in item.peaks.items()},
+        "resonance_rad_s": item.resonance_rad_s,
+        "objective": item.value,
+        "motions": {name: dict(values) for name, values in item.motions.items()},
+    }

@@ -1,0 +1,327 @@
+"""The closed loop of a structure with several dampers: each with its own model, brace and controller.
+
+::
+
+    dampers = [LoopDamper("base", w1, model.chain(), controller1), LoopDamper("top", w2, None, controller2)]
+    response = simulate_dampers(frame, dampers, excitation, LoopOptions())
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.control.central import CentralRegulator
+from mrpipe.control.controller import Controller
+from mrpipe.control.kernel import (
+    COMMAND_SIZE,
+    MEASURED_DISPLACEMENT,
+    MEASURED_FLOORS,
+    MEASURED_GROUND,
+)
+from mrpipe.control.laws import is_linear
+from mrpipe.dampers.drive import command_place
+from mrpipe.dampers.plant import Chain, build_chain, new_state
+from mrpipe.errors import DivergedError, UserError
+from mrpipe.simulation import several_kernel as kernel
+from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.loop import LoopOptions, Response, add_fault, sensor_noise
+from mrpipe.structures import Frame, discretise_first_order, state_space
+
+
+@dataclass(frozen=True)
+class LoopDamper:
+    """One damper of the loop.
+
+    Attributes
+    ----------
+    name
+        For messages and tables.
+    position
+        Connectivity vector w of damper and brace together, shape (n,).
+    chain
+        The damper with its effects; None with perfect tracking.
+    controller
+        Of this damper.
+    brace_n_m
+        Stiffness of the brace in series with the damper [N/m]; infinite: rigid.
+    central
+        Whether the central regulator gives its desired force.
+    """
+
+    name: str
+    position: FloatArray
+    chain: Chain | None
+    controller: Controller
+    brace_n_m: float = math.inf
+    central: bool = False
+
+
+@dataclass(frozen=True)
+class DampersResponse:
+    """What the loop did.
+
+    Attributes
+    ----------
+    dampers
+        Name of a damper -> the response as with this damper alone: histories of the floors, which are the same for
+        all, and displacement, force, drive, commands and work of this damper.
+    work_dampers
+        Dissipated by all dampers together since the start [J], shape (m,).
+    """
+
+    dampers: dict[str, Response]
+    work_dampers: FloatArray
+
+    @property
+    def first(self) -> Response:
+        """The response of the first damper."""
+        return next(iter(self.dampers.values()))
+
+    @property
+    def energy_balance_error(self) -> float:
+        """What the balance of energies misses over all that was stored or dissipated on the way [1]."""
+        return replace(self.first, work_damper=self.work_dampers).energy_balance_error
+
+    @property
+    def largest_stroke(self) -> Response:
+        """The response of the damper with the largest RMS displacement."""
+        return max(self.dampers.values(), key=lambda item: float(np.mean(item.damper_displacement**2)))
+
+
+def simulate_dampers(
+    frame: Frame,
+    dampers: Sequence[LoopDamper],
+    excitation: Excitation,
+    options: LoopOptions | None = None,
+    *,
+    regulator: CentralRegulator | None = None,
+    rng: np.random.Generator | None = None,
+    initial_state: FloatArray | None = None,
+) -> DampersResponse:
+    """Run the loop.
+
+    Parameters
+    ----------
+    frame
+        Structure.
+    dampers
+        At least one; their controllers have the same rate.
+    excitation
+        Base acceleration; its duration is that of the run.
+    options
+        How the loop is run.
+    regulator
+        Of the dampers with `central`.
+    rng
+        For sensor noise; needed where there is some.
+    initial_state
+        [x, v] of the floors at the start, shape (2n,); rest if left out.
+
+    Raises
+    ------
+    UserError
+        If a damper does not suit the structure or the options.
+    DivergedError
+        If the response grows without bound.
+    """
+    options = options or LoopOptions()
+    n, k = frame.floors, len(dampers)
+    _check(frame, dampers, options)
+    rate = dampers[0].controller.options.rate_hz
+    per_sample = max(1, math.ceil(options.plant_rate_hz / rate - 1e-9))
+    dt = 1.0 / (rate * per_sample)
+    steps = max(1, round(excitation.duration_s / dt))
+    ground = np.ascontiguousarray(excitation.at(dt * np.arange(steps + 1, dtype=np.float64)))
+    every = max(1, round(1.0 / (dt * options.record_rate_hz)))
+    samples = steps // per_sample + 1
+    positions = np.ascontiguousarray([item.position for item in dampers], dtype=np.float64)
+    counts = np.zeros(kernel.I_SIZE, dtype=np.int64)
+    counts[kernel.I_STEPS], counts[kernel.I_PER_SAMPLE], counts[kernel.I_RECORD] = steps, per_sample, every
+    counts[kernel.I_DELAY] = round(options.delay_s / dt)
+    counts[kernel.I_TRACK] = {"damper": kernel.TRACK_DAMPER, "ideal": kernel.TRACK_SAMPLED}.get(
+        options.tracking, kernel.TRACK_LAW
+    )
+    chains = [item.chain or build_chain([]) for item in dampers]
+    for chain in chains:
+        chain.check_interval(dt)
+    commands = np.zeros((k, samples, COMMAND_SIZE))
+    record = np.zeros((steps // every + 1, 3 * n + k * kernel.T_DEVICE + kernel.T_SIZE))
+    z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
+    began = time.perf_counter()
+    kernel.compiled(k)(
+        counts, dt, _plant(frame, positions, dt), positions, _devices(dampers, chains, options, dt), ground, z,
+        *_packed_chains(chains), *_packed_controllers(dampers), *_packed_regulator(frame, dampers, regulator),
+        _noise(dampers, options, samples, n, rng), commands, record,
+    )  # fmt: skip
+    seconds = time.perf_counter() - began
+    if not np.all(np.isfinite(record)):
+        laws = ", ".join(item.controller.law for item in dampers)
+        raise DivergedError(f"laws {laws}: the response grows without bound; lower the negative stiffness")
+    return _response(record, commands, dampers, frame, dt * every, dt * per_sample, seconds)
+
+
+def _check(frame: Frame, dampers: Sequence[LoopDamper], options: LoopOptions) -> None:
+    if not dampers:
+        raise UserError("structure", "dampers", "there is none", "give at least one damper")
+    if options.delay_s < 0.0 or options.driver_time_constant_s < 0.0:
+        raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
+    if np.linalg.matrix_rank(frame.mass) < frame.floors:
+        raise UserError(f"frame {frame.name}", "mass", "is singular", "every degree of freedom needs a positive mass")
+    for item in dampers:
+        where = f"structure.dampers: {item.name}"
+        if item.position.shape != (frame.floors,):
+            raise UserError(where, "between", f"{item.position.size} entries", f"the structure has {frame.floors}")
+        if item.controller.options.rate_hz != dampers[0].controller.options.rate_hz:
+            raise UserError(where, "rate_hz", "differs from that of the first damper", "give all controllers one rate")
+        if options.tracking == "damper" and item.chain is None:
+            raise UserError(where, "damper", "there is none", "give a damper or tracking: ideal")
+        if options.tracking == "ideal" and not math.isinf(item.brace_n_m):
+            raise UserError(
+                where,
+                "brace_stiffness_n_m",
+                "cannot carry a force that jumps from sample to sample, as simulate.tracking: ideal gives it",
+                "set tracking to damper or continuous, or leave the brace out",
+            )
+        if options.tracking in ("continuous", "unclipped") and not is_linear(item.controller.law):
+            raise UserError(
+                "simulate",
+                "tracking",
+                f"law {item.controller.law} cannot run in continuous time",
+                "give ideal or damper",
+            )
+
+
+def _plant(frame: Frame, positions: FloatArray, dt: float) -> tuple[FloatArray, ...]:
+    n = frame.floors
+    space = state_space(frame, -positions.T)
+    Ad, B0, B1 = discretise_first_order(space.A, space.B, dt)
+    step_matrix = np.column_stack([Ad, B0[:, 0], B1[:, 0], B0[:, 1:]])
+    columns = np.vstack([frame.ground_influence, frame.mass.T @ frame.ground_influence])
+    arrays = (step_matrix.T, B1[:, 1:].T, space.A[n:].T, space.B[n:, 1:].T,
+              frame.mass, frame.damping, frame.stiffness, columns)  # fmt: skip
+    return tuple(np.ascontiguousarray(item, dtype=np.float64) for item in arrays)
+
+
+def _devices(dampers: Sequence[LoopDamper], chains: Sequence[Chain], options: LoopOptions, dt: float) -> FloatArray:
+    lag = options.driver_time_constant_s
+    rows = np.zeros((len(dampers), kernel.D_SIZE))
+    for row, item, chain in zip(rows, dampers, chains, strict=True):
+        row[kernel.D_C], row[kernel.D_K] = item.controller.gains.c_n_s_m, item.controller.gains.k_n_m
+        row[kernel.D_CLIPPED] = 0.0 if options.tracking == "unclipped" else 1.0
+        row[kernel.D_FLEXIBILITY] = 1.0 / item.brace_n_m
+        row[kernel.D_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
+        row[kernel.D_COMMAND] = command_place(chain)
+    return rows
+
+
+def _packed_chains(chains: Sequence[Chain]) -> tuple[Any, ...]:
+    states = [new_state(chain) for chain in chains]
+    offsets = (
+        np.ascontiguousarray([chain.parameter_offsets for chain in _padded(chains)]),
+        np.ascontiguousarray([chain.state_offsets for chain in _padded(chains)]),
+        _starts([len(chain.parameters) for chain in chains]),
+        _starts([len(state) for state in states]),
+    )
+    parameters = np.concatenate([chain.parameters for chain in chains])
+    return tuple(chain.functions for chain in chains), parameters, offsets, np.concatenate(states)
+
+
+def _padded(chains: Sequence[Chain]) -> list[Chain]:
+    """Return the chains with as many steps as the longest; steps that are added have no numbers and no memory."""
+    length = max(len(chain.parameter_offsets) for chain in chains)
+
+    def longer(offsets: Any) -> Any:
+        return np.concatenate([offsets, np.full(length - len(offsets), offsets[-1])]).astype(np.int64)
+
+    return [
+        replace(chain, parameter_offsets=longer(chain.parameter_offsets), state_offsets=longer(chain.state_offsets))
+        for chain in chains
+    ]
+
+
+def _packed_controllers(dampers: Sequence[LoopDamper]) -> tuple[Any, ...]:
+    controllers = [item.controller for item in dampers]
+    memories = [item.new_state() for item in controllers]
+    parts = ([item.numbers for item in controllers], [item.layout for item in controllers], memories)
+    places = np.column_stack([_starts([len(array) for array in arrays]) for arrays in parts])
+    numbers, layouts, states = (np.concatenate(arrays) for arrays in parts)
+    return tuple(item.force for item in controllers), numbers, layouts, np.ascontiguousarray(places), states
+
+
+def _starts(lengths: Sequence[int]) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
+def _packed_regulator(
+    frame: Frame, dampers: Sequence[LoopDamper], regulator: CentralRegulator | None
+) -> tuple[Any, ...]:
+    members = np.array([place for place, item in enumerate(dampers) if item.central], dtype=np.int64)
+    if regulator is None or not len(members):
+        n = 2 * frame.floors
+        empty = (np.zeros((n, n)), np.zeros((n, 1)), np.zeros((n, 1)), np.zeros((1, n)), np.zeros((0, 2)))
+        return empty, np.zeros(0, dtype=np.int64)
+    sensors = [(members[0], MEASURED_GROUND)]
+    sensors += [(members[place], MEASURED_DISPLACEMENT) for place in regulator.sensors.dampers]
+    sensors += [(members[0], MEASURED_FLOORS + place) for place in regulator.sensors.accelerometers]
+    arrays = (regulator.transition, regulator.force_input, regulator.innovation, regulator.gain, np.array(sensors))
+    return tuple(np.ascontiguousarray(item, dtype=np.float64) for item in arrays), members
+
+
+def _noise(
+    dampers: Sequence[LoopDamper], options: LoopOptions, samples: int, floors: int, rng: np.random.Generator | None
+) -> FloatArray:
+    """Return sensor noise, shape (dampers, samples, 5 + n); the accelerometers of ground and floors are shared."""
+    result = np.stack([sensor_noise(options.noise, samples, floors, rng) for _ in dampers])
+    result[1:, :, MEASURED_GROUND] = result[0, :, MEASURED_GROUND]
+    result[1:, :, MEASURED_FLOORS:] = result[0, :, MEASURED_FLOORS:]
+    if options.fault is not None:
+        for noise in result:
+            add_fault(noise, options.fault, rng)
+    return np.ascontiguousarray(result)
+
+
+def _response(
+    record: FloatArray,
+    commands: FloatArray,
+    dampers: Sequence[LoopDamper],
+    frame: Frame,
+    dt: float,
+    command_dt: float,
+    seconds: float,
+) -> DampersResponse:
+    n, k = frame.floors, len(dampers)
+    tail = record[:, 3 * n + k * kernel.T_DEVICE :]
+    ground = tail[:, kernel.T_GROUND]
+    absolute = record[:, 2 * n : 3 * n]
+    found: dict[str, Response] = {}
+    for place, item in enumerate(dampers):
+        own = record[:, 3 * n + place * kernel.T_DEVICE :]
+        found[item.name] = Response(
+            time_s=dt * np.arange(len(record), dtype=np.float64),
+            displacement=record[:, :n],
+            velocity=record[:, n : 2 * n],
+            acceleration=absolute - np.outer(ground, frame.ground_influence),
+            absolute_acceleration=absolute,
+            damper_displacement=own[:, kernel.T_X],
+            damper_velocity=own[:, kernel.T_V],
+            force=own[:, kernel.T_FORCE],
+            drive=own[:, kernel.T_DRIVE],
+            desired_force=own[:, kernel.T_DESIRED],
+            ground_acceleration=ground,
+            work_in=tail[:, kernel.T_WORK_IN],
+            work_damper=own[:, kernel.T_WORK],
+            work_frame=tail[:, kernel.T_WORK_FRAME],
+            energy=tail[:, kernel.T_ENERGY],
+            commands=commands[place],
+            command_time_s=command_dt * np.arange(commands.shape[1], dtype=np.float64),
+            seconds=seconds,
+        )
+    works = np.sum([item.work_damper for item in found.values()], axis=0)
+    return DampersResponse(found, np.asarray(works))

@@ -1,0 +1,87 @@
+"""`calibrate` for a structure with several dampers: each has its own place, brace, law and gains.
+
+Takes the place of the stage for one damper where the configuration has `structure.dampers`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.pipeline.stage import Stage, StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.config.model import RunSettings
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    from mrpipe.control.assembly import expected_amplitude
+    from mrpipe.control.calibration import CalibrationOptions, balanced_weights
+    from mrpipe.control.placed import calibrate_placed, modes_together, placed_warnings
+    from mrpipe.control.placed_storage import damper_as_json, placed_dampers, together_as_json, write_placed
+    from mrpipe.dampers.model import read_tested
+    from mrpipe.reporting import several_dampers as report
+    from mrpipe.simulation.several_rig import damper_model
+    from mrpipe.structures import read_frame
+
+    settings, entries = context.settings.calibrate, context.settings.structure.dampers
+    frame = read_frame(context.artifact("identify-frame"))
+    dampers = [
+        replace(item, gains={**settings.given(item.law), **(item.gains or {})})
+        for item in placed_dampers(frame, entries, settings.target_mode)
+    ]
+    options = CalibrationOptions(
+        source=settings.gains,
+        published=settings.published,
+        positive_stiffness_n_m=settings.positive_stiffness_n_m,
+        negative_stiffness_n_m=settings.negative_stiffness_n_m,
+    )
+    found = calibrate_placed(frame, dampers, options, together=settings.together)
+    context.progress(0.8, "forces")
+    tested = read_tested(context.artifact("identify-damper")) if "identify-damper" in context.inputs else {}
+    rows, weights = [], []
+    for entry, item in zip(entries, found, strict=True):
+        model = damper_model(entry, settings.damper, context.artifact)
+        amplitude = entry.expected_amplitude_m or settings.expected_amplitude_m
+        if amplitude is None:
+            known = tested if (entry.damper or settings.damper) == "identified" else {}
+            amplitude = expected_amplitude(model, known, item.modes)
+        speed = amplitude * item.modes.omega_0
+        residual, largest = (float(model.quasi_static_force(speed, drive)) for drive in (0.0, model.drive_limit))
+        rows.append(damper_as_json(item, amplitude, residual, settings.friction_rounding_share * speed))
+        weights.append(balanced_weights(item.modes, residual, **settings.regulator.known()))
+        for line in placed_warnings(item, amplitude_m=amplitude, residual_force_n=residual, largest_force_n=largest):
+            context.warn(line)
+    modes = sorted({item.damper.mode for item in found} | set(range(1, min(frame.floors, 3) + 1)))
+    summary = {
+        "dampers": rows,
+        "together": together_as_json(frame, modes_together(frame, found, modes), modes),
+        "alone": together_as_json(frame, modes_together(frame, found, modes, alone=True), modes),
+    }
+    with context.write("control.h5") as artifact:
+        write_placed(artifact, found, weights, summary)
+    report.describe_calibration(context.report, summary)
+    return summary
+
+
+VARIANTS = (
+    Stage(
+        name="calibrate",
+        summary="Compute the gains of several dampers, each alone and all together.",
+        run=_run,
+        inputs=("identify-frame",),
+        settings=("calibrate", "structure"),
+        outputs=("control.h5",),
+    ),
+)
+
+
+def variant(configuration: RunSettings, _: str = "") -> Stage | None:
+    """Return the stage where the configuration has several dampers, else None."""
+    structure, settings = (getattr(configuration, name, None) for name in ("structure", "calibrate"))
+    if structure is None or settings is None or not structure.dampers:
+        return None
+    if any((entry.damper or settings.damper) == "identified" for entry in structure.dampers):
+        return replace(VARIANTS[0], inputs=("identify-frame", "identify-damper"))
+    return VARIANTS[0]

@@ -1,0 +1,67 @@
+"""`design` for a structure with several dampers: the gains of all dampers are searched together.
+
+Takes the place of the stage for one damper where the configuration has `structure.dampers`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from mrpipe.pipeline.stage import Stage, StageContext
+
+if TYPE_CHECKING:
+    from mrpipe.config.model import RunSettings
+
+
+def _run(context: StageContext) -> Mapping[str, Any]:
+    import time
+
+    from mrpipe.errors import UserError
+    from mrpipe.law_design.run import load_of
+    from mrpipe.law_design.several import design_as_json, design_dampers
+    from mrpipe.reporting import several_dampers as report
+    from mrpipe.simulation.several_rig import dampers_band, dampers_excitation, read_dampers_rig
+
+    began = time.perf_counter()
+    settings, simulate = context.settings.design, context.settings.simulate
+    rig = read_dampers_rig(simulate, context.settings.structure, context.settings.calibrate.damper, context.artifact)
+    details = dampers_excitation(rig, simulate.excitation).details
+    if "base_amplitude_m_s2" not in details:
+        raise UserError(
+            "simulate.excitation", "kind", f"{details.get('kind')} has no amplitude", "set kind: harmonic for a design"
+        )
+    band = settings.band_rad_s or context.settings.resonance.band_rad_s or dampers_band(rig)
+    load = load_of(settings, float(details["base_amplitude_m_s2"]), band)
+    found = design_dampers(
+        rig, settings, load, absolute=simulate.accelerations == "absolute", seed=int(context.rng.integers(2**32))
+    )
+    summary = design_as_json(rig, found)
+    with context.write("design.h5") as artifact:
+        artifact.put_json("design", summary)
+    report.describe_design(context.report, summary)
+    return {**summary, "seconds": time.perf_counter() - began}
+
+
+VARIANTS = (
+    Stage(
+        name="design",
+        summary="Find the gains of several dampers with the smallest largest response over frequency and amplitude.",
+        run=_run,
+        inputs=("identify-frame", "calibrate"),
+        after=("simulate",),
+        settings=("design", "simulate", "resonance", "structure", "calibrate.damper"),
+        outputs=("design.h5",),
+    ),
+)
+
+
+def variant(configuration: RunSettings, _: str = "") -> Stage | None:
+    """Return the stage where the configuration has several dampers, else None."""
+    structure, settings = (getattr(configuration, name, None) for name in ("structure", "calibrate"))
+    if structure is None or settings is None or not structure.dampers:
+        return None
+    if any((entry.damper or settings.damper) == "identified" for entry in structure.dampers):
+        return replace(VARIANTS[0], inputs=("identify-frame", "identify-damper", "calibrate"))
+    return VARIANTS[0]

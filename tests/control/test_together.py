@@ -1,0 +1,109 @@
+"""Several linear devices in a structure: exact eigenvalues, braces, and gains for all dampers together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrpipe.control.calibration import CalibrationOptions, calibrate
+from mrpipe.control.laws import law_named
+from mrpipe.control.placed import PlacedDamper, calibrate_placed, modes_together
+from mrpipe.control.together import LinearDevice, damping_together, ground_response, linear_device
+from mrpipe.errors import UserError
+from mrpipe.structures import complex_modes, frequency_response, shear_frame
+from mrpipe.structures.given import device_position
+
+FRAME = shear_frame([20.0] * 4, [3.0e4] * 4, np.full(4, 0.01), name="four storeys", source="test")
+FIRST, BETWEEN = device_position(FRAME, 1), device_position(FRAME, 3, 2)
+
+
+@pytest.mark.property
+def test_rigid_devices_are_part_of_the_matrices() -> None:
+    devices = [LinearDevice(FIRST, 200.0, 1000.0), LinearDevice(BETWEEN, 150.0)]
+    inside = FRAME
+    for item in devices:
+        outer = np.outer(item.position, item.position)
+        inside = replace(
+            inside, damping=inside.damping + item.viscosity * outer, stiffness=inside.stiffness + item.stiffness * outer
+        )
+    expected = complex_modes(inside, position=np.zeros(4))
+    found = damping_together(FRAME, devices, [1, 2])
+    np.testing.assert_allclose(found.poles, expected.poles[:2], rtol=1e-9)
+    top = frequency_response(inside, 7.0, absolute_acceleration=False)[0]
+    floors, strokes = ground_response(FRAME, devices, 7.0)
+    np.testing.assert_allclose(floors, top, rtol=1e-9)
+    np.testing.assert_allclose(strokes, [FIRST @ top, BETWEEN @ top], rtol=1e-9)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("brace", [2.0e4, 2.0e6])
+def test_eigenvalue_with_a_brace_solves_the_dynamic_stiffness(brace: float) -> None:
+    devices = [LinearDevice(FIRST, 400.0, 500.0, brace_n_m=brace), LinearDevice(BETWEEN, equivalent=900.0 + 2000.0j)]
+    s = complex(damping_together(FRAME, devices, [1]).poles[0])
+    dynamic = FRAME.stiffness + s * FRAME.damping + s**2 * FRAME.mass
+    own = 500.0 + s * 400.0
+    dynamic = dynamic + own * brace / (own + brace) * np.outer(FIRST, FIRST)
+    dynamic = dynamic + (900.0 + 2000.0j) * np.outer(BETWEEN, BETWEEN)
+    singular = np.linalg.svd(dynamic, compute_uv=False)
+    assert singular[-1] < 1e-9 * singular[0]
+
+
+@pytest.mark.property
+def test_a_damper_alone_has_the_gains_of_the_calibration_of_one_damper() -> None:
+    placed = calibrate_placed(FRAME, [PlacedDamper("base", FIRST, "vdns")], CalibrationOptions())
+    single = calibrate(FRAME, FIRST, CalibrationOptions(), [law_named("vdns")])
+    assert placed[0].together == single.laws["vdns"].gains
+
+
+@pytest.mark.property
+def test_gains_together_damp_the_target_mode_more_than_gains_alone() -> None:
+    dampers = [PlacedDamper("base", FIRST, "vd"), PlacedDamper("third", BETWEEN, "fdns")]
+    found = calibrate_placed(FRAME, dampers, CalibrationOptions())
+    bare = replace(FRAME, damping=np.zeros_like(FRAME.damping))
+    alone = modes_together(bare, found, [1], alone=True).damping_ratios[0]
+    together = modes_together(bare, found, [1]).damping_ratios[0]
+    assert together > alone
+    # a small change of either gain does not damp more
+    for place in (0, 1):
+        for factor in (0.97, 1.03):
+            law = law_named(found[place].damper.law)
+            moved = list(found)
+            moved[place] = replace(found[place], together=law.scaled(found[place].together, factor))
+            assert modes_together(bare, moved, [1]).damping_ratios[0] <= together + 1e-7
+
+
+@pytest.mark.property
+def test_a_given_gain_stays_and_a_brace_changes_the_best_gain() -> None:
+    dampers = [PlacedDamper("base", FIRST, "vd", gains={"c_n_s_m": 321.0}), PlacedDamper("third", BETWEEN, "vd")]
+    found = calibrate_placed(FRAME, dampers, CalibrationOptions())
+    assert found[0].together.c_n_s_m == 321.0
+    # a viscosity that is left out suits the stiffness that is given
+    stiff = PlacedDamper("base", FIRST, "vdps", gains={"k_n_m": 3000.0})
+    best = calibrate_placed(FRAME, [stiff], CalibrationOptions())[0].together
+    assert best.k_n_m == 3000.0
+    ratios = [
+        damping_together(
+            replace(FRAME, damping=np.zeros((4, 4))), [LinearDevice(FIRST, factor * best.c_n_s_m, 3000.0)], [1]
+        ).damping_ratios[0]
+        for factor in (0.97, 1.0, 1.03)
+    ]
+    assert max(ratios) == ratios[1]
+    rigid, braced = (
+        calibrate_placed(FRAME, [PlacedDamper("base", FIRST, "vd", brace_n_m=brace)], CalibrationOptions())[0]
+        for brace in (math.inf, 3.0e4)
+    )
+    bare = replace(FRAME, damping=np.zeros_like(FRAME.damping))
+    tried = linear_device(law_named("vd"), rigid.alone, FIRST, rigid.modes.omega_0, 1.0, 3.0e4)
+    assert tried is not None
+    with_brace = modes_together(bare, [braced], [1]).damping_ratios[0]
+    assert with_brace > damping_together(bare, [tried], [1]).damping_ratios[0]
+    assert with_brace < modes_together(bare, [rigid], [1]).damping_ratios[0]
+
+
+@pytest.mark.property
+def test_a_law_with_a_network_is_refused() -> None:
+    with pytest.raises(UserError, match="network"):
+        calibrate_placed(FRAME, [PlacedDamper("base", FIRST, "nnc")], CalibrationOptions())

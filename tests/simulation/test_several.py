@@ -1,0 +1,148 @@
+"""The loop with several dampers, against the loop with one, against exact linear responses, and by its energy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrpipe.artifacts import load_parameter_set
+from mrpipe.control.central import CENTRAL, Sensors, central_regulator
+from mrpipe.control.controller import Controller, ControllerOptions, build_controller
+from mrpipe.control.gains import Gains
+from mrpipe.control.inverse import inverse_table
+from mrpipe.control.lqg import Weights, lqg_observer
+from mrpipe.control.together import LinearDevice, loop_matrix
+from mrpipe.dampers.model import damper_from_parameter_set
+from mrpipe.errors import UserError
+from mrpipe.simulation.excitation import recorded
+from mrpipe.simulation.loop import LoopOptions, SensorNoise, simulate_law
+from mrpipe.simulation.several import LoopDamper, simulate_dampers
+from mrpipe.structures import discretise_first_order, shear_frame
+from mrpipe.structures.given import device_position
+from mrpipe.structures.response import linear_response
+
+FRAME = shear_frame([25.0] * 3, [3.0e4] * 3, np.full(3, 0.01), name="three storeys", source="test")
+FIRST, SECOND = device_position(FRAME, 1), device_position(FRAME, 3, 2)
+MODEL = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+INTERVAL = 0.02
+TIME = np.arange(0.0, 4.0 + INTERVAL / 2, INTERVAL)
+GROUND = np.random.default_rng(5).standard_normal(TIME.size) * np.exp(-(((TIME - 1.5) / 1.0) ** 2))
+SHAKING = recorded(TIME, 2.0 * GROUND)
+WEIGHTS = Weights(force=1e-4, force_noise_n=20.0)
+
+
+def controller(law: str, gains: Gains | None = None, rate: float = 200.0) -> Controller:
+    options = ControllerOptions(rate_hz=rate, residual_force_n=18.0, friction_rounding_m_s=0.01)
+    return build_controller(law, gains or Gains(), options, inverse=inverse_table(MODEL), position=FIRST)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("law", ["vd", "fdns"])
+def test_one_damper_is_the_loop_with_one_damper(law: str) -> None:
+    gains = {"vd": Gains(c_n_s_m=300.0), "fdns": Gains(alpha_n_m=4000.0)}[law]
+    chosen = controller(law, gains)
+    expected = simulate_law(FRAME, MODEL.chain(), chosen, SHAKING, position=FIRST)
+    found = simulate_dampers(FRAME, [LoopDamper("only", FIRST, MODEL.chain(), chosen)], SHAKING).first
+    np.testing.assert_allclose(found.displacement, expected.displacement, atol=1e-4 * np.ptp(expected.displacement))
+    np.testing.assert_allclose(found.force, expected.force, atol=1e-3 * np.ptp(expected.force))
+    assert found.work_damper[-1] == pytest.approx(expected.work_damper[-1], rel=1e-4)
+
+
+@pytest.mark.oracle
+def test_two_linear_devices_are_a_linear_structure() -> None:
+    dampers = [
+        LoopDamper("a", FIRST, None, controller("vd", Gains(c_n_s_m=300.0))),
+        LoopDamper("b", SECOND, None, controller("vdps", Gains(c_n_s_m=150.0, k_n_m=2000.0))),
+    ]
+    options = LoopOptions(plant_rate_hz=4000.0, tracking="unclipped", record_rate_hz=50.0)
+    found = simulate_dampers(FRAME, dampers, SHAKING, options)
+    first, second = np.outer(FIRST, FIRST), np.outer(SECOND, SECOND)
+    inside = replace(
+        FRAME,
+        damping=FRAME.damping + 300.0 * first + 150.0 * second,
+        stiffness=FRAME.stiffness + 2000.0 * second,
+    )
+    expected = linear_response(inside, 2.0 * GROUND, INTERVAL).displacement
+    np.testing.assert_allclose(found.first.displacement, expected, atol=2e-5 * np.abs(expected).max())
+    assert found.energy_balance_error < 1e-5
+
+
+@pytest.mark.oracle
+def test_a_brace_is_a_spring_in_series() -> None:
+    """A dashpot behind a spring, against the exact step of the matrix with the dashpot's displacement as a state."""
+    brace, c = 2.0e4, 300.0
+    dampers = [LoopDamper("a", FIRST, None, controller("vd", Gains(c_n_s_m=c)), brace_n_m=brace)]
+    options = LoopOptions(plant_rate_hz=4000.0, tracking="unclipped", record_rate_hz=50.0)
+    found = simulate_dampers(FRAME, dampers, SHAKING, options).first
+    A = loop_matrix(FRAME, [LinearDevice(FIRST, c, brace_n_m=brace)]).real
+    B = np.zeros((A.shape[0], 1))
+    B[3:6, 0] = -1.0
+    step, now, after = discretise_first_order(A, B, INTERVAL)
+    state, states = np.zeros(A.shape[0]), []
+    for k in range(TIME.size):
+        states.append(state)
+        if k + 1 < TIME.size:
+            state = step @ state + 2.0 * (now[:, 0] * GROUND[k] + after[:, 0] * GROUND[k + 1])
+    expected = np.array(states)
+    scale = np.abs(expected[:, 0]).max()
+    np.testing.assert_allclose(found.displacement, expected[:, :3], atol=1e-4 * np.abs(expected[:, :3]).max())
+    np.testing.assert_allclose(found.damper_displacement, expected[:, 6], atol=1e-3 * scale)
+    np.testing.assert_allclose(found.force, brace * (expected[:, 0] - expected[:, 6]), atol=2e-3 * np.ptp(found.force))
+
+
+@pytest.mark.property
+def test_energy_balance_with_braces_delay_and_noise() -> None:
+    dampers = [
+        LoopDamper("a", FIRST, MODEL.chain(), controller("vd", Gains(c_n_s_m=300.0)), brace_n_m=1.0e6),
+        LoopDamper("b", SECOND, MODEL.chain(), controller("fdns", Gains(alpha_n_m=3000.0)), brace_n_m=5.0e5),
+    ]
+    options = LoopOptions(delay_s=0.01, driver_time_constant_s=0.01, noise=SensorNoise(20e-6, 0.1))
+    found = simulate_dampers(FRAME, dampers, SHAKING, options, rng=np.random.default_rng(1))
+    assert found.energy_balance_error < 1e-3
+    assert all(item.work_damper[-1] > 0.0 for item in found.dampers.values())
+    assert found.largest_stroke in tuple(found.dampers.values())
+
+
+def regulated(positions: np.ndarray, sensors: Sensors, rate: float = 500.0) -> tuple[list[LoopDamper], object]:
+    options = ControllerOptions(rate_hz=rate, velocity="measured")
+    weights = [WEIGHTS] * positions.shape[1]
+    regulator = central_regulator(FRAME, positions, weights, sensors, 1.0 / rate)
+    dampers = [
+        LoopDamper(
+            f"damper {place}", positions[:, place], None, build_controller(CENTRAL, Gains(), options), central=True
+        )
+        for place in range(positions.shape[1])
+    ]
+    return dampers, regulator
+
+
+@pytest.mark.property
+def test_central_regulator_of_one_damper_is_lqg() -> None:
+    rate = 500.0
+    options = ControllerOptions(rate_hz=rate, velocity="measured")
+    observer = lqg_observer(FRAME, FIRST, WEIGHTS, 1.0 / rate)
+    single = build_controller("lqg", Gains(), options, observer=observer, position=FIRST)
+    ideal = LoopOptions(tracking="ideal")
+    expected = simulate_law(FRAME, None, single, SHAKING, ideal, position=FIRST)
+    dampers, regulator = regulated(FIRST[:, None], Sensors((0, 1, 2), (0,)))
+    found = simulate_dampers(FRAME, dampers, SHAKING, ideal, regulator=regulator).first  # type: ignore[arg-type]
+    np.testing.assert_allclose(found.displacement, expected.displacement, atol=1e-8 * np.ptp(expected.displacement))
+
+
+@pytest.mark.property
+def test_two_dampers_under_lqg_with_one_accelerometer_damp_the_response() -> None:
+    ideal = LoopOptions(tracking="ideal")
+    dampers, regulator = regulated(np.column_stack([FIRST, SECOND]), Sensors((2,), (0, 1)))
+    found = simulate_dampers(FRAME, dampers, SHAKING, ideal, regulator=regulator).first  # type: ignore[arg-type]
+    free = linear_response(FRAME, 2.0 * GROUND, INTERVAL).displacement[:, -1]
+    tail = found.displacement[found.time_s > 2.5, -1]
+    assert np.sqrt(np.mean(tail**2)) < 0.5 * np.sqrt(np.mean(free[TIME > 2.5] ** 2))
+
+
+@pytest.mark.property
+def test_a_brace_with_perfect_tracking_is_refused() -> None:
+    damper = LoopDamper("a", FIRST, None, controller("vd", Gains(c_n_s_m=300.0)), brace_n_m=1e6)
+    with pytest.raises(UserError, match="brace"):
+        simulate_dampers(FRAME, [damper], SHAKING, LoopOptions(tracking="ideal"))
