@@ -12,10 +12,11 @@ from scipy.optimize import minimize
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named
+from mrpipe.law_design.kept import Designed, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Limits, Load, Objective, RunOf, evaluate
 from mrpipe.law_design.options import DesignSettings
 from mrpipe.law_design.search import FreeGain
-from mrpipe.law_design.study import COARSE, Designed, LawUnderDesign, reference_evaluation
+from mrpipe.law_design.study import COARSE, reference_evaluation
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
 from mrpipe.simulation.response_curve import CurveOptions, Run
@@ -82,7 +83,7 @@ def design_dampers(
     objective = Objective(settings.weights, reference.peaks, limits)
     entry = LawUnderDesign(TOGETHER, start, free, TOGETHER)
     tried: list[Evaluation] = []
-    coarse = replace(COARSE, absolute=absolute)
+    coarse = replace(COARSE, absolute=absolute, refined=tuple(settings.weights))
     searched = replace(load, amplitudes_m_s2=(max(load.amplitudes_m_s2),))
 
     def value(logarithms: FloatArray) -> float:

@@ -133,7 +133,7 @@ def test_design_of_two_dampers(tmp_path: Path, capsys: pytest.CaptureFixture[str
     ("damper", "words"),
     [
         ({"between": [1, 1]}, "connects a degree of freedom to itself"),
-        ({"between": ["roof", "ground"]}, "is no degree of freedom"),
+        ({"between": ["roof", "ground"]}, "is not a degree of freedom"),
         ({"between": [1, "ground"], "law": "magic"}, "is not a control law"),
         ({"between": [1, "ground"], "law": "nnc"}, "trained for one damper"),
         ({"between": [1, "ground"], "sensors": ["acceleration"]}, "lack the displacement"),
