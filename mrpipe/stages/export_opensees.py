@@ -29,6 +29,7 @@ STAGE = Stage(
     summary="Write the structure as an openseespy script.",
     run=_run,
     inputs=("identify-frame",),
+    settings=("structure",),
     after=("export-controller",),
     family="export",
     outputs=(FILE,),
