@@ -43,6 +43,9 @@ DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 SWEEP = (0.4, 2.4)
 """First and last frequency of a sweep over the free frequency, where the settings give none."""
 
+ADJUSTED = ("harmonic", "sweep", "random")
+"""Kinds of motion whose amplitude is found where the settings give none."""
+
 
 @dataclass(frozen=True)
 class Rig:
