@@ -35,11 +35,11 @@ HOSTILE = {
 def test_hostile_yaml_is_one_line_and_fast(tmp_path: Path, case: str) -> None:
     text, expected = HOSTILE[case]
     (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
-    begun = time.monotonic()
+    begun = time.process_time()
     with pytest.raises(UserError) as caught:
         read_yaml(tmp_path / "a.yaml")
     assert expected in str(caught.value) and "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 500 and time.monotonic() - begun < 5.0
+    assert len(str(caught.value)) < 500 and time.process_time() - begun < 5.0
 
 
 @pytest.mark.golden
