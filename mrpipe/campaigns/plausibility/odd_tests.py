@@ -248,6 +248,12 @@ def _covered(index: int, others: Sequence[int], tests: Sequence[Slow]) -> bool:
     return min(levels) - slack <= tests[index].drive_level <= max(levels) + slack
 
 
+def _as_fast(index: int, others: Sequence[int], tests: Sequence[Slow]) -> bool:
+    """Whether the RMS velocity of a test lies between those of the others."""
+    speeds = [tests[other].speed_rms for other in others]
+    return min(speeds) <= tests[index].speed_rms <= max(speeds)
+
+
 def _explain(reference: ReferenceMap, tests: Sequence[Slow], index: int, odd: Sequence[int]) -> Finding:
     """Name the simplest mistake that makes an odd test agree with the sound ones."""
     test = tests[index]
@@ -338,7 +344,8 @@ def _late(reference: ReferenceMap, tests: Sequence[Slow], sound: Sequence[int]) 
     """Return tests whose force comes earlier or later than in the other tests.
 
     Delays are compared as phases of the mean frequency, because what the map does not know of hysteresis shifts the
-    force by a share of the period.
+    force by a share of the period. This share depends on speed and drive, so only a test within the speeds and drives
+    of the others is judged.
     """
     without = [index for index in range(len(tests)) if index not in sound]
     phases: dict[int, float] = {}
@@ -350,7 +357,8 @@ def _late(reference: ReferenceMap, tests: Sequence[Slow], sound: Sequence[int]) 
     findings = []
     for index, phase in phases.items():
         others = np.array([value for other, value in phases.items() if other != index])
-        if others.size < 3:
+        company = [other for other in phases if other != index]
+        if others.size < 3 or not _covered(index, company, tests) or not _as_fast(index, company, tests):
             continue
         by = phase - float(np.median(others))
         if abs(by) <= max(limit_of(others, PHASE_SCATTER, len(phases)), SMALLEST_PHASE):
