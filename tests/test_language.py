@@ -23,7 +23,7 @@ BANNED = {
     r"\bask(s|ed)? for\b": "require, request",
     r"(?<!-)\bbeside\b(?! *$)": "in addition to, compared with, next to",
     r"\bmend(s|ed|ing)?\b": "correct, repair",
-    r"\bof (one's|its|their|our|your) own\b": "separate, another, or leave it out",
+    r"\bof (one's|its|their|our|your) own\b(?! [a-z])": "separate, another, or leave it out",
     r"\bwhat is left\b": "the rest, the residual",
     r"\b(nought|naught|aught)\b": "0, zero",
     r"\bthrice\b": "three times",
