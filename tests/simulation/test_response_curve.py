@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mrpipe.control.gains import Gains
+from mrpipe.errors import UserError
 from mrpipe.simulation import LoopOptions, simulate_law
-from mrpipe.simulation.response_curve import CurveOptions, ResponseCurve, response_curve, steady_values
+from mrpipe.simulation.response_curve import CurveOptions, ResponseCurve, response_curve, settled, steady_values
 from mrpipe.structures import Frame, frequency_response
 
 from .conftest import Rig
@@ -86,3 +87,21 @@ def test_a_curve_says_what_it_holds(rig: Rig) -> None:
     assert found["peak_rms_x_top_m"] == max(found["response_curve"]["rms_x_top_m"])
     assert len(found["response_curve"]["frequency_rad_s"]) == len(found["response_curve"]["rms_a1_m_s2"])
     assert found["response_curve"]["frequency_rad_s"] == sorted(found["response_curve"]["frequency_rad_s"])
+
+
+@pytest.mark.property
+def test_noise_is_averaged_and_a_drift_is_not_taken_for_noise() -> None:
+    rng = np.random.default_rng(4)
+    noisy = 1.0 + 0.01 * rng.standard_normal((40, 1))
+    assert settled(noisy[:4], 1e-3) is None
+    found = settled(noisy, 3e-3)
+    assert found is not None
+    assert found[0] == pytest.approx(1.0, abs=5e-3)
+    # a response that still grows by 1 % from window to window is not steady, with or without noise
+    assert settled(1.01 ** np.arange(12.0)[:, None], 2e-3) is None
+
+
+@pytest.mark.property
+def test_a_law_that_commands_the_drive_has_no_force_for_a_perfect_damper(rig: Rig) -> None:
+    with pytest.raises(UserError, match="commands the drive"):
+        rig.run("passive-on", LoopOptions(tracking="ideal"))

@@ -1,0 +1,205 @@
+"""Every control law over frequency: the thesis' frame with set C and with a perfect damper, and the ten-storey frame.
+
+    python -m benchmarks.laws --results laws.jsonl [--laws vd fdns] [--structures frame ten-storey]
+    python -m benchmarks.laws --results laws.jsonl --table
+
+One line of JSON per structure and law, so that an interrupted run goes on where it ended; `--table` prints Markdown.
+Gains are those of the thesis where it prints some, else the exact optimum of the calibration.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrpipe.artifacts import load_parameter_set
+from mrpipe.case_studies.motion import spectrum_compatible_motion
+from mrpipe.case_studies.ten_storey.structure import ten_storey
+from mrpipe.control.assembly import ControllerFactory, calibrated_from
+from mrpipe.control.calibration import CalibrationOptions, calibrate
+from mrpipe.control.laws import all_laws, law_named
+from mrpipe.control.lqg import Weights
+from mrpipe.control.neural import ReferenceOptions, train_reference
+from mrpipe.control.settings import ControllerSettings
+from mrpipe.dampers.model import damper_from_parameter_set
+from mrpipe.errors import DivergedError
+from mrpipe.simulation.excitation import Excitation, recorded
+from mrpipe.simulation.loop import LoopOptions, Response, SensorNoise
+from mrpipe.simulation.response_curve import CurveOptions, response_curve
+from mrpipe.simulation.rig import Rig
+from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
+from mrpipe.thesis.gains import THESIS_GAINS
+
+FACTORS = (0.5, 1.0, 2.0)
+"""Amplitudes of the base acceleration over that at which vd moves the top of the thesis' frame by 24.3 mm RMS."""
+
+AMPLITUDE_M_S2 = 0.768
+
+CURVES = CurveOptions(points=13, tolerance=1e-2, most_cycles=80, frequency_tolerance=4e-3, refined=("rms_x_top_m",))
+
+FRAME_DAMPING = 0.02
+"""Damping ratio of the ten-storey frame in its first mode: P4's has none, and then no steady response exists."""
+
+
+@cache
+def thesis_rig() -> Rig:
+    """Return the thesis' frame with set C, sensors with noise, and the exact inverse of the damper's model."""
+    frame = frame_from_parameter_set("thesis")
+    damper = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    published = {law: dict(gains) for law, gains in THESIS_GAINS.items()}
+    options = CalibrationOptions(
+        source="published", published=published, positive_stiffness_n_m=2500.0, negative_stiffness_n_m=-4500.0
+    )
+    omega = natural_modes(frame).angular_frequencies
+    amplitudes = tuple(0.0093 * np.geomspace(0.2, 2.0, 7))
+    frequencies = tuple(float(omega[0]) / (2.0 * np.pi) * np.geomspace(0.625, 1.6, 7))
+    learning = ReferenceOptions(
+        3000.0, amplitudes, frequencies, starts=2, rounding_m_s=0.0125, disturbances_rad_s=tuple(omega[1:])
+    )
+    reference = train_reference(learning, np.random.default_rng(1)).network
+    weights = Weights(force=1e-4, force_noise_n=20.0)
+    calibration = calibrate(frame, np.eye(5)[0], replace(options, weights=weights))
+    known = calibrated_from(calibration, weights, damper, amplitude_m=0.0093, reference=reference)
+    settings = ControllerSettings(inverse="model", residual_force_n=18.0)
+    noise = SensorNoise(20e-6, 0.1)
+    return Rig(frame, damper, ControllerFactory(frame, damper, known, settings), LoopOptions(noise=noise))
+
+
+@cache
+def ten_storey_rig() -> Rig:
+    """Return the ten-storey frame of P4 with its 1000 kN damper between the ground and the first floor."""
+    model = ten_storey()
+    plain = Frame(model.mass, model.damping, model.stiffness, "ten-storey")
+    first = float(natural_modes(plain).angular_frequencies[0])
+    frame = replace(plain, damping=2.0 * FRAME_DAMPING / first * plain.stiffness)
+    damper = damper_from_parameter_set(load_parameter_set("dampers", "p4-1000kn"))
+    calibration = calibrate(frame, model.devices[:, 0], CalibrationOptions())
+    known = calibrated_from(calibration, Weights(), damper, amplitude_m=0.02)
+    noise = ControllerSettings(inverse="model", kalman_displacement_noise_m=1e-4, kalman_acceleration_noise_m_s2=0.05)
+    return Rig(frame, damper, ControllerFactory(frame, damper, known, noise), LoopOptions())
+
+
+def largest(rig: Rig, law: str, amplitude: float) -> dict[str, float] | None:
+    """Return resonance and largest RMS responses over the band; None where the response grows without bound."""
+    known = rig.controllers.calibrated
+    controller = rig.controller(law)
+    chain = rig.damper.chain()
+
+    def run(excitation: Excitation) -> Response:
+        return rig.run(controller, excitation, chain=chain, rng=np.random.default_rng(7))
+
+    curve = response_curve(run, amplitude, (0.75 * known.omega_0, 1.6 * known.omega_0), CURVES)
+    if not math.isfinite(curve.peak("rms_x_top_m")):
+        return None
+    names = ("rms_x_top_m", "rms_a1_m_s2", "rms_a_top_m_s2")
+    return {"resonance_rad_s": curve.resonance_rad_s, **{f"peak_{name}": curve.peak(name) for name in names}}
+
+
+def of_thesis_frame(law: str) -> dict[str, Any]:
+    """Return the largest responses with set C and with a perfect damper at three amplitudes."""
+    rig = thesis_rig()
+    found: dict[str, Any] = {"set C": [largest(rig, law, factor * AMPLITUDE_M_S2) for factor in FACTORS]}
+    if law_named(law).output == "force":
+        perfect = replace(rig, options=LoopOptions(tracking="ideal", record_rate_hz=1000.0))
+        found["ideal"] = [largest(perfect, law, factor * AMPLITUDE_M_S2) for factor in FACTORS]
+    return found
+
+
+def of_ten_storeys(law: str) -> dict[str, Any]:
+    """Return the largest responses over frequency, and peaks and RMS under a synthetic earthquake of 0.3 g."""
+    rig = ten_storey_rig()
+    motion = spectrum_compatible_motion(np.random.default_rng(5))
+    clock = motion.interval_s * np.arange(len(motion.acceleration_m_s2))
+    excitation = recorded(clock, motion.acceleration_m_s2[:, 0])
+    try:
+        response = rig.run(rig.controller(law), excitation, rng=np.random.default_rng(7))
+    except DivergedError:
+        return {"over frequency": None, "earthquake": None}
+    drift = np.diff(np.column_stack([np.zeros(len(response.time_s)), response.displacement]), axis=1)
+    return {
+        "over frequency": largest(rig, law, 1.0),
+        "earthquake": {
+            "peak_x_top_m": float(np.max(np.abs(response.displacement[:, -1]))),
+            "rms_x_top_m": float(np.sqrt(np.mean(response.displacement[:, -1] ** 2))),
+            "peak_drift_m": float(np.max(np.abs(drift))),
+            "peak_a_m_s2": float(np.max(np.abs(response.absolute_acceleration))),
+            "peak_force_n": float(np.max(np.abs(response.force))),
+        },
+    }
+
+
+STUDIES: dict[str, Callable[[str], dict[str, Any]]] = {"frame": of_thesis_frame, "ten-storey": of_ten_storeys}
+
+
+def as_markdown(rows: list[dict[str, Any]]) -> str:
+    """Return both tables."""
+
+    def cells(found: list[Any] | None) -> list[str]:
+        if found is None:
+            return ["-"] * len(FACTORS)
+        return ["grows" if item is None else f"{1e3 * item['peak_rms_x_top_m']:.1f}" for item in found]
+
+    lines = [
+        "| law | " + " | ".join(f"{kind} x{factor:g} [mm]" for kind in ("set C", "ideal") for factor in FACTORS)
+        + " | resonance, set C x1 [rad/s] | peak a1, set C x1 [m/s2] |",
+        "| --- |" + " --- |" * (2 * len(FACTORS) + 2),
+    ]  # fmt: skip
+    for row in (item for item in rows if item["structure"] == "frame"):
+        nominal = row["set C"][1]
+        more = ["grows", "-"]
+        if nominal is not None:
+            more = [f"{nominal['resonance_rad_s']:.2f}", f"{nominal['peak_rms_a1_m_s2']:.2f}"]
+        lines.append("| " + " | ".join([row["law"], *cells(row["set C"]), *cells(row.get("ideal")), *more]) + " |")
+    lines += [
+        "",
+        "| law | over frequency: resonance [rad/s] | largest RMS x top [mm] | earthquake: peak x top [mm] "
+        "| peak drift [mm] | peak acceleration [m/s2] | peak force [kN] |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in (item for item in rows if item["structure"] == "ten-storey"):
+        band, quake = row["over frequency"], row["earthquake"]
+        first = ["grows", "grows"] if band is None else [
+            f"{band['resonance_rad_s']:.2f}", f"{1e3 * band['peak_rms_x_top_m']:.0f}"
+        ]  # fmt: skip
+        last = ["grows"] * 4 if quake is None else [
+            f"{1e3 * quake['peak_x_top_m']:.0f}", f"{1e3 * quake['peak_drift_m']:.0f}", f"{quake['peak_a_m_s2']:.2f}",
+            f"{1e-3 * quake['peak_force_n']:.0f}",
+        ]  # fmt: skip
+        lines.append("| " + " | ".join([row["law"], *first, *last]) + " |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run what is missing, or print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--results", type=Path, required=True)
+    parser.add_argument("--laws", nargs="*", default=list(all_laws()))
+    parser.add_argument("--structures", nargs="*", default=list(STUDIES), choices=list(STUDIES))
+    parser.add_argument("--table", action="store_true")
+    given = parser.parse_args()
+    rows = [json.loads(line) for line in given.results.read_text().splitlines()] if given.results.is_file() else []
+    if given.table:
+        print(as_markdown(rows))
+        return
+    done = {(row["structure"], row["law"]) for row in rows}
+    for structure in given.structures:
+        for law in given.laws:
+            if (structure, law) in done or (structure == "ten-storey" and law == "nnc"):
+                # the network of nnc is trained for the thesis' frame
+                continue
+            row = {"structure": structure, "law": law, **STUDIES[structure](law)}
+            with given.results.open("a") as handle:
+                handle.write(json.dumps(row) + "\n")
+            print(structure, law, flush=True)
+
+
+if __name__ == "__main__":
+    main()
