@@ -117,7 +117,7 @@ def test_tuned_mass_splits_the_first_mode(tower: Tower) -> None:
 
 @pytest.mark.property
 def test_outrigger_needs_a_floor_between(tower: Tower) -> None:
-    with pytest.raises(UserError, match="no floor for an outrigger"):
+    with pytest.raises(UserError, match="is not a floor for an outrigger"):
         with_outrigger(tower, 76, 21.0)
 
 

@@ -118,7 +118,7 @@ def test_matlab_functions_equal_python(tmp_path: Path) -> None:
     octave = shutil.which("octave-cli")
     if octave is None:
         pytest.skip("GNU Octave is not installed")
-    chosen = ("modified-bouc-wen", "gamota-filisko", "creeping-yield", "backlash", "delay", "rate-dependent-yield")
+    chosen = ("modified-bouc-wen", "gamota-filisko", "creeping-yield", "backlash", "delay", "stribeck")
     subjects = {name: damper_subject(dampers()[name]) for name in chosen}
     subjects |= {**networks(), "frame": frame()}
     lines = []

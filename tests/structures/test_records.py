@@ -163,7 +163,7 @@ def spoilt(kind: str, folder: Path) -> Path:
         ("clock", "not uniform"),
         ("units", "names the units"),
         ("two-units", "mixed units"),
-        ("too-strong", "no ground motion"),
+        ("too-strong", "not a ground motion"),
         ("dt", "header says 0.02"),
         ("flat", "all samples are zero"),
         ("ambiguous", "could be g or m/s^2"),
