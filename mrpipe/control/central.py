@@ -103,7 +103,7 @@ def central_regulator(
     W += Bd[:, 1:] @ np.diag(force_noise**2) @ Bd[:, 1:].T
     W[n:, n:] += (MODEL_NOISE_SHARE * first.ground_noise_m_s2 * dt) ** 2 * np.eye(n)
     V = np.diag([first.displacement_noise_m**2] * len(sensors.dampers) + [first.acceleration_noise_m_s2**2] * len(rows))
-    # an accelerometer beside a damper reads the error of its force at once
+    # an accelerometer next to a damper reads the error of its force at once
     V += np.diag(np.sum((D[:, 1:] * force_noise) ** 2, axis=1))
     try:
         R = np.diag([item.force for item in weights])

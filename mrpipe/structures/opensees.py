@@ -67,7 +67,7 @@ def opensees_script(frame: Frame, devices: Sequence[ViscousDevice] = ()) -> str:
     Raises
     ------
     UserError
-        If a device does not connect two degrees of freedom, or a braced device has a stiffness of its own.
+        If a device does not connect two degrees of freedom, or a braced device has its own stiffness.
     """
     lines = [
         f'"""OpenSees model of the structure {frame.name}, written by mrpipe (SI units)."""',
