@@ -206,7 +206,7 @@ print("\\nMATRICES " + json.dumps(result))
 def opensees_matrices(script: Path) -> dict[str, FloatArray]:
     """Return the matrices M, C and K of the model that an openseespy script builds.
 
-    The script runs in a process of its own; the model must still be there at its end. The rows are the free degrees of
+    The script runs in a separate process; the model must still be there at its end. The rows are the free degrees of
     freedom in the order of the nodes. Source: integrator GimmeMCK of OpenSees.
 
     Parameters
