@@ -15,6 +15,7 @@ from mrpipe.exports.translation.routines import (
     is_length,
     is_negative,
 )
+from mrpipe.exports.translation.writer import Writer
 
 _HELPERS = {
     "min_real": "static double min_real(double a, double b) { return b < a ? b : a; }",
@@ -61,13 +62,11 @@ def helpers_of(text: str) -> str:
     return "".join(f"{definition}\n" for name, definition in _HELPERS.items() if f"{name}(" in text)
 
 
-class _Writer:
+class _Writer(Writer):
     """Writes one routine."""
 
     def __init__(self, routine: Routine) -> None:
-        self.routine = routine
-        self.lines: list[str] = []
-        self.depth = 1
+        super().__init__(routine)
         self.loops = 0
 
     def function(self) -> str:
@@ -91,28 +90,8 @@ class _Writer:
         body = "\n".join(self.lines)
         return f"static {result} {routine.name}({', '.join(arguments)})\n{{\n{body}\n}}\n"
 
-    def line(self, text: str) -> None:
-        self.lines.append("    " * self.depth + text)
-
-    def block(self, statements: Iterable[ast.stmt]) -> None:
-        for statement in statements:
-            self.statement(statement)
-
-    def inner(self, statements: Iterable[ast.stmt]) -> None:
-        self.depth += 1
-        self.block(statements)
-        self.depth -= 1
-
-    def statement(self, node: ast.stmt) -> None:
-        if isinstance(node, ast.Assign):
-            self.assign(node)
-        elif isinstance(node, ast.AnnAssign) and node.value is not None:
-            self.line(f"{self.target(node.target)} = {self.value(node.value)};")
-        elif isinstance(node, ast.AugAssign):
-            combined = ast.BinOp(node.target, node.op, node.value)
-            ast.copy_location(combined, node)
-            self.line(f"{self.target(node.target)} = {self.value(combined)};")
-        elif isinstance(node, ast.If):
+    def control(self, node: ast.stmt) -> None:
+        if isinstance(node, ast.If):
             self.line(f"if ({self.value(node.test)}) {{")
             self.inner(node.body)
             if node.orelse:
@@ -123,8 +102,6 @@ class _Writer:
             self.line(f"while ({self.value(node.test)}) {{")
             self.inner(node.body)
             self.line("}")
-        elif isinstance(node, ast.For) and not node.orelse:
-            self.loop(node)
         elif isinstance(node, ast.Break):
             self.line("break;")
         elif isinstance(node, ast.Continue):
@@ -133,37 +110,23 @@ class _Writer:
             self.line("return;" if node.value is None else f"return {self.value(node.value)};")
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             self.line(f"{self.value(node.value)};")
-        elif not isinstance(node, ast.Pass):
-            raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+        else:
+            raise self.refuse(node)
 
-    def assign(self, node: ast.Assign) -> None:
-        for target in node.targets:
-            if not isinstance(target, ast.Tuple):
-                self.line(f"{self.target(target)} = {self.value(node.value)};")
-                continue
-            if not isinstance(node.value, ast.Tuple):
-                raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
-            pairs = list(zip(target.elts, node.value.elts, strict=True))
-            # all values are read before any is set
-            self.line("{")
-            self.depth += 1
-            for place, (_, value) in enumerate(pairs):
-                self.line(f"const {_TYPES[self.routine.kind_of(value)]} new_{place} = {self.value(value)};")
-            for place, (item, _) in enumerate(pairs):
-                self.line(f"{self.target(item)} = new_{place};")
-            self.depth -= 1
-            self.line("}")
+    def exchange(self, pairs: list[tuple[ast.expr, ast.expr]]) -> None:
+        self.line("{")
+        self.depth += 1
+        for place, (_, value) in enumerate(pairs):
+            self.line(f"const {_TYPES[self.routine.kind_of(value)]} new_{place} = {self.value(value)};")
+        for place, (item, _) in enumerate(pairs):
+            self.set(item, f"new_{place}")
+        self.depth -= 1
+        self.line("}")
 
     def loop(self, node: ast.For) -> None:
-        if not (isinstance(node.iter, ast.Call) and called(node.iter) == "range" and isinstance(node.target, ast.Name)):
-            raise self.routine.refuse(node, f"a loop over `{ast.unparse(node.iter)}`")
-        bounds = [self.value(item) for item in node.iter.args]
-        start, stop = ("0", bounds[0]) if len(bounds) == 1 else bounds[:2]
-        step, down = "1", False
-        if len(bounds) == 3:
-            step, down = bounds[2], is_negative(node.iter.args[2])
+        variable, start, stop, step, down = self.range_of(node)
         self.loops += 1
-        name, end = safe(node.target.id), f"end_{self.loops}"
+        name, end = safe(variable), f"end_{self.loops}"
         self.line("{")
         self.line(f"const long {end} = {stop};")
         self.line(f"for ({name} = {start}; {name} {'>' if down else '<'} {end}; {name} += {step}) {{")
@@ -176,7 +139,7 @@ class _Writer:
             return safe(node.id)
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
             return f"{safe(node.value.id)}[{self.index(node)}]"
-        raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+        raise self.refuse(node)
 
     def index(self, node: ast.Subscript) -> str:
         if is_negative(node.slice) and isinstance(node.value, ast.Name):
@@ -206,7 +169,7 @@ class _Writer:
             return f"({self.value(node.test)} ? {self.value(node.body)} : {self.value(node.orelse)})"
         if isinstance(node, ast.Call):
             return self.call(node)
-        raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+        raise self.refuse(node)
 
     def name(self, node: ast.Name) -> str:
         constant = self.routine.constants.get(node.id)
@@ -229,7 +192,7 @@ class _Writer:
             return f"(({left} - modulo_long({left}, {right})) / {right})" if whole else f"floor({left} / {right})"
         operator = _OPERATORS.get(type(node.op))
         if operator is None:
-            raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+            raise self.refuse(node)
         return f"({left} {operator} {right})"
 
     def comparison(self, node: ast.Compare) -> str:
@@ -238,7 +201,7 @@ class _Writer:
         for place, operator in enumerate(node.ops):
             sign = _COMPARISONS.get(type(operator))
             if sign is None:
-                raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+                raise self.refuse(node)
             parts.append(f"{self.value(values[place])} {sign} {self.value(values[place + 1])}")
         return f"({' && '.join(parts)})"
 
@@ -273,7 +236,7 @@ class _Writer:
                 continue
             array = array_argument(given)
             if array is None:
-                raise self.routine.refuse(given, f"`{ast.unparse(given)}`")
+                raise self.refuse(given)
             start, stop = "0", f"{array}_size"
             if isinstance(given, ast.Subscript) and isinstance(given.slice, ast.Slice):
                 start = self.value(given.slice.lower) if given.slice.lower else "0"

@@ -17,6 +17,7 @@ from mrpipe.exports.translation.routines import (
     is_length,
     is_negative,
 )
+from mrpipe.exports.translation.writer import Writer
 
 HELPERS = """\
 function value = mr_pick(condition, first, second)
@@ -67,13 +68,11 @@ def matlab_functions(routines: Iterable[Routine]) -> str:
     return "\n".join([*(_Writer(routine).function() for routine in routines), HELPERS])
 
 
-class _Writer:
+class _Writer(Writer):
     """Writes one routine."""
 
     def __init__(self, routine: Routine) -> None:
-        self.routine = routine
-        self.lines: list[str] = []
-        self.depth = 1
+        super().__init__(routine)
         self.hoisted = 0
         self.conditional = 0
 
@@ -86,28 +85,8 @@ class _Writer:
         head = f"[{', '.join(results)}] = " if results else ""
         return f"function {head}{routine.name}({', '.join(map(safe, routine.arguments))})\n{body}\nend\n"
 
-    def line(self, text: str) -> None:
-        self.lines.append("    " * self.depth + text)
-
-    def block(self, statements: Iterable[ast.stmt]) -> None:
-        for statement in statements:
-            self.statement(statement)
-
-    def inner(self, statements: Iterable[ast.stmt]) -> None:
-        self.depth += 1
-        self.block(statements)
-        self.depth -= 1
-
-    def statement(self, node: ast.stmt) -> None:
-        if isinstance(node, ast.Assign):
-            self.assign(node)
-        elif isinstance(node, ast.AnnAssign) and node.value is not None:
-            self.set(node.target, self.value(node.value))
-        elif isinstance(node, ast.AugAssign):
-            combined = ast.BinOp(node.target, node.op, node.value)
-            ast.copy_location(combined, node)
-            self.set(node.target, self.value(combined))
-        elif isinstance(node, ast.If):
+    def control(self, node: ast.stmt) -> None:
+        if isinstance(node, ast.If):
             self.line(f"if {self.value(node.test)}")
             self.inner(node.body)
             if node.orelse:
@@ -118,8 +97,6 @@ class _Writer:
             self.line(f"while {self.in_part(node.test)}")
             self.inner(node.body)
             self.line("end")
-        elif isinstance(node, ast.For) and not node.orelse:
-            self.loop(node)
         elif isinstance(node, ast.Break | ast.Continue):
             self.line("break;" if isinstance(node, ast.Break) else "continue;")
         elif isinstance(node, ast.Return):
@@ -128,37 +105,23 @@ class _Writer:
             self.line("return;")
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             self.value(node.value)
-        elif not isinstance(node, ast.Pass):
-            raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+        else:
+            raise self.refuse(node)
 
-    def set(self, target: ast.expr, value: str) -> None:
-        self.line(f"{self.place(target)} = {value};")
-
-    def assign(self, node: ast.Assign) -> None:
-        for target in node.targets:
-            if not isinstance(target, ast.Tuple):
-                self.set(target, self.value(node.value))
-                continue
-            if not isinstance(node.value, ast.Tuple):
-                raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
-            # all values are read before any is set
-            for place, value in enumerate(node.value.elts):
-                self.line(f"new_{place} = {self.value(value)};")
-            for place, item in enumerate(target.elts):
-                self.set(item, f"new_{place}")
+    def exchange(self, pairs: list[tuple[ast.expr, ast.expr]]) -> None:
+        for place, (_, value) in enumerate(pairs):
+            self.line(f"new_{place} = {self.value(value)};")
+        for place, (item, _) in enumerate(pairs):
+            self.set(item, f"new_{place}")
 
     def loop(self, node: ast.For) -> None:
-        if not (isinstance(node.iter, ast.Call) and called(node.iter) == "range" and isinstance(node.target, ast.Name)):
-            raise self.routine.refuse(node, f"a loop over `{ast.unparse(node.iter)}`")
-        bounds = [self.value(item) for item in node.iter.args]
-        start, stop = ("0", bounds[0]) if len(bounds) == 1 else bounds[:2]
-        step = bounds[2] if len(bounds) == 3 else "1"
-        last = f"{stop} + 1" if len(bounds) == 3 and is_negative(node.iter.args[2]) else f"{stop} - 1"
-        self.line(f"for {safe(node.target.id)} = {start}:{step}:({last})")
+        name, start, stop, step, down = self.range_of(node)
+        last = f"{stop} + 1" if down else f"{stop} - 1"
+        self.line(f"for {safe(name)} = {start}:{step}:({last})")
         self.inner(node.body)
         self.line("end")
 
-    def place(self, node: ast.expr) -> str:
+    def target(self, node: ast.expr) -> str:
         if isinstance(node, ast.Name):
             return safe(node.id)
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
@@ -168,7 +131,7 @@ class _Writer:
             if isinstance(node.slice, ast.Constant):
                 return f"{name}({int(str(node.slice.value)) + 1})"
             return f"{name}({self.value(node.slice)} + 1)"
-        raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+        raise self.refuse(node)
 
     def value(self, node: ast.expr) -> str:
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
@@ -181,7 +144,7 @@ class _Writer:
         if isinstance(node, ast.Subscript):
             if is_length(node):
                 return f"numel({safe(ast.unparse(node.value).split('.')[0])})"
-            return self.place(node)
+            return self.target(node)
         if isinstance(node, ast.BinOp):
             return self.binary(node)
         if isinstance(node, ast.UnaryOp):
@@ -202,7 +165,7 @@ class _Writer:
             return f"mr_pick({self.value(node.test)}, {self.in_part(node.body)}, {self.in_part(node.orelse)})"
         if isinstance(node, ast.Call):
             return self.call(node)
-        raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+        raise self.refuse(node)
 
     def in_part(self, node: ast.expr) -> str:
         """Return an expression that may not be evaluated, or more than once: a call there cannot change arrays."""
@@ -219,7 +182,7 @@ class _Writer:
             return f"floor({left} / {right})"
         operator = _OPERATORS.get(type(node.op))
         if operator is None:
-            raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+            raise self.refuse(node)
         return f"({left} {operator} {right})"
 
     def call(self, node: ast.Call) -> str:
@@ -260,7 +223,7 @@ class _Writer:
     def part(self, node: ast.expr) -> str:
         array = array_argument(node)
         if array is None:
-            raise self.routine.refuse(node, f"`{ast.unparse(node)}`")
+            raise self.refuse(node)
         if not (isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice)):
             return safe(array)
         start = self.value(node.slice.lower) if node.slice.lower else "0"
