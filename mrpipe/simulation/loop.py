@@ -26,6 +26,7 @@ from mrpipe.dampers.hysteresis import hysteresis_step
 from mrpipe.dampers.plant import Chain, build_chain, new_state, sum_step
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import kernel, parts
+from mrpipe.simulation.clock import Clock, clock_of
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.settings import SensorFaultSettings, SimulateSettings
 from mrpipe.structures import Frame, discretise_first_order, state_space
@@ -241,19 +242,16 @@ def simulate_law(
         raise UserError("simulate", "damper", "there is none", "give a damper or tracking: ideal")
     chain = chain or no_damper()
     rate = controller.options.rate_hz
-    per_sample = max(1, math.ceil(options.plant_rate_hz / rate - 1e-9))
-    dt = 1.0 / (rate * per_sample)
+    clock = clock_of(excitation.duration_s, rate, options.plant_rate_hz, options.record_rate_hz)
+    dt, samples = clock.dt, clock.samples
     chain.check_interval(dt)
-    steps = max(1, round(excitation.duration_s / dt))
-    ground = np.ascontiguousarray(excitation.at(dt * np.arange(steps + 1, dtype=np.float64)))
-    every = max(1, round(1.0 / (dt * options.record_rate_hz)))
-    counts, run = _run_numbers(controller, options, steps, per_sample, every, dt)
+    ground = clock.ground(excitation)
+    counts, run = _run_numbers(controller, options, clock)
     counts[parts.I_COMMAND] = command_place(chain)
     if options.tracking == "damper" and is_plain(chain):
         counts[parts.I_TRACK] = parts.TRACK_BOUC_WEN
-    samples = steps // per_sample + 1
     commands = np.zeros((samples, COMMAND_SIZE))
-    record = np.zeros((steps // every + 1, 3 * n + parts.T_SIZE))
+    record = np.zeros((clock.records, 3 * n + parts.T_SIZE))
     z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
     noise = sensor_noise(options.noise, samples, n, rng)
     if options.fault is not None:
@@ -269,7 +267,7 @@ def simulate_law(
     seconds = time.perf_counter() - began
     if not np.all(np.isfinite(record)):
         raise DivergedError(f"law {controller.law}: the response grows without bound; lower the negative stiffness")
-    return _response(record, commands, w, frame.ground_influence, dt * every, dt * per_sample, seconds)
+    return _response(record, commands, w, frame.ground_influence, dt * clock.every, dt * clock.per_sample, seconds)
 
 
 def _plant(frame: Frame, w: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -307,7 +305,7 @@ def _position(frame: Frame, position: FloatArray | None) -> FloatArray:
 
 
 def _run_numbers(
-    controller: Controller, options: LoopOptions, steps: int, per_sample: int, every: int, dt: float
+    controller: Controller, options: LoopOptions, clock: Clock
 ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int64]], FloatArray]:
     if options.delay_s < 0.0 or options.driver_time_constant_s < 0.0:
         raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
@@ -328,13 +326,17 @@ def _run_numbers(
             )
         track = parts.TRACK_LAW
     counts = np.zeros(parts.I_SIZE, dtype=np.int64)
-    counts[parts.I_STEPS], counts[parts.I_PER_SAMPLE], counts[parts.I_RECORD] = steps, per_sample, every
-    counts[parts.I_DELAY] = round(options.delay_s / dt)
+    counts[parts.I_STEPS], counts[parts.I_PER_SAMPLE], counts[parts.I_RECORD] = (
+        clock.steps,
+        clock.per_sample,
+        clock.every,
+    )
+    counts[parts.I_DELAY] = round(options.delay_s / clock.dt)
     counts[parts.I_TRACK] = track
     run = np.zeros(parts.R_SIZE)
-    run[parts.R_DT] = dt
+    run[parts.R_DT] = clock.dt
     lag = options.driver_time_constant_s
-    run[parts.R_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
+    run[parts.R_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-clock.dt / lag)
     run[parts.R_C], run[parts.R_K] = controller.gains.c_n_s_m, controller.gains.k_n_m
     run[parts.R_CLIPPED] = 0.0 if options.tracking == "unclipped" else 1.0
     return counts, run

@@ -30,6 +30,7 @@ from mrpipe.dampers.drive import command_place
 from mrpipe.dampers.plant import Chain, build_chain, new_state
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import several_kernel as kernel
+from mrpipe.simulation.clock import clock_of
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions, Response, add_fault, sensor_noise
 from mrpipe.structures import Frame, discretise_first_order, state_space
@@ -135,15 +136,16 @@ def simulate_dampers(
     n, k = frame.floors, len(dampers)
     _check(frame, dampers, options)
     rate = dampers[0].controller.options.rate_hz
-    per_sample = max(1, math.ceil(options.plant_rate_hz / rate - 1e-9))
-    dt = 1.0 / (rate * per_sample)
-    steps = max(1, round(excitation.duration_s / dt))
-    ground = np.ascontiguousarray(excitation.at(dt * np.arange(steps + 1, dtype=np.float64)))
-    every = max(1, round(1.0 / (dt * options.record_rate_hz)))
-    samples = steps // per_sample + 1
+    clock = clock_of(excitation.duration_s, rate, options.plant_rate_hz, options.record_rate_hz)
+    dt, samples = clock.dt, clock.samples
+    ground = clock.ground(excitation)
     positions = np.ascontiguousarray([item.position for item in dampers], dtype=np.float64)
     counts = np.zeros(kernel.I_SIZE, dtype=np.int64)
-    counts[kernel.I_STEPS], counts[kernel.I_PER_SAMPLE], counts[kernel.I_RECORD] = steps, per_sample, every
+    counts[kernel.I_STEPS], counts[kernel.I_PER_SAMPLE], counts[kernel.I_RECORD] = (
+        clock.steps,
+        clock.per_sample,
+        clock.every,
+    )
     counts[kernel.I_DELAY] = round(options.delay_s / dt)
     counts[kernel.I_TRACK] = {"damper": kernel.TRACK_DAMPER, "ideal": kernel.TRACK_SAMPLED}.get(
         options.tracking, kernel.TRACK_LAW
@@ -152,7 +154,7 @@ def simulate_dampers(
     for chain in chains:
         chain.check_interval(dt)
     commands = np.zeros((k, samples, COMMAND_SIZE))
-    record = np.zeros((steps // every + 1, 3 * n + k * kernel.T_DEVICE + kernel.T_SIZE))
+    record = np.zeros((clock.records, 3 * n + k * kernel.T_DEVICE + kernel.T_SIZE))
     z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
     began = time.perf_counter()
     kernel.compiled(k)(
@@ -164,7 +166,7 @@ def simulate_dampers(
     if not np.all(np.isfinite(record)):
         laws = ", ".join(item.controller.law for item in dampers)
         raise DivergedError(f"laws {laws}: the response grows without bound; lower the negative stiffness")
-    return _response(record, commands, dampers, frame, dt * every, dt * per_sample, seconds)
+    return _response(record, commands, dampers, frame, dt * clock.every, dt * clock.per_sample, seconds)
 
 
 def _check(frame: Frame, dampers: Sequence[LoopDamper], options: LoopOptions) -> None:
