@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -136,6 +136,10 @@ class Problem:
     reference: tuple[Law, ...]
     window_share: float = 0.0
     offsets: bool = True
+
+    def on_samples_of(self, other: Problem) -> Problem:
+        """Return the same model compared on the recordings of another problem, with its weights."""
+        return replace(self, recordings=other.recordings, root_weight=other.root_weight)
 
     @property
     def searched(self) -> list[tuple[int, Parameter]]:

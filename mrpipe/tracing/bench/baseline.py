@@ -16,14 +16,10 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Base, Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, fit_with_form, polynomial_laws
-from mrpipe.tracing.bench.screen import screen
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, force_deviation, noise_scale, sensor_deviation
 from mrpipe.tracing.rules import NoiseRules
 
-FREE_EXPONENT = "bouc-wen-n"
-"""Name of the base form whose hysteresis has a free exponent."""
-
-LISTED = ("bouc-wen", FREE_EXPONENT, "dahl", "yielding-part")
+LISTED = ("bouc-wen", "bouc-wen-n", "dahl", "yielding-part")
 
 DEFAULT_OF_FAMILY = {"rate-dependent-yield": "yielding-part"}
 """The form that stands for a family where the settings name the family."""
@@ -137,15 +133,6 @@ def _with_declared(before: Fit, effect: Effect) -> Fit:
     return min(fits, key=lambda item: item.cost * (1.0 + 0.01 * len(item.problem.terms[-1].form.parameters)))
 
 
-def with_form(before: Fit, effect: Effect, name: str, *, iterations: int = 12) -> Fit:
-    """Return the fit with one more effect in a form of this name, started at the screened point of its grid."""
-    term = Term(effect, effect.form(name))
-    problem = replace(before.problem, terms=(*before.problem.terms, term))
-    start = start_of(problem, before.base_values, [*before.term_values, screen(before, [term])[0].values])
-    start[: len(before.theta)] = before.theta
-    return fit(problem, start, iterations=iterations)
-
-
 def noise_level_of(found: Fit, scale: NoiseScale) -> float:
     """Return the mean square of the weighted residual that noise leaves."""
     root = found.problem.root_weight
@@ -156,11 +143,6 @@ def noise_level_of(found: Fit, scale: NoiseScale) -> float:
 def in_form(found: Fit, name: str) -> Fit:
     """Return the fit with another base form of the library; the same fit where it has that form already."""
     return found if found.problem.base.name == name else fit_with_form(found, base_form(name), iterations=8)
-
-
-def with_free_exponent(found: Fit) -> Fit:
-    """Return the fit with the exponent of the hysteresis free."""
-    return in_form(found, FREE_EXPONENT)
 
 
 def ladder(found: Fit) -> dict[str, Fit]:

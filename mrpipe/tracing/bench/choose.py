@@ -49,14 +49,11 @@ class Choice:
         Base form and effects, fitted to all training tests.
     race
         The models that competed; None where nothing is missing.
-    winner
-        The model of the race that was chosen.
     """
 
     baseline: Baseline
     selection: Selection
     race: Race | None = None
-    winner: Model | None = None
 
     def support(self, effect: str, options: TracingOptions, rng: np.random.Generator) -> float:
         """Return the share of resamples of the training tests in which an effect is needed; 0 without a race."""
@@ -163,7 +160,7 @@ def _raced(
     progress(0.1, "base forms")
     singles = alone(draft(baseline.fit), forms, jobs=jobs)
     if not model_error:
-        baseline, singles = _with_noise_of_best(baseline, singles, baseline.fit.problem.recordings, options.rules)
+        baseline, singles = _with_noise_of_best(baseline, singles, options.rules)
     base, noise = baseline.fit, baseline.noise
     search = partial(
         forward_selection,
@@ -180,10 +177,13 @@ def _raced(
     # where a model's error outweighs the noise, further terms improve the model although their cause is not proven
     model = found.extended(winner) if model_error and len(winner.effects) > len(found.own) else winner
     progress(0.7, "fit to all tests")
-    proven = len(winner.effects) - len(found.own)
-    tied = found.tied_forms(winner, options.lead)
-    selection = replace(promoted(found, model, base), proven=proven, tied_forms=tied, nothing_missing=least)
-    return Choice(baseline, selection, found, winner)
+    selection = replace(
+        promoted(found, model, base),
+        proven=len(winner.effects) - len(found.own),
+        tied_forms=found.tied_forms(winner, options.lead),
+        nothing_missing=least,
+    )
+    return Choice(baseline, selection, found)
 
 
 def promoted(found: Race, winner: Model, base: Fit) -> Selection:
@@ -200,16 +200,16 @@ def promoted(found: Race, winner: Model, base: Fit) -> Selection:
     """
     problem, noise = base.problem, found.noise
     count = len(found.own)
-    if winner.form == found.declared:
-        ground = None
-        chosen = base if len(winner.effects) == count else on_all_tests(winner.fit, problem, found.coupled)
-    else:
+    ground = None
+    if winner.form != found.declared:
         plain = min(
             (item for item in found.models if item.form == winner.form and item.effects == found.own),
             key=lambda item: float(item.squares.sum()),
         )
         ground = on_all_tests(plain.fit, problem, found.coupled)
-        chosen = ground if len(winner.effects) == count else on_all_tests(winner.fit, problem, found.coupled)
+    chosen = ground or base
+    if len(winner.effects) > count:
+        chosen = on_all_tests(winner.fit, problem, found.coupled)
     rounds: list[tuple[Candidate, ...]] = []
     search = found.searches.get(winner.form, found.searches.get(found.declared))
     for place, candidates in enumerate((search.rounds if search else ())[: max(1, len(winner.effects) - count)]):
@@ -217,7 +217,7 @@ def promoted(found: Race, winner: Model, base: Fit) -> Selection:
         if any(tuple(term.effect.name for term in c.fit.problem.terms[:-1]) != names for c in candidates[:1]):
             break
         rounds.append(_on_all(candidates, found, winner, chosen, base, count + place))
-    return Selection(base, noise, tuple(rounds), chosen, proven=len(winner.effects) - count, ground=ground)
+    return Selection(base, noise, tuple(rounds), chosen, ground=ground)
 
 
 def _on_all(
@@ -252,7 +252,7 @@ def _with_noise_of(
 
 
 def _with_noise_of_best(
-    baseline: Baseline, singles: Mapping[str, Fit], training: Recordings, rules: TracingRules
+    baseline: Baseline, singles: Mapping[str, Fit], rules: TracingRules
 ) -> tuple[Baseline, dict[str, Fit]]:
     """Return baseline and base forms with weights and noise by the best base form, if it is clearly better.
 
@@ -266,8 +266,8 @@ def _with_noise_of_best(
         or best.chi_square > rules.model_error.better_form * base.chi_square
     ):
         return baseline, dict(singles)
-    whole = replace(best.problem, recordings=base.problem.recordings, root_weight=base.problem.root_weight)
-    found = fit(whole, best.theta, iterations=4)
+    training = base.problem.recordings
+    found = on_all_tests(best, base.problem, iterations=4)
     scale = noise_scale(found, rules.noise)
     root = training.used / force_deviation(found, training, 0.0, scale, rules.noise)
     found = replace(found, problem=replace(found.problem, root_weight=root))

@@ -18,7 +18,7 @@ from mrpipe.dampers.form import BaseForm
 from mrpipe.fitting.engine import Fit, centred, fit, regressors, start_of, weighting
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.start import fit_with_form
-from mrpipe.tracing.bench.select import Selection
+from mrpipe.tracing.bench.select import Selection, left_of
 from mrpipe.tracing.rules import RaceRules
 
 LEADERS = 3
@@ -60,9 +60,13 @@ class Model:
 
     @property
     def claims(self) -> int:
-        """Number of fitted numbers, and three for each effect."""
-        problem = self.fit.problem
-        return len(problem.searched) + len(problem.amplitudes) + problem.base.columns + 3 * len(problem.terms)
+        """See :func:`claims_of`."""
+        return claims_of(self.fit.problem)
+
+
+def claims_of(problem: Problem) -> int:
+    """Return the number of fitted numbers, and three for each effect."""
+    return len(problem.searched) + len(problem.amplitudes) + problem.base.columns + 3 * len(problem.terms)
 
 
 @dataclass(frozen=True)
@@ -286,7 +290,7 @@ def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, jobs: int = 1) -> li
         return list(pool.map(one, singles))
 
 
-def on_all_tests(drafted: Fit, problem: Problem, coupled: frozenset[str], *, iterations: int = 10) -> Fit:
+def on_all_tests(drafted: Fit, problem: Problem, coupled: frozenset[str] = frozenset(), *, iterations: int = 10) -> Fit:
     """Return a model of the race fitted to all training tests.
 
     Parameters
@@ -303,7 +307,7 @@ def on_all_tests(drafted: Fit, problem: Problem, coupled: frozenset[str], *, ite
     base = drafted.problem.base
     if base.name in coupled:
         base = replace(base, form=replace(base.form, coupled=True))
-    whole = replace(drafted.problem, base=base, recordings=problem.recordings, root_weight=problem.root_weight)
+    whole = replace(drafted.problem, base=base).on_samples_of(problem)
     return fit(whole, drafted.theta, iterations=iterations)
 
 
@@ -315,14 +319,12 @@ def _without(found: Fit, place: int) -> Fit:
 
 
 def _draft_cost(found: Fit, noise: float, rules: RaceRules) -> float:
-    model = Model(found, np.zeros(0))
-    left = max(found.chi_square - noise, 0.0) + rules.noise_share * noise
-    return left * (1.0 + rules.claim_cost * model.claims)
+    return left_of(found, noise, rules.noise_share) * (1.0 + rules.claim_cost * claims_of(found.problem))
 
 
 def _squares(found: Fit, problem: Problem) -> FloatArray:
     """Return the weighted squared error of a model on each test of a problem, its coefficients as they are."""
-    whole = replace(found.problem, recordings=problem.recordings, root_weight=problem.root_weight)
+    whole = found.problem.on_samples_of(problem)
     w = weighting(whole)
     columns = regressors(whole, found.theta)[:, w.at]
     error = problem.recordings.force[w.at] - found.linear @ columns

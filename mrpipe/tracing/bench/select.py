@@ -91,12 +91,6 @@ class Selection:
         return self.base if self.ground is None else self.ground
 
     @property
-    def proven_share(self) -> float:
-        """Share of the recoverable residual that the effects with a proven cause recover, without further terms."""
-        count = min(self.proven, len(self.rounds))
-        return self.rounds[count - 1][0].share if count else 0.0
-
-    @property
     def recoverable(self) -> float:
         """Excess of the base's chi-square over the noise."""
         return max(self.base.chi_square - self.noise, 0.0)
@@ -123,6 +117,11 @@ def share_of(base: Fit, found: Fit, noise: float) -> float:
     """Return the share of the base's excess over noise that a fit recovers, at most 1."""
     excess = max(base.chi_square - noise, 1e-12)
     return float(min(1.0, (base.chi_square - found.chi_square) / excess))
+
+
+def left_of(found: Fit, noise: float, share: float) -> float:
+    """Return the excess of the chi-square over the noise, plus a share of the noise that does not separate fits."""
+    return max(found.chi_square - noise, 0.0) + share * noise
 
 
 def draft(found: Fit) -> Fit:
@@ -342,5 +341,5 @@ def _with_fit(item: Candidate, old: Fit, new: Fit, base: Fit, noise: float) -> C
 def _leads(candidates: Sequence[Candidate], noise: float, rules: SelectionRules) -> bool:
     if len(candidates) < 2:
         return True
-    best, second = (max(item.fit.chi_square - noise, 0.0) + rules.same * noise for item in candidates[:2])
+    best, second = (left_of(item.fit, noise, rules.same) for item in candidates[:2])
     return second >= rules.lead * best

@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of
-from mrpipe.tracing.bench.select import Candidate, Selection, share_of
+from mrpipe.tracing.bench.select import Candidate, Selection, left_of, share_of
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.verdict import Candidate as RankedCandidate
 from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
@@ -72,11 +72,6 @@ def tied(
         if alike:
             rivals.append(item.name)
     return tuple(rivals)
-
-
-def left_of(found: Fit, noise: float, share: float) -> float:
-    """Return the excess of the chi-square over the noise, plus a share of the noise that does not separate fits."""
-    return max(found.chi_square - noise, 0.0) + share * noise
 
 
 def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
