@@ -182,7 +182,7 @@ def export(
     options: CommonOptions,
     what: Annotated[str, typer.Argument(metavar="[WHAT]", help=f"{', '.join(_EXPORTS)}; or all.")] = "controller",
     law: Annotated[
-        str | None, typer.Option(metavar="LAW", help="Control law. Default: the setting export.law.")
+        str | None, typer.Option(metavar="LAW", help="Control law, into controller/LAW. Default: the setting export.law.")
     ] = None,
     damper: Annotated[
         str | None,
@@ -197,14 +197,21 @@ def export(
     ] = None,
 ) -> None:
     """Write the calibrated controller or a model for other programs, with test vectors."""
+    from mrpipe.artifacts.yaml_source import nearest
+
     if what not in (*_EXPORTS, "all"):
         raise UserError("export", what, "cannot be exported", f"one of {', '.join((*_EXPORTS, 'all'))}")
-    given = {"export.law": law, "simulate.damper": damper, "gains.source": gains}
+    if law is not None and law not in law_names():
+        raise UserError("--law", law, "is not a control law", nearest(law, law_names()))
+    given = {"simulate.damper": damper, "gains.source": gains}
     overrides = [f"{name}={value}" for name, value in given.items() if value is not None]
     if formats:
         overrides.append(f"export.formats=[{', '.join(formats)}]")
     chosen = replace(options, overrides=[*options.overrides, *overrides])
-    build_and_print([f"export-{name}" for name in (_EXPORTS if what == "all" else (what,))], chosen)
+    stages = {name: f"export-{name}" for name in _EXPORTS}
+    if law is not None:
+        stages["controller"] += f"-{law}"
+    build_and_print([stages[name] for name in (_EXPORTS if what == "all" else (what,))], chosen)
 
 
 _FAMILIES: dict[str, Callable[..., None]] = {"record": record, "simulate": simulate, "export": export}

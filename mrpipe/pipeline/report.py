@@ -8,6 +8,7 @@ from mrpipe.pipeline.parts import read_part
 from mrpipe.pipeline.runner import Pipeline
 from mrpipe.pipeline.sources import CAMPAIGN_RECORDERS
 from mrpipe.reporting.facts import ReportStage, RunFacts
+from mrpipe.thesis import figures as thesis
 
 
 def run_facts(pipeline: Pipeline) -> RunFacts:
@@ -28,6 +29,8 @@ def run_facts(pipeline: Pipeline) -> RunFacts:
         if manifest is None or not _belongs(pipeline, name, manifest):
             continue
         items = read_part(directory, name)
+        if thesis.STAGE in config.stages:
+            items = thesis.with_citations(items)
         stages.append(
             ReportStage(
                 name,

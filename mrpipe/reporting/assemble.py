@@ -48,4 +48,4 @@ def describe(sink: Sink, result: TrainingSet) -> None:
         "Continuity at the joins. The displacement is continuous; velocity and force of tests at different frequency "
         "or drive are not, and no network sees these steps.",
     )
-    sink.figure("history", joined_history(training), "The joined training history (thesis Figure 2.11 b).")
+    sink.figure("history", joined_history(training), "The joined training history.")

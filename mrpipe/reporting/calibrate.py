@@ -57,7 +57,7 @@ def describe(
     sink.table(
         "candidates",
         pd.DataFrame(sources),
-        "Gains as the thesis ran them, by closed form, and of best exact damping.",
+        "Gains by source: by closed form, of best exact damping and, where given, as published.",
     )
     _maps(sink, frame, calibration, map_points)
     _loops(sink, calibration, amplitude_m)

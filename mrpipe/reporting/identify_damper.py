@@ -49,9 +49,9 @@ def describe(sink: Sink, result: IdentifiedDamper) -> None:
         sink.text(f"Law of the drive: {summary['drive_law']['reason']}.")
     tables = {
         "parameters": (pd.DataFrame(summary["parameters"]).T.rename_axis("name").reset_index(), "Parameters (SI)."),
-        "thesis-parameters": (
+        "classical-parameters": (
             pd.DataFrame(summary["thesis_parameters"]).T.rename_axis("name").reset_index(),
-            "The same in the notation of thesis Table 2.2, for a chosen A.",
+            "The same in the classical notation of the Bouc-Wen model (alpha, beta, gamma, A), for a chosen A.",
         ),
         "comparison": (
             pd.DataFrame(summary["comparison"]),
@@ -74,7 +74,7 @@ def describe(sink: Sink, result: IdentifiedDamper) -> None:
     sink.figure(
         "loops",
         damper_loops(shown_loops(chosen.fit.model, tests)),
-        "Measured loops and those of the model (thesis Figures 2.7 to 2.9).",
+        "Measured loops and those of the model.",
     )
     sink.figure(
         "comparison",

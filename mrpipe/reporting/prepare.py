@@ -58,7 +58,7 @@ def describe(sink: Sink, result: PreparedCampaign) -> None:
     sink.figure(
         "history",
         prepared_history(shown.test.time_s, before, after, units, shown.test.cycles),
-        f"Channels before and after (thesis Figures 2.10 and 2.11 a), test {shown.test.name}.",
+        f"Channels before and after, test {shown.test.name}.",
     )
     step = max(1, len(preparations) // _SHOWN_TESTS)
     chosen = [item.test for item in preparations[::step][:_SHOWN_TESTS]]

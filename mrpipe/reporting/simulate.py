@@ -25,7 +25,6 @@ def describe(
     excitation: Excitation,
     values: Mapping[str, Any],
     viscous: Mapping[str, Any] | None,
-    printed: Mapping[str, Mapping[str, float]],
 ) -> None:
     """Write the section of a stage `simulate-LAW`.
 
@@ -37,11 +36,9 @@ def describe(
         What ran.
     values, viscous
         Indices of the run, and of vd under the same excitation where it was run.
-    printed
-        Source -> index -> value: columns to compare with.
     """
     sink.text(_words(law, excitation, values))
-    sink.table("indices", _table(law, values, viscous, printed), "Indices, compared with vd and printed values (SI).")
+    sink.table("indices", _table(law, values, viscous), "Indices, and those of vd under the same excitation (SI).")
     last = excitation.steady_s[1]
     cycle = 2.0 * np.pi / excitation.frequency_rad_s if np.isfinite(excitation.frequency_rad_s) else last / 4.0
     shown = (response.time_s >= last - 4.0 * cycle) & (response.time_s < last)
@@ -83,7 +80,7 @@ def describe(
                 decay.peak_m,
                 decay.point_to_point,
             ),
-            "Free decay after the base stops (thesis Figure 5.7).",
+            "Free decay after the base stops.",
         )
 
 
@@ -102,19 +99,12 @@ def _words(law: str, excitation: Excitation, values: Mapping[str, Any]) -> str:
     )
 
 
-def _table(
-    law: str,
-    values: Mapping[str, Any],
-    viscous: Mapping[str, Any] | None,
-    printed: Mapping[str, Mapping[str, float]],
-) -> pd.DataFrame:
+def _table(law: str, values: Mapping[str, Any], viscous: Mapping[str, Any] | None) -> pd.DataFrame:
     numbers = {key: value for key, value in values.items() if isinstance(value, float)}
     frame = pd.DataFrame({"index": list(numbers), law: list(numbers.values())})
     if viscous is not None:
         frame["vd"] = [viscous.get(key) for key in numbers]
         frame["over vd"] = [value / viscous[key] if viscous.get(key) else None for key, value in numbers.items()]
-    for source, known in printed.items():
-        frame[source] = [known.get(key) for key in numbers]
     return frame
 
 

@@ -45,7 +45,7 @@ def describe(sink: Sink, result: SweepResult) -> None:
         f"{len(result.run.held_out)} training records that no fit has seen. Chosen is the smallest network within one "
         f"standard error of the best: {chosen.candidate.label}."
     )
-    sink.table("findings", _verdicts(result.verdicts), "Statements of thesis section 2.3.2 on architectures, checked.")
+    sink.table("findings", _verdicts(result.verdicts), "General statements on architectures, checked on this campaign.")
     sink.table("candidates", _candidates(outcomes), "All candidates; errors over the starts on held-out records.")
     sink.figure(
         "axes",

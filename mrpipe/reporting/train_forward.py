@@ -43,5 +43,5 @@ def describe(sink: Sink, result: TrainedForward) -> None:
     sink.figure(
         "loops",
         figures.force_loops(result.validation, result.judged.samples, result.judged.estimated),
-        "Force against displacement and velocity on validation tests (thesis Figures 2.17 to 2.20).",
+        "Force against displacement and velocity on validation tests.",
     )

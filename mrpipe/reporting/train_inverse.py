@@ -46,7 +46,7 @@ def describe(sink: Sink, result: TrainedInverse) -> None:
     sink.figure(
         "drive",
         figures.drive_histories(result.validation, result.judged.samples, result.judged.estimated),
-        "Drive measured and estimated on validation tests (thesis Figures 2.21 to 2.23).",
+        "Drive measured and estimated on validation tests.",
     )
     if result.signed is not None:
         sink.text(
@@ -67,5 +67,5 @@ def describe(sink: Sink, result: TrainedInverse) -> None:
     sink.figure(
         "viscous",
         figures.viscous_emulation(viscous, unit),
-        "Viscous damping emulated by inverse and forward network (thesis Figure 2.24).",
+        "Viscous damping emulated by inverse and forward network.",
     )

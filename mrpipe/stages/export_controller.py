@@ -1,4 +1,8 @@
-"""`export controller`: the calibrated controller as C and JSON for a real-time target."""
+"""`export controller [--law LAW]`: calibrated controllers as C and JSON for a real-time target.
+
+Without a law, the one of the setting `export.law` is written to `controller/`. Each law that is named has a stage and a
+folder of its own, `controller/LAW/`, so that the export of one law leaves those of the others in place.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+from mrpipe.control.laws import law_names
 from mrpipe.pipeline.stage import Stage, StageContext
 
 FOLDER = "controller"
@@ -13,7 +18,26 @@ DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 """Dampers of this run by name, and the stage whose artifact holds each."""
 
 
-def _run(context: StageContext) -> Mapping[str, Any]:
+FILES = ("controller.json", "controller.c", "controller.h", "self_test.c", "vectors.csv", "README.md")
+
+
+def export_stage(law: str = "") -> Stage:
+    """Return the stage that writes the controller of a law; that of `export.law` where none is named."""
+    folder = f"{FOLDER}/{law}" if law else FOLDER
+    return Stage(
+        name=f"export-controller-{law}" if law else "export-controller",
+        summary=f"Write the calibrated controller{f' {law}' if law else ''} as C and JSON, with test vectors.",
+        run=lambda context: _run(context, law or context.settings.export.law, folder),
+        inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
+        conditional_inputs=(("simulate.damper", "traced", "close-loop"), ("gains.source", "design", "design")),
+        settings=("gains", "export.prefix" if law else "export", "simulate.controller", "simulate.damper"),
+        after=("reproduce",),
+        family="export",
+        outputs=tuple(f"{folder}/{name}" for name in FILES),
+    )
+
+
+def _run(context: StageContext, law: str, place: str) -> Mapping[str, Any]:
     from mrpipe.artifacts import atomic_write_text
     from mrpipe.control.assembly import ControllerFactory, inverse_network
     from mrpipe.control.storage import read_calibrated_with
@@ -36,16 +60,16 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         chosen,
         inverse_network(chosen, lambda: context.artifact("train-inverse")),
     )
-    built = factory.build(settings.law)
+    built = factory.build(law)
     details = {"drive_unit": damper.drive_unit, "stroke_m": damper.stroke_m}
     details["inverse"] = chosen.inverse
-    folder = context.run_directory / FOLDER
+    folder = context.run_directory / place
     files = controller_files(built, settings.prefix, details)
     for name, text in files.items():
         atomic_write_text(folder / name, text)
-    section.describe(context.report, built, settings.law, FOLDER)
+    section.describe(context.report, built, law, place)
     return {
-        "law": settings.law,
+        "law": law,
         "folder": str(folder),
         "files": list(files),
         "sample_time_s": built.sample_time_s,
@@ -53,17 +77,5 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     }
 
 
-STAGE = Stage(
-    name="export-controller",
-    summary="Write the calibrated controller as C and JSON, with test vectors.",
-    run=_run,
-    inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-    conditional_inputs=(("simulate.damper", "traced", "close-loop"), ("gains.source", "design", "design")),
-    settings=("gains", "export", "simulate.controller", "simulate.damper"),
-    after=("reproduce",),
-    family="export",
-    outputs=tuple(
-        f"{FOLDER}/{name}"
-        for name in ("controller.json", "controller.c", "controller.h", "self_test.c", "vectors.csv", "README.md")
-    ),
-)
+STAGE = export_stage()
+STAGES = (STAGE, *(export_stage(law) for law in law_names()))

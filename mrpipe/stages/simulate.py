@@ -32,7 +32,6 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     from mrpipe.simulation.rig import DAMPERS, excitation_of, read_rig, release_state
     from mrpipe.simulation.storage import write_response
     from mrpipe.simulation.training_range import check_ranges, ranges_as_json
-    from mrpipe.thesis.entries import loop_columns
 
     settings = context.settings.simulate
     rig = read_rig(settings, context.artifact, context.settings.gains.source)
@@ -67,7 +66,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
         artifact.put_json("training_range", ranges_as_json(ranges))
         artifact.put_json("excitation", excitation.details)
         artifact.attributes("/", law=law)
-    report.describe(context.report, law, rig, response, excitation, values, against, loop_columns(law))
+    report.describe(context.report, law, rig, response, excitation, values, against)
     report.describe_ranges(context.report, ranges)
     details = {"excitation": excitation.details, "drive_unit": rig.damper.drive_unit}
     return {"law": law, **values, **details, "training_range": ranges_as_json(ranges)}

@@ -52,7 +52,7 @@ MISTAKES = {
     "settings file missing": (["prepare", "--settings", "no.yaml"], "--settings: no.yaml: no such file"),
     "unknown law": (["simulate", "--law", "vdn"], "did you mean vd"),
     "law missing": (["simulate"], "--law: is missing; one of vd, vdps"),
-    "law of the export": (["export", "--law", "vdn"], "no such control law; one of vd"),
+    "law of the export": (["export", "--law", "vdn"], "vdn: is not a control law; did you mean vdns?"),
     "run in the working directory": (["prepare", "--run", ""], "is the working directory"),
     "name of a path": (["prepare", "--set", "name=../x"], "'../x': is not the name of a directory"),
     "until what is not there": (["run", "--until", "prepair"], "did you mean prepare?"),

@@ -250,6 +250,17 @@ def test_export_writes_a_folder(run):
 
 
 @pytest.mark.golden
+def test_the_export_of_one_law_leaves_that_of_another_in_place(run):
+    stages = {stage.name: stage for stage in export_controller.STAGES}
+    summaries = {law: run(stages[f"export-controller-{law}"], {"export": {"prefix": "rig"}}) for law in ("vd", "vdns")}
+    for law, summary in summaries.items():
+        folder = summary["directory"] / "controller" / law
+        assert summary["law"] == law and summary["folder"] == str(folder)
+        assert set(summary["files"]) == {item.name for item in folder.iterdir()}
+        assert json.loads((folder / "controller.json").read_text())["law"] == law
+
+
+@pytest.mark.golden
 @pytest.mark.parametrize("name", ["damper", "frame"])
 def test_export_of_a_model_writes_a_folder_with_the_formats_asked_for(run, name):
     stage = {item.name: item for item in export_models.STAGES}[f"export-{name}"]
