@@ -9,7 +9,7 @@ from mrpipe.numba_cache import use_keyed_cache
 
 __version__ = "0.1.0"
 
-LOADS_FROM: tuple[str, ...] = ()  # the interface for notebooks is no part of any stage
+LOADS_FROM: tuple[str, ...] = ()  # the interface for notebooks is not a part of any stage
 
 _INTERFACE = (
     "NetworkRegressor",

@@ -108,7 +108,7 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
         wanted = SI_UNITS[quantity]
         if parsed.dimensionality != registry.parse_units(wanted).dimensionality:
             remedy = _nearest(str(unit).strip()) or f"write one such as {wanted}"
-            raise UserError(where or "unit", f"unit {unit!r}", f"is no unit of {quantity}", remedy)
+            raise UserError(where or "unit", f"unit {unit!r}", f"is not a unit of {quantity}", remedy)
     try:
         return float((1.0 * parsed).to_base_units().magnitude)
     except Exception as error:

@@ -35,7 +35,7 @@ def test_unknown_unit_is_told_with_its_place(unit: str) -> None:
 
 
 def test_unit_of_another_quantity_is_refused() -> None:
-    with pytest.raises(UserError, match="is no unit of force; write one such as N"):
+    with pytest.raises(UserError, match="is not a unit of force; write one such as N"):
         conversion("mm", where="campaign.yaml", quantity="force")
 
 

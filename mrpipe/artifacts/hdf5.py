@@ -143,7 +143,7 @@ class Artifact:
     Raises
     ------
     UserError
-        If the file is missing or is no artifact of mrpipe.
+        If the file is missing or is not an artifact of mrpipe.
     """
 
     def __init__(self, path: Path) -> None:

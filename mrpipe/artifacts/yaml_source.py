@@ -149,7 +149,7 @@ def read_yaml(path: Path) -> YamlSource:
         raise UserError(path, "", "is not UTF-8 text", "save it as UTF-8") from error
     node, content = parse(text, path)
     if not isinstance(content, dict):
-        raise UserError(path, "line 1", "is no mapping", "write `key: value` lines")
+        raise UserError(path, "line 1", "is not a mapping", "write `key: value` lines")
     lines: dict[Place, int] = {}
     _collect_lines(node, (), lines, path)
     return YamlSource(path, content, lines)

@@ -12,7 +12,7 @@ from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
 
 LARGEST_SAMPLE = 1e30
-"""Larger numbers [SI] are no measurements of any quantity."""
+"""Larger numbers [SI] are not measurements of any quantity."""
 
 
 def require_finite(file: DataFile, values: FloatArray, first: int, channel: str, where: str) -> None:
@@ -141,7 +141,7 @@ def _falls_to_zero(values: FloatArray) -> IntArray:
     lost, place = lost[within], place[within]
     near = np.minimum(np.abs(values[known[place - 1]]), np.abs(values[known[place]]))
     same_side = np.sign(values[known[place - 1]]) == np.sign(values[known[place]])
-    # in noise around zero, a sample of exactly 0 is no further from its neighbours than others are
+    # in noise around zero, a sample of exactly 0 is not further from its neighbours than others are
     usual = 1.48 * float(np.median(np.abs(np.diff(values))))
     far = near > max(0.2 * float(np.max(np.abs(values))), 4.0 * usual)
     return np.asarray(lost[same_side & far], dtype=np.int64)

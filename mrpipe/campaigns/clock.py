@@ -125,7 +125,7 @@ def _lost_samples(time: FloatArray, rate: float) -> IntArray:
 
 
 def _unrounded(time: FloatArray) -> FloatArray:
-    """Return an even clock where the given one is even but for the rounding of its printed digits."""
+    """Return an even clock where the given one deviates from it only by the rounding of its printed digits."""
     # with a fixed number of significant digits, the end of the record is the coarsest
     late = time[time.size // 2 :]
     digits = next((count for count in range(10) if np.allclose(late, np.round(late, count), rtol=0, atol=1e-11)), 12)

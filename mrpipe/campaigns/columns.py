@@ -86,7 +86,7 @@ class DataFile:
         if array.ndim != 1 or array.size < 2:
             shape = " x ".join(map(str, array.shape)) or "one number"
             raise UserError(
-                self.path, where, f"column {column!r} is no vector ({shape})", f"pick one column, as in {name}[:,0]"
+                self.path, where, f"column {column!r} is not a vector ({shape})", f"pick one column, as in {name}[:,0]"
             )
         return np.ascontiguousarray(array)
 

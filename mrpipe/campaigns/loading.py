@@ -141,7 +141,7 @@ def _folder(source: YamlSource, entry: CampaignEntry) -> Path:
         return folder
     folder = source.path.parent / entry.directory
     if not folder.is_dir():
-        raise source.error(("directory",), f"{entry.directory!r} is no directory", "name the folder of the files")
+        raise source.error(("directory",), f"{entry.directory!r} is not a directory", "name the folder of the files")
     return folder
 
 
@@ -155,7 +155,7 @@ def _channels(source: YamlSource, content: dict[str, Any], rig: str, place: Plac
 
 
 def _merge(shared: ChannelEntry | None, own: ChannelEntry) -> ChannelEntry:
-    """Complete a test's channel by what the campaign says of it, as far as the test leaves it open."""
+    """Complete a test's channel with the entries of the campaign that the test does not give."""
     if shared is None:
         return own
     inherited = {key: getattr(shared, key) for key in ("unit", "floor", "direction", "mass_kg")}

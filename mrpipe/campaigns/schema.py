@@ -31,7 +31,7 @@ FRAME_QUANTITIES = {
     "desired_drive": "drive",
     "desired_force": "force",
 }
-"""Channel of a frame test -> physical quantity, besides the numbered floor channels."""
+"""Channel of a frame test -> physical quantity, in addition to the numbered floor channels."""
 
 _FLOOR = re.compile(r"^floor_(acceleration|displacement|velocity)_([1-9][0-9]*)(?:_[a-z][a-z0-9]*)?$")
 _FURTHER_INPUT = re.compile(r"^(?:(ground_acceleration)|(input_force))_[a-z0-9]+$")

@@ -171,7 +171,7 @@ def _numbers(path: Path, column: Any, name: str, first: int) -> FloatArray:
     if wrong.any():
         row = int(np.argmax(wrong.to_numpy()))
         raise UserError(
-            path, f"line {first + 1 + row}, column {name}", f"{column.iloc[row]!r} is no number", "write a number"
+            path, f"line {first + 1 + row}, column {name}", f"{column.iloc[row]!r} is not a number", "write a number"
         )
     return np.asarray(numbers, dtype=np.float64)
 
@@ -185,5 +185,5 @@ def _seconds(path: Path, column: Any, name: str, first: int) -> FloatArray:
     if wrong.any():
         row = int(np.argmax(wrong.to_numpy()))
         where = f"line {first + 1 + row}, column {name}"
-        raise UserError(path, where, f"{column.iloc[row]!r} is no time stamp", "write it as 2026-03-01T12:00:00.000")
+        raise UserError(path, where, f"{column.iloc[row]!r} is not a time stamp", "write it as 2026-03-01T12:00:00.000")
     return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)

@@ -31,7 +31,7 @@ class TestFile:
         Other keys of the test (`kind`, `mode`, `law`, `gains`, `segments_s`, `channels`, `about`, ...).
     """
 
-    __test__ = False  # the name is no test case, whatever a test runner makes of it
+    __test__ = False  # the name is not a test case, whatever a test runner makes of it
 
     name: str
     role: str

@@ -1,6 +1,6 @@
 """The time loop of the benchmark structures, compiled: exact steps of the linear structure, implicit device forces.
 
-Loads run straight between their samples, device forces are constant over a step; for both the structure's step is exact
+Loads are linear between their samples, device forces are constant over a step; for both the structure's step is exact
 (matrix exponential). Where damping does not couple the modes a step costs a few operations a mode.
 """
 

@@ -32,7 +32,7 @@ def overrides_of(
     if name not in NAMES:
         from mrpipe.artifacts.yaml_source import nearest
 
-        raise UserError("benchmark", name, "is no benchmark structure", nearest(name, list(NAMES)))
+        raise UserError("benchmark", name, "is not a benchmark structure", nearest(name, list(NAMES)))
     section = f"benchmark.{NAMES[name]}"
     result = []
     if model is not None:

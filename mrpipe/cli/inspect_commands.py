@@ -32,7 +32,7 @@ def show(
             file, "", "no such file or directory", "give a campaign, a run directory, an artifact or a file"
         )
     if plot is not None and plot.suffix.lower() not in {".png", ".svg", ".pdf"}:
-        raise UserError("--plot", str(plot), "is no picture", "end it in .png, .svg or .pdf")
+        raise UserError("--plot", str(plot), "is not a picture", "end it in .png, .svg or .pdf")
     try:
         description = describe_any(file)
     except (OSError, RuntimeError, KeyError) as error:
@@ -162,7 +162,7 @@ def init(
     from mrpipe.cli.project import lay_out
 
     if rig not in (None, "bench", "frame", "both"):
-        raise UserError("--rig", str(rig), "is no rig", nearest(str(rig), ("bench", "frame", "both")))
+        raise UserError("--rig", str(rig), "is not a rig", nearest(str(rig), ("bench", "frame", "both")))
     project = lay_out(directory, rig, source)  # type: ignore[arg-type]
     if options.json:
         print_json(

@@ -144,7 +144,7 @@ def _proposals(source: Path, directory: Path, rig: Rig | None) -> list[Proposal]
     from mrpipe.campaigns.proposal import propose_campaigns
 
     if not source.is_dir():
-        raise UserError("--from", str(source), "is no folder", "name the folder that holds the measured files")
+        raise UserError("--from", str(source), "is not a folder", "name the folder that holds the measured files")
     name = slug(source.resolve().name) or "campaign"
     # all campaigns lie equally deep, so the way back to the files is the same
     return propose_campaigns(source, name, rig, directory / "data" / name)

@@ -73,7 +73,7 @@ def _refuse_folder(path: Path) -> dict[str, Any]:
         remedy = f"propose a campaign with `mrpipe init DIR --from {path}`"
         raise UserError(path, "", "holds data files, but no campaign.yaml", remedy)
     raise UserError(
-        path, "", "is no campaign and no run directory", "name a folder with campaign.yaml, or one that a run wrote"
+        path, "", "is neither a campaign nor a run directory", "name a folder with campaign.yaml, or that of a run"
     )
 
 
@@ -102,7 +102,7 @@ def _describe_json(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, OSError, RecursionError) as error:
-        raise UserError(path, "", f"is no JSON that can be read ({error})", "name another file") from None
+        raise UserError(path, "", f"is not JSON that can be read ({error})", "name another file") from None
     columns = [value for value in content.values() if _is_column(value)] if isinstance(content, dict) else []
     if len(columns) >= 2 or (isinstance(content, list) and content and isinstance(content[0], dict)):
         return _describe_data(path)

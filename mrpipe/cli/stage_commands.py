@@ -109,7 +109,7 @@ def record(
     from mrpipe.config.sections.campaigns import LABORATORY
 
     if rig is not None and rig not in _RIGS:
-        raise UserError("--rig", rig, "is no rig", f"one of {', '.join(_RIGS)}")
+        raise UserError("--rig", rig, "is not a rig", f"one of {', '.join(_RIGS)}")
     config = load(options).config
     sources = {key.replace("_", "-"): source for key, source in config.campaigns.model_dump().items()}
     listed = [name.removeprefix("record-") for name in config.stages if name.startswith("record-")]
@@ -182,7 +182,7 @@ def export(
     options: CommonOptions,
     what: Annotated[str, typer.Argument(metavar="[WHAT]", help=f"{', '.join(_EXPORTS)}; or all.")] = "controller",
     law: Annotated[
-        str | None, typer.Option(metavar="LAW", help="Control law, into controller/LAW. Default: the setting export.law.")
+        str | None, typer.Option(metavar="LAW", help="Control law, to controller/LAW. Default: the setting export.law.")
     ] = None,
     damper: Annotated[
         str | None,

@@ -149,7 +149,7 @@ def _apply(content: dict[str, Any], override: str) -> None:
     """Set one `section.key=value` in place."""
     keys, separator, text = override.partition("=")
     if not separator or not keys.strip():
-        raise UserError("--set", override, "is no assignment", "write section.key=value")
+        raise UserError("--set", override, "is not an assignment", "write section.key=value")
     path = _override_path(override)
     for depth, key in enumerate(path):
         section = section_of(config_model(), path[:depth])

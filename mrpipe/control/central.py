@@ -23,7 +23,7 @@ the ground hardly excites."""
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the observer reads besides the ground acceleration.
+    """What the observer reads in addition to the ground acceleration.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ class ExactDamping:
 
     @property
     def damping_ratio(self) -> float:
-        """-Re s/|s| of the target; of the worst pole (negative) where the structure folds."""
+        """-Re s/|s| of the target; of the worst pole (negative) where the structure is statically unstable."""
         if not self.stable and abs(self.pole.imag) < 1e-9:
             return -1.0
         return float(-self.pole.real / max(abs(self.pole), 1e-300))
@@ -137,7 +137,7 @@ def best_gain(damping_ratio: Callable[[float], float], largest: float) -> Optimu
 
 
 def damping_map(frame: Frame, position: FloatArray, modes: LimitingModes, c: FloatArray, k: FloatArray) -> FloatArray:
-    """Return exact damping ratios, shape (len(k), len(c)), of f = c v + k x; NaN where the structure folds."""
+    """Return exact damping ratios, shape (len(k), len(c)), of f = c v + k x; NaN if statically unstable."""
     result = np.full((len(k), len(c)), np.nan)
     for row, stiffness in enumerate(k):
         for column, viscosity in enumerate(c):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mrpipe.structures import Frame
 
 Need = Literal["network", "observer", "floor-accelerations", "damper-force", "drive-limit"]
-"""What a law may need besides the motion of the damper.
+"""What a law may need in addition to the motion of the damper.
 
 `network`: the trained reference network. `observer`: a state observer, which reads all accelerometers.
 `floor-accelerations`: the accelerometers of ground and floors. `damper-force`: a load cell at the damper.
@@ -144,7 +144,7 @@ class Law:
     gains
         Its free gains.
     needs
-        What it needs besides the motion of the damper.
+        What it needs in addition to the motion of the damper.
     candidates
         From a plant to gains by source: `closed-form`, `exact` and more.
     assess

@@ -33,7 +33,7 @@ COEFFICIENT_STEPS = ("polynomial-coefficients", "drive-laws")
 
 @njit(float64(float64, float64, float64, float64), cache=True)
 def advance_lag(lagged: float, previous: float, present: float, rate_dt: float) -> float:
-    """Return the exact answer of u' = -eta (u - I) to a command that runs straight from `previous` to `present`.
+    """Return the exact answer of u' = -eta (u - I) to a command that is linear from `previous` to `present`.
 
     `rate_dt` is eta times the interval. A straight command between samples keeps the lag right to second order where
     the command was recorded; a held one would come out half a sample late.
@@ -62,7 +62,7 @@ def lag_apart_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     if wire[FIRST] > 0.5:
         state[0] = wire[DRIVE]
     else:
-        # the rate goes by where the command stands over the interval
+        # the mean command over the interval determines the rate
         rate = parameters[0] if abs(wire[DRIVE]) + abs(state[1]) > 2.0 * abs(state[0]) else parameters[1]
         state[0] = advance_lag(state[0], state[1], wire[DRIVE], rate * dt)
     state[1] = wire[DRIVE]

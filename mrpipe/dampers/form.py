@@ -60,7 +60,7 @@ class BaseForm:
     source
         Publication that describes it.
     parameters
-        Its numbers besides the laws of the drive and the lag of the driver, which all forms share.
+        Its numbers, without the laws of the drive and the lag of the driver, which all forms share.
     steps
         (values) -> steps of the chain that set z, p and other forces of the form. Every amplitude has its own step.
     amplitude_steps

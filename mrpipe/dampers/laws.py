@@ -3,7 +3,7 @@
 A magnetic circuit saturates, so the yield force first rises with the drive and then levels off. Few measured levels
 support few coefficients; :mod:`mrpipe.fitting.drive_laws` chooses a law by leaving out whole levels.
 
-Every law is linear in its coefficients but for one scale of the drive. Polynomials are written in Bernstein's basis on
+Every law is linear in its coefficients, except for one scale of the drive. Polynomials are in Bernstein's basis on
 0..limit: where its coefficients are not negative, neither is the polynomial on that range. Coefficients of the
 monotone basis (sums of Bernstein polynomials) that are not negative give a polynomial that does not fall.
 """
@@ -110,7 +110,7 @@ class LawShape:
 
     @property
     def saturates(self) -> bool:
-        """Whether the law has a scale of the drive besides its coefficients."""
+        """Whether the law has a scale of the drive in addition to its coefficients."""
         return self.kind in ("tanh", "langevin", "froehlich")
 
     @property

@@ -80,7 +80,7 @@ class DamperModel:
     laws
         Block -> kind of its law of the drive; polynomials where left out.
     effects
-        What acts besides the base form.
+        What acts in addition to the base form.
     stroke_m
         Half the largest peak-to-peak displacement of the tests [m]: effects with a memory need it for the force at
         constant speed.
@@ -241,7 +241,7 @@ def damper_from_parameter_set(parameters: ParameterSet) -> DamperModel:
     given = {name: float(value) for name, value in parameters.values.items()}
     known = base_forms()
     if parameters.model not in known:
-        raise UserError(source, "model", f"{parameters.model!r} is no damper form", f"known: {', '.join(known)}")
+        raise UserError(source, "model", f"{parameters.model!r} is not a base form", f"known: {', '.join(known)}")
     if "drive_limit" not in given:
         raise UserError(source, "parameters", "no drive_limit", "write {value: 4, unit: A}")
     drive_limit = given.pop("drive_limit")

@@ -110,7 +110,7 @@ def advance_dashpot(
     """Return atanh(z) after `dt` [s] of z' = q (v - v0 atanh z).
 
     A spring of q [1/m] in series with a dashpot that saturates: z = tanh(v/v0) in the steady state. Two-stage
-    diagonally implicit Runge-Kutta (L-stable, second order); the velocity runs straight from `previous` to `present`.
+    diagonally implicit Runge-Kutta (L-stable, second order); the velocity is linear from `previous` to `present`.
     """
     gain = stiffness * dt
     weight = _SDIRK * gain * velocity_scale

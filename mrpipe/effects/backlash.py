@@ -82,7 +82,7 @@ def free_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     left = rod
     moved = 0.0
     place = state[0]
-    # how far the damper can still go with the flank that its force presses on
+    # distance that the damper can still move with the flank that its force presses on
     if abs(place) >= half and force * place > 0.0 and rod * force < 0.0:
         change = state[1] - state[4]
         slope = (force - state[3]) / change if abs(change) > 1e-12 else 0.0

@@ -227,7 +227,7 @@ def _steps(form: EffectForm, size: Size) -> str:
     motion = motion_of(size)
     for step in steps:
         if not isinstance(step.phase, Phase):
-            return f"step {step.name}: the phase is no Phase"
+            return f"step {step.name}: the phase is not a Phase"
         failure = _within_memory(step, motion)
         if failure:
             return f"step {step.name}: {failure}"

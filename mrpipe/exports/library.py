@@ -44,7 +44,7 @@ def chosen_formats(kind: str, names: Iterable[str]) -> list[ExportFormat]:
         return [item for item in known.values() if not item.needs or importlib.util.find_spec(item.needs)]
     for name in named:
         if name not in known:
-            raise UserError("--format", name, f"is no format of a {kind}", f"one of {', '.join(known)}")
+            raise UserError("--format", name, f"is not a format of a {kind}", f"one of {', '.join(known)}")
         needs = known[name].needs
         if needs and not importlib.util.find_spec(needs):
             raise UserError("--format", name, f"needs the package {needs}", install_extra(name))

@@ -334,7 +334,7 @@ def _offsets(problem: Problem, offsets: FloatArray) -> FloatArray:
 def _settled_shape(found: FormFit, options: FitOptions, unit: str) -> FormFit:
     """Return the fit with gamma = beta where the data do not determine their ratio.
 
-    On many real loops the share of gamma runs to its bound and gains next to nothing there. It is taken as the thesis
+    On many real loops the share of gamma runs to its bound and hardly improves the fit there. It is taken as the thesis
     prints it (gamma = beta, share 0.5) unless that costs more than :data:`WORTHWHILE` of the error.
     """
     if "gamma_share" not in found.at_bound:

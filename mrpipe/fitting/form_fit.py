@@ -268,7 +268,7 @@ def _nelder_mead(problem: Problem, begin: FloatArray) -> Fit:
 def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return covariance and correlation of the model's parameters.
 
-    What a model leaves is no white noise, so the covariance is the sandwich over stretches of the recordings whose
+    What a model leaves is not white noise, so the covariance is the sandwich over stretches of the recordings whose
     errors are correlated; the correlation is that of the curvature alone.
     """
     problem = found.problem

@@ -31,10 +31,10 @@ MOST_JUDGED = 200_000
 """Errors on validation tests are judged on up to so many samples: they are simulated once, not fitted."""
 
 JUMP_RATE_HZ = 500.0
-"""Least rate of a test whose drive jumps: between samples it is taken to run straight, a jump must not be smeared."""
+"""Minimum sampling rate of a test with drive steps: the drive is interpolated linearly, which smears steps."""
 
 CUTOFF_MARGIN = 1.5
-"""The displacement is cut off so much above the frequency where it sinks into its noise."""
+"""The displacement is cut off at this multiple of the frequency above which it is below its noise."""
 
 QUANTISED_SHARE = 0.5
 """A channel with fewer different values than this share of its samples is quantised."""
@@ -175,7 +175,7 @@ def record_tests(
     cutoff_hz
         Cut-off of the displacement; 0 chooses it for each test by criterion.
     longest_s
-        Of longer tests only so much is used.
+        Longer tests are cut to this length.
     most_samples
         Of campaigns that hold more only so many are used, the same time of every test.
     """

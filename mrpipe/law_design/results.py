@@ -49,7 +49,7 @@ def point_as_json(item: Evaluation) -> dict[str, Any]:
 
 
 def design_as_json(result: Result, weights: Mapping[str, float]) -> dict[str, Any]:
-    """Return what `mrpipe design --json` prints, but for times.
+    """Return what `mrpipe design --json` prints, without wall-clock times.
 
     Parameters
     ----------

@@ -190,7 +190,7 @@ def _completed(shapes: FloatArray, modes: PartialModes, masses: FloatArray) -> F
     With L = M^(1/2) the mass-normalised shapes form an orthogonal matrix. Its measured rows A are known up to a scale
     d_r of each mode, and A diag(d^2) A' = 1 gives these scales. The other rows span the complement of the measured
     ones. Of all rotations of the complement the one is taken that leaves the smallest stiffness between floors that
-    are no neighbours, because the measurements cannot show it.
+    are not neighbours, because the measurements cannot show it.
     """
     root = np.sqrt(masses)[:, None]
     rows = list(modes.measured)

@@ -66,7 +66,7 @@ def choose_tests(
 
 
 def _is_sound(fit: MultiModeFit, layout: Layout) -> bool:
-    """Return whether all modes were found, each stands out, and the shapes are orthogonal to the mass."""
+    """Return whether all modes were found, each is well above the noise, and the shapes are orthogonal to the mass."""
     if fit.mode_coherence().min() < _ENOUGH_COHERENCE:
         return False
     if not layout.is_chain or layout.masses is None or not all_floors_measured(fit, layout):

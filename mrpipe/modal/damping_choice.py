@@ -26,9 +26,7 @@ def decays_of_modes(tests: FrameTests, fit: MultiModeFit) -> tuple[dict[int, Dec
             continue
         result = analyse_decay(common, shapes, fit.angular_frequencies, fit.damping_ratios)
         if result is None:
-            findings.append(
-                f"test {test.name}: fewer than six peaks of a free decay stand out of the noise; it was left out"
-            )
+            findings.append(f"test {test.name}: fewer than six peaks of a free decay exceed the noise; it was left out")
             continue
         known = results.get(result.mode)
         if known is None or result.exponential_fit.half_width < known.exponential_fit.half_width:

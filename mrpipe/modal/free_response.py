@@ -1,7 +1,7 @@
 """What free decays say of modes that the forced tests hardly show: frequency, damping and shape.
 
 A table that moves all floors alike leaves the highest modes of a tall frame nearly at rest, and their peaks drown in
-the noise of a sweep. A decay test has driven its mode at resonance before it let go, so the mode stands out there, and
+the noise of a sweep. A decay test has driven its mode at resonance before it let go, so the mode dominates there, and
 after the stop every floor's accelerometer gives the shape, with no excitation to be known.
 """
 
@@ -82,7 +82,7 @@ def free_mode(
     mode
         Of the poles given.
     angular_frequencies, damping_ratios
-        Poles, shape (r,): start for this mode, and what else may ring besides.
+        Poles, shape (r,): start for this mode, and for other modes that may ring.
     """
     rate, omega = test.sampling_rate_hz, float(angular_frequencies[mode])
     responses = _accelerations(test)

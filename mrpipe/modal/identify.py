@@ -187,7 +187,7 @@ def _identify(
     progress(0.75, "verification")
     corrected_tests = {test.name: test for test in chosen.tests}
     shown = tuple(corrected_tests.get(test.name, test) for test in forced)
-    # beyond its highest mode the frame says nothing of what a flexible support does
+    # beyond its highest mode the frame carries no information on a flexible support
     band = chosen.search.band_hz
     inside = (band[0], min(band[1], 1.15 * float(fit.angular_frequencies[-1]) / (2.0 * np.pi)))
     frame = assembly.frame

@@ -121,7 +121,7 @@ def couplings(fit: MultiModeFit, layout: Layout) -> tuple[FloatArray, FloatArray
 
 
 def sign_ranges(fit: MultiModeFit, layout: Layout, tolerance: float = _SHAPE_TOLERANCE) -> list[tuple[int, int]]:
-    """Return the fewest and the most sign changes that each shape can have; floors without a sensor leave it open."""
+    """Return the fewest and the most sign changes that each shape can have; a missing sensor widens the range."""
     shapes, errors = floor_shapes(fit, layout)
     largest = np.abs(shapes).max(axis=0)
     return [

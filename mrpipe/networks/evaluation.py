@@ -229,7 +229,7 @@ class Judgement:
         span
             Range of the target. Where it is given (drive of an inverse network) errors are also shown as a share of it,
             and relative errors are left out for groups whose target is constant within each test: the RMS of a drive
-            of 0 A says nothing about the error.
+            of 0 A is not a measure of the error.
         """
         groups = [
             ("all", self.pooled),

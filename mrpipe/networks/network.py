@@ -39,7 +39,7 @@ class FeatureSpec:
     channels
         Input channels in order, such as ("velocity", "drive") of (2.8) or ("velocity", "force") of (2.9).
     past_values
-        How many past values of each channel besides the present one.
+        How many past values of each channel, in addition to the present one.
     absolute
         Absolute values of all channels are taken, as in (2.9).
     sampling_rate_hz

@@ -47,7 +47,7 @@ def training_plan(
     Parameters
     ----------
     options
-        Settings of the stage; an architecture `sweep` is replaced by what the sweep chose.
+        Settings of the stage; an architecture `sweep` is replaced by the one that the sweep chose.
     training_set
         Artifact of `assemble`.
     choice

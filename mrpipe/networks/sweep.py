@@ -294,7 +294,7 @@ def _iteration_seconds(
     seconds = []
     for rows in (options.screen_rows, options.refine_rows):
         fitted = problem(rows)
-        # processor time: who else uses the machine for these few iterations says nothing of the hours to come
+        # processor time, because the load of the machine in these iterations does not predict that of later hours
         began = time.thread_time()
         outcome = fit(fitted, start, method=options.method, rules=rules, held_out=held)
         seconds.append((time.thread_time() - began) / max(1, outcome.iterations))
@@ -310,7 +310,7 @@ def _number(key: str) -> int:
 
 
 def _digest_of(data: _Data, options: SweepOptions, seed: int) -> str:
-    """Return a digest of all that a fit depends on besides its candidate."""
+    """Return a digest of all that a fit depends on, without its candidate."""
     digest = hashlib.sha256()
     fits = options.model_dump(exclude={"refined", "design", "states", "past_values", "layers", "neurons", "biases"})
     digest.update(json.dumps([fits, data.normalisation, seed], sort_keys=True).encode())

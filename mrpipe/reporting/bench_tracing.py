@@ -194,7 +194,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     flexible = len(effects) < len(summary["effects"])
     added = (
         f" As requested, a flexible model is added as the effect `unattributed`, with which the error is "
-        f"{_percent(after)}: it stands for no physics and does not run in the closed loop."
+        f"{_percent(after)}: it has no physical meaning and does not run in the closed loop."
         if flexible
         else ""
     )

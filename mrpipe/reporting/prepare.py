@@ -28,7 +28,7 @@ class PreparedCampaign:
     preparations
         Its tests, prepared.
     rows
-        What is said of each (:func:`mrpipe.signals.summary.preparation_row`).
+        Row of each test (:func:`mrpipe.signals.summary.preparation_row`).
     """
 
     campaign: Campaign

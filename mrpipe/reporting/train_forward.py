@@ -23,7 +23,7 @@ class TrainedForward:
     validation
         Validation tests.
     free
-        Errors where the network runs on its own past outputs; None where these are no inputs.
+        Errors where the network runs on its own past outputs; None where these are not inputs.
     """
 
     trained: Trained

@@ -71,7 +71,7 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
     Parameters
     ----------
     displacement
-        Shape (n,), low-passed; an offset does no harm.
+        Shape (n,), low-passed; an offset does not matter.
     sampling_rate_hz
         Rate.
     fewest

@@ -94,7 +94,7 @@ def cutoff_by_criterion(
 
 
 def signal_end(values: FloatArray, sampling_rate_hz: float) -> float:
-    """Return the frequency [Hz] up to which a motion stands out of its noise; half the rate where it does all over.
+    """Return the frequency [Hz] up to which a motion exceeds its noise; half the rate where it does at all frequencies.
 
     Short windows smear a slow sine over tens of hertz, which then looks like signal. Here windows are half the record
     long and fall off by 92 dB (Blackman-Harris); a density counts only where it exceeds what so few windows scatter.

@@ -1,4 +1,4 @@
-"""What is said of prepared tests: one row for each, and findings that several tests share on one line."""
+"""Summary of prepared tests: one row for each, and findings that several tests share on one line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def summarised(lines: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def preparation_row(item: Preparation) -> dict[str, Any]:
-    """Return what is said of one prepared test, by name (SI)."""
+    """Return the row of one prepared test: name -> value (SI)."""
     test = item.test
     return {
         "name": test.name,

@@ -27,7 +27,7 @@ LEAST_ENERGY = 0.02
 """Below this share of the energy the motion is not a decay any more."""
 
 SMALLEST_FITTED_PEAK = 0.15
-"""Peaks below this share of the first are no decay under control any more: residual force or a locked damper."""
+"""Peaks below this share of the first are not part of the controlled decay: residual force or a locked damper."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     drive = response.drive
     if len(turns):
         turns = turns[np.abs(x[turns]) > SMALLEST_PEAK * np.max(np.abs(x[turns]))]
-    # a wiggle of a higher mode is no half period: an extremum counts when the displacement changes sign between
+    # a wiggle of a higher mode is not a half period: an extremum counts when the displacement changes sign between
     keep: list[int] = []
     for turn in turns:
         if keep and x[turn] * x[keep[-1]] > 0.0:

@@ -1,6 +1,6 @@
 """The compiled loop of Figure 5.3: frame, damper, sensors and controller.
 
-One plant step: the frame's linear part is exact for inputs that run straight between the ends of the step
+One plant step: the frame's linear part is exact for inputs that are linear between the ends of the step
 (`discretise_first_order`), and the force at its end is found together with the motion there, by fixed point and, where
 a law jumps, by bisection. See docs/numerics.md.
 """

@@ -103,7 +103,7 @@ class LoopOptions:
     delay_s
         From sampling to output of the controller.
     driver_time_constant_s
-        Lag of the current driver besides what the damper's model has; 0: none.
+        Lag of the current driver in addition to that of the damper's model; 0: none.
     noise
         Of the sensors.
     fault

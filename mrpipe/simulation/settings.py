@@ -120,11 +120,11 @@ class SimulateSettings(Section):
     ideal_rounding_m_s: float | None = Field(
         None,
         ge=0.0,
-        description="Speed over which the friction of a perfect damper changes its sign; 0: a jump; null: half as much "
-        "again as calibrated, since no yielding rounds it besides.",
+        description="Speed over which the friction of a perfect damper changes its sign; 0: a jump; null: 1.5 times "
+        "the calibrated one, because there is no yielding that would round it.",
     )
     driver_time_constant_s: float = Field(
-        0.0, ge=0.0, description="Lag of the current driver besides the damper's own."
+        0.0, ge=0.0, description="Lag of the current driver in addition to the damper's own."
     )
     accelerations: Literal["relative", "absolute"] = Field(
         "relative", description="Which accelerations `simulate --resonance` and `design` judge."

@@ -1,6 +1,6 @@
 """The compiled loop of a structure with several dampers, each with its own controller and perhaps behind a brace.
 
-The structure's linear part is exact for inputs that run straight between the ends of a step. The forces at the end of a
+The structure's linear part is exact for inputs that are linear between the ends of a step. The forces at the end of a
 step are found together with the motion there: damper by damper, repeated until no force changes. A brace has no mass;
 the rate of its deformation is the backward difference of second order, which damps what the step cannot resolve.
 """

@@ -20,7 +20,7 @@ from mrpipe.simulation.loop import Response
 from mrpipe.simulation.rig import Rig
 
 MARGIN = 0.02
-"""How far beyond the range counts as within, as a share of the range: noise at the edge is no extrapolation."""
+"""How far beyond the range counts as within, as a share of the range: noise at the edge is not an extrapolation."""
 
 WORTH_A_WARNING = 1e-3
 """Share of time outside above which it is warned of: six hundredths of a second in a minute, one strong peak."""

@@ -130,7 +130,7 @@ def _train_reference(
         starts=neural.starts,
         iterations=neural.iterations,
         rounding_m_s=rounding_m_s,
-        # what lies above a quarter of the rate is no motion to the network
+        # what lies above a quarter of the rate is not motion to the network
         disturbances_rad_s=tuple(others[others < 0.5 * np.pi * neural.rate_hz]),
         disturbance_share=neural.disturbance_share,
         displacement_noise_m=INPUT_NOISE[0] * amplitude,

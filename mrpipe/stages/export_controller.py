@@ -1,7 +1,7 @@
 """`export controller [--law LAW]`: calibrated controllers as C and JSON for a real-time target.
 
-Without a law, the one of the setting `export.law` is written to `controller/`. Each law that is named has a stage and a
-folder of its own, `controller/LAW/`, so that the export of one law leaves those of the others in place.
+Without a law, the one of the setting `export.law` is written to `controller/`. Each law that is named has its own stage
+and folder, `controller/LAW/`, so that the export of one law leaves those of the others in place.
 """
 
 from __future__ import annotations

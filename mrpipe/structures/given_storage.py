@@ -29,7 +29,7 @@ def read_matrix(file: Path, name: str) -> Any:
     if file.suffix == ".py":
         matrices = opensees_matrices(file)
         if name not in matrices:
-            raise UserError(file, name, "is no matrix of an OpenSees model", "M, C or K")
+            raise UserError(file, name, "is not a matrix of an OpenSees model", "M, C or K")
         return matrices[name]
     found = open_data_file(file)
     if name:

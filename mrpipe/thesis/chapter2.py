@@ -158,7 +158,7 @@ def _networks(
             by,
             f"error {ahead.varying.nrmse:.3f} with varying and {ahead.constant.nrmse:.3f} with constant current",
         ),
-        # the RMS of a constant current of 0 A is no scale for an error, so RMS errors are compared
+        # the RMS of a constant current of 0 A is not a scale for an error, so RMS errors are compared
         "F2-half-sine-inverse": Value(
             back.varying.rms / back.constant.rms,
             by,

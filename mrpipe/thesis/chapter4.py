@@ -150,7 +150,7 @@ def _tables(bench: Bench) -> Outcomes:
     amplitude = amplitude_of(rig, top / np.sqrt(2.0))
     runs = {law: run_law(rig, law, excite(amplitude), bench.seed) for law in bench.laws if law != "vdps"}
     peaks = {law: cycle_peaks(run) for law, run in runs.items()}
-    # the viscous damper of P3 is no MR damper: its force is c times the true velocity at every instant
+    # the viscous damper of P3 is not an MR damper: its force is c times the true velocity at every instant
     linear = replace(rig, options=replace(rig.options, tracking="continuous", noise=SensorNoise()))
     peaks["viscous"] = cycle_peaks(run_law(linear, "vd", excite(amplitude), bench.seed))
     by = f"closed loop of {bench.source} at {OMEGA:g} rad/s and {amplitude:.3f} m/s^2"

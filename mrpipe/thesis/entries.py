@@ -156,7 +156,7 @@ INDICES = ("rms_x5_m", "rms_x1_m", "rms_a5_m_s2", "rms_a1_m_s2")
 def loop_columns(law: str) -> dict[str, dict[str, float]]:
     """Return source -> index -> value of the harmonic closed loop under a law: Table 5.1 and the errata page.
 
-    Empty for a law of which neither says anything.
+    Empty for a law that neither of them lists.
     """
     found = {
         f"thesis {name}": columns[law]

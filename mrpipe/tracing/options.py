@@ -72,7 +72,7 @@ class TracingSettings(NamingRules):
         ge=0.0,
         lt=1.0,
         description="Model error to weigh by, as a share of the force RMS, where it is known to outweigh the sensors' "
-        "noise, as on real dampers; 0 finds out by a first pass, for twice the time.",
+        "noise, as on real dampers; 0: estimated by a first pass, which doubles the run time.",
     )
     rules: TracingRules = Field(TracingRules(), description="Thresholds of the decisions.")
     unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")

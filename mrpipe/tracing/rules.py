@@ -66,8 +66,8 @@ class ValidationRules(Section):
     deviation: float = Field(
         0.03,
         gt=0.0,
-        description="A gain that differs from 1 by less is not reported: load cells and their amplifiers are no "
-        "better.",
+        description="A gain that differs from 1 by less is not reported, because it is within the accuracy of "
+        "load cells and their amplifiers.",
     )
     spreads: float = Field(
         4.0,
@@ -286,7 +286,8 @@ class SelectionRules(Section):
     lead: float = Field(
         1.25,
         ge=1.0,
-        description="It is named only if every other family leaves at least this multiple of what it leaves.",
+        description="It is named only if the residual of every other family is at least this multiple of the "
+        "residual of the named one.",
     )
     contender_share: float = Field(
         0.3,
@@ -324,7 +325,7 @@ class SelectionRules(Section):
 
 
 BY_FORCE = SelectionRules(gain=0.02, term_share=0.06, named_share=0.25, lead=1.0)
-"""Numerical technique: defaults where weights go by the RMS force, because the error of any model exceeds the noise."""
+"""Numerical technique: defaults for weights relative to the RMS force: no model reaches the noise."""
 
 
 class RaceRules(Section):
@@ -364,8 +365,8 @@ class ModelErrorRules(Section):
     chi_square: float = Field(
         6.0,
         gt=1.0,
-        description="If the best model leaves this multiple of the noise, the noise is not the measure: weights go by "
-        "the RMS force.",
+        description="If the best model leaves this multiple of the noise, noise is not the measure: the weights are "
+        "relative to the RMS force.",
     )
     better_form: float = Field(
         0.5,
@@ -410,7 +411,7 @@ class RefinementRules(Section):
 
 
 class RemainderRules(Section):
-    """When something remains unexplained, and what is said of it. All numbers are dimensionless."""
+    """When something remains unexplained, and how it is reported. All numbers are dimensionless."""
 
     of_excess: float = Field(
         0.1,
@@ -474,7 +475,7 @@ class FrameRules(Section):
         1e-5,
         gt=0.0,
         lt=1.0,
-        description="Probability that noise alone makes any group of lines stand out. It is small because a campaign "
+        description="Probability that noise alone makes any group of lines significant. It is small because a campaign "
         "has hundreds of groups and noise of real sensors is not perfectly white.",
     )
     coloured: float = Field(
@@ -486,7 +487,7 @@ class FrameRules(Section):
     of_response: float = Field(
         0.01,
         gt=0.0,
-        description="What stands out of the noise matters if it is this share of the shear force of a storey in a "
+        description="A residual above the noise is material if it is this share of the shear force of a storey in a "
         "record.",
     )
     of_floor: float = Field(
@@ -545,7 +546,7 @@ class FrameRules(Section):
     least_storey: float = Field(
         0.05,
         ge=0.0,
-        description="Storeys with a smaller share of what stands out get no flexible model for the ceiling.",
+        description="Storeys with a smaller share of the residual above the noise get no flexible model.",
     )
     listed: float = Field(
         0.002,
@@ -574,7 +575,7 @@ class BraceRules(Section):
         gt=0.0,
         lt=1.0,
         description="A brace that removes this share of the recoverable squared error takes precedence: rival effects "
-        "of the damper are then weighed by what the brace leaves.",
+        "of the damper are then weighed by the residual of the brace model.",
     )
     better: float = Field(
         0.8,
@@ -638,7 +639,7 @@ class LoopRules(Section):
     alike: float = Field(
         0.01,
         ge=0.0,
-        description="Laws whose RMS responses differ by less than this share have no order, because repeated tests "
+        description="Laws whose RMS responses differ by less than this share are not ranked, because repeated tests "
         "differ as much.",
     )
     diverged: float = Field(
@@ -680,7 +681,8 @@ class TracingRules(Section):
     )
     selection: SelectionRules = Field(SelectionRules(), description="When forward selection adds and names an effect.")
     selection_by_force: SelectionRules = Field(
-        BY_FORCE, description="The same where weights go by the RMS force, because any model's error exceeds the noise."
+        BY_FORCE,
+        description="The same for weights relative to the RMS force, where any model's error exceeds the noise.",
     )
     race: RaceRules = Field(RaceRules(), description="How base forms with and without effects are compared.")
     model_error: ModelErrorRules = Field(ModelErrorRules(), description="When the sensors' noise is not the measure.")

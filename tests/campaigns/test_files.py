@@ -191,11 +191,11 @@ def test_damaged_files_are_told_in_a_line(tmp_path: Path, name: str, content: by
     ("column", "expected"),
     [
         ("x_G[:,2]", "no column 'x_G[:,2]'; did you mean x_F?"),
-        ("x_F", "is no vector (500 x 3); pick one column, as in x_F[:,0]"),
+        ("x_F", "is not a vector (500 x 3); pick one column, as in x_F[:,0]"),
         ("x_F[:,3]", "lies outside an array of 500 x 3; count from 0"),
         ("x_F[:,a]", "index [:,a] is not understood"),
         ("note", "column 'note' holds no numbers"),
-        ("one", "is no vector (one number)"),
+        ("one", "is not a vector (one number)"),
     ],
 )
 def test_columns_that_do_not_fit(tmp_path: Path, column: str, expected: str) -> None:

@@ -95,7 +95,7 @@ def test_several_segments_keep_what_lies_between_them_out(tmp_path: Path) -> Non
             "force.colum: unknown key; did you mean col",
         ),
         ({"channels": {**CHANNELS, "force": {"column": "F"}}}, "line 17, channels.force.unit: is missing"),
-        ({"channels": {**CHANNELS, "force": {"column": "F", "unit": "Nm"}}}, "unit 'Nm': is no unit of force"),
+        ({"channels": {**CHANNELS, "force": {"column": "F", "unit": "Nm"}}}, "unit 'Nm': is not a unit of force"),
         ({"channels": {**CHANNELS, "force": {"column": "F", "unit": "newt"}}}, "unit 'newt': is not a unit"),
         (
             {"channels": {**CHANNELS, "force": {"column": "Ft", "unit": "N"}}},
@@ -109,7 +109,7 @@ def test_several_segments_keep_what_lies_between_them_out(tmp_path: Path) -> Non
         ({"sampling_rate_hz": 500}, "the clock runs at 1000 Hz, but sampling_rate_hz says 500"),
         ({"sampling_rate_hz": -1}, "sampling_rate_hz: is -1"),
         ({"tests": []}, "tests: is empty; list one test"),
-        ({"directory": "elsewhere"}, "directory: 'elsewhere' is no directory"),
+        ({"directory": "elsewhere"}, "directory: 'elsewhere' is not a directory"),
     ],
 )
 def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: dict, expected: str) -> None:
@@ -182,7 +182,7 @@ def test_words_among_numbers_are_told_with_their_line(tmp_path: Path) -> None:
     lines = (tmp_path / "one.csv").read_text().splitlines()
     lines[7] = lines[7].replace(lines[7].split(",")[4], "overload")
     (tmp_path / "one.csv").write_text("\n".join(lines))
-    assert "one.csv: line 8, column F: 'overload' is no number" in told(directory)
+    assert "one.csv: line 8, column F: 'overload' is not a number" in told(directory)
 
 
 @pytest.mark.golden
@@ -194,7 +194,7 @@ def test_yaml_faults_are_told_with_their_line(tmp_path: Path) -> None:
     (directory / "campaign.yaml").write_text("campaign: [1, 2\nrig: x\n")
     assert "campaign.yaml: line 2" in told(directory)
     (directory / "campaign.yaml").write_text("just words\n")
-    assert "is no mapping" in told(directory)
+    assert "is not a mapping" in told(directory)
 
 
 @pytest.mark.planted

@@ -59,7 +59,7 @@ MISTAKES = {
     "no campaign": (["prepare", "--campaign", "nowhere"], "nowhere"),
     "no file to show": (["show", "nowhere.h5"], "nowhere.h5: no such file or directory"),
     "no picture": (["show", "README.md", "--plot", "x.txt"], "end it in .png, .svg or .pdf"),
-    "no rig": (["record", "--rig", "table"], "--rig: table: is no rig; one of bench, frame, closed-loop"),
+    "no rig": (["record", "--rig", "table"], "--rig: table: is not a rig; one of bench, frame, closed-loop"),
     "nothing to export": (["export", "plant"], "export: plant: cannot be exported"),
     "no run to report": (["report", "nowhere"], "no such run directory"),
     "no run for status": (["status", "nowhere"], "no such run directory"),

@@ -71,7 +71,7 @@ def test_a_json_result_is_printed_and_an_unreadable_one_is_one_line(
     assert "  verdict: backlash" in shown(capsys, str(tmp_path / "close-loop.json"))
     (tmp_path / "close-loop.json").write_text("{", encoding="utf-8")
     assert run(["show", str(tmp_path / "close-loop.json")]) == 2
-    assert "is no JSON that can be read" in capsys.readouterr().err
+    assert "is not JSON that can be read" in capsys.readouterr().err
 
 
 @pytest.mark.golden

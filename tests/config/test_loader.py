@@ -24,7 +24,7 @@ FAULTS = {
     ),
     "key twice": ("seed: 1\nname: x\nseed: 2\n", "line 3, seed: appears already in line 1; keep one of the two"),
     "no YAML": ("seed: [1\n", "not valid YAML"),
-    "no mapping": ("- a\n- b\n", "line 1: is no mapping; write `key: value` lines"),
+    "no mapping": ("- a\n- b\n", "line 1: is not a mapping; write `key: value` lines"),
     "section is a number": ("prepare: 3\n", "line 1, prepare: is 3; input should be a valid dictionary"),
     "code in YAML": (
         "name: !!python/object/apply:os.system ['true']\n",
@@ -48,7 +48,7 @@ def test_fault_is_one_line_with_place(fault: str, tmp_path: Path) -> None:
 
 OVERRIDES = {
     "prepare.cutof_hz=80": "--set: prepare.cutof_hz: unknown key; did you mean cutoff_hz?",
-    "prepare": "--set: prepare: is no assignment; write section.key=value",
+    "prepare": "--set: prepare: is not an assignment; write section.key=value",
     "seed=many": "--set: seed: is 'many'; input should be a valid integer",
     "train_inverse.architecture=[12, six]": "train_inverse.architecture.1: is 'six'; input should be a valid int",
     "train_inverse.architecture=[0]": "--set: train_inverse.architecture.0: is 0; input should be greater than 0",

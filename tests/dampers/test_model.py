@@ -141,7 +141,7 @@ def parameter_file(tmp_path: Path, text: str) -> Path:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("model: bouc-wenn\nparameters:\n  drive_limit: {value: 4, unit: A}\n", "'bouc-wenn' is no damper form"),
+        ("model: bouc-wenn\nparameters:\n  drive_limit: {value: 4, unit: A}\n", "'bouc-wenn' is not a base form"),
         ("model: bouc-wen\nparameters:\n  A: {value: 4, unit: '1'}\n", "no drive_limit"),
         (
             "model: bouc-wen\nparameters:\n  A: {value: 4, unit: '1'}\n  drive_limit: {value: 4, unit: A}\n",

@@ -49,7 +49,7 @@ class Sensors:
 
 
 def random_tower(rng, floors=None, coupling=0.03, damping=(0.006, 0.02)):
-    """A shear tower of unequal storeys whose stiffness also couples floors that are no neighbours."""
+    """A shear tower of unequal storeys whose stiffness also couples floors that are not neighbours."""
     floors = floors or int(rng.integers(5, 9))
     mass = 45e3 * rng.uniform(0.8, 1.2, floors)
     storeys = rng.uniform(0.75, 1.25, floors) * np.linspace(1.2, 0.9, floors)

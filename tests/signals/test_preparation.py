@@ -374,7 +374,7 @@ def test_faults_of_the_load_cell_that_are_known_are_taken_out() -> None:
     (plain,) = prepare_campaign(campaign(test), PreparationOptions()).tests
     (mended,) = prepare_campaign(source, PreparationOptions(corrections=faults)).tests  # type: ignore[arg-type]
     assert mended.test.force_n == pytest.approx(plain.test.force_n, abs=1e-9)
-    # what was taken out is no offset that the test remembers: tracing it again finds it gone
+    # what was taken out is not an offset that the test remembers: tracing it again finds it gone
     assert mended.test.force_offset_n == pytest.approx(plain.test.force_offset_n, abs=1e-9)
 
 

@@ -25,7 +25,7 @@ def test_headers_separators_and_units(tmp_path):
         ("0 1\n0 2\n", "m/s^2", "row 2: time does not rise"),
         ("0 1\n1\n", "m/s^2", "line 2: has no two numbers"),
         ("a b\n", "m/s^2", "holds 0 rows"),
-        ("0 1\n1 2\n", "mm", "is no unit of acceleration"),
+        ("0 1\n1 2\n", "mm", "is not a unit of acceleration"),
         ("0 1\n1 nan\n", "m/s^2", "not finite"),
     ],
 )

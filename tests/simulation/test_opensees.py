@@ -29,7 +29,7 @@ needs_opensees = pytest.mark.skipif(
 
 
 def coupled_structure() -> Frame:
-    """Return a structure that is no shear frame: full M, C and K, and a degree of freedom without ground motion."""
+    """Return a structure that is not a shear frame: full M, C and K, and a degree of freedom without ground motion."""
     rng = np.random.default_rng(3)
     plain = shear_frame([25.0] * 4, [3.0e4] * 4, np.full(4, 0.01), name="storeys", source="test")
     part = 0.05 * rng.standard_normal((4, 4))

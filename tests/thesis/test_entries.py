@@ -32,7 +32,7 @@ def test_every_number_of_the_result_tables_is_there() -> None:
     found = Counter(entry.table for entry in all_entries() if entry.kind == "table")
     assert found == NUMBERS
     assert sum(found.values()) == 164
-    # only the response that sets the amplitude of the base is no result
+    # only the response that sets the amplitude of the base is not a result
     given = [entry.id for entry in all_entries() if entry.given]
     assert given == ["P3-T1-vd-peak_x5_m", "T4.1-vd-peak_x5_m", "T5.1s-vd-rms_x5_m", "T5.1m-vd-rms_x5_m"]
 

@@ -26,7 +26,7 @@ class Agreement:
         Correlation of measured and predicted force.
     log_gain_error
         Standard error of log(gain) by the jackknife over the other tests; infinite where the prediction depends on
-        single tests so much that it says nothing.
+        single tests so much that it is not usable.
     highest_correlation
         Highest correlation that any jackknife prediction reaches.
     """

@@ -15,7 +15,7 @@ SPIKE_SHARE = 0.3
 
 
 def is_dead(values: FloatArray) -> bool:
-    """Return whether a channel holds one single value but for the rounding of numbers."""
+    """Return whether a channel holds one single value, apart from the rounding of numbers."""
     return bool(np.ptp(values) <= 1e-12 * max(float(np.abs(values).max()), 1e-300))
 
 

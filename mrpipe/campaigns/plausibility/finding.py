@@ -70,7 +70,7 @@ class TestArrays:
     `drive` is in A or V, the same unit for all tests of a comparison.
     """
 
-    __test__ = False  # the name is no test case for pytest
+    __test__ = False  # the name is not a test case for pytest
 
     name: str
     time_s: FloatArray

@@ -329,7 +329,7 @@ def _decades(tests: Sequence[Slow]) -> list[Finding]:
         ratio = float(ratios[cut - 1])
         large = channel == "drive" or len(order) - cut <= cut
         named = order[cut:] if large else order[:cut]
-        # a drive near zero is noise, so ratios alone say nothing
+        # a drive near zero is noise, so ratios alone carry no information
         suspect = channel != "drive" or (sizes[order[cut]] > LARGE_DRIVE and len(order) - cut <= cut)
         if not suspect or ratio <= decades:
             continue

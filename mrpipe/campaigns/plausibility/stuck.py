@@ -132,7 +132,7 @@ def _states(displacement: FloatArray, drive: FloatArray) -> tuple[FloatArray, fl
     velocity = uniform_filter1d(np.gradient(centred), max(3, int(cycle / 60.0)))
     columns = [centred, velocity, drive - np.mean(drive)]
     spreads = [float(np.std(column)) for column in columns]
-    # the noise of a constant drive is no state
+    # the noise of a constant drive is not a state
     spreads[2] = max(spreads[2], 0.1 * float(np.abs(drive).max()))
     scaled = [column / spread for column, spread in zip(columns, spreads, strict=True) if spread > 0.0]
     return np.stack(scaled, axis=1), cycle

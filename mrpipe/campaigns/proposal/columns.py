@@ -1,4 +1,4 @@
-"""Which column of a file is which channel, from its header and, where that says nothing, from its samples."""
+"""Which column of a file is which channel, from its header or, if the header names no quantity, from its samples."""
 
 from __future__ import annotations
 
@@ -245,12 +245,12 @@ def _drive_unit(values: FloatArray) -> str:
 
 
 def _by_samples(channels: dict[str, Guess], taken: set[str], columns: list[Column]) -> None:
-    """Propose displacement, force and drive among columns whose headers say nothing.
+    """Propose displacement, force and drive among columns whose headers name no quantity.
 
     A drive is constant or has few levels. Of the others, the displacement has the lowest mean frequency, because a
     damper distorts its force.
     """
-    why = "the header says nothing; guessed from the samples"
+    why = "the header names no quantity; guessed from the samples"
     constant = [item for item in columns if _few_levels(item.values)]
     moving = [item for item in columns if item not in constant]
     if "drive" not in channels and constant:

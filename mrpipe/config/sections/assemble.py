@@ -24,7 +24,7 @@ class AssembleSettings(Section):
         gt=0.0,
         description="Rate of the networks; the record is decimated by the nearest whole factor, or kept where slower.",
     )
-    past_values: int = Field(3, ge=0, le=50, description="Past values of each input besides the present one.")
+    past_values: int = Field(3, ge=0, le=50, description="Past values of each input, in addition to the present one.")
     forward_inputs: tuple[ForwardInput, ...] = Field(
         ("velocity", "drive"), min_length=1, description="Input channels of the forward network, in order (2.8)."
     )

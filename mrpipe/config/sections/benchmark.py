@@ -69,8 +69,7 @@ class BaseIsolatedSettings(Section):
 
     model: str | None = Field(
         None,
-        description="Path of the published STRUC.mat; `published` for that of the public data; null: the surrogate of "
-        "our own.",
+        description="Path of the published STRUC.mat; `published` for that of the public data; null: the surrogate.",
     )
     surrogate: str = Field(
         "base-isolated-surrogate", description="Parameter set in configs/structures (or YAML file) of the surrogate."
@@ -78,7 +77,7 @@ class BaseIsolatedSettings(Section):
     bearing_stiffness_n_m: float = Field(919.422e3, gt=0.0, description="Of each bearing, published model [N/m].")
     bearing_viscosity_n_s_m: float = Field(27.717e3, ge=0.0, description="Of each bearing, published model [N s/m].")
     motion: MotionSettings = Field(MotionSettings(), description="Ground motion of two components.")
-    all_motions: bool = Field(False, description="Run all seven public motions besides (--all).")
+    all_motions: bool = Field(False, description="Also run all seven public motions (--all).")
     laws: tuple[str, ...] = Field(
         ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on"),
         min_length=1,

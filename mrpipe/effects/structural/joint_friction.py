@@ -79,11 +79,7 @@ EFFECT = StructuralEffect(
         StructuralForm(
             "coulomb",
             "F 2/pi atan(rate/v0)",
-            (
-                shape(
-                    "rounding_speed", "m/s", "speed over which the force turns round", "speed", 1e-4, 0.2, (0.005, 0.04)
-                ),
-            ),
+            (shape("rounding_speed", "m/s", "speed over which the force reverses", "speed", 1e-4, 0.2, (0.005, 0.04)),),
             (_FORCE,),
             coulomb_step,
         ),

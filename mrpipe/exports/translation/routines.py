@@ -177,7 +177,7 @@ def _collect(function: Any, found: dict[Any, Routine], names: set[str]) -> Routi
         return found[python]
     tree = ast.parse(textwrap.dedent(inspect.getsource(python))).body[0]
     if not isinstance(tree, ast.FunctionDef):
-        raise UserError(python.__module__, python.__name__, "is no function", "write it with def")
+        raise UserError(python.__module__, python.__name__, "is not a function", "write it with def")
     if isinstance(tree.body[0], ast.Expr) and isinstance(tree.body[0].value, ast.Constant):
         del tree.body[0]
     body = ast.Module(tree.body, [])

@@ -123,7 +123,7 @@ def verdict_class(summary: Mapping[str, Any]) -> str:
 
 
 def proper_effects(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the named effects, without the flexible model that stands for no physics."""
+    """Return the named effects, without the flexible model, which has no physical meaning."""
     return [effect for effect in summary.get("effects", []) if effect["name"] != "unattributed"]
 
 

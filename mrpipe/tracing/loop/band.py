@@ -154,7 +154,7 @@ def rank_over_band(
     ways
         `before`, `after` and, where the controller was renewed, `recalibrated`.
     alike
-        Laws whose responses differ by less than this share have no order.
+        Laws whose responses differ by less than this share are not ranked.
     """
     rows = [
         {"law": law} | {way: _peaks(of_law.get(way)) for way in ways if way in of_law} for law, of_law in curves.items()

@@ -350,7 +350,7 @@ def reversed_pairs(
     first, second
         Columns that are compared.
     alike
-        Laws whose responses differ by less than this share have no order.
+        Laws whose responses differ by less than this share are not ranked.
     """
     one, other = _means(rows, first), _means(rows, second)
     found = []

@@ -166,7 +166,7 @@ def _plant_words(traced: Tracing) -> dict[str, Any]:
     left_out = {term.effect.name: "a fault of sensors: corrected in prepare" for term in terms if term.effect.sensor}
     for item in traced.summary["effects"]:
         if item["name"] == "unattributed":
-            left_out["unattributed"] = "a flexible model of the record stands for no physics: it cannot run in a loop"
+            left_out["unattributed"] = "a flexible model of the record has no physical meaning: it cannot run in a loop"
         elif item.get("corrected_in") == "prepare":
             left_out.setdefault(item["name"], "a fault of sensors: corrected in prepare")
     declared = set(traced.summary["declared_effects"])
@@ -246,7 +246,7 @@ def _working_drive(rig: Rig, force_n: float, limit: float, speed_m_s: float) -> 
 def _retrained(study: LoopStudy, limit: float, summary: dict[str, Any]) -> Network | InverseTable:
     network = study.rig.controllers.inverse
     if not isinstance(network, Network):
-        raise TypeError("the inverse of the controller is no network")
+        raise TypeError("the inverse of the controller is not a network")
 
     again = retrain_inverse(
         network,

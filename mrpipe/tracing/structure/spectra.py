@@ -148,7 +148,7 @@ def lines_in_band(samples: int, dt: float, band: Band) -> FloatArray:
 
 
 def taper_of(samples: int, dt: float, low_hz: float) -> FloatArray:
-    """Return a window that is flat but for a few periods of the lower edge at either end.
+    """Return a window that is flat except for a few periods of the lower edge at either end.
 
     The window is zero in the first and last of these periods, where the transients of the integration decay.
     """
