@@ -11,6 +11,9 @@ from matplotlib.figure import Figure
 from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.style import COLOURS, MEASURED, figure_with_axes, label
 
+Table = Mapping[str, Mapping[str, float]]
+"""Law -> index -> value."""
+
 _POINTS = 4000
 
 
@@ -108,7 +111,7 @@ def floor_profiles(
     return figure
 
 
-def index_bars(indices: Mapping[str, Mapping[str, float]], thesis: Mapping[str, Mapping[str, float]]) -> Figure:
+def index_bars(indices: Table, thesis: Table) -> Figure:
     """Return the indices of each law as bars, the thesis' as marks.
 
     Parameters
@@ -165,9 +168,7 @@ def sensitivity(
     return figure
 
 
-def beside_thesis(
-    indices: Mapping[str, Mapping[str, float]], thesis: Mapping[str, Mapping[str, float]], model: str
-) -> pd.DataFrame:
+def beside_thesis(indices: Table, thesis: Table, model: str) -> pd.DataFrame:
     """Return a table with a row an index and, for each law, our value and the printed one.
 
     Parameters

@@ -72,6 +72,7 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.ten_storey import study as bench
     from mrpipe.case_studies.ten_storey.structure import ten_storey
     from mrpipe.effects.damper import damper_named
+    from mrpipe.thesis.entries import printed_columns
 
     settings = context.settings.benchmark.ten_storey
     bench.check_laws(settings.laws)
@@ -94,14 +95,15 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
         studies[name] = (study, study.cases(settings.laws, jobs=context.jobs))
     study, cases = studies[settings.structures[0]]
     sweep = study.sensitivity(settings.laws, settings.dampers, jobs=context.jobs)
-    summary = report.summary(studies, sweep)
+    printed = printed_columns("P4 Table 2", "P4-T2")
+    summary = report.summary(studies, sweep, printed)
     with context.write("benchmark-ten-storey.h5") as artifact:
         artifact.put_json("summary", {key: summary[key] for key in ("laws", "variants", "thesis")})
         for case in cases:
             if case.variant == "filtered":
                 _write_response(artifact, f"responses/{case.law}", case.response)
         artifact.attributes("/", model=study.model.origin, source=study.model.source)
-    report.describe(context.report, studies, sweep)
+    report.describe(context.report, studies, sweep, printed)
     return {**summary, "motion_details": _motion_summary(motion)}
 
 
@@ -111,6 +113,7 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.base_isolated.structure import building_of
     from mrpipe.case_studies.inverse import train_inverse
     from mrpipe.case_studies.motion import SEVEN_MOTIONS, load_motion
+    from mrpipe.thesis.entries import printed_columns
 
     settings = context.settings.benchmark.base_isolated
     bench.check_laws(settings.laws)
@@ -147,13 +150,14 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     sweep = bench.capacity_sensitivity(study, motion, law, settings.dampers)
     error = trained.starts[0].held_out_nrmse if trained else float("nan")
     result = report.IsolationResult(study, motion, free, cases, motions, law, sweep, error)
-    summary = report.summary(result)
+    printed = printed_columns("Table 6.2", "T6.2")
+    summary = report.summary(result, printed)
     with context.write("benchmark-base-isolated.h5") as artifact:
         artifact.put_json("summary", {key: summary[key] for key in ("laws", "motions", "thesis", "sensitivity")})
         for case in cases:
             _write_response(artifact, f"responses/{case.law}", case.response)
         artifact.attributes("/", model=building.model.origin, source=building.model.source)
-    report.describe(context.report, result)
+    report.describe(context.report, result, printed)
     return {**summary, "motion_details": _motion_summary(motion)}
 
 
@@ -181,6 +185,7 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.wind import report
     from mrpipe.case_studies.wind import study as bench
     from mrpipe.case_studies.wind.structure import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of
+    from mrpipe.thesis.entries import printed_columns
 
     settings = context.settings.benchmark.wind
     bench.check_laws(settings.laws)
@@ -221,13 +226,14 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
     sweep = bench.wind_sensitivity(study, law, [study.dampers * item for item in multiples], context.jobs)
     error = trained.starts[0].held_out_nrmse if trained else float("nan")
     result = report.WindResult(study, cases, law, sweep, error)
-    summary = report.summary(result)
+    printed = printed_columns("Table 6.3", "T6.3")
+    summary = report.summary(result, printed)
     with context.write("benchmark-wind.h5") as artifact:
         artifact.put_json("summary", {key: summary[key] for key in ("laws", "thesis", "sensitivity")})
         for case in cases:
             _write_response(artifact, f"responses/{case.law}", case.response)
         artifact.attributes("/", model=tower.model.origin, source=tower.model.source)
-    report.describe(context.report, result)
+    report.describe(context.report, result, printed)
     return summary
 
 

@@ -115,17 +115,6 @@ def test_printed_columns_and_gains_are_those_of_the_thesis() -> None:
 
 
 @pytest.mark.property
-def test_case_studies_show_the_same_tables() -> None:
-    from mrpipe.case_studies.base_isolated.study import THESIS as ISOLATED
-    from mrpipe.case_studies.ten_storey.study import THESIS as TEN_STOREY
-    from mrpipe.case_studies.wind.study import THESIS as WIND
-
-    assert printed_columns("Table 6.2", "T6.2") == ISOLATED
-    assert printed_columns("Table 6.3", "T6.3") == WIND
-    assert printed_columns("P4 Table 2", "P4-T2") == TEN_STOREY
-
-
-@pytest.mark.property
 def test_pages_promise_what_the_ledger_contains() -> None:
     assert (ROOT / "docs" / "ledger.md").read_text(encoding="utf-8") == as_markdown()
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())

@@ -20,16 +20,6 @@ from mrpipe.case_studies.run import BinghamDevice, Controller, Response, simulat
 from mrpipe.networks.network import Network
 from mrpipe.structures.records import GroundMotion
 
-_NAMES = tuple(f"J{number}" for number in range(1, 10))
-_PRINTED = {
-    "vd": (1.31, 1.19, 1.13, 0.95, 1.17, 0.67, 1.21, 1.15, 0.91),
-    "vdns": (1.13, 1.04, 1.09, 0.91, 1.12, 0.48, 1.02, 1.10, 0.77),
-    "fdns": (1.09, 0.99, 1.02, 0.86, 1.02, 0.33, 0.92, 1.03, 0.65),
-    "lqg": (0.93, 0.92, 0.82, 0.82, 0.85, 0.12, 0.78, 0.72, 1.89),
-}
-THESIS = {law: dict(zip(_NAMES, values, strict=True)) for law, values in _PRINTED.items()}
-"""Table 6.2, El Centro."""
-
 REASON = (
     "Two dampers of 1000 kN (1.4 MN at 10 V and 0.55 m/s) stand against some 15 to 25 MN of base shear, so J6 of MR "
     "dampers cannot exceed about 0.1 (lqg has ideal actuators without a limit) and J3 and J7 cannot change as printed; "

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mrpipe.case_studies import report as figures
-from mrpipe.case_studies.ten_storey.study import REASON, THESIS, VARIANTS, TenStoreyCase, TenStoreyStudy
+from mrpipe.case_studies.ten_storey.study import REASON, VARIANTS, TenStoreyCase, TenStoreyStudy
 from mrpipe.reporting.sink import Sink
 
 Studies = Mapping[str, tuple[TenStoreyStudy, Sequence[TenStoreyCase]]]
@@ -39,7 +39,7 @@ def _gains(study: TenStoreyStudy, laws: Sequence[str]) -> dict[str, dict[str, fl
     return result
 
 
-def summary(studies: Studies, sweep: Mapping[float, Mapping[str, float]]) -> dict[str, Any]:
+def summary(studies: Studies, sweep: Mapping[float, Mapping[str, float]], printed: figures.Table) -> dict[str, Any]:
     """Return what the command prints: the first structure's indices, and all variants of all structures.
 
     Parameters
@@ -48,6 +48,8 @@ def summary(studies: Studies, sweep: Mapping[float, Mapping[str, float]]) -> dic
         Structure -> study and its runs.
     sweep
         Number of dampers -> indices.
+    printed
+        Table 2 of P4: law -> index -> value.
     """
     study, cases = next(iter(studies.values()))
     tables = index_tables(studies)
@@ -68,7 +70,7 @@ def summary(studies: Studies, sweep: Mapping[float, Mapping[str, float]]) -> dic
         "gains": _gains(study, [case.law for case in shown if not case.law.startswith("passive")]),
         "peak_force_n": {case.law: case.peak_force_n for case in shown},
         "peak_stroke_m": {case.law: case.peak_stroke_m for case in shown},
-        "thesis": THESIS,
+        "thesis": printed,
         "why_different": REASON,
         "sensitivity": {f"{number:g}": dict(row) for number, row in sweep.items()},
         "energy_balance_error": max(
@@ -77,14 +79,14 @@ def summary(studies: Studies, sweep: Mapping[float, Mapping[str, float]]) -> dic
     }
 
 
-def describe(sink: Sink, studies: Studies, sweep: Mapping[float, Mapping[str, float]]) -> None:
+def describe(sink: Sink, studies: Studies, sweep: Mapping[float, Mapping[str, float]], printed: figures.Table) -> None:
     """Write the part of the report; the arguments are those of :func:`summary`."""
     study, cases = next(iter(studies.values()))
     origin, motion = study.model.origin, study.motion
     sink.text(f"Model: **{origin}**. {study.model.source}. {REASON}")
     for name, variants in index_tables(studies).items():
         for variant, table in variants.items():
-            frame = figures.beside_thesis(table, THESIS, origin)
+            frame = figures.beside_thesis(table, printed, origin)
             sink.table(f"{name}-{variant}", frame, f"P4 Table 2 and our results: {name}, {variant}, {motion.name}.")
     shown = [case for case in cases if case.variant == "filtered"]
     picture = figures.histories(
@@ -112,7 +114,7 @@ def describe(sink: Sink, studies: Studies, sweep: Mapping[float, Mapping[str, fl
     )
     sink.figure("loops", picture, "Damper force against displacement and velocity.")
     laws = {case.law: case.indices for case in shown}
-    sink.figure("indices", figures.index_bars(laws, THESIS), "Indices compared with P4 Table 2.")
+    sink.figure("indices", figures.index_bars(laws, printed), "Indices compared with P4 Table 2.")
     keys = list(next(iter(sweep.values())))
     picture = figures.sensitivity(
         [number * 1000.0 for number in sweep],

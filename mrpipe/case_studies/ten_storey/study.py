@@ -23,13 +23,6 @@ REASON = (
 )
 """Why our figures differ from the printed ones."""
 
-THESIS = {
-    "vd": {"J1": 0.6995, "J2": 0.9526, "J3": 0.7154, "J4": 0.6789},
-    "kelvin-0.3": {"J1": 0.6745, "J2": 0.9332, "J3": 0.6909, "J4": 0.6645},
-    "kelvin-0.7": {"J1": 0.6574, "J2": 0.9310, "J3": 0.6799, "J4": 0.6615},
-}
-"""Table 2 of paper P4."""
-
 VARIANTS = ("filtered", "unfiltered", "ideal", "clipped")
 """MR damper with and without the voltage filter; a damper that gives the force as asked; one that can only resist."""
 

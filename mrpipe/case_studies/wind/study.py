@@ -20,16 +20,6 @@ from mrpipe.case_studies.wind.load import WindLoad
 from mrpipe.case_studies.wind.structure import REDUCED_FLOORS, Tower
 from mrpipe.networks.network import Network
 
-_NAMES = tuple(f"J{number}" for number in range(1, 13))
-_PRINTED = {
-    "vd": (0.63, 0.76, 0.96, 0.90, 0.55, 32.55, 0.69, 0.82, 0.94, 0.85, 0.25, 332.75),
-    "vdns": (0.54, 0.66, 0.93, 0.85, 0.41, 31.21, 0.61, 0.77, 0.93, 0.82, 0.19, 324.54),
-    "fdns": (0.54, 0.64, 0.88, 0.81, 0.41, 27.4, 0.53, 0.75, 0.82, 0.81, 0.21, 298.11),
-    "lqg": (0.38, 0.43, 0.71, 0.67, 0.14, 59.9, 0.31, 0.44, 0.75, 0.65, 0.03, 601.1),
-}
-THESIS = {law: dict(zip(_NAMES, values, strict=True)) for law, values in _PRINTED.items()}
-"""Table 6.3; J6 and J12 in kN m/s."""
-
 REASON = (
     "A damper between ground and floor 1 of a cantilever moves by 4e-4 (surrogate) to 2e-3 (published model) of the "
     "top motion, so J5 and J11 are of that order, and no law of 1 MN changes J1 to J4 and J7 to J10 by more than a "
