@@ -181,28 +181,11 @@ def fit_damper(tests: PreparedTests, **settings: Any) -> DamperFit:
     UserError
         If a form is not known.
     """
-    from mrpipe.config.sections.identify_damper import IdentifyDamperSettings
-    from mrpipe.dampers.library import forms_named
-    from mrpipe.fitting.comparison import best_by_folds, compare_forms
-    from mrpipe.stages.identify_damper import fit_options
+    from mrpipe.fitting.choice import compare_and_choose
+    from mrpipe.fitting.settings import IdentifyDamperSettings
 
     chosen_settings = settings_of(IdentifyDamperSettings, "identify_damper", settings)
-    by_choice = chosen_settings.form == "best"
-    named = [*chosen_settings.compare, *([] if by_choice or not chosen_settings.compare else [chosen_settings.form])]
-    forms = forms_named(list(dict.fromkeys(named)), chosen_settings.form_files)
-    comparison = compare_forms(
-        list(forms.values()),
-        list(tests),
-        fit_options(chosen_settings),
-        folds=chosen_settings.folds if by_choice else 0,
-        keep=(*chosen_settings.compare, *(() if by_choice else (chosen_settings.form,))),
-        progress=silent,
-    )
-    judged = comparison.judged
-    if by_choice:
-        chosen = best_by_folds(judged)
-    else:
-        chosen = next(item for item in judged if item.fit.form.name == chosen_settings.form)
+    comparison, chosen = compare_and_choose(chosen_settings, list(tests), progress=silent)
     return DamperFit(chosen.fit.model, chosen, comparison)
 
 

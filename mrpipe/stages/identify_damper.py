@@ -9,15 +9,13 @@ from mrpipe.errors import StageSkipped
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
-    from mrpipe.config.sections.identify_damper import IdentifyDamperSettings
-    from mrpipe.fitting.comparison import Comparison, FitOptions, JudgedFit
+    from mrpipe.fitting.comparison import Comparison, JudgedFit
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     import numpy as np
 
-    from mrpipe.dampers.library import forms_named
-    from mrpipe.fitting.comparison import compare_forms
+    from mrpipe.fitting.choice import compare_and_choose
     from mrpipe.fitting.samples import smooth_motion
     from mrpipe.fitting.summary import findings
     from mrpipe.reporting import identify_damper as section
@@ -30,21 +28,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     training = [test for test in tests if test.role == "training"]
     if not training:
         raise StageSkipped("identify-damper: the campaign has no training test")
-    by_choice = settings.form == "best"
-    named = [*settings.compare, *([] if by_choice or not settings.compare else [settings.form])]
-    forms = forms_named(list(dict.fromkeys(named)), settings.form_files)
-    if not by_choice and settings.form not in forms:
-        forms_named([settings.form], settings.form_files)
-    comparison = compare_forms(
-        list(forms.values()),
-        tests,
-        fit_options(settings),
-        folds=settings.folds if by_choice else 0,
-        keep=(*settings.compare, *(() if by_choice else (settings.form,))),
-        jobs=context.jobs,
-        progress=context.progress,
-    )
-    chosen = _chosen(comparison, settings.form)
+    comparison, chosen = compare_and_choose(settings, tests, jobs=context.jobs, progress=context.progress)
     for line in findings(chosen.fit):
         context.warn(line)
     summary = _summary(comparison, chosen, settings.reference_A)
@@ -55,33 +39,6 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     _write(context, comparison.judged, chosen, summary, largest)
     section.describe(context.report, section.IdentifiedDamper(tests, comparison.judged, chosen, summary))
     return summary
-
-
-def fit_options(settings: IdentifyDamperSettings) -> FitOptions:
-    """Return how forms are fitted, from the settings."""
-    from mrpipe.dampers.library import form_of_file
-    from mrpipe.fitting.comparison import FitOptions
-    from mrpipe.fitting.form_fit import FitMethod
-
-    files = {form_of_file(path).name: str(path) for path in settings.form_files}
-    return FitOptions(
-        method=FitMethod(settings.method, settings.starts, assumed_eta=settings.assumed_eta_per_s, form_files=files),
-        cycles=settings.cycles,
-        maximum_samples=settings.maximum_samples,
-        raw_force=settings.force == "raw",
-        offsets=settings.offset_per_test,
-        equal_tests=settings.equal_tests,
-        drive_law=settings.drive_law,
-        yield_order=settings.yield_order,
-        viscosity_order=settings.viscosity_order,
-    )
-
-
-def _chosen(comparison: Comparison, form: str) -> JudgedFit:
-    from mrpipe.fitting.comparison import best_by_folds
-
-    judged = comparison.judged
-    return best_by_folds(judged) if form == "best" else next(item for item in judged if item.fit.form.name == form)
 
 
 def _summary(comparison: Comparison, chosen: JudgedFit, reference: float) -> dict[str, Any]:
