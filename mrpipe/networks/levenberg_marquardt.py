@@ -197,7 +197,9 @@ def _own_loop(problem: Problem, start: FloatArray, watch: _Watch, *, identity: b
     mu = rules.mu
     while True:
         gram = problem.gram(parameters)
-        curvature, gradient, mean_square = gram[:-1, :-1], gram[:-1, -1], float(gram[-1, -1])
+        curvature, gradient = gram[:-1, :-1], gram[:-1, -1]
+        # trials are compared in double precision
+        mean_square = problem.mean_square(parameters) if problem.single else float(gram[-1, -1])
         reason = watch.accepted(parameters, mean_square, 2.0 * gradient)
         if reason:
             return reason

@@ -223,7 +223,8 @@ def _fit_all(
         small = rows_at(data.fit, spec, data.screen)
         scaling = scaling_of(*small, spec, data.normalisation, whitened=options.whitened)
     held_features, held_target = rows_at(data.held, spec, data.judged)
-    problem = Problem(scaling.inputs(features), scaling.target(target), candidate.layers, candidate.biases)
+    # errors of candidates are compared to two digits, so that single precision serves
+    problem = Problem(scaling.inputs(features), scaling.target(target), candidate.layers, candidate.biases, single=True)
     held = Problem(scaling.inputs(held_features), scaling.target(held_target), candidate.layers, candidate.biases)
     rules = replace(
         options.rules, iterations=options.screen_iterations if starts is None else options.refine_iterations
@@ -286,7 +287,7 @@ def _iteration_seconds(
 
     def problem(rows: int) -> Problem:
         inputs = rng.normal(size=(candidate.layers[0], min(rows, available)))
-        return Problem(inputs, np.tanh(inputs[0]), candidate.layers, candidate.biases)
+        return Problem(inputs, np.tanh(inputs[0]), candidate.layers, candidate.biases, single=True)
 
     held = problem(options.held_out_rows)
     start = rng.uniform(-0.5, 0.5, held.size)

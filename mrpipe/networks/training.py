@@ -206,6 +206,8 @@ def train_on(
     late: list[tuple[FitResult, float]] = []
     if options.iterations > 0:
         whole, held = _second_phase(data, layers, options, rng)
+        # threads that have no start of their own share the rows of one
+        whole = replace(whole, threads=max(1, jobs // len(chosen)))
 
         def second(place: int) -> tuple[FitResult, float]:
             started = time.perf_counter()

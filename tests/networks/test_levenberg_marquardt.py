@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -52,6 +54,32 @@ def test_compression_keeps_norm_gradient_and_curvature(rows: int) -> None:
     np.testing.assert_allclose(matrix.T @ small, jacobian.T @ residual / rows, atol=1e-13)
     np.testing.assert_allclose(matrix.T @ matrix, jacobian.T @ jacobian / rows, atol=1e-12)
     assert problem.mean_square(parameters) == pytest.approx(small @ small, rel=1e-12)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("single", [False, True])
+def test_threads_do_not_change_the_gram_matrix(single: bool) -> None:
+    problem = replace(common_problem(5 * CHUNK_ROWS + 3), single=single)
+    parameters = np.random.default_rng(2).uniform(-1.0, 1.0, problem.size)
+    np.testing.assert_array_equal(replace(problem, threads=3).gram(parameters), problem.gram(parameters))
+
+
+@pytest.mark.oracle
+def test_a_gram_matrix_in_single_precision_trains_as_well() -> None:
+    problem = replace(common_problem(CHUNK_ROWS + 13), weight_decay=1e-5)
+    single = replace(problem, single=True)
+    parameters = np.random.default_rng(2).uniform(-1.0, 1.0, problem.size)
+    exact, rounded = problem.gram(parameters), single.gram(parameters)
+    size = np.sqrt(np.diag(exact))
+    assert np.max(np.abs(rounded - exact) / np.outer(size, size)) < 2e-6
+    assert not np.array_equal(rounded, exact)
+    rules = StoppingRules(iterations=40)
+    start = np.random.default_rng(3).uniform(-0.5, 0.5, problem.size)
+    ends = [fit(item, start, method="mu-identity", rules=rules) for item in (problem, single)]
+    assert ends[1].mean_square == pytest.approx(ends[0].mean_square, rel=1e-3)
+    # what is reported, and what accepts a step, is in double precision
+    assert ends[1].mean_square == problem.mean_square(ends[1].parameters)
+    assert np.all(np.diff(ends[1].path) < 0.0)
 
 
 @pytest.mark.oracle
