@@ -27,7 +27,7 @@ from mrpipe.control.assembly import ControllerFactory, calibrated_from
 from mrpipe.control.calibration import CalibrationOptions, calibrate
 from mrpipe.control.laws import all_laws, law_named
 from mrpipe.control.lqg import Weights
-from mrpipe.control.neural import ReferenceOptions, train_reference
+from mrpipe.control.neural import ReferenceNetwork, ReferenceOptions, train_reference
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import DivergedError
@@ -45,36 +45,53 @@ AMPLITUDE_M_S2 = 0.768
 
 CURVES = CurveOptions(points=13, tolerance=1e-2, most_cycles=80, frequency_tolerance=4e-3, refined=("rms_x_top_m",))
 
+RATE_HZ = 200.0
+"""Sampling rate of the controllers."""
+
 FRAME_DAMPING = 0.02
 """Damping ratio of the ten-storey frame in its first mode: P4's has none, and then no steady response exists."""
 
 
+def reference(frame: Frame, alpha_n_m: float, amplitude_m: float) -> ReferenceNetwork:
+    """Return the network of `nnc`, trained about the first mode of a frame and an expected amplitude of the damper."""
+    omega = natural_modes(frame).angular_frequencies
+    speed = amplitude_m * float(omega[0])
+    learning = ReferenceOptions(
+        alpha_n_m,
+        tuple(amplitude_m * np.geomspace(0.2, 2.0, 7)),
+        tuple(float(omega[0]) / (2.0 * np.pi) * np.geomspace(0.625, 1.6, 7)),
+        starts=2,
+        rounding_m_s=speed / 6.0,
+        # what lies above a quarter of the rate is no motion to the network
+        disturbances_rad_s=tuple(omega[1:][omega[1:] < 0.5 * np.pi * RATE_HZ]),
+    )
+    return train_reference(learning, np.random.default_rng(1))
+
+
 @cache
-def thesis_rig() -> Rig:
+def thesis_rig(network: bool) -> Rig:
     """Return the thesis' frame with set C, sensors with noise, and the exact inverse of the damper's model."""
     frame = frame_from_parameter_set("thesis")
     damper = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
     published = {law: dict(gains) for law, gains in THESIS_GAINS.items()}
-    options = CalibrationOptions(
-        source="published", published=published, positive_stiffness_n_m=2500.0, negative_stiffness_n_m=-4500.0
-    )
-    omega = natural_modes(frame).angular_frequencies
-    amplitudes = tuple(0.0093 * np.geomspace(0.2, 2.0, 7))
-    frequencies = tuple(float(omega[0]) / (2.0 * np.pi) * np.geomspace(0.625, 1.6, 7))
-    learning = ReferenceOptions(
-        3000.0, amplitudes, frequencies, starts=2, rounding_m_s=0.0125, disturbances_rad_s=tuple(omega[1:])
-    )
-    reference = train_reference(learning, np.random.default_rng(1)).network
     weights = Weights(force=1e-4, force_noise_n=20.0)
-    calibration = calibrate(frame, np.eye(5)[0], replace(options, weights=weights))
-    known = calibrated_from(calibration, weights, damper, amplitude_m=0.0093, reference=reference)
+    options = CalibrationOptions(
+        source="published",
+        published=published,
+        positive_stiffness_n_m=2500.0,
+        negative_stiffness_n_m=-4500.0,
+        weights=weights,
+    )
+    calibration = calibrate(frame, np.eye(5)[0], options)
+    trained = reference(frame, 3000.0, 0.0093).network if network else None
+    known = calibrated_from(calibration, weights, damper, amplitude_m=0.0093, reference=trained)
     settings = ControllerSettings(inverse="model", residual_force_n=18.0)
     noise = SensorNoise(20e-6, 0.1)
     return Rig(frame, damper, ControllerFactory(frame, damper, known, settings), LoopOptions(noise=noise))
 
 
 @cache
-def ten_storey_rig() -> Rig:
+def ten_storey_rig(network: bool) -> Rig:
     """Return the ten-storey frame of P4 with its 1000 kN damper between the ground and the first floor."""
     model = ten_storey()
     plain = Frame(model.mass, model.damping, model.stiffness, "ten-storey")
@@ -82,7 +99,10 @@ def ten_storey_rig() -> Rig:
     frame = replace(plain, damping=2.0 * FRAME_DAMPING / first * plain.stiffness)
     damper = damper_from_parameter_set(load_parameter_set("dampers", "p4-1000kn"))
     calibration = calibrate(frame, model.devices[:, 0], CalibrationOptions())
-    known = calibrated_from(calibration, Weights(), damper, amplitude_m=0.02)
+    trained = None
+    if network:
+        trained = reference(frame, calibration.laws["nnc"].gains.alpha_n_m, 0.02).network
+    known = calibrated_from(calibration, Weights(), damper, amplitude_m=0.02, reference=trained)
     noise = ControllerSettings(inverse="model", kalman_displacement_noise_m=1e-4, kalman_acceleration_noise_m_s2=0.05)
     return Rig(frame, damper, ControllerFactory(frame, damper, known, noise), LoopOptions())
 
@@ -105,7 +125,7 @@ def largest(rig: Rig, law: str, amplitude: float) -> dict[str, float] | None:
 
 def of_thesis_frame(law: str) -> dict[str, Any]:
     """Return the largest responses with set C and with a perfect damper at three amplitudes."""
-    rig = thesis_rig()
+    rig = thesis_rig("network" in law_named(law).needs)
     found: dict[str, Any] = {"set C": [largest(rig, law, factor * AMPLITUDE_M_S2) for factor in FACTORS]}
     if law_named(law).output == "force":
         perfect = replace(rig, options=LoopOptions(tracking="ideal", record_rate_hz=1000.0))
@@ -115,7 +135,7 @@ def of_thesis_frame(law: str) -> dict[str, Any]:
 
 def of_ten_storeys(law: str) -> dict[str, Any]:
     """Return the largest responses over frequency, and peaks and RMS under a synthetic earthquake of 0.3 g."""
-    rig = ten_storey_rig()
+    rig = ten_storey_rig("network" in law_named(law).needs)
     motion = spectrum_compatible_motion(np.random.default_rng(5))
     clock = motion.interval_s * np.arange(len(motion.acceleration_m_s2))
     excitation = recorded(clock, motion.acceleration_m_s2[:, 0])
@@ -192,8 +212,7 @@ def main() -> None:
     done = {(row["structure"], row["law"]) for row in rows}
     for structure in given.structures:
         for law in given.laws:
-            if (structure, law) in done or (structure == "ten-storey" and law == "nnc"):
-                # the network of nnc is trained for the thesis' frame
+            if (structure, law) in done:
                 continue
             row = {"structure": structure, "law": law, **STUDIES[structure](law)}
             with given.results.open("a") as handle:
