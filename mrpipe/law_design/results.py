@@ -84,6 +84,12 @@ def design_as_json(result: Result, weights: Mapping[str, float]) -> dict[str, An
                 {"parameter": name, "rank_correlation": value, "test": test_for(name)} for name, value in listed
             ],
         }
+    if result.untraced is not None:
+        summary["before_tracing"] = {
+            "design": point_as_json(result.untraced.design),
+            "with_traced_damper": point_as_json(result.untraced.with_traced),
+            "regret": result.untraced.regret,
+        }
     return summary
 
 
@@ -91,6 +97,7 @@ def _confirmation_as_json(found: Confirmation) -> dict[str, Any]:
     return {
         "design": point_as_json(found.design),
         "calibrated": point_as_json(found.calibrated),
+        "same_law_calibrated": point_as_json(found.same_law),
         "improvement_x_top": found.improvement("rms_x_top_m"),
         "improvement_a_top": found.improvement("rms_a_top_m_s2"),
     }

@@ -12,7 +12,7 @@ from joblib import Parallel, delayed
 from mrpipe.artifacts import Artifact, FloatArray, Progress
 from mrpipe.control.law import Plant
 from mrpipe.errors import UserError
-from mrpipe.law_design.kept import Designed, Kept
+from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Limits, Load, Motion, Objective, evaluate
 from mrpipe.law_design.options import DesignSettings
 from mrpipe.law_design.problem import LoopOf, laws_in_the_race
@@ -47,20 +47,44 @@ APART = 0.04
 
 @dataclass(frozen=True)
 class Confirmation:
-    """The best design and the best calibrated gains, run again at half the step with other sensor noise.
+    """The best design and calibrated gains, run again at half the step with other sensor noise.
 
     Attributes
     ----------
-    design, calibrated
-        The two evaluations.
+    design
+        The best design.
+    calibrated
+        The best law at its calibrated gains.
+    same_law
+        The law of the best design at its calibrated gains.
     """
 
     design: Evaluation
     calibrated: Evaluation
+    same_law: Evaluation
 
     def improvement(self, quantity: str) -> float:
-        """Return by how much the largest value of a quantity is smaller than with the calibrated gains [1]."""
+        """Return by how much the largest value of a quantity is smaller than with the best calibrated gains [1]."""
         return 1.0 - self.design.peaks[quantity] / self.calibrated.peaks[quantity]
+
+
+@dataclass(frozen=True)
+class Untraced:
+    """The design for the damper as identified, before effects were traced, and what it does with the traced damper.
+
+    Attributes
+    ----------
+    design
+        The best design with the identified damper in the loop, as the search saw it.
+    with_traced
+        The same law and gains with the traced damper in the loop, with accurate response curves.
+    regret
+        Excess of its objective with the traced damper over that of the best design for the traced damper [1].
+    """
+
+    design: Evaluation
+    with_traced: Evaluation
+    regret: float
 
 
 @dataclass(frozen=True)
@@ -87,6 +111,8 @@ class Result:
         Law -> why it is not compared.
     load
         What the design was exposed to.
+    untraced
+        The design for the damper before it was traced; None where the damper of the design is not a traced one.
     """
 
     designed: Mapping[str, Designed]
@@ -98,6 +124,7 @@ class Result:
     confirmation: Confirmation
     left_out: Mapping[str, str]
     load: Load
+    untraced: Untraced | None = None
 
 
 def load_of(settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[float, float]) -> Load:
@@ -132,6 +159,7 @@ def run_design(
     jobs: int,
     progress: Progress,
     kept: Kept | None = None,
+    identified: Rig | None = None,
 ) -> Result:
     """Search all laws, rank them under uncertainty, and confirm the best design.
 
@@ -153,7 +181,10 @@ def run_design(
         Receives the share that is done.
     kept
         Results of an interrupted run; None: none are kept.
+    identified
+        Where `rig` has a traced damper: the same rig with the damper before the tracing, for the design without it.
     """
+    kept = kept or Kept()
     calibrated = rig.controllers.calibrated.gains
     entries, free_entries, left_out = laws_in_the_race(settings, plant, calibrated)
     run_of = LoopOf(rig, int(rng.integers(2**32)))
@@ -172,9 +203,9 @@ def run_design(
         load,
         objective,
         (SearchOptions(settings.grid, settings.evaluations), final),
-        kept or Kept(),
+        kept,
         jobs,
-        part(0.0, 0.75),
+        part(0.0, 0.75 if identified is None else 0.5),
     )
     designed = {entry.label: found[entry.label] for entry in entries}
     free = {entry.law: found[entry.label] for entry in free_entries}
@@ -189,7 +220,32 @@ def run_design(
     front = _front(run_of, every, load, objective, final, jobs)
     progress(0.94, "confirmation")
     confirmation = _confirmation(run_of, every, load, objective, final, jobs)
-    return Result(designed, free, best, reference, front, ranking, confirmation, left_out, load)
+    result = Result(designed, free, best, reference, front, ranking, confirmation, left_out, load)
+    if identified is None:
+        return result
+    without = _untraced(
+        LoopOf(identified, run_of.seed).at_rate(SEARCH_RATE), [*entries, *free_entries], load, objective, settings,
+        replace(kept, problem=f"{kept.problem}|before the tracing"), jobs, part(0.5, 0.25),
+    )  # fmt: skip
+    with_traced = evaluate(run_of, without.law, without.gains, load, objective, final)
+    least = min(item.best.value for item in every)
+    return replace(result, untraced=Untraced(without, with_traced, with_traced.value / least - 1.0))
+
+
+def _untraced(
+    run_of: LoopOf,
+    entries: Sequence[LawUnderDesign],
+    load: Load,
+    objective: Objective,
+    settings: DesignSettings,
+    kept: Kept,
+    jobs: int,
+    progress: Progress,
+) -> Evaluation:
+    """Return the best design of another loop, all of it with the coarse curves of the search."""
+    options = (SearchOptions(settings.grid, settings.evaluations), COARSE)
+    found = design_all(Loops(run_of, run_of), entries, load, objective, options, kept, jobs, progress)
+    return min((item.best for item in found.values()), key=lambda item: item.value)
 
 
 def _front(
@@ -208,15 +264,15 @@ def _front(
 def _confirmation(
     run_of: LoopOf, found: Sequence[Designed], load: Load, objective: Objective, final: CurveOptions, jobs: int
 ) -> Confirmation:
-    """Run the best design and the best calibrated gains at half the step with other sensor noise."""
-    best = min((item.best for item in found), key=lambda item: item.value)
+    """Run the best design and calibrated gains at half the step with other sensor noise."""
+    chosen = min(found, key=lambda item: item.best.value)
     calibrated = min((item.calibrated for item in found), key=lambda item: item.value)
     finer = replace(run_of.at_rate(CONFIRMING_RATE), seed=run_of.seed + 1)
+    wanted = {(item.law, item.gains): item for item in (chosen.best, calibrated, chosen.calibrated)}
     runner = Parallel(n_jobs=max(1, jobs), backend="threading")
-    again = runner(
-        delayed(evaluate)(finer, item.law, item.gains, load, objective, final) for item in (best, calibrated)
-    )
-    return Confirmation(*again)
+    again = runner(delayed(evaluate)(finer, law, gains, load, objective, final) for law, gains in wanted)
+    known = dict(zip(wanted, again, strict=True))
+    return Confirmation(*(known[item.law, item.gains] for item in (chosen.best, calibrated, chosen.calibrated)))
 
 
 def _rank(

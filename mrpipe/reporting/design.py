@@ -55,6 +55,8 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
             f"The second best law is {name}; its objective is {item['objective'] / best['objective'] - 1.0:.0%} larger."
         )
     sentences.append(_confirmed(summary["confirmation"]))
+    if "before_tracing" in summary:
+        sentences.append(_against_untraced(summary["before_tracing"]))
     uncertainty = summary.get("uncertainty")
     if uncertainty:
         sentences.append(
@@ -76,7 +78,18 @@ def _confirmed(found: Mapping[str, Any]) -> str:
         f"{_words(design['gains']) or 'no gains'}) has a largest RMS top displacement of "
         f"{1e3 * design['peak_rms_x_top_m']:.1f} mm and top acceleration of {design['peak_rms_a_top_m_s2']:.2f} m/s^2; "
         f"the best law at its calibrated gains ({calibrated['law']}) has {1e3 * calibrated['peak_rms_x_top_m']:.1f} mm "
-        f"and {calibrated['peak_rms_a_top_m_s2']:.2f} m/s^2."
+        f"and {calibrated['peak_rms_a_top_m_s2']:.2f} m/s^2. The design is {found['improvement_x_top']:.1%} better in "
+        f"displacement and {found['improvement_a_top']:.1%} in acceleration."
+    )
+
+
+def _against_untraced(found: Mapping[str, Any]) -> str:
+    design, with_traced = found["design"], found["with_traced_damper"]
+    return (
+        f"For the damper before the tracing the best design would be {design['law']} "
+        f"({_words(design['gains']) or 'no gains'}). With the traced damper in the loop that design has a largest RMS "
+        f"top displacement of {1e3 * with_traced['peak_rms_x_top_m']:.1f} mm; its objective is "
+        f"{found['regret']:.1%} above that of the best design for the traced damper."
     )
 
 

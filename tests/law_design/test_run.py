@@ -19,10 +19,11 @@ from mrpipe.control.settings import ControllerSettings
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
 from mrpipe.law_design.options import DesignSettings
-from mrpipe.law_design.problem import LoopOf, laws_in_the_race
+from mrpipe.law_design.problem import LoopOf, laws_in_the_race, scaled_force
 from mrpipe.law_design.results import design_as_json
 from mrpipe.law_design.run import Result, load_of, run_design
 from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty, draw
+from mrpipe.reporting.design import in_plain_words
 from mrpipe.simulation.loop import LoopOptions
 from mrpipe.simulation.response_curve import CurveOptions, response_curve
 from mrpipe.simulation.rig import Rig
@@ -54,7 +55,7 @@ def rig(plant: Plant) -> Rig:
     )
 
 
-def designed(rig: Rig, plant: Plant, settings: DesignSettings) -> Result:
+def designed(rig: Rig, plant: Plant, settings: DesignSettings, identified: Rig | None = None) -> Result:
     load = load_of(settings, 0.79, (7.0, 11.5))
     return run_design(
         rig,
@@ -66,6 +67,7 @@ def designed(rig: Rig, plant: Plant, settings: DesignSettings) -> Result:
         rng=np.random.default_rng(3),
         jobs=1,
         progress=lambda _, __="": None,
+        identified=identified,
     )
 
 
@@ -98,6 +100,28 @@ def test_better_gains_stay_better_at_half_the_step_with_other_noise(rig: Rig) ->
         run = LoopOf(finer, seed=99)(law, Gains(**gains))
         peaks[name] = response_curve(run, 0.79, (7.0, 11.5), CurveOptions(points=9, tolerance=2e-2)).peak("rms_x_top_m")
     assert peaks["free"] < 0.95 * peaks["thesis"]
+
+
+@pytest.mark.property
+def test_a_design_says_what_it_would_lose_without_the_tracing(rig: Rig, plant: Plant) -> None:
+    # a residual force that nobody knew of: the traced damper is half as strong again as the identified one
+    traced = replace(rig, damper=scaled_force(rig.damper, 1.5))
+    settings = DesignSettings(laws=("fdns",), amplitude_factors=(1.0,), draws=0, grid=4, evaluations=4)
+    result = designed(traced, plant, settings, identified=rig)
+    without = result.untraced
+    assert without is not None
+    best = result.designed["fdns"].best
+    assert without.design.gains != best.gains
+    assert without.with_traced.gains == without.design.gains
+    assert without.regret == without.with_traced.value / best.value - 1.0
+    assert without.regret > -0.01
+    summary = design_as_json(result, settings.weights)
+    assert summary["before_tracing"]["regret"] == without.regret
+    assert f"{without.regret:.1%} above" in in_plain_words(summary)
+    # the confirmation compares the best design with calibrated gains
+    confirmed = summary["confirmation"]
+    assert confirmed["same_law_calibrated"] == confirmed["calibrated"]
+    assert confirmed["design"]["gains"] == summary["laws"]["fdns"]["gains"]
 
 
 @pytest.mark.property
