@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from mrpipe.pipeline.loop_inputs import LOOP_INPUTS
 from mrpipe.pipeline.stage import Stage, StageContext
 
 KEPT = "design-kept"
@@ -29,6 +30,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     began = time.perf_counter()
     settings, simulate = context.settings.design, context.settings.simulate
     rig = read_rig(simulate, context.artifact)
+    # what would be designed without the tracing, to say what the tracing is worth
+    identified = (
+        read_rig(simulate.changed(damper="identified"), context.artifact) if simulate.damper == "traced" else None
+    )
     excitation, _ = excitation_of(rig, simulate.excitation)
     amplitude = _amplitude(excitation.details)
     band = settings.band_rad_s or context.settings.resonance.band_rad_s or default_band(context.artifact("calibrate"))
@@ -45,6 +50,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         jobs=context.jobs,
         progress=context.progress,
         kept=(kept := Kept(context.run_directory / KEPT, _problem(context))),
+        identified=identified,
     )
     for law, why in result.left_out.items():
         context.warn(f"law {law} is not in the race, because {why}")
@@ -95,9 +101,9 @@ STAGE = Stage(
     name="design",
     summary="Find the law and gains with the smallest largest response over frequency and amplitude.",
     run=_run,
-    inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-    conditional_inputs=(("simulate.damper", "traced", "close-loop"),),
-    after=("simulate", "resonance"),
+    inputs=("identify-frame", "calibrate"),
+    conditional_inputs=LOOP_INPUTS,
+    after=("identify-damper", "train-inverse", "simulate", "resonance"),
     settings=("design", "simulate", "resonance", "calibrate.target_mode"),
     outputs=("design.h5",),
 )

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from mrpipe.control.laws import law_names
+from mrpipe.pipeline.loop_inputs import LOOP_INPUTS
 from mrpipe.pipeline.stage import Stage, StageContext
 
 FOLDER = "controller"
@@ -28,10 +29,10 @@ def export_stage(law: str = "") -> Stage:
         name=f"export-controller-{law}" if law else "export-controller",
         summary=f"Write the calibrated controller{f' {law}' if law else ''} as C and JSON, with test vectors.",
         run=lambda context: _run(context, law or context.settings.export.law, folder),
-        inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-        conditional_inputs=(("simulate.damper", "traced", "close-loop"), ("gains.source", "design", "design")),
+        inputs=("identify-frame", "calibrate"),
+        conditional_inputs=(*LOOP_INPUTS, ("gains.source", "design", "design")),
         settings=("gains", "export.prefix" if law else "export", "simulate.controller", "simulate.damper"),
-        after=("reproduce",),
+        after=("identify-damper", "train-inverse", "reproduce"),
         family="export",
         outputs=tuple(f"{folder}/{name}" for name in FILES),
     )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mrpipe.control.laws import law_names
+from mrpipe.pipeline.loop_inputs import LOOP_INPUTS
 from mrpipe.pipeline.stage import Stage, StageContext
 
 
@@ -15,8 +16,9 @@ def simulate_stage(law: str) -> Stage:
         name=f"simulate-{law}",
         summary=f"Run the closed loop under law {law}.",
         run=lambda context: _run(context, law),
-        inputs=("identify-frame", "identify-damper", "calibrate", "train-inverse"),
-        conditional_inputs=(("simulate.damper", "traced", "close-loop"), ("gains.source", "design", "design")),
+        inputs=("identify-frame", "calibrate"),
+        conditional_inputs=(*LOOP_INPUTS, ("gains.source", "design", "design")),
+        after=("identify-damper", "train-inverse"),
         settings=("gains", "simulate"),
         family="simulate",
         outputs=(f"response-{law}.h5",),

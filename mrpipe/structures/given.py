@@ -13,7 +13,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.structures.frame import Frame
 from mrpipe.structures.options import MatrixEntry, StructureSettings
-from mrpipe.structures.shear_frames import frame_from_modes, modal_damping_matrix, shear_frame
+from mrpipe.structures.shear_frames import frame_from_modes, frame_from_parameter_set, modal_damping_matrix, shear_frame
 from mrpipe.units import conversion, same_unit_dimension
 
 Reader = Callable[[Path, str], Any]
@@ -41,6 +41,7 @@ def structure_from_settings(settings: StructureSettings, read: Reader, name: str
         If several descriptions are given, sizes disagree, or a matrix is not symmetric and positive as required.
     """
     ways = {
+        "frame": bool(settings.frame),
         "file": bool(settings.file or settings.mass.file),
         "storeys": bool(settings.storeys),
         "mode_shapes": bool(settings.mode_shapes),
@@ -48,11 +49,13 @@ def structure_from_settings(settings: StructureSettings, read: Reader, name: str
     given = [way for way, there in ways.items() if there]
     if len(given) != 1:
         problem = "describes no structure" if not given else f"describes it {len(given)} times: {', '.join(given)}"
-        raise UserError("structure", "", problem, "give matrices (file), or storeys, or mode_shapes")
+        raise UserError("structure", "", problem, "give frame, or matrices (file), or storeys, or mode_shapes")
     if given == ["storeys"]:
         frame = _from_storeys(settings, name)
     elif given == ["mode_shapes"]:
         frame = _from_modes(settings, name)
+    elif given == ["frame"]:
+        frame = frame_from_parameter_set(settings.frame)
     else:
         frame = _from_matrices(settings, read, name)
     return Frame(

@@ -84,8 +84,9 @@ class ReductionSettings(Section):
 
 
 class StructureSettings(Section):
-    """A linear structure from a file, a storey table or modes; without any of them `identify-frame` identifies it."""
+    """A linear structure from a file, a parameter set, a storey table or modes; else `identify-frame` identifies it."""
 
+    frame: str = Field("", description="Set of configs/frames, such as `thesis`, or its YAML file.")
     file: str = Field(
         "",
         description="File of the matrices (.mat, .csv, .h5, .json), or an openseespy script (.py), which is run.",
@@ -125,7 +126,7 @@ class StructureSettings(Section):
     @property
     def given(self) -> bool:
         """Whether a structure is given at all."""
-        return bool(self.file or self.storeys or self.mode_shapes or self.mass.file)
+        return bool(self.frame or self.file or self.storeys or self.mode_shapes or self.mass.file)
 
     def in_folder(self, folder: Path) -> StructureSettings:
         """Return the same settings with the paths of all files resolved against a folder."""
@@ -137,4 +138,5 @@ class StructureSettings(Section):
             key: entry.changed(file=resolved(entry.file))
             for key, entry in (("mass", self.mass), ("stiffness", self.stiffness), ("damping", self.damping))
         }
-        return self.changed(file=resolved(self.file), **entries)
+        frame = resolved(self.frame) if self.frame.endswith((".yaml", ".yml")) else self.frame
+        return self.changed(frame=frame, file=resolved(self.file), **entries)
