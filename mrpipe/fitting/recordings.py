@@ -160,6 +160,7 @@ def record_tests(
     *,
     rate_hz: float = 500.0,
     cutoff_hz: float = 0.0,
+    highest_cutoff_hz: float = np.inf,
     longest_s: float = 60.0,
     most_samples: int = MOST_SAMPLES,
 ) -> Recordings:
@@ -174,6 +175,8 @@ def record_tests(
         filtered. A test whose drive jumps keeps a higher rate.
     cutoff_hz
         Cut-off of the displacement; 0 chooses it for each test by criterion.
+    highest_cutoff_hz
+        Upper limit of the cut-offs that are chosen by criterion.
     longest_s
         Longer tests are cut to this length.
     most_samples
@@ -191,7 +194,7 @@ def record_tests(
         _one_test(
             test,
             max(rate_hz, JUMP_RATE_HZ) if drive_jumps(test, largest) else rate_hz,
-            cutoff_hz,
+            cutoff_hz or min(displacement_cutoff(test), highest_cutoff_hz),
             shared if one else test.displacement_offset_m,
             longest_s,
         )
@@ -266,10 +269,9 @@ def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[Prepare
     return found
 
 
-def _one_test(test: PreparedTest, rate_hz: float, cutoff_hz: float, offset: float, longest_s: float) -> dict[str, Any]:
+def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, longest_s: float) -> dict[str, Any]:
     rate = test.sampling_rate_hz
     raw = test.displacement_raw_m + (test.displacement_offset_m - offset)
-    cutoff = cutoff_hz or displacement_cutoff(test)
     smooth = butterworth_lowpass(raw, cutoff, rate)
     velocity = np.gradient(smooth, 1.0 / rate)
     acceleration = np.gradient(velocity, 1.0 / rate)

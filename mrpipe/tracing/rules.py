@@ -196,6 +196,13 @@ class NuisanceRules(Section):
         description="A moving average of the records, or a lag that differs between rising and falling drive, must "
         "remove this share of the sum of squares.",
     )
+    filter_gain: float = Field(
+        0.01,
+        ge=0.0,
+        lt=1.0,
+        description="The displacement is filtered below the cut-off that its spectrum suggests if a base form then "
+        "leaves an error that is smaller by this share.",
+    )
     fewest_of_session: int = Field(
         3, ge=2, description="Number of records that must agree on a gain before it counts as a gain of the session."
     )

@@ -22,6 +22,7 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline
 from mrpipe.tracing.bench.choose import Choice, choose_model, judged_by_trees
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
+from mrpipe.tracing.bench.cutoff import highest_cutoff
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
 from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
@@ -68,9 +69,11 @@ def trace_campaign(
     rules = options.rules
     ordered = sort_tests(tests, rules.validation)
     usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))
-    training = record_tests(usable, rate_hz=rate, cutoff_hz=cutoff)
     unseen = [t for t in ordered.tests if t.role == "validation"]
-    validation = record_tests(unseen, rate_hz=rate, cutoff_hz=cutoff, most_samples=MOST_JUDGED)
+    training, highest = _training(usable, options)
+    validation = record_tests(
+        unseen, rate_hz=rate, cutoff_hz=cutoff, highest_cutoff_hz=highest, most_samples=MOST_JUDGED
+    )
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects, rules.testability)
     first = _first_baseline(training, declared, options)
@@ -121,6 +124,25 @@ def trace_campaign(
     causes = [held(item, judgement) for item in causes]
     report = Summary(selection, baseline, training, offsets, found, judgement, ordered)
     return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared])
+
+
+def _training(tests: Sequence[PreparedTest], options: TracingOptions) -> tuple[Recordings, float]:
+    """Return the training tests and the limit of the cut-offs of their displacement [Hz]."""
+    rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
+    automatic = record_tests(tests, rate_hz=rate, cutoff_hz=cutoff)
+    if cutoff > 0.0:
+        return automatic, np.inf
+    highest = highest_cutoff(
+        tests,
+        automatic,
+        rate_hz=rate,
+        yield_order=options.yield_order,
+        viscosity_order=options.viscosity_order,
+        rules=options.rules.nuisances,
+    )
+    if not np.isfinite(highest):
+        return automatic, highest
+    return record_tests(tests, rate_hz=rate, highest_cutoff_hz=highest), highest
 
 
 def _first_baseline(training: Recordings, declared: Sequence[Effect], options: TracingOptions) -> Baseline:

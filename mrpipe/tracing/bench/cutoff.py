@@ -1,0 +1,98 @@
+"""How far the displacement is filtered: the limit of the cut-offs with which base forms leave least.
+
+A spectrum shows where a displacement sinks into its white noise. It cannot separate motion from hum of the mains, and it
+does not show what the remaining noise does to a force that follows velocity or acceleration. Therefore the limit is
+chosen by the error of models.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrpipe.dampers.library import base_form
+from mrpipe.fitting.recordings import Recordings, record_tests
+from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.crossvalidation import folds_of
+from mrpipe.tracing.bench.select import DRAFT_SAMPLES, MOST_PARTS
+from mrpipe.tracing.rules import NuisanceRules
+
+FORMS = ("bouc-wen", "bingham", "hyperbolic-tangent", "hysteretic-sigmoid")
+"""Numerical technique: base forms that judge the filter: one each that reads displacement, velocity, both, and
+acceleration."""
+
+RATIO = 2.0
+"""Numerical technique: ratio of successive limits."""
+
+HARMONICS = 4.0
+"""Numerical technique: the lowest limit in multiples of the frequency of the motion."""
+
+ITERATIONS = 6
+"""Numerical technique: iterations of each fit."""
+
+
+def highest_cutoff(
+    tests: Sequence[PreparedTest],
+    automatic: Recordings,
+    *,
+    rate_hz: float,
+    yield_order: int,
+    viscosity_order: int,
+    rules: NuisanceRules | None = None,
+) -> float:
+    """Return the upper limit of the cut-offs of the displacement [Hz]; infinite where the criterion is the best choice.
+
+    Parameters
+    ----------
+    tests
+        Training tests.
+    automatic
+        The same tests with cut-offs by criterion.
+    rate_hz
+        Rate at which models are fitted [Hz].
+    yield_order, viscosity_order
+        Degrees of the laws of the drive.
+    rules
+        Decision thresholds; their defaults if None.
+    """
+    rules = rules or NuisanceRules()
+    lowest, limit = _lowest(automatic), float(np.max(automatic.cutoff_hz)) / RATIO
+    limits = []
+    while limit > lowest:
+        limits.append(limit)
+        limit /= RATIO
+    if not limits:
+        return np.inf
+    parts = min(-(-len(automatic.force) // DRAFT_SAMPLES), MOST_PARTS, max(1, automatic.tests // 4))
+    few = [tests[place] for place in folds_of(automatic, parts)[0]]
+
+    def left(highest: float) -> float:
+        recordings = record_tests(few, rate_hz=rate_hz, highest_cutoff_hz=highest)
+        return min(_left(recordings, name, yield_order, viscosity_order) for name in FORMS)
+
+    best, least = np.inf, (1.0 - rules.filter_gain) * left(np.inf)
+    for item in limits:
+        error = left(item)
+        if error < least:
+            best, least = item, error
+    return best
+
+
+def _lowest(recordings: Recordings) -> float:
+    """Return the lowest limit that is tried [Hz]: a few times the frequency of the fastest motion."""
+    frequencies = []
+    for test in range(recordings.tests):
+        own = recordings.test == test
+        motion = float(np.std(recordings.displacement[own]))
+        frequencies.append(float(np.std(recordings.velocity[own])) / (2.0 * np.pi * max(motion, 1e-300)))
+    return HARMONICS * max(frequencies)
+
+
+def _left(recordings: Recordings, name: str, yield_order: int, viscosity_order: int) -> float:
+    """Return the RMS of the residual of a base form, as a share of the scale of the force."""
+    form = base_form(name)
+    laws = polynomial_laws(form, distinct_levels(recordings), yield_order, viscosity_order)
+    found = best_fit(first_problem(recordings, base_of(recordings, form, laws)), starts=1, iterations=ITERATIONS)
+    return float(np.sqrt(found.chi_square))

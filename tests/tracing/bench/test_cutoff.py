@@ -1,0 +1,78 @@
+"""The displacement is filtered as far as models predict better, and no further."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from mrpipe.fitting.recordings import Recordings, record_tests
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.cutoff import highest_cutoff
+from tests.tracing.bench.rig import hysteresis
+
+RATE = 1000.0
+SECONDS = 6.0
+
+
+def sine(amplitude_m: float, frequency_hz: float) -> np.ndarray:
+    """Return a sine."""
+    return amplitude_m * np.sin(2.0 * np.pi * frequency_hz * np.arange(int(SECONDS * RATE)) / RATE)
+
+
+def random_motion(amplitude_m: float, highest_hz: float, seed: int) -> np.ndarray:
+    """Return random motion with power up to a frequency."""
+    sos = signal.butter(6, highest_hz, fs=RATE, output="sos")
+    values = signal.sosfiltfilt(sos, np.random.default_rng(seed).standard_normal(int(SECONDS * RATE)))
+    return amplitude_m * values / float(np.max(np.abs(values)))
+
+
+def recorded(motions: list[np.ndarray], law: str, hum_m: float = 0.0) -> list[PreparedTest]:
+    """Return tests of a damper without effects; 1 micrometre and 0.3 N of noise, and hum of the mains in the motion."""
+    rng = np.random.default_rng(5)
+    tests = []
+    for number, x in enumerate(motions):
+        time = np.arange(len(x)) / RATE
+        v = np.gradient(x, 1.0 / RATE)
+        current = float(1 + number % 3)
+        z = np.tanh(v / 0.01) if law == "velocity" else hysteresis(x, 2e-4)
+        force = 60.0 * current * z + 200.0 * v + 0.3 * rng.standard_normal(len(x))
+        hum = hum_m * sum(np.sin(2.0 * np.pi * line * time + line) for line in (50.0, 100.0, 150.0))
+        measured = x + 1e-6 * rng.standard_normal(len(x)) + hum
+        a, drive = np.gradient(v, 1.0 / RATE), np.full_like(x, current)
+        tests.append(
+            PreparedTest(
+                f"{number}", "training", RATE, time, x, v, a, drive, force, measured, force,
+                np.array([], dtype=np.int64), "A", "periodic",
+            )
+        )  # fmt: skip
+    return tests
+
+
+def limit_of(tests: list[PreparedTest]) -> tuple[float, Recordings]:
+    automatic = record_tests(tests, rate_hz=250.0)
+    return highest_cutoff(tests, automatic, rate_hz=250.0, yield_order=2, viscosity_order=1), automatic
+
+
+@pytest.mark.planted
+def test_hum_that_stands_out_of_the_noise_is_filtered_as_the_motion_does_not_need_it() -> None:
+    # a spectrum cannot separate the lines of the mains from motion; the force by velocity shows that they are none
+    motions = [sine(0.01 * size, speed) for size in (0.5, 1.0) for speed in (0.5, 1.0, 1.5)]
+    limit, automatic = limit_of(recorded(motions, "velocity", hum_m=1e-6))
+    assert np.max(automatic.cutoff_hz) > 150.0
+    assert limit < 50.0
+
+
+@pytest.mark.planted
+def test_the_filter_keeps_motion_that_the_hysteresis_follows() -> None:
+    motions = [random_motion(0.002, highest, seed) for seed, highest in enumerate((60.0, 60.0, 30.0, 15.0))]
+    limit, automatic = limit_of(recorded(motions, "hysteresis"))
+    assert limit > 60.0
+    assert np.max(automatic.cutoff_hz) > 60.0
+
+
+@pytest.mark.property
+def test_a_limit_lowers_only_the_cut_offs_above_it() -> None:
+    tests = recorded([random_motion(0.002, 60.0, 1), sine(0.01, 0.5)], "velocity")
+    automatic, limited = (record_tests(tests, rate_hz=250.0, highest_cutoff_hz=value) for value in (np.inf, 40.0))
+    np.testing.assert_allclose(limited.cutoff_hz, np.minimum(automatic.cutoff_hz, 40.0))
