@@ -94,12 +94,17 @@ def choose_model(
     progress
         Called with the share done and a text.
     """
-    baseline, floor = first, options.model_error_share
+    baseline, floor, weighed = first, options.model_error_share, False
     if floor > 0.0:
         baseline = _without_nuisances(baseline, options)
     while True:
-        choice = _raced(baseline, effects, options, floor > 0.0, jobs, progress)
+        choice = _raced(baseline, effects, options, floor > 0.0, weighed, jobs, progress)
         selection = choice.selection
+        quieter = None if weighed or floor > 0.0 or choice.race is None else _quieter(choice, options.rules)
+        if quieter is not None:
+            # what an effect changes from cycle to cycle looked like noise until the effect was found
+            baseline, weighed = quieter, True
+            continue
         if choice.race is not None:
             selection = with_laws_again(selection, options.yield_order, options.viscosity_order)
         if floor > 0.0:
@@ -147,10 +152,11 @@ def _raced(
     effects: Mapping[str, Effect],
     options: TracingOptions,
     model_error: bool,
+    weighed: bool,
     jobs: int,
     progress: Progress,
 ) -> Choice:
-    """Run the race and fit its winner to all training tests."""
+    """Run the race and fit its winner to all training tests; `weighed` if the weights are those of a winner already."""
     rules = options.rules.selection_by_force if model_error else options.rules.selection
     least = options.rules.selection.nothing_missing
     nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=least)
@@ -159,7 +165,7 @@ def _raced(
     forms = {name: form.without_springs() for name, form in forms_named(options.base_forms).items()}
     progress(0.1, "base forms")
     singles = alone(draft(baseline.fit), forms, jobs=jobs)
-    if not model_error:
+    if not model_error and not weighed:
         baseline, singles = _with_noise_of_best(baseline, singles, options.rules)
     base, noise = baseline.fit, baseline.noise
     search = partial(
@@ -266,21 +272,34 @@ def _with_noise_of_best(
         or best.chi_square > rules.model_error.better_form * base.chi_square
     ):
         return baseline, dict(singles)
-    training = base.problem.recordings
-    found = on_all_tests(best, base.problem, iterations=4)
-    scale = noise_scale(found, rules.noise)
-    root = training.used / force_deviation(found, training, 0.0, scale, rules.noise)
-    found = replace(found, problem=replace(found.problem, root_weight=root))
-    noise = noise_level_of(found, scale)
-    base = fit(replace(base.problem, root_weight=root), base.theta, iterations=8)
-    small = draft(base)
+    baseline = _weighed_by(baseline, on_all_tests(best, base.problem, iterations=4), rules.noise)
+    small = draft(baseline.fit)
     again = {
         name: fit(replace(item.problem, root_weight=small.problem.root_weight), item.theta, iterations=3)
         for name, item in singles.items()
         if name != base.problem.base.name
     }
     again[base.problem.base.name] = small
-    return replace(baseline, fit=base, noise=noise, scale=scale), again
+    return baseline, again
+
+
+def _weighed_by(baseline: Baseline, found: Fit, rules: NoiseRules) -> Baseline:
+    """Return the baseline with the weights and the noise that follow from another fit to all training tests."""
+    problem = baseline.fit.problem
+    scale = noise_scale(found, rules)
+    root = problem.recordings.used / force_deviation(found, problem.recordings, 0.0, scale, rules)
+    noise = noise_level_of(replace(found, problem=replace(found.problem, root_weight=root)), scale)
+    base = fit(replace(problem, root_weight=root), baseline.fit.theta, iterations=8)
+    return replace(baseline, fit=base, noise=noise, scale=scale)
+
+
+def _quieter(choice: Choice, rules: TracingRules) -> Baseline | None:
+    """Return the baseline weighed by the noise of the chosen model, if that is clearly less; else None."""
+    chosen = choice.selection.chosen
+    noise = noise_level_of(chosen, noise_scale(chosen, rules.noise))
+    if min(noise, chosen.chi_square) > rules.model_error.better_form * choice.baseline.noise:
+        return None
+    return _weighed_by(choice.baseline, chosen, rules.noise)
 
 
 def _without_nuisances(baseline: Baseline, options: TracingOptions) -> Baseline:

@@ -266,6 +266,8 @@ def _compared(
         models = tuple(Model(item, value) for item, value in zip(fits, squares, strict=True))
     used = problem.root_weight > 0.0
     counts = np.bincount(problem.recordings.test[used], minlength=problem.recordings.tests).astype(np.float64)
+    # noise is no larger than what the best model leaves: what differs between repeats may be an effect that it lacks
+    noise = min(noise, min(float(np.sum(model.squares)) for model in models) / max(float(np.sum(counts)), 1.0))
     own = tuple(term.effect.name for term in problem.terms)
     return Race(models, problem.base.name, own, searches, counts, noise, coupled, rules)
 
