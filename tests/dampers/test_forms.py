@@ -33,8 +33,11 @@ NUMBERS: dict[str, dict[str, float]] = {
     "dahl-stiffness": {"initial_stiffness": 8e4},
     "bingham": {"transition_velocity": 0.01},
     "bingham-spring": {"spring_stiffness": 6e4},
-    "biviscous": {"yield_velocity": 0.02},
-    "hysteretic-biviscous": {"yield_velocity": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.02},
+    "biviscous": {"yield_velocity": 0.02, "growth": 0.7, "reference_force": 60.0},
+    "hysteretic-biviscous": {
+        "yield_velocity": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.02, "growth": 0.7,
+        "reference_force": 60.0,
+    },
     "hyperbolic-tangent": {"velocity_scale": 0.015, "shift": 0.6, "displacement_scale": 1e-3, "stiffness": 900.0},
     "hysteretic-sigmoid": {"velocity_scale": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.02},
     "algebraic": {"velocity_scale": 0.015, "frequency": 1.5},
@@ -96,7 +99,7 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
     length = p.get("yield_displacement", math.nan)
     if "initial_stiffness" in p:
         length = YIELD / p["initial_stiffness"]
-    if "growth" in p:
+    if "growth" in p and "yield_displacement" in p:
         length = p["yield_displacement"] * (YIELD / p["reference_force"]) ** p["growth"]
     if name == "modified-bouc-wen":
         c1 = p["c1_a"] + p["c1_b"] * DRIVE
@@ -149,7 +152,7 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
 
         return YIELD * integrated(creep, [0.0], t)[0] + viscous
     late = np.tanh(np.gradient(v, t) / p.get("acceleration_scale", 1.0)) * p.get("hysteresis_velocity", 0.0)
-    width = p.get("yield_velocity", math.inf)
+    width = p.get("yield_velocity", math.inf) * (YIELD / p.get("reference_force", YIELD)) ** p.get("growth", 0.0)
     static = {
         "bingham": lambda: np.tanh(v / p["transition_velocity"]),
         "biviscous": lambda: np.clip(v / width, -1, 1),
