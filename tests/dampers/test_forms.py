@@ -33,10 +33,10 @@ NUMBERS: dict[str, dict[str, float]] = {
     "dahl-stiffness": {"initial_stiffness": 8e4},
     "bingham": {"transition_velocity": 0.01},
     "bingham-spring": {"spring_stiffness": 6e4},
-    "biviscous": {"yield_velocity": 0.02, "growth": 0.7, "reference_force": 60.0},
+    "biviscous": {"yield_velocity": 0.02, "rest_share": 0.4, "bend": 1.0, "largest_drive": 2.0},
     "hysteretic-biviscous": {
-        "yield_velocity": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.02, "growth": 0.7,
-        "reference_force": 60.0,
+        "yield_velocity": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.1, "rest_share": 0.4,
+        "bend": 1.0, "largest_drive": 2.0,
     },
     "hyperbolic-tangent": {"velocity_scale": 0.015, "shift": 0.6, "displacement_scale": 1e-3, "stiffness": 900.0},
     "hysteretic-sigmoid": {"velocity_scale": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.02},
@@ -152,7 +152,9 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
 
         return YIELD * integrated(creep, [0.0], t)[0] + viscous
     late = np.tanh(np.gradient(v, t) / p.get("acceleration_scale", 1.0)) * p.get("hysteresis_velocity", 0.0)
-    width = p.get("yield_velocity", math.inf) * (YIELD / p.get("reference_force", YIELD)) ** p.get("growth", 0.0)
+    rest, width = p.get("rest_share", 1.0), p.get("yield_velocity", math.inf)
+    if rest < 1.0:
+        width *= rest + (1.0 - rest) * (DRIVE / p["largest_drive"]) ** p["bend"]
     static = {
         "bingham": lambda: np.tanh(v / p["transition_velocity"]),
         "biviscous": lambda: np.clip(v / width, -1, 1),

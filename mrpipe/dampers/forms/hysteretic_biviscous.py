@@ -8,9 +8,9 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
-from mrpipe.dampers.forms.biviscous import GROWTH, REFERENCE_FORCE, growth_of, width_of, yield_velocity
+from mrpipe.dampers.forms.biviscous import BEND, LARGEST_DRIVE, REST, growth_of, width_of, yield_velocity
 from mrpipe.dampers.parameters import Parameter, Values, shape
-from mrpipe.dampers.plant import ACCELERATION, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
+from mrpipe.dampers.plant import ACCELERATION, CURRENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.dampers.viscoplastic import rounded_sign
 
 NUMBERS = ("yield_velocity", "hysteresis_velocity", "acceleration_scale")
@@ -18,11 +18,11 @@ NUMBERS = ("yield_velocity", "hysteresis_velocity", "acceleration_scale")
 
 @njit(STEP_SIGNATURE, cache=True)
 def hysteretic_biviscous_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: yield velocity at the reference force, hysteresis velocity [m/s], acceleration scale [m/s^2], growth,
-    reference force [N].
+    """Parameters: yield velocity at the largest drive, hysteresis velocity [m/s], acceleration scale [m/s^2], share of
+    the yield velocity without drive, power, largest drive.
     """
     late = wire[VELOCITY] - parameters[1] * rounded_sign(wire[ACCELERATION], parameters[2])
-    width = yield_velocity(parameters[0], wire[YIELD_FORCE], parameters[4], parameters[3])
+    width = yield_velocity(parameters[0], wire[CURRENT], parameters[3], parameters[4], parameters[5])
     wire[HYSTERESIS] = min(max(late / width, -1.0), 1.0)
 
 
@@ -39,16 +39,16 @@ def _post_yield(values: Values, at: Strength) -> FloatArray:
 
 FORM = BaseForm(
     name="hysteretic-biviscous",
-    summary="biviscous, its branches shifted by v_h tanh(v'/a0); v_y = v_r (F_y/F_r)^p",
+    summary="biviscous, its branches shifted by v_h tanh(v'/a0); v_y grows with the drive",
     source="Wereley, Pang, Kamath 1998, J. Intell. Mater. Syst. Struct. 9, 642-649; Pang, Kamath, Wereley 1998",
     parameters=(
         shape("yield_velocity", "m/s", "speed at which it yields", "speed", 1e-3, 1.0, (0.05, 0.2)),
         Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
         shape("acceleration_scale", "m/s^2", "over which the branches change", "acceleration", 1e-4, 1.0, (0.02,)),
-        GROWTH,
-        REFERENCE_FORCE,
+        REST,
+        BEND,
+        LARGEST_DRIVE,
     ),
     steps=_steps,
     post_yield=_post_yield,
-    coupled=True,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -120,9 +120,8 @@ def choose_model(
         left = chosen.residual[used] / chosen.problem.root_weight[used]
         floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
         base = declared_base(training, options.model, options.yield_order, options.viscosity_order)
-        baseline = _without_nuisances(
-            fit_baseline(training, base, declared, model_error_share=floor, rules=options.rules.noise), options
-        )
+        declared_fit = fit_baseline(training, base, declared, model_error_share=floor, rules=options.rules.noise)
+        baseline = _without_nuisances(_with_scale(declared_fit, choice, options.rules.noise), options)
 
 
 def _near_the_noise(
@@ -180,16 +179,34 @@ def _raced(
     further = partial(with_play, effects=effects) if model_error else None
     found = race(base, singles, search, noise, further=further, rules=options.rules.race, jobs=jobs, progress=progress)
     winner = found.winner(options.lead)
-    # where a model's error outweighs the noise, further terms improve the model although their cause is not proven
-    model = found.extended(winner) if model_error and len(winner.effects) > len(found.own) else winner
     progress(0.7, "fit to all tests")
+    selection = promoted(found, winner, base)
     selection = replace(
-        promoted(found, model, base),
+        selection,
+        extension=_extension(found, winner, selection, search, options.rules),
         proven=len(winner.effects) - len(found.own),
         tied_forms=found.tied_forms(winner, options.lead),
         nothing_missing=least,
     )
     return Choice(baseline, selection, found)
+
+
+def _extension(
+    found: Race, winner: Model, selection: Selection, search: Callable[[Fit], Selection], rules: TracingRules
+) -> Fit | None:
+    """Return the winner with further terms, fitted to all training tests; None where there are none.
+
+    Further terms improve the model although their cause is not proven.
+    """
+    if selection.chosen.chi_square < (1.0 + rules.refinement.worth_a_try) * found.noise:
+        return None
+    model = found.extended(winner)
+    further = model.fit
+    if model is winner and winner.form not in found.searches:
+        further = search(winner.fit).chosen
+    if len(further.problem.terms) == len(winner.effects):
+        return None
+    return on_all_tests(further, selection.base.problem, found.coupled)
 
 
 def promoted(found: Race, winner: Model, base: Fit) -> Selection:
@@ -291,6 +308,13 @@ def _weighed_by(baseline: Baseline, found: Fit, rules: NoiseRules) -> Baseline:
     noise = noise_level_of(replace(found, problem=replace(found.problem, root_weight=root)), scale)
     base = fit(replace(problem, root_weight=root), baseline.fit.theta, iterations=8)
     return replace(baseline, fit=base, noise=noise, scale=scale)
+
+
+def _with_scale(baseline: Baseline, choice: Choice, rules: NoiseRules) -> Baseline:
+    """Return a baseline whose noise is that which the best model known shows, where this is less."""
+    scale = noise_scale(choice.selection.chosen, rules)
+    noise = noise_level_of(baseline.fit, scale)
+    return replace(baseline, noise=noise, scale=scale) if noise < baseline.noise else baseline
 
 
 def _quieter(choice: Choice, rules: TracingRules) -> Baseline | None:

@@ -1,7 +1,7 @@
 """How far the displacement is filtered: the limit of the cut-offs with which base forms leave least.
 
-A spectrum shows where a displacement sinks into its white noise. It cannot separate motion from hum of the mains, and it
-does not show what the remaining noise does to a force that follows velocity or acceleration. Therefore the limit is
+A spectrum shows where a displacement sinks into its white noise. It cannot separate motion from hum of the mains, and
+it does not show what the remaining noise does to a force that follows velocity or acceleration. Therefore the limit is
 chosen by the error of models.
 """
 

@@ -1,7 +1,8 @@
-"""A richer form for an effect that has its name: which equation it follows is asked after which effect it is.
+"""What improves a model after its effects are named: richer forms of the named effects, and further terms.
 
-Supple forms explain many things; among the candidates they would blur the names. Once a family is named they cost
-nothing of that, and bring the error down to the noise where the plain forms do not fit.
+Flexible forms explain many things, so among the candidates they would make the names uncertain. Once an effect is
+named they do no such harm, and they lower the error where the plain forms do not fit. Further terms are effects whose
+cause is not proven. Both are kept only if tests that were left out are predicted better.
 """
 
 from __future__ import annotations
@@ -64,6 +65,49 @@ def with_richer_forms(
         if gain.significant and gain.share > rules.least_gain:
             chosen, unseen = richer, trial
     return replace(selection, chosen=chosen)
+
+
+def with_further_terms(
+    selection: Selection,
+    *,
+    folds: int,
+    draws: int,
+    rng: np.random.Generator,
+    jobs: int = 1,
+    rules: RefinementRules | None = None,
+) -> Selection:
+    """Return the selection with the terms of its extension if they lower the error on tests that were left out.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit, and the extension that is considered.
+    folds, draws
+        Of the cross-validation and its bootstrap.
+    rng
+        Source of randomness.
+    jobs
+        Processes; the result does not depend on their number.
+    rules
+        Decision thresholds; their defaults if None.
+    """
+    rules = rules or RefinementRules()
+    chosen, extension = selection.chosen, selection.extension
+    if extension is None or chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
+        return selection
+    count = len(chosen.problem.terms)
+    if [item.effect for item in extension.problem.terms[:count]] != [item.effect for item in chosen.problem.terms]:
+        return selection
+    problem = replace(chosen.problem, terms=(*chosen.problem.terms, *extension.problem.terms[count:]))
+    start = start_of(problem, chosen.base_values, [*chosen.term_values, *extension.term_values[count:]])
+    longer = fit(problem, start, iterations=15)
+    if longer.chi_square > (1.0 - rules.least_gain) * chosen.chi_square:
+        return selection
+    left_out = [left_out_residual(item, folds, jobs=jobs) for item in (chosen, longer)]
+    gain = gain_of(left_out[0], left_out[1], problem, draws=draws, rng=rng)
+    if not gain.significant or gain.share < rules.least_gain:
+        return selection
+    return replace(selection, chosen=longer, named_fit=chosen)
 
 
 def _richest(chosen: Fit, place: int) -> Fit | None:

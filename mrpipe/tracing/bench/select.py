@@ -72,6 +72,10 @@ class Selection:
         Fit without effects that the rounds build on: the base, or another base form that the tests need.
     tied_forms
         Other base forms that are not clearly worse with the same effects.
+    extension
+        Fit with further terms, whose cause is not proven, until it is known whether left-out tests confirm them.
+    named_fit
+        Fit with the named effects alone, where `chosen` holds further terms.
     nothing_missing
         Excess of the chi-square over the noise, in units of the noise, below which nothing is missing.
     """
@@ -83,12 +87,19 @@ class Selection:
     proven: int = 3
     ground: Fit | None = None
     tied_forms: tuple[str, ...] = ()
+    extension: Fit | None = None
+    named_fit: Fit | None = None
     nothing_missing: float = SelectionRules().nothing_missing
 
     @property
     def without_effects(self) -> Fit:
         """Return the fit that the rounds build on."""
         return self.base if self.ground is None else self.ground
+
+    @property
+    def with_named_alone(self) -> Selection:
+        """Return the same without terms whose cause is not proven."""
+        return self if self.named_fit is None else replace(self, chosen=self.named_fit, named_fit=None)
 
     @property
     def recoverable(self) -> float:

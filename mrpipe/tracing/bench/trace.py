@@ -28,7 +28,7 @@ from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
 from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.on_validation import OnValidation
-from mrpipe.tracing.bench.refine import with_richer_forms
+from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
 from mrpipe.tracing.bench.select import Selection, forward_selection, share_of
 from mrpipe.tracing.bench.summary import Summary, Tracing
 from mrpipe.tracing.bench.testability import untestable
@@ -99,6 +99,14 @@ def trace_campaign(
         selection = replace(selection, chosen=selection.without_effects)
     elif not baseline.model_error:
         selection = _refined(selection, len(declared), options, rng, jobs)
+    selection = with_further_terms(
+        selection,
+        folds=options.folds,
+        draws=options.bootstrap_draws,
+        rng=rng,
+        jobs=jobs,
+        rules=options.rules.refinement,
+    )
     progress(0.85, "ceiling")
     offsets = offset_between_tests(
         selection.chosen,
@@ -106,17 +114,22 @@ def trace_campaign(
         rules=rules.offsets,
         least_ratio=rules.offsets.clear if reason and selection.structured else 0.0,
     )
-    named = _named(selection, choice, gains, len(declared), options, rng)
-    causes = [*named[: selection.proven], *([offsets.named()] if offsets is not None else [])]
-    if offsets is not None and any(item.effect.name == "offset" for item in named[: selection.proven]):
+    proven = selection.with_named_alone
+    named = _named(proven, choice, gains, len(declared), options, rng)
+    further = _named(selection, choice, (), len(declared) + len(named), options, rng)
+    causes = [*named, *([offsets.named()] if offsets is not None else [])]
+    if offsets is not None and any(item.effect.name == "offset" for item in named):
         causes.pop()
-    further = named[selection.proven :]
     missing = structured(selection, baseline, training, options, bool(causes))
     found = validated(selection.base, selection.chosen, baseline, training, validation, options, offsets is not None)
-    judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
+    # the class of the verdict is that of the named effects; further terms do not explain anything
+    alone = found
+    if proven is not selection:
+        alone = validated(selection.base, proven.chosen, baseline, training, validation, options, offsets is not None)
+    judgement = judged(alone, proven, training, options, causes, missing, reason, ordered, jobs)
     if causes and judgement.evidence.after >= judgement.evidence.before:
         # what does not lower the error on the validation tests is not named
-        selection = replace(selection, chosen=selection.without_effects)
+        selection = replace(selection, chosen=selection.without_effects, named_fit=None)
         causes, further, offsets = [], (), None
         reason = "the effects that the training tests require do not lower the error on the validation tests"
         found = validated(selection.base, selection.chosen, baseline, training, validation, options)
@@ -223,8 +236,11 @@ def _with_window(
         again = replace(again, base=base, ground=ground).with_floor(noise)
     if noise < selection.noise:
         again = judged_by_trees(again, options.rules.model_error)
-    if again.chosen.chi_square > filtered.chi_square:
-        again = replace(again, chosen=filtered, rounds=selection.rounds)
+    known = {term.effect.name for term in selection.chosen.problem.terms}
+    others = {term.effect.name for term in again.chosen.problem.terms} - known
+    if others or again.chosen.chi_square > filtered.chi_square:
+        # only the race compares an effect with all base forms, so the filter brings no new name
+        again = replace(again, chosen=filtered, rounds=selection.rounds, proven=selection.proven)
     return share, again
 
 
@@ -260,6 +276,7 @@ def _named(
     options: TracingOptions,
     rng: np.random.Generator,
 ) -> tuple[Named, ...]:
+    """Return the terms of the chosen fit behind the first `declared` ones, with what is said of them."""
     chosen = selection.chosen
     named = []
     limits = intervals(chosen) if len(chosen.problem.terms) > declared else []
