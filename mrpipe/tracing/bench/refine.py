@@ -93,7 +93,7 @@ def with_further_terms(
     """
     rules = rules or RefinementRules()
     chosen, extension = selection.chosen, selection.extension
-    if extension is None or chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
+    if extension is None:
         return selection
     count = len(chosen.problem.terms)
     if [item.effect for item in extension.problem.terms[:count]] != [item.effect for item in chosen.problem.terms]:
