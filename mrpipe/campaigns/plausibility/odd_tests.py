@@ -26,6 +26,16 @@ PRIOR_TESTS = 4
 CHANCE = 0.02
 """Probability with which a sound campaign would have one test called odd."""
 
+MIDDLE = 2.0 / 3.0
+"""Share of the other tests, closest to their median, from which their scatter is taken."""
+
+QUANTILE, EFFICIENCY = 0.967, 0.526
+"""For normal samples: half the width of this share over the standard deviation; information over that of the latter."""
+
+POWERS = 0.29
+"""Standard deviation of a power between 0 and 1: beyond the speeds of the other tests, the force of a damper may grow
+with any such power of the speed."""
+
 DECADES = 100.0
 """Ratio of RMS force or drive between a test and all others from which a unit is suspected by itself."""
 
@@ -184,10 +194,14 @@ def limit_of(others: FloatArray, prior: float, tests: int, error: float = 0.0) -
     """Return the largest deviation from the middle of the others that chance explains.
 
     The scatter of the others is pooled with a prior (Student's t); `error` is the standard error of the figure itself.
+    The scatter is taken from the two thirds of the others that lie closest to their median, because few tests at the
+    edge of what was measured scatter more than all others, and because other tests may be wrong too.
     """
-    freedom = PRIOR_TESTS + others.size - 1
-    middle = float(np.median(others))
-    variance = (PRIOR_TESTS * prior**2 + float(np.sum((others - middle) ** 2))) / freedom
+    distances = np.abs(others - float(np.median(others)))
+    scatter = float(np.quantile(distances, MIDDLE)) / QUANTILE
+    counted = EFFICIENCY * (others.size - 1)
+    freedom = PRIOR_TESTS + counted
+    variance = (PRIOR_TESTS * prior**2 + counted * scatter**2) / freedom
     quantile = float(stats.t.ppf(1.0 - CHANCE / (2 * tests), freedom))
     return quantile * float(np.sqrt(variance * (1.0 + 1.0 / others.size) + error**2))
 
@@ -234,6 +248,7 @@ def _score(
         # too little to judge a gain, but decades show in any case
         error = 1.0
     by = abs(item.log_gain - float(np.median(gains)))
+    error = float(np.hypot(error, POWERS * _beyond(index, _all_but(items, index), tests)))
     return by / limit_of(gains, GAIN_SCATTER, len(items), error)
 
 
@@ -246,6 +261,13 @@ def _covered(index: int, others: Sequence[int], tests: Sequence[Slow]) -> bool:
     levels = [tests[other].drive_level for other in others]
     slack = 0.1 * (max(levels) - min(levels)) + 0.02 * max(levels)
     return min(levels) - slack <= tests[index].drive_level <= max(levels) + slack
+
+
+def _beyond(index: int, others: Sequence[int], tests: Sequence[Slow]) -> float:
+    """Return by how much the RMS velocity of a test lies beyond those of the others, as a logarithm; 0 within them."""
+    speeds = [tests[other].speed_rms for other in others]
+    speed = tests[index].speed_rms
+    return float(max(np.log(speed / max(speeds)), np.log(min(speeds) / speed), 0.0))
 
 
 def _as_fast(index: int, others: Sequence[int], tests: Sequence[Slow]) -> bool:
@@ -349,11 +371,14 @@ def _late(reference: ReferenceMap, tests: Sequence[Slow], sound: Sequence[int]) 
     """
     without = [index for index in range(len(tests)) if index not in sound]
     phases: dict[int, float] = {}
+    errors: dict[int, float] = {}
     for index in sound:
         item = agreement(reference, reference.parts[index], {*without, index})
         if item.correlation > 0.8 and item.log_gain_error < 0.3:
             expected = reference.predict(tests[index], {*without, index})
             phases[index] = 2.0 * np.pi * tests[index].frequency_hz * delay(tests[index], expected)
+            # a prediction that is wrong by this share can be wrong by this angle
+            errors[index] = item.log_gain_error
     findings = []
     for index, phase in phases.items():
         others = np.array([value for other, value in phases.items() if other != index])
@@ -361,7 +386,7 @@ def _late(reference: ReferenceMap, tests: Sequence[Slow], sound: Sequence[int]) 
         if others.size < 3 or not _covered(index, company, tests) or not _as_fast(index, company, tests):
             continue
         by = phase - float(np.median(others))
-        if abs(by) <= max(limit_of(others, PHASE_SCATTER, len(phases)), SMALLEST_PHASE):
+        if abs(by) <= max(limit_of(others, PHASE_SCATTER, len(phases), errors[index]), SMALLEST_PHASE):
             continue
         seconds = by / (2.0 * np.pi * tests[index].frequency_hz)
         findings.append(

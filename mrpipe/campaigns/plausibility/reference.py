@@ -1,9 +1,9 @@
 """A flexible force map learned from all other tests, against which one test is compared.
 
 The map is not a damper model. It is a ridge regression on the forces of elastic-plastic elements of several yield
-displacements (stop operators, which carry the hysteresis) and on velocity, each multiplied by powers of the drive. It
-follows most dampers within a few percent in gain. The normal equations of every test are kept apart, so that leaving
-tests out is cheap.
+displacements (stop operators, which carry the hysteresis), on velocity, and on saturating functions of velocity, each
+multiplied by powers of the drive. It follows most dampers within a few percent in gain. The normal equations of every
+test are kept apart, so that leaving tests out is cheap.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ ROUNDS = 12
 
 YIELD_DISPLACEMENTS = (0.02, 0.15, 0.6)
 """Yield displacements of the elastic-plastic elements over the typical RMS displacement of the tests."""
+
+SPEEDS = (0.2, 1.0)
+"""Speeds at which the force saturates, over the typical RMS velocity of the tests."""
 
 
 @dataclass(frozen=True)
@@ -226,7 +229,8 @@ class ReferenceMap:
         speed = test.velocity / self._speed
         drive = np.abs(test.drive) / self._drive
         shapes = [_stop(test.displacement / self.travel, limit) for limit in YIELD_DISPLACEMENTS]
-        shapes += [np.tanh(speed), speed]
+        shapes += [np.tanh(speed / scale) for scale in SPEEDS]
+        shapes.append(speed)
         columns = [shape * drive**power for shape in shapes for power in range(self._powers + 1)]
         columns.append(test.displacement / self.travel)
         features = np.stack(columns, axis=1) * self._force

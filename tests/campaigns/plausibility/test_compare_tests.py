@@ -12,7 +12,8 @@ import pytest
 
 from mrpipe.campaigns import load_campaign
 from mrpipe.campaigns.plausibility import Finding, TestArrays, arrays_of, compare_tests
-from tests.campaigns.plausibility.rig import sound_tests
+from mrpipe.campaigns.plausibility.odd_tests import find_odd_tests, limit_of
+from tests.campaigns.plausibility.rig import hysteretic_force, sound_tests
 
 Fault = Callable[[TestArrays], TestArrays]
 
@@ -112,6 +113,42 @@ def test_a_gain_of_any_one_test_is_found() -> None:
         (item,) = _with_fault(lambda test: replace(test, force_n=1.3 * test.force_n), index)
         found.append((item.test, item.name))
     assert found == [(f"T{index}", "gain-differs") for index in range(10)]
+
+
+@pytest.mark.planted
+def test_a_gain_of_one_test_under_random_motion_is_mostly_found() -> None:
+    found = []
+    for seed in range(8):
+        tests = sound_tests(10, random=True, seed=seed)
+        odd = (3 * seed + 1) % 10
+        tests[odd] = replace(tests[odd], force_n=1.3 * tests[odd].force_n)
+        named = [item.test for item in find_odd_tests(tests)]
+        assert named in ([], [f"T{odd}"])
+        found.append(bool(named))
+    assert sum(found) >= 5
+
+
+@pytest.mark.property
+def test_a_few_wild_tests_do_not_widen_the_limit_for_another() -> None:
+    calm = np.linspace(-0.02, 0.02, 12)
+    wild = np.concatenate((calm[:9], [0.4, -0.5, 0.6]))
+    assert limit_of(wild, 0.04, 13) < 1.3 * limit_of(calm, 0.04, 13)
+    # scatter of most tests, and an unsure figure, do widen it
+    assert limit_of(10.0 * calm, 0.04, 13) > 2.0 * limit_of(calm, 0.04, 13)
+    assert limit_of(calm, 0.04, 13, 0.2) > 2.0 * limit_of(calm, 0.04, 13)
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("random", [False, True])
+def test_a_test_slower_than_all_others_is_not_called_odd(random: bool) -> None:
+    rng = np.random.default_rng(2)
+    tests = list(_sound(10, random))
+    slow = 0.15 * tests[3].displacement_m
+    force = hysteretic_force(slow, np.gradient(slow, tests[3].time_s), 1.5, rng)
+    assert [
+        item.line
+        for item in find_odd_tests([*tests, replace(tests[3], name="slow", displacement_m=slow, force_n=force)])
+    ] == []
 
 
 @pytest.mark.planted
