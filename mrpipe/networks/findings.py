@@ -44,12 +44,19 @@ def score(errors: FloatArray) -> Score:
 
 
 def choose(outcomes: Sequence[Outcome]) -> Outcome:
-    """Return the smallest refined network within one standard error of the best."""
+    """Return the smallest refined network that is not clearly worse than the best.
+
+    Not clearly worse: the mean of the logarithmic ratio of the errors, start by start, is at most its standard error
+    and at most that of :data:`WORTHWHILE`. All candidates share the splits of the starts, so how hard a split is drops
+    out of the ratio.
+    """
     refined = [outcome for outcome in outcomes if outcome.is_refined]
-    scores = [score(outcome.refined) for outcome in refined]
-    best = min(scores, key=lambda item: item.mean)
-    limit = best.mean * float(np.exp(best.standard_error))
-    within = [outcome for outcome, item in zip(refined, scores, strict=True) if item.mean <= limit]
+    best = min(refined, key=lambda outcome: score(outcome.refined).mean)
+    within = []
+    for outcome in refined:
+        ratio = score(outcome.refined / best.refined)
+        if np.log(ratio.mean) <= min(ratio.standard_error, np.log1p(WORTHWHILE)):
+            within.append(outcome)
     return min(within, key=lambda outcome: (outcome.candidate.parameters, score(outcome.refined).mean))
 
 
@@ -145,7 +152,8 @@ def _compare(name: str, statement: str, reference: Outcome | None, others: Seque
     other = min(rated, key=lambda o: score(getattr(o, level)).mean)
     first, second = score(getattr(reference, level)), score(getattr(other, level))
     change = second.mean / first.mean - 1.0
-    uncertainty = 2.0 * float(np.hypot(first.standard_error, second.standard_error))
+    # start by start, because both have the same splits
+    uncertainty = 2.0 * score(getattr(other, level) / getattr(reference, level)).standard_error
     clear = abs(np.log(second.mean / first.mean)) > max(uncertainty, np.log1p(WORTHWHILE))
     holds = (clear and change > 0.0) if claim == "worse" else not (clear and change < 0.0)
     return Finding(

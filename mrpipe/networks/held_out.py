@@ -13,6 +13,9 @@ from mrpipe.networks.network import FeatureSpec
 from mrpipe.networks.problem import Problem
 from mrpipe.networks.scaling import NORMALISATION, Normalisation, Scaling, scaling_of
 
+ALIKE = 1.0 / 12.0
+"""Relative difference of RMS displacement and RMS velocity up to which two tests have the same motion."""
+
 
 @dataclass(frozen=True)
 class TrainingData:
@@ -82,6 +85,52 @@ def hold_out(history: History, share: float, rng: np.random.Generator) -> tuple[
         held = sorted(int(rng.choice(group)) for group in groups)
         return history.select([index for index in range(count) if index not in held]), history.select(held)
     return _part(history, 0.0, 1.0 - share), _part(history, 1.0 - share, 1.0)
+
+
+def folds(history: History, count: int, rng: np.random.Generator) -> list[tuple[History, History]]:
+    """Split a history `count` times into one for fitting and one for judging, by motion.
+
+    Tests with the same motion (frequency and amplitude) stay together, so that a network is judged on motions that it
+    was not fitted to. Motions are distributed over the folds by their number of samples. With fewer than three motions
+    the records are distributed instead, by RMS force; fewer than five records are cut within, as by :func:`hold_out`.
+
+    Parameters
+    ----------
+    history
+        Training tests.
+    count
+        Number of splits, at least 1. It is lowered to the number of motions or records.
+    rng
+        Decides which split holds which motion.
+    """
+    records = len(history.names)
+    groups = motions(history)
+    if len(groups) < 3:
+        groups = [[index] for index in range(records)]
+    if records < 5 or count < 2:
+        share = 1.0 / max(count, 4)
+        return [hold_out(history, share, rng)]
+    samples_of = np.diff(history.starts)
+    held: list[list[int]] = [[] for _ in range(min(count, len(groups)))]
+    for place in sorted(rng.permutation(len(groups)), key=lambda item: -int(samples_of[groups[item]].sum())):
+        min(held, key=lambda fold: int(samples_of[fold].sum()) if fold else 0).extend(groups[place])
+    return [
+        (history.select([index for index in range(records) if index not in fold]), history.select(sorted(fold)))
+        for fold in held
+    ]
+
+
+def motions(history: History) -> list[list[int]]:
+    """Return the indices of the tests, grouped by motion: RMS displacement and RMS velocity within a twelfth."""
+    sizes = [
+        (float(np.std(history.record(index, "displacement"))), float(np.std(history.record(index, "velocity"))))
+        for index in range(len(history.names))
+    ]
+    groups: list[list[int]] = []
+    for index, size in enumerate(sizes):
+        group = next((item for item in groups if np.allclose(size, sizes[item[0]], rtol=ALIKE, atol=0.0)), None)
+        groups.append([index]) if group is None else group.append(index)
+    return groups
 
 
 def _part(history: History, first: float, last: float) -> History:

@@ -60,7 +60,13 @@ class SweepOptions(Section):
     refine_rows: int = Field(6000, ge=50, description="Rows of the second fit.")
     refine_iterations: int = Field(80, ge=0, description="Iterations of the second fit at most.")
     held_out_rows: int = Field(5000, ge=50, description="Rows of held-out records on which candidates are judged.")
-    held_out_share: float = Field(0.25, gt=0.0, lt=0.9, description="Share of the training records held out.")
+    held_out_share: float = Field(
+        0.25,
+        gt=0.0,
+        lt=0.9,
+        description="Share of the training tests left out of the fit of each start (tests with the same motion "
+        "together); 0.25 gives four splits, which the starts share.",
+    )
     held_out_failures: int = Field(
         10, ge=1, description="Consecutive iterations without gain on the held-out records that end a fit."
     )

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from mrpipe.artifacts import FloatArray, IntArray, Progress, atomic_path, no_progress
 from mrpipe.networks.assembly import History, rows_at, window_starts
 from mrpipe.networks.candidates import Candidate
-from mrpipe.networks.held_out import hold_out
+from mrpipe.networks.held_out import folds
 from mrpipe.networks.levenberg_marquardt import fit
 from mrpipe.networks.options import SweepOptions
 from mrpipe.networks.problem import Problem
@@ -34,7 +34,11 @@ _Fits = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one candidate fared: RMS error over RMS of the held-out force, a number a start (NaN: not refined)."""
+    """RMS error of a candidate over RMS of the held-out force, one number for each start (NaN: not refined).
+
+    Each start has its split into tests that are fitted and tests that are held out; all candidates have the same ones,
+    so their errors are compared start by start.
+    """
 
     candidate: Candidate
     screened: FloatArray
@@ -48,17 +52,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class SweepRun:
-    """All outcomes in the order of the candidates; predicted and spent wall time [s]."""
+    """All outcomes in the order of the candidates; tests held out in each split; predicted and spent wall time [s]."""
 
     outcomes: tuple[Outcome, ...]
-    held_out: tuple[str, ...]
+    held_out: tuple[tuple[str, ...], ...]
     predicted_seconds: float
     seconds: float
 
 
 @dataclass(frozen=True)
 class _Data:
-    """The same rows for every candidate: places in the histories for the two fits and for judging."""
+    """The same rows of one split for every candidate: places in the histories for the two fits and for judging."""
 
     fit: History
     held: History
@@ -81,7 +85,10 @@ def sweep(
     progress: Progress = no_progress,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SweepRun:
-    """Compare candidates on training records, of which some are held out.
+    """Compare candidates on training records by cross-validation over motions.
+
+    Each start of a candidate is fitted to one split of the records (see :func:`mrpipe.networks.held_out.folds`) and
+    judged on motions that it was not fitted to.
 
     Parameters
     ----------
@@ -107,12 +114,12 @@ def sweep(
         Called with the share done and a text; called with the predicted cost before the sweep starts.
     """
     began = time.perf_counter()
-    data = _places(history, candidates, options, seed, normalisation)
+    data = _splits(history, candidates, options, seed, normalisation)
     digest = _digest_of(data, options, seed)
     further = crossings[1] if crossings else 0
     kept = [_kept_file(cache, f"screen-{digest}", item) is not None for item in candidates]
     with threadpool_limits(1):
-        screening, refining = predicted_cost(data.fit, candidates, options, further, kept)
+        screening, refining = predicted_cost(data[0].fit, candidates, options, further, kept)
     predicted = (screening + refining) / max(1, jobs)
     more = f" and up to {further} combinations of the best" if further else ""
     cores = "1 free core" if jobs <= 1 else f"{jobs} free cores"
@@ -148,7 +155,7 @@ def sweep(
     outcomes = tuple(
         Outcome(candidate, screened[index][0], after.get(index, absent)) for index, candidate in enumerate(every)
     )
-    return SweepRun(outcomes, data.held.names, predicted, time.perf_counter() - began)
+    return SweepRun(outcomes, tuple(split.held.names for split in data), predicted, time.perf_counter() - began)
 
 
 def _to_refine(means: Sequence[float], planned: int, count: int) -> list[int]:
@@ -163,7 +170,7 @@ def _to_refine(means: Sequence[float], planned: int, count: int) -> list[int]:
 
 
 def _mean(errors: FloatArray) -> float:
-    """Return the logarithm of the geometric mean."""
+    """Return the logarithm of the geometric mean, so that one start that fails does not decide."""
     return float(np.mean(np.log(errors)))
 
 
@@ -193,51 +200,65 @@ def _part(progress: Progress, first: float, last: float) -> Progress:
     return lambda fraction, text="": progress(first + (last - first) * fraction, text)
 
 
-def _places(
+def _splits(
     history: History, candidates: Sequence[Candidate], options: SweepOptions, seed: int, normalisation: Normalisation
-) -> _Data:
+) -> list[_Data]:
     rng = np.random.default_rng([seed, 1])
-    fit_history, held = hold_out(history, options.held_out_share, rng)
     longest = max(candidate.past_values for candidate in candidates)
-    available, judged = window_starts(fit_history, longest), window_starts(held, longest)
-    shuffled = rng.permutation(available)
-    return _Data(
-        fit=fit_history,
-        held=held,
-        screen=np.sort(shuffled[: options.screen_rows]),
-        refine=np.sort(shuffled[: options.refine_rows]),
-        judged=np.sort(rng.permutation(judged)[: options.held_out_rows]),
-        normalisation=normalisation,
-    )
+    count = min(options.starts, max(2, round(1.0 / options.held_out_share)))
+    splits = []
+    for fitted, held in folds(history, count, rng):
+        shuffled = rng.permutation(window_starts(fitted, longest))
+        judged = rng.permutation(window_starts(held, longest))
+        splits.append(
+            _Data(
+                fit=fitted,
+                held=held,
+                screen=np.sort(shuffled[: options.screen_rows]),
+                refine=np.sort(shuffled[: options.refine_rows]),
+                judged=np.sort(judged[: options.held_out_rows]),
+                normalisation=normalisation,
+            )
+        )
+    return splits
 
 
 def _fit_all(
-    data: _Data, candidate: Candidate, options: SweepOptions, seed: int, starts: FloatArray | None = None
-) -> tuple[FloatArray, FloatArray]:
-    """Fit every start of a candidate; return held-out errors (starts,) and parameters (starts, P)."""
-    spec = candidate.spec(data.fit.sampling_rate_hz)
-    features, target = rows_at(data.fit, spec, data.screen if starts is None else data.refine)
-    scaling = scaling_of(features, target, spec, data.normalisation, whitened=options.whitened)
-    if starts is not None:
-        # the parameters of the screening refer to the basis of its rows
-        small = rows_at(data.fit, spec, data.screen)
-        scaling = scaling_of(*small, spec, data.normalisation, whitened=options.whitened)
-    held_features, held_target = rows_at(data.held, spec, data.judged)
-    # errors of candidates are compared to two digits, so that single precision serves
-    problem = Problem(scaling.inputs(features), scaling.target(target), candidate.layers, candidate.biases, single=True)
-    held = Problem(scaling.inputs(held_features), scaling.target(held_target), candidate.layers, candidate.biases)
+    data: Sequence[_Data], candidate: Candidate, options: SweepOptions, seed: int, starts: FloatArray | None = None
+) -> _Fits:
+    """Fit every start of a candidate to its split; return held-out errors (starts,) and parameters (starts, P)."""
     rules = replace(
         options.rules, iterations=options.screen_iterations if starts is None else options.refine_iterations
     )
     rngs = np.random.default_rng([seed, 2, _number(_key(candidate))]).spawn(options.starts)
-    size = float(np.sqrt(np.mean(held_target**2)))
+    problems = [_problems(split, candidate, options, screening=starts is None) for split in data]
     errors, parameters = [], []
     for index in range(options.starts):
+        problem, held, scale = problems[index % len(problems)]
         guess = initial_parameters(problem, rngs[index], options.initial) if starts is None else starts[index]
         outcome = fit(problem, guess, method=options.method, rules=rules, held_out=held)
-        errors.append(np.sqrt(outcome.held_out_mean_square) * scaling.output_scale / size)
+        errors.append(np.sqrt(outcome.held_out_mean_square) * scale)
         parameters.append(outcome.parameters)
     return np.array(errors), np.array(parameters)
+
+
+def _problems(
+    data: _Data, candidate: Candidate, options: SweepOptions, *, screening: bool
+) -> tuple[Problem, Problem, float]:
+    """Return the problem to fit, that to judge, and what turns a normalised RMS error into an NRMSE, of one split."""
+    spec = candidate.spec(data.fit.sampling_rate_hz)
+    features, target = rows_at(data.fit, spec, data.screen if screening else data.refine)
+    # the parameters of the screening refer to the basis of its rows, so refining keeps that basis
+    basis = (features, target) if screening else rows_at(data.fit, spec, data.screen)
+    scaling = scaling_of(*basis, spec, data.normalisation, whitened=options.whitened)
+    held_features, held_target = rows_at(data.held, spec, data.judged)
+    size = float(np.sqrt(np.mean(held_target**2)))
+    # errors of candidates are compared to two digits, so that single precision serves
+    return (
+        Problem(scaling.inputs(features), scaling.target(target), candidate.layers, candidate.biases, single=True),
+        Problem(scaling.inputs(held_features), scaling.target(held_target), candidate.layers, candidate.biases),
+        scaling.output_scale / size,
+    )
 
 
 def predicted_cost(
@@ -310,12 +331,12 @@ def _number(key: str) -> int:
     return int(key, 16) % 2**63
 
 
-def _digest_of(data: _Data, options: SweepOptions, seed: int) -> str:
+def _digest_of(data: Sequence[_Data], options: SweepOptions, seed: int) -> str:
     """Return a digest of all that a fit depends on, without its candidate."""
     digest = hashlib.sha256()
     fits = options.model_dump(exclude={"refined", "design", "states", "past_values", "layers", "neurons", "biases"})
-    digest.update(json.dumps([fits, data.normalisation, seed], sort_keys=True).encode())
-    for history, places in ((data.fit, data.refine), (data.held, data.judged)):
+    digest.update(json.dumps([fits, data[0].normalisation, seed], sort_keys=True).encode())
+    for history, places in (pair for split in data for pair in ((split.fit, split.refine), (split.held, split.judged))):
         digest.update(places.tobytes())
         for name in sorted(history.channels):
             digest.update(np.ascontiguousarray(history.channels[name]).tobytes())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from mrpipe.networks.candidates import Candidate
-from mrpipe.networks.findings import Finding, score
+from mrpipe.networks.findings import WORTHWHILE, Finding, score
 from mrpipe.networks.sweep import Outcome, SweepRun
 from mrpipe.reporting import networks as figures
 from mrpipe.reporting.sink import Sink
@@ -23,7 +23,7 @@ class SweepResult:
     run
         Every candidate with its errors.
     chosen
-        The smallest network within one standard error of the best.
+        The smallest network that is not clearly worse than the best.
     verdicts
         Statements of the thesis on architectures, checked.
     centre
@@ -41,9 +41,11 @@ def describe(sink: Sink, result: SweepResult) -> None:
     outcomes, chosen = result.run.outcomes, result.chosen
     sink.text(
         f"{len(outcomes)} architectures, each from {len(chosen.screened)} random starts, were screened on few rows; "
-        f"{sum(outcome.is_refined for outcome in outcomes)} were trained further. All are judged on "
-        f"{len(result.run.held_out)} training records that no fit has seen. Chosen is the smallest network within one "
-        f"standard error of the best: {chosen.candidate.label}."
+        f"{sum(outcome.is_refined for outcome in outcomes)} were trained further. Each start is judged on training "
+        f"tests that were left out of its fit, in {len(result.run.held_out)} splits. Tests of one motion are "
+        "left out together, so that a network is judged on unseen motions. Chosen is the smallest network "
+        "that is worse than the best by less than the standard error of their ratio and by less than "
+        f"{100.0 * WORTHWHILE:.0f} %: {chosen.candidate.label}."
     )
     sink.table("findings", _verdicts(result.verdicts), "General statements on architectures, checked on this campaign.")
     sink.table("candidates", _candidates(outcomes), "All candidates; errors over the starts on held-out records.")

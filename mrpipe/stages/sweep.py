@@ -83,7 +83,7 @@ def _write(context: StageContext, run: SweepRun, chosen: Outcome, verdicts: list
         )
         artifact.put_json("candidates", [outcome.candidate.label for outcome in run.outcomes])
         artifact.put_json("findings", [asdict(item) for item in verdicts])
-        artifact.put_json("held_out", list(run.held_out))
+        artifact.put_json("held_out", [list(names) for names in run.held_out])
         sizes = [outcome.candidate.parameters for outcome in run.outcomes]
         artifact.put("parameters", sizes, unit="1", dims=("candidate",))
         for level in ("screened", "refined"):

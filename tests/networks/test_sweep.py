@@ -10,6 +10,7 @@ import pytest
 
 from mrpipe.networks.candidates import Candidate, Grid
 from mrpipe.networks.findings import choose, findings, score
+from mrpipe.networks.held_out import folds, motions
 from mrpipe.networks.options import SweepOptions
 from mrpipe.networks.sweep import Outcome, predicted_costs, sweep
 from tests.networks.rig import bench_history
@@ -54,7 +55,7 @@ def test_outcomes_do_not_depend_on_jobs_or_on_who_else_is_tried() -> None:
     for one, other in zip(alone.outcomes, among.outcomes, strict=True):
         assert one.screened.tobytes() == other.screened.tobytes()
         assert one.refined.tobytes() == other.refined.tobytes()
-    assert set(alone.held_out) < set(history.names)
+    assert all(set(names) < set(history.names) for names in alone.held_out)
 
 
 @pytest.mark.property
@@ -176,6 +177,34 @@ def test_the_smallest_within_one_standard_error_is_chosen() -> None:
     assert choose(clear).candidate == large
     unrefined = Outcome(large, np.array([0.01, 0.01]), np.full(2, np.nan))
     assert choose([outcome(middle, 0.05, 0.06), unrefined]).candidate == middle
+
+
+@pytest.mark.planted
+def test_a_network_that_fails_on_one_motion_is_not_chosen_for_its_size() -> None:
+    small, large = replace(CENTRE, hidden=(3,)), CENTRE
+    # four splits alike, and one motion at which the small network is three times worse
+    outcomes = [outcome(small, 0.05, 0.05, 0.05, 0.05, 0.15), outcome(large, 0.05, 0.05, 0.05, 0.05, 0.05)]
+    assert choose(outcomes).candidate == large
+    # splits of different difficulty do not hide that one network is better in all of them
+    hard = np.array([0.02, 0.05, 0.1, 0.2, 0.4])
+    outcomes = [Outcome(small, 1.2 * hard, 1.2 * hard), Outcome(large, hard, hard)]
+    assert choose(outcomes).candidate == large
+
+
+@pytest.mark.property
+def test_splits_leave_whole_motions_out_and_every_test_once() -> None:
+    history = bench_history(frequencies=(0.5, 0.8, 1.2, 1.8))
+    assert len(motions(history)) == 4
+    splits = folds(history, 4, np.random.default_rng(3))
+    held = [name for _, part in splits for name in part.names]
+    assert sorted(held) == sorted(history.names)
+    for fitted, part in splits:
+        assert set(fitted.names) | set(part.names) == set(history.names)
+        assert not {name.split("-")[-1] for name in fitted.names} & {name.split("-")[-1] for name in part.names}
+    # few motions: records are left out; few records: each is cut
+    assert len(folds(bench_history(), 3, np.random.default_rng(3))) == 3
+    ((fitted, part),) = folds(history.select([0, 1]), 4, np.random.default_rng(3))
+    assert fitted.names == part.names and fitted.samples > part.samples > 0
 
 
 @pytest.mark.planted
