@@ -78,6 +78,8 @@ def _until(names: list[str], until: str | None) -> list[str]:
 
 
 def _run_summary(pipeline: Pipeline, report: list[Path], seconds: float) -> dict[str, Any]:
+    from mrpipe.reporting.headlines import weak_network
+
     stages = {
         name: {
             "outcome": outcome.what,
@@ -90,12 +92,14 @@ def _run_summary(pipeline: Pipeline, report: list[Path], seconds: float) -> dict
         }
         for name, outcome in pipeline.outcomes.items()
     }
+    weak = weak_network({name: stage["summary"] for name, stage in stages.items()})
     return {
         "run": str(pipeline.run_directory),
         "seconds": seconds,
         "stages": stages,
         "report": [str(path) for path in report],
         "failed": [name for name, stage in stages.items() if "failed" in stage],
+        "notes": [weak] if weak else [],
     }
 
 
@@ -109,6 +113,8 @@ def _print_run(pipeline: Pipeline, content: dict[str, Any]) -> None:
             print(f"{'':20} {line}")
         for warning in stage["warnings"]:
             print(f"{'':20} warning: {warning}")
+    for note in content["notes"]:
+        print(f"note: {note}")
     print(f"done in {content['seconds']:.1f} s, in {pipeline.run_directory}")
     for path in content["report"]:
         print(f"report: {path}")

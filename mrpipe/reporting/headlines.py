@@ -74,6 +74,29 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {floor})"
 
 
+FAR_WORSE = 1.5
+"""Ratio of the errors of forward network and damper model from which the network is called worse."""
+
+
+def weak_network(summaries: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return a sentence where the forward network is far worse than the damper model of the same run, else nothing.
+
+    Parameters
+    ----------
+    summaries
+        Stage -> its summary.
+    """
+    network, damper = summaries.get("train-forward") or {}, summaries.get("identify-damper") or {}
+    error, reference = network.get("validation_nrmse"), damper.get("validation_nrmse")
+    if not error or not reference or error < FAR_WORSE * reference:
+        return ""
+    return (
+        f"The forward network misses the validation tests by {100.0 * error:.2g} % of the RMS force, "
+        f"{error / reference:.2g} times the error of the damper model {damper.get('form', '')} "
+        f"({100.0 * reference:.2g} %). Use the damper model for predictions; a network needs tests with more motions."
+    )
+
+
 def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
     """Return the few lines that a person wants to read of a stage; empty where its numbers speak for themselves."""
     if stage != "close-loop" or "before" not in summary:

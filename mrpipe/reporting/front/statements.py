@@ -11,6 +11,7 @@ from typing import Any
 
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import laws as law_facts
+from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.words import duration, listed, number, percent, plain, with_interval
 
 
@@ -152,7 +153,8 @@ def models(facts: RunFacts) -> str:
         text += f" The inverse network misses the drive by {percent(inverse['error_over_range'])} of its range"
         linear = inverse.get("linear_baseline_error_over_range")
         text += f" (linear model {percent(linear)})." if linear is not None else "."
-    return text.strip()
+    weak = weak_network({name: facts.summary(name) for name in ("identify-damper", "train-forward")})
+    return f"{text} {weak}".strip()
 
 
 def model_errors(facts: RunFacts) -> list[tuple[str, float, str]]:
