@@ -37,10 +37,12 @@ def nearest(word: str, known: Iterable[str]) -> str:
     words = sorted(known)
     # the case of a unit matters, but its misspelling often is the case alone
     folded = {item.casefold(): item for item in words}
-    close = difflib.get_close_matches(str(word), words, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(str(word), words, n=len(words) or 1, cutoff=0.5)
+    # of words that are about equally close, letters in another order are the likeliest mistake
+    turned = [item for item in close if sorted(item.casefold()) == sorted(str(word).casefold())]
     same = folded.get(str(word).casefold())
     if same or close:
-        return f"did you mean {same or close[0]}?"
+        return f"did you mean {same or (turned or close)[0]}?"
     return f"known: {', '.join(words)}" if words else "there are none"
 
 

@@ -92,6 +92,7 @@ def check(
     checking.check_headers(loaded)
     without = checking.stages_without_data(loaded)
     result = checking.check_campaigns(loaded)
+    count = "1 error" if result.errors == 1 else f"{result.errors} errors"
     stages = list(loaded.config.stages)
     if options.json:
         print_json(
@@ -104,7 +105,7 @@ def check(
             }
         )
     else:
-        verdict = f"{result.errors} errors in the data" if result.errors else "valid"
+        verdict = f"{count} in the data" if result.errors else "valid"
         print(f"{_shortest(loaded.path)}: {verdict}, {len(stages)} stages")
         for rig, text in result.campaigns.items():
             print(f"  campaign {rig}: {text}")
@@ -117,7 +118,7 @@ def check(
         if not result.errors:
             print(f"next: mrpipe run {options.config or _shortest(loaded.path)}")
     if result.errors:
-        raise CheckFailed(f"{loaded.path}: {result.errors} errors in the measured data (listed above)")
+        raise CheckFailed(f"{loaded.path}: {count} in the measured data (listed above)")
 
 
 def _shortest(path: Path) -> Path:

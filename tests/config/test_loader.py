@@ -54,6 +54,7 @@ OVERRIDES = {
     "train_inverse.architecture=[0]": "--set: train_inverse.architecture.0: is 0; input should be greater than 0",
     "train_inverse.architecture=best": "train_inverse.architecture: is 'best'; input should be 'thesis' or 'sweep'",
     "identify_damper.form=bouc-wenn": "no base form 'bouc-wenn'; did you mean bouc-wen",
+    "sweep.strats=3": "--set: sweep.strats: unknown key; did you mean starts?",
     "sweep.neurons=[0]": "--set: sweep.neurons.0: is 0; input should be greater than 0",
     "sweep.layers=[]": "--set: sweep.layers: is []; tuple should have at least 1 item",
     "seed=[1": "--set: seed=[1: value: not valid YAML",
