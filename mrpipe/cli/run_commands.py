@@ -92,7 +92,7 @@ def _run_summary(pipeline: Pipeline, report: list[Path], seconds: float) -> dict
         }
         for name, outcome in pipeline.outcomes.items()
     }
-    weak = weak_network({name: stage["summary"] for name, stage in stages.items()})
+    weak = weak_network({name: outcome.manifest.summary for name, outcome in pipeline.outcomes.items()})
     return {
         "run": str(pipeline.run_directory),
         "seconds": seconds,

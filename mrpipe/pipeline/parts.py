@@ -32,7 +32,7 @@ class PartWriter:
         """Add a table and save it as CSV."""
         file = f"tables/{self.stage}-{name}.csv"
         with atomic_path(self.run_directory / file) as temporary:
-            frame.to_csv(temporary, index=False)
+            frame.map(_readable).to_csv(temporary, index=False)
         self.items.append({"kind": "table", "file": file, "caption": caption})
 
     def figure(self, name: str, figure: Figure, caption: str) -> None:
@@ -54,6 +54,11 @@ class PartWriter:
             self.run_directory / PARTS / f"{self.stage}.json",
             json.dumps({"stage": self.stage, "items": self.items}),
         )
+
+
+def _readable(cell: Any) -> Any:
+    """Return a list as people write it; other cells are left alone."""
+    return ", ".join(str(item) for item in cell) if isinstance(cell, list | tuple) else cell
 
 
 def read_part(run_directory: Path, stage: str) -> list[dict[str, Any]]:

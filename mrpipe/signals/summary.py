@@ -32,6 +32,7 @@ def preparation_row(item: Preparation) -> dict[str, Any]:
         "cycles": max(0, int(test.cycles.size) - 1),
         "displacement_offset_m": test.displacement_offset_m,
         "force_offset_n": test.force_offset_n,
+        "displacement_peak_m": float(abs(test.displacement_m).max()),
         "force_peak_n": float(abs(test.force_n).max()),
         "velocity_peak_m_s": float(abs(test.velocity_m_s).max()),
         "drive_mean": float(test.drive.mean()),

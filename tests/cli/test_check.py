@@ -76,7 +76,7 @@ def test_errors_in_the_data_are_listed_and_exit_1(tmp_path: Path, capsys: pytest
     config = project(tmp_path, tests)
     status, out, err = checked(capsys, str(config))
     assert status == 1 and "error: test T3, force: force or displacement has the opposite sign" in out
-    assert "1 errors in the measured data" in err
+    assert "1 error in the measured data" in err
     status, out, _ = checked(capsys, str(config), "--json")
     content = json.loads(out)
     assert status == 1 and content["valid"] is False

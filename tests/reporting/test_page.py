@@ -64,3 +64,13 @@ def test_missing_figure_is_said(tmp_path: Path, stages: list[ReportStage]) -> No
     (tmp_path / "figures" / "prepare-loop.svg").unlink()
     (path,) = write_report(RunFacts(tmp_path, "T", "", stages), ["html"])
     assert "is missing: build the stage again" in path.read_text(encoding="utf-8")
+
+
+def test_a_cell_that_holds_a_list_is_written_as_words(tmp_path: Path) -> None:
+    part = PartWriter("identify-damper", tmp_path)
+    part.table("forms", pd.DataFrame({"form": ["dahl", "lugre"], "at bound": [["k0", "c1"], []]}), "Forms")
+    part.save()
+    stage = ReportStage("identify-damper", "", read_part(tmp_path, "identify-damper"), {}, [], "", 0.0)
+    (path,) = write_report(RunFacts(tmp_path, "T", "", [stage]), ["markdown"])
+    text = path.read_text(encoding="utf-8")
+    assert "| dahl | k0, c1 |" in text and "[" not in (tmp_path / "tables" / "identify-damper-forms.csv").read_text()

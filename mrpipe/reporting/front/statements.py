@@ -53,7 +53,7 @@ def measured(facts: RunFacts) -> str:
         tests = prepared["tests"]
         unseen = sum(test["role"] == "validation" for test in tests)
         seconds = sum(test["duration_s"] for test in tests)
-        stroke = max(test["amplitude_m"] for test in tests)
+        stroke = max(test.get("displacement_peak_m", test["amplitude_m"]) for test in tests)
         speed = max(test["velocity_peak_m_s"] for test in tests)
         force = max(test["force_peak_n"] for test in tests)
         motion = f"up to {number(1e3 * stroke)} mm, " if stroke > 0.0 else ""

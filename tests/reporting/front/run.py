@@ -105,7 +105,14 @@ def run_in(directory: Path, loop: Mapping[str, Any] | None = None) -> RunFacts:
     prepared = {
         "campaign": "my-rig",
         "tests": [
-            {"role": role, "duration_s": 30.0, "amplitude_m": 0.01, "velocity_peak_m_s": 0.06, "force_peak_n": 150.0}
+            {
+                "role": role,
+                "duration_s": 30.0,
+                "amplitude_m": 0.01,
+                "displacement_peak_m": 0.012,
+                "velocity_peak_m_s": 0.06,
+                "force_peak_n": 150.0,
+            }
             for role in ("training", "validation")
         ],
     }

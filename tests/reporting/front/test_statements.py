@@ -90,3 +90,8 @@ def test_a_law_that_was_designed_is_the_answer(tmp_path: Path) -> None:
 def test_tied_effect_is_not_called_sure(tmp_path: Path) -> None:
     weak = {**EFFECT, "confidence": 0.5}
     assert "Confidence: low (0.50)" in answers(tmp_path, effects=[weak])["Missing"]
+
+
+def test_the_largest_motion_is_that_of_any_test(tmp_path: Path) -> None:
+    """A random test has no amplitude of its cycles, but it may move furthest."""
+    assert "up to 12.0 mm, " in answers(tmp_path)["Measured"]
