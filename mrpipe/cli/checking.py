@@ -221,11 +221,39 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
         if key not in measured:
             result.campaigns[key] = source or "none"
             continue
+        if key == "closed_loop" and measured[key] == measured.get("frame"):
+            result.campaigns[key] = f"{result.campaigns['frame']}, the same as frame"
+            result.findings[key] = _without_law(load_campaign(measured[key]))
+            continue
         campaign = load_campaign(measured[key])
         result.campaigns[key] = f"{campaign.name}: {len(campaign.recordings)} tests"
         result.notes[key] = list(campaign.findings)
         result.findings[key] = [*judge(campaign), *_too_short(loaded, campaign), *_no_validation(loaded, key, campaign)]
+        if key == "closed_loop":
+            result.findings[key] += _without_law(campaign)
     return result
+
+
+def _without_law(campaign: Campaign) -> list[Finding]:
+    """Return closed-loop tests that do not state their law, or not the gains of a law that has gains."""
+    from mrpipe.campaigns.plausibility import Finding
+    from mrpipe.control.laws import law_named, law_names
+
+    findings = []
+    for test in campaign.recordings:
+        if test.kind != "closed-loop":
+            continue
+        law = str(test.details.get("law") or "")
+        wanted = law_named(law).gain_names if law in law_names() else ()
+        if law and (test.details.get("gains") or not wanted):
+            continue
+        sentence = "its control law is not stated, so close-loop does not compare it"
+        remedy = "write law: and gains: of this test"
+        if law:
+            sentence = f"the gains of law {law} are not stated, so the calibrated ones are taken"
+            remedy = f"write gains: {{{', '.join(f'{name}: ...' for name in wanted)}}} as they were in this test"
+        findings.append(Finding("law-unknown", "warning", sentence, remedy, test=test.name))
+    return findings
 
 
 def _no_validation(loaded: LoadedConfig, key: str, campaign: Campaign) -> list[Finding]:

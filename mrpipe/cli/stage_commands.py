@@ -13,6 +13,8 @@ from mrpipe.control.laws import law_names
 from mrpipe.errors import CheckFailed, UserError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from mrpipe.pipeline.runner import Outcome, Pipeline
 
 _EXPORTS = ("controller", "damper", "frame", "forward", "inverse", "opensees")
@@ -42,6 +44,8 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
     from mrpipe.reporting.headlines import in_brief
 
     with session(options) as pipeline:
+        if options.campaign is not None:
+            _require_use(names, pipeline, options.campaign)
         if options.force:
             pipeline.force = frozenset(names)
         outcomes = [pipeline.build(name) for name in names]
@@ -66,6 +70,37 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
             print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
     print(f"in {pipeline.run_directory}; next: mrpipe report {pipeline.run_directory}")
     _raise_failures(outcomes, pipeline)
+
+
+def _require_use(names: Sequence[str], pipeline: Pipeline, campaign: Path) -> None:
+    """Refuse a campaign on the command line that no requested stage reads, itself or through its inputs."""
+    from mrpipe.cli.session import rig_key
+
+    used: set[str] = set()
+
+    def collect(name: str) -> None:
+        stage = pipeline.stages[name]
+        for item in (*stage.inputs, *stage.optional_inputs):
+            if item.startswith("campaign:"):
+                used.add(item.partition(":")[2])
+            elif item in pipeline.stages and item not in seen:
+                seen.add(item)
+                collect(item)
+
+    seen: set[str] = set(names)
+    for name in names:
+        collect(name)
+    given = rig_key(campaign).replace("_", "-")
+    if used and given not in used:
+        kinds = {
+            "bench": "a damper-bench campaign",
+            "frame": "a campaign of a structure",
+            "closed-loop": "closed-loop tests",
+        }
+        wanted = " or ".join(kinds[item] for item in ("bench", "frame", "closed-loop") if item in used)
+        raise UserError(
+            "--campaign", str(campaign), f"holds {kinds[given]}; {names[0]} reads {wanted}", "give another one"
+        )
 
 
 def _raise_failures(outcomes: Sequence[Outcome], pipeline: Pipeline) -> None:

@@ -216,6 +216,29 @@ def test_laws_and_gains_of_recorded_tests_are_known(
 
 
 @pytest.mark.golden
+def test_recorded_tests_without_law_or_gains_are_named_and_one_campaign_is_judged_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    loops = [
+        {"name": name, "file": "one.csv", "kind": "closed-loop", "role": "training", **more}
+        for name, more in (
+            ("bare", {}),
+            ("off", {"law": "passive-off"}),
+            ("vd", {"law": "vd"}),
+            ("known", {"law": "vd", "gains": {"c_n_s_m": 900.0}}),
+        )
+    ]
+    config = tower(tmp_path, tests=[*_tests(role="validation"), *loops], frame={})
+    text = config.read_text(encoding="utf-8")
+    config.write_text(text.replace("closed_loop: null", "closed_loop: data"), encoding="utf-8")
+    out = checked(capsys, str(config))[1]
+    assert "campaign closed_loop: tower: 6 tests, the same as frame" in out
+    assert out.count("masses of the floors are not given") == 1
+    named = [line for line in out.splitlines() if "control law is not stated" in line or "gains of law" in line]
+    assert len(named) == 2 and "test bare:" in named[0] and "test vd:" in named[1] and "{c_n_s_m: ...}" in named[1]
+
+
+@pytest.mark.golden
 def test_a_structure_without_masses_is_not_traced_and_the_rest_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -116,6 +116,16 @@ def test_a_configuration_is_taken_with_and_without_the_option(
 
 
 @pytest.mark.property
+def test_a_campaign_that_a_command_does_not_read_is_refused(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    campaign = _campaign(project / "data")
+    for frame in ("null", "laboratory"):
+        (project / "configs" / "a.yaml").write_text(CONFIG.replace("frame: null", f"frame: {frame}"))
+        assert run(["identify-frame", "--campaign", str(campaign)]) == 2
+        said = capsys.readouterr().err
+        assert "holds a damper-bench campaign; identify-frame reads a campaign of a structure" in said
+
+
+@pytest.mark.property
 def test_the_bare_name_and_help_explain(capsys: pytest.CaptureFixture[str]) -> None:
     pages = []
     for arguments in ([], ["help"], ["--help"]):

@@ -13,11 +13,27 @@ from mrpipe.campaigns.proposal.words import split_words
 KINDS: dict[str, set[str]] = {
     "free-decay": {"decay", "free", "ausschwing", "release", "snap", "snapback", "pull", "libre", "ausschwingversuch"},
     "sweep": {"sweep", "chirp", "sine", "gleitsinus", "barrido", "balayage"},
-    "closed-loop": {"closed", "loop", "control", "controlled", "geregelt", "vd", "vdps", "vdns", "fdns", "lqg", "nnc"},
+    "closed-loop": {
+        *("closed", "loop", "control", "controlled", "geregelt", "boucle", "lazo", "malha", "anello", "regelkreis"),
+        *("vd", "vdps", "vdns", "fdns", "lqg", "nnc"),
+    },
     "random": {"random", "noise", "white", "rauschen", "quake", "earthquake", "northridge", "kobe", "ambient"},
 }
 MODE = {"mode", "modo", "eigenform", "moda", "m"}
-LAWS = {"vd", "vdps", "vdns", "fdns", "nnc", "lqg"}
+GAINS: dict[str, tuple[str, ...]] = {
+    "vd": ("c_n_s_m",),
+    "vdps": ("c_n_s_m", "k_n_m"),
+    "vdns": ("c_n_s_m", "k_n_m"),
+    "fdns": ("alpha_n_m",),
+    "nnc": ("alpha_n_m",),
+    "lqg": (),
+    "passive-off": (),
+    "passive-on": (),
+}
+"""Control law that a file name may state -> names of its gains."""
+
+_PASSIVE = {"passive", "passiv", "passif", "pasivo", "passivo"}
+_OFF, _ON = {"off", "aus", "arret", "apagado", "spento"}, {"on", "ein", "an", "marche", "encendido", "acceso"}
 
 
 def kind_of(path: Path, channels: dict[str, FloatArray], rate: float) -> tuple[str, str]:
@@ -26,6 +42,8 @@ def kind_of(path: Path, channels: dict[str, FloatArray], rate: float) -> tuple[s
     for kind, known in KINDS.items():
         if words & known:
             return kind, ""
+    if law_of(path):
+        return "closed-loop", ""
     if "damper_force" in channels:
         return "closed-loop", "guessed, because a damper force was recorded"
     floors = [values for name, values in channels.items() if name.startswith("floor_")]
@@ -47,7 +65,10 @@ def kind_of(path: Path, channels: dict[str, FloatArray], rate: float) -> tuple[s
 
 def law_of(path: Path) -> str:
     """Return the control law that a file name states, empty where it states none."""
-    return next((word for word in split_words(path.stem) if word in LAWS), "")
+    words = split_words(path.stem)
+    if _PASSIVE & set(words):
+        return "passive-off" if _OFF & set(words) else "passive-on" if _ON & set(words) else ""
+    return next((word for word in words if word in GAINS), "")
 
 
 def mode_of(path: Path) -> int | None:

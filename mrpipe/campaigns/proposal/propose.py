@@ -23,7 +23,7 @@ from mrpipe.campaigns.proposal.columns import (
     lay_out_frame,
     open_columns,
 )
-from mrpipe.campaigns.proposal.kinds import kind_of, law_of, mode_of
+from mrpipe.campaigns.proposal.kinds import GAINS, kind_of, law_of, mode_of
 from mrpipe.campaigns.proposal.roles import (
     Condition,
     condition_of,
@@ -282,10 +282,14 @@ def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
         if doubt:
             notes.append(f"test {name}: kind {kind}, {doubt}")
         law = law_of(item.path) if kind == "closed-loop" else ""
+        missing = ""
         if kind == "closed-loop" and not law:
-            notes.append(f"test {name}: the control law is not known; write law: vd, or another one")
-        elif law:
-            notes.append(f"test {name}: the gains of law {law} are not known; write gains: {{...}}")
+            missing = "the control law is not known; write law: vd, or another one"
+        elif law and GAINS[law]:
+            gains = ", ".join(f"{gain}: ..." for gain in GAINS[law])
+            missing = f"the gains of law {law} are not known; write gains: {{{gains}}}"
+        if missing:
+            notes.append(f"test {name}: {missing}")
         tests.append(
             TestText(
                 name=name,
@@ -295,7 +299,7 @@ def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
                 kind=kind,
                 law=law,
                 mode=mode_of(item.path) if kind == "free-decay" else None,
-                doubt=doubt,
+                doubt="; ".join(text for text in (doubt, missing) if text),
             )
         )
     notes.append("frame: floor_masses_kg is not known; write the masses where they are known")

@@ -63,7 +63,7 @@ def campaign_text(
     if sampling_rate_hz is not None:
         lines += [f"sampling_rate_hz: {sampling_rate_hz:g}   # UNSURE: no clock in the files, write the true rate"]
     if rig == "shear-frame":
-        lines += ["# frame: {floor_masses_kg: [..., ...]}   # masses of the floors, lowest first, where they are known"]
+        lines += ["# frame: {floor_masses_kg: [..., ...]}   # UNSURE: write the masses, lowest floor first, if known"]
     lines += ["channels:"]
     lines += [f"  {key}: {_channel(guess)}{_doubt(guess.unsure)}" for key, guess in channels.items()]
     if rig == "damper-bench":

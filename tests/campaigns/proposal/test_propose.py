@@ -11,8 +11,10 @@ import yaml
 from mrpipe.campaigns import load_campaign
 from mrpipe.campaigns.plausibility import judge
 from mrpipe.campaigns.proposal import Proposal, propose_campaigns
+from mrpipe.campaigns.proposal.kinds import GAINS, law_of
 from mrpipe.campaigns.proposal.roles import propose_frame_roles
 from mrpipe.campaigns.proposal.words import read_header
+from mrpipe.control.laws import law_named
 from mrpipe.errors import UserError
 from tests.campaigns.plausibility.rig import sound_tests
 from tests.campaigns.proposal.rigs import bench_folder, frame_folder
@@ -112,7 +114,24 @@ def test_channels_that_some_files_lack_belong_to_the_tests_that_have_them(tmp_pa
     assert {"floor_displacement_1", "damper_force", "drive"} <= set(tests["geregelt_vd_1"].channels)
     assert (tests["geregelt_vd_1"].kind, tests["geregelt_vd_1"].details["law"]) == ("closed-loop", "vd")
     assert [name for name, test in tests.items() if test.role == "validation"] == ["geregelt_vd_2", "gleitsinus2"]
-    assert any("gains of law vd are not known" in line for line in proposal.unsure)
+    assert any("gains of law vd are not known; write gains: {c_n_s_m: ...}" in line for line in proposal.unsure)
+    # every open question is marked where it is to be answered
+    marked = [line for line in proposal.text.splitlines() if "UNSURE" in line]
+    assert any("geregelt_vd_1" in line for line in marked) and any("floor_masses_kg" in line for line in marked)
+
+
+@pytest.mark.golden
+def test_laws_in_the_names_of_files() -> None:
+    names = {
+        "boucle_passive_off": "passive-off",
+        "passiv ein 2": "passive-on",
+        "geregelt_fdns_1": "fdns",
+        "essai_12": "",
+        "passive": "",
+    }
+    assert {name: law_of(Path(f"{name}.csv")) for name in names} == names
+    # the names of gains are those of the control laws
+    assert all(law_named(law).gain_names == gains for law, gains in GAINS.items())
 
 
 @pytest.mark.golden
