@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -65,3 +66,35 @@ def test_own_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyte
     stages = re.search(r"valid, \d+ stages", page)
     assert "floor masses: 200, 200, 180 kg" in out and stages is not None and stages[0] in out
     assert steps[4] == ["mrpipe", "run"]
+
+
+def _shown(page: str, command: str) -> str:
+    """Return what a page shows below a command."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return text.partition(f"$ {command}\n")[2].partition("```")[0].partition("\n$ ")[0].strip()
+
+
+@pytest.mark.golden
+def test_own_rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The session up to the run is that of the page, word for word."""
+    page = "tutorial-own-rig.md"
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(DOCS / "examples"))
+    import_module("foreign_rig").main(tmp_path / "essais")
+    steps = commands(page)
+    assert len(steps) <= 6 and steps[-1] == ["mrpipe", "run"]
+    assert run(steps[0][1:]) == 0
+    assert capsys.readouterr().out.strip() == _shown(page, "mrpipe init my-rig --rig both --from essais")
+    # the two lines of the page that are written in an editor
+    file = tmp_path / "my-rig" / "data" / "essais-frame" / "campaign.yaml"
+    text = file.read_text(encoding="utf-8")
+    masses = re.search(r"^frame: \{.*$", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE)
+    assert masses is not None
+    text = re.sub(r"^# frame: .*$", masses[0], text, flags=re.MULTILINE).replace(
+        "law: vd,", "law: vd, gains: {c_n_s_m: 1800},"
+    )
+    file.write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path / "my-rig")
+    for words in steps[2:-1]:
+        assert run(words[1:]) == 0, words
+        assert capsys.readouterr().out.strip() == _shown(page, " ".join(words)), words
