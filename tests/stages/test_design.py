@@ -32,7 +32,7 @@ SMALL = {
         "controller": {"inverse": "model", "residual_force_n": 18.0},
     },
     "design": {
-        "laws": ["vd", "fdns"],
+        "laws": ["fdns"],
         "amplitude_factors": [1.0],
         "band_rad_s": [8.0, 10.5],
         "grid": 3,
