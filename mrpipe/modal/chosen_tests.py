@@ -37,7 +37,11 @@ class ChosenTests:
 def choose_tests(
     forced: tuple[FrameTest, ...], tests: FrameTests, layout: Layout, options: IdentificationOptions
 ) -> tuple[ChosenTests, list[str]]:
-    """Find the modes in the tests that are not for validation; in more tests where modes are weak or missing there."""
+    """Find the modes in the tests that are not for validation; sweeps alone where modes are weak there.
+
+    Validation tests are used only where the other tests do not show all modes, because the simulated response to a
+    validation test proves nothing once the test is part of the fit.
+    """
     first = tuple(test for test in forced if test.role != "validation") or forced
     arguments = (layout, options.band_low_hz, options.band_high_hz, tests.source, tests.decays)
     sets = [first]
@@ -48,6 +52,9 @@ def choose_tests(
     found: list[ChosenTests] = []
     fault: UserError | None = None
     for chosen in sets:
+        complete = any(len(item.search.numbers) >= layout.floors for item in found)
+        if complete and any(test.role == "validation" for test in chosen):
+            continue
         try:
             found.append(ChosenTests(find_modes(chosen, *arguments), chosen))
         except UserError as error:

@@ -211,3 +211,35 @@ def added(first: Sequence[SensorClock], second: Sequence[SensorClock]) -> list[S
             before.step_at_s,
         )
     return list(result.values())
+
+
+def expected_clocks(
+    clocks: Sequence[SensorClock], tests: Sequence[FrameTest], others: Sequence[FrameTest]
+) -> list[SensorClock]:
+    """Return the delays that sensors had in all tests of the fit, for tests that were not fitted.
+
+    A delay counts where each test of the fit shows it for the same sensor, and its scatter is below a fifth of it.
+
+    Parameters
+    ----------
+    clocks
+        Delays of the sensors of `tests`.
+    tests
+        Tests of the fit.
+    others
+        Tests that were not fitted.
+    """
+    found = []
+    for sensor in dict.fromkeys(item.sensor for item in clocks):
+        having = [test.name for test in tests if sensor in test.sensors]
+        own = [item for item in clocks if item.sensor == sensor and item.test in having]
+        offsets = np.array([item.offset_s for item in own])
+        steady = all(item.drift == 0.0 and item.step_s == 0.0 for item in own)
+        if steady and len(own) == len(having) >= 2 and offsets.std() < 0.2 * abs(offsets.mean()):
+            error = float(offsets.std())
+            found += [
+                SensorClock(test.name, sensor, float(offsets.mean()), error)
+                for test in others
+                if sensor in test.sensors
+            ]
+    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.amplitude_fit import AmplitudeDependence
 from mrpipe.modal.clocks import SensorClock
 from mrpipe.modal.decay import DecayResult, Estimate
 from mrpipe.modal.lscf import PoleCandidate
@@ -66,6 +67,9 @@ class FrameIdentification:
         Name of each row of `mode_shapes`.
     masses, mass_intervals
         Shape (n,) and (n, 2) [kg]; nan where unknown.
+    amplitude, amplitude_in_time
+        Modes over amplitude and their simulation of each forced test; None and empty where constant modes predict as
+        well.
     """
 
     frame: Frame | None
@@ -90,3 +94,5 @@ class FrameIdentification:
     degrees_of_freedom: tuple[str, ...]
     masses: FloatArray
     mass_intervals: FloatArray
+    amplitude: AmplitudeDependence | None = None
+    amplitude_in_time: tuple[TimeVerification, ...] = ()

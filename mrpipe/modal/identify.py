@@ -11,17 +11,18 @@ from threadpoolctl import threadpool_limits
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
 from mrpipe.modal.ambient import find_ambient_modes
+from mrpipe.modal.amplitude_fit import amplitude_finding, find_amplitude_dependence
 from mrpipe.modal.assembly import Assembly, PartialModes, assemble_partial
 from mrpipe.modal.checks import check_mode_matrix, orthogonal_shapes
 from mrpipe.modal.chosen_tests import ChosenTests, choose_tests, training_first, with_clocks, without_complex
-from mrpipe.modal.clocks import SensorClock
+from mrpipe.modal.clocks import SensorClock, corrected, expected_clocks
 from mrpipe.modal.damping_choice import choose_damping, decays_of_modes
 from mrpipe.modal.decay import Estimate
 from mrpipe.modal.identification import FrameIdentification, GivenShapes
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.peak_picking import pick_peaks
-from mrpipe.modal.records import FrameTests
+from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.search import ModeSearch, check_channels
 from mrpipe.modal.selection import (
     LEAST_COHERENCE,
@@ -32,6 +33,7 @@ from mrpipe.modal.selection import (
 )
 from mrpipe.modal.tridiagonal import fit_tridiagonal
 from mrpipe.modal.verification import (
+    compare_in_time,
     verify_in_frequency,
     verify_in_time,
 )
@@ -185,12 +187,16 @@ def _identify(
     assembly, notes = _assemble(chosen.search, zeta, tests, layout, options, given)
     findings += notes
     progress(0.75, "verification")
-    corrected_tests = {test.name: test for test in chosen.tests}
-    shown = tuple(corrected_tests.get(test.name, test) for test in forced)
+    shown = _shown(forced, chosen, clocks)
     # beyond its highest mode the frame carries no information on a flexible support
     band = chosen.search.band_hz
     inside = (band[0], min(band[1], 1.15 * float(fit.angular_frequencies[-1]) / (2.0 * np.pi)))
     frame = assembly.frame
+    amplitude = None
+    if forced and options.amplitude_dependence:
+        progress(0.85, "amplitude")
+        amplitude = find_amplitude_dependence(fit, [test for test in chosen.tests if test.excitation is not None])
+        findings += [] if amplitude is None else [amplitude_finding(amplitude)]
     return FrameIdentification(
         frame=frame,
         frequencies=frequencies,
@@ -214,7 +220,19 @@ def _identify(
         degrees_of_freedom=_names(fit, layout),
         masses=assembly.masses,
         mass_intervals=assembly.mass_intervals,
+        amplitude=amplitude,
+        amplitude_in_time=()
+        if amplitude is None
+        else tuple(compare_in_time(amplitude.model.response(test), test, inside) for test in shown),
     )
+
+
+def _shown(forced: Sequence[FrameTest], chosen: ChosenTests, clocks: Sequence[SensorClock]) -> tuple[FrameTest, ...]:
+    """Return the forced tests with the delays of their sensors taken out, also those that were not fitted."""
+    fitted = {test.name: test for test in chosen.tests}
+    others = [test for test in forced if test.name not in fitted]
+    delays = expected_clocks(clocks, chosen.tests, others)
+    return tuple(fitted[test.name] if test.name in fitted else corrected(test, delays) for test in forced)
 
 
 def _names(fit: MultiModeFit, layout: Layout) -> tuple[str, ...]:

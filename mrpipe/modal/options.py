@@ -47,3 +47,8 @@ class IdentificationOptions(BaseModel):
         True,
         description="Estimate the clock offset and drift of each sensor and correct them where the data support it.",
     )
+    amplitude_dependence: bool = Field(
+        True,
+        description="Look for modes whose frequency and damping depend on the amplitude; used where they predict tests "
+        "that were left out of the fit better than constant modes. M, C and K remain those of constant modes.",
+    )

@@ -75,6 +75,7 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
         "off_band_share": None if frame is None else off_band_share(frame.stiffness),
         "phase_scatter": result.phase_scatter.tolist(),
         "clocks": [_clock_row(item) for item in result.clocks],
+        "amplitude_dependence": _over_amplitude(result),
         "stabilisation": [
             {
                 "frequency_hz": float(item.angular_frequency / _TWO_PI),
@@ -85,6 +86,36 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
         ],
         "band_hz": list(result.band_hz),
         "findings": list(result.findings),
+    }
+
+
+def _over_amplitude(result: FrameIdentification) -> dict[str, Any] | None:
+    """Return the laws of the modes over amplitude, values up to the largest amplitude, and errors on data left out."""
+    found = result.amplitude
+    if found is None:
+        return None
+    laws, largest = found.model.laws, found.model.largest_m
+    shares = (0.0, 0.03, 0.1, 0.3, 1.0)
+    return {
+        "measure": laws.measure,
+        "frequencies_hz": (laws.angular_frequencies / _TWO_PI).tolist(),
+        "damping_ratios": laws.damping_ratios.tolist(),
+        "softening_exponents": laws.softening.tolist(),
+        "damping_exponents": laws.damping_growth.tolist(),
+        "reference_amplitudes_m": laws.references_m.tolist(),
+        "at_amplitudes": [
+            {
+                "amplitudes_m": (share * largest).tolist(),
+                "frequencies_hz": (laws.at(share * largest)[0] / _TWO_PI).tolist(),
+                "damping_ratios": laws.at(share * largest)[1].tolist(),
+            }
+            for share in shares
+        ],
+        "left_out": [
+            {"name": name, "constant_modes_error": before, "error": after}
+            for name, before, after in zip(found.left_out, found.constant_error, found.error, strict=True)
+        ],
+        "time_fit_percent": {item.test: item.fit_percent.tolist() for item in result.amplitude_in_time},
     }
 
 
@@ -144,6 +175,18 @@ def write_identification(artifact: ArtifactWriter, result: FrameIdentification) 
         artifact.put(f"{group}/peak", decay.peak, unit="m/s^2", dims=("peak",))
         artifact.put(f"{group}/point_to_point", decay.point_to_point_series, unit="1", dims=("pair",))
         artifact.attributes(group, test=decay.test)
+    if result.amplitude is not None:
+        laws = result.amplitude.model.laws
+        for name, column, unit in (
+            ("angular_frequency", laws.angular_frequencies, "rad/s"),
+            ("damping_ratio", laws.damping_ratios, "1"),
+            ("softening_exponent", laws.softening, "1"),
+            ("damping_exponent", laws.damping_growth, "1"),
+            ("reference", laws.references_m, "m"),
+        ):
+            artifact.put(f"amplitude/{name}", column, unit=unit, dims=("mode",))
+        artifact.put("amplitude/largest", result.amplitude.model.largest_m, unit="m", dims=("mode",))
+        artifact.attributes("amplitude", measure=laws.measure)
     responses = result.in_frequency
     if responses is not None:
         unit = "1/kg" if result.tests[0].shaker_floor else "1"

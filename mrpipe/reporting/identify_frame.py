@@ -63,6 +63,24 @@ def describe(sink: Sink, result: IdentifiedFrame) -> None:
             "Frequency responses: measured (leakage taken out), of M, C and K, and coherence of the averaged spectra.",
         )
     sink.figure("mode-shapes", figures.mode_shapes(found.mode_shapes, frequencies), "Mode shapes.")
+    law = values["amplitude_dependence"]
+    if law is not None:
+        rows = [
+            {
+                "mode": mode,
+                "amplitude [mm]": 1e3 * item["amplitudes_m"][mode - 1],
+                "frequency [Hz]": item["frequencies_hz"][mode - 1],
+                "damping [%]": 100.0 * item["damping_ratios"][mode - 1],
+            }
+            for mode in range(1, count + 1)
+            for item in law["at_amplitudes"]
+        ]
+        sink.table(
+            "amplitude",
+            pd.DataFrame(rows),
+            "Frequencies and damping ratios over the amplitude at the sensor that moves most; M, C and K are those of "
+            "constant modes.",
+        )
     if found.decays:
         decays = [found.decays[mode] for mode in sorted(found.decays)]
         sink.figure("decays", figures.decays(decays), "Free decays, exponential fit and peak-to-peak damping.")

@@ -36,6 +36,7 @@ from mrpipe.simulation.loop import (
 )
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
 from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes, read_frame
+from mrpipe.structures.over_amplitude import frame_at_amplitude
 
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 """Dampers of a run by name, and the stage whose artifact holds each."""
@@ -134,6 +135,8 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact], ga
     """
     if settings.frame == "identified":
         frame = read_frame(artifact("identify-frame"))
+        if settings.frame_amplitude_m > 0.0:
+            frame = frame_at_amplitude(artifact("identify-frame"), frame, settings.frame_amplitude_m)
     else:
         frame = frame_from_parameter_set(settings.frame)
     dampers = {name: partial(artifact, stage) for name, stage in DAMPERS.items()}

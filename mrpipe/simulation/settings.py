@@ -101,6 +101,12 @@ class SimulateSettings(Section):
     """The closed loop."""
 
     frame: str = Field("identified", description="Frame: `identified`, or a set of configs/frames or its YAML file.")
+    frame_amplitude_m: float = Field(
+        0.0,
+        ge=0.0,
+        description="Where identify-frame found modes that depend on amplitude: amplitude of the motion [m] at which "
+        "the identified frame is taken (equivalent linear frame). 0 takes M, C and K of constant modes.",
+    )
     damper: str = Field(
         "identified",
         description="Damper in the loop: `identified`; `traced`, the one with the base form and effects that "

@@ -1,0 +1,76 @@
+"""Linear frame that is equivalent to an identified frame at one amplitude of its motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mrpipe.artifacts import Artifact, FloatArray
+from mrpipe.errors import UserError
+from mrpipe.structures.dynamics import natural_modes
+from mrpipe.structures.frame import Frame
+
+GROUP = "amplitude"
+
+
+def frame_with_modes(frame: Frame, angular_frequencies: FloatArray, damping_ratios: FloatArray) -> Frame:
+    """Return the frame with the same masses and mode shapes, and other frequencies and damping.
+
+    With mass-normalised shapes U, K = M U diag(omega^2) U' M and C = M U diag(2 zeta omega) U' M.
+
+    Parameters
+    ----------
+    frame
+        n floors.
+    angular_frequencies, damping_ratios
+        Shape (n,) [rad/s], [1].
+    """
+    shapes = natural_modes(frame).mode_shapes
+    shapes = shapes / np.sqrt(np.einsum("ir,ij,jr->r", shapes, frame.mass, shapes))
+    left = frame.mass @ shapes
+    stiffness = (left * angular_frequencies**2) @ left.T
+    damping = (left * (2.0 * damping_ratios * angular_frequencies)) @ left.T
+    return replace(frame, damping=damping, stiffness=stiffness)
+
+
+def frame_at_amplitude(artifact: Artifact, frame: Frame, amplitude_m: float) -> Frame:
+    """Return the linear frame that is equivalent to the identified one at an amplitude of the motion.
+
+    Where the amplitude of each mode counts, modes share the motion in proportion to the largest amplitudes of the
+    identification.
+
+    Parameters
+    ----------
+    artifact
+        frame.h5 of `identify-frame`.
+    frame
+        The frame in it.
+    amplitude_m
+        Amplitude at the floor that moves most [m].
+
+    Raises
+    ------
+    UserError
+        If the identification found no dependence on amplitude, or not all modes.
+    """
+    name = "simulate.frame_amplitude_m"
+    if f"{GROUP}/angular_frequency" not in artifact:
+        problem = "identify-frame found no dependence of the modes on amplitude"
+        raise UserError(artifact.path, name, problem, "set it to 0")
+    omega, zeta, softening, growth, reference, largest = (
+        artifact.array(f"{GROUP}/{column}")
+        for column in (
+            "angular_frequency",
+            "damping_ratio",
+            "softening_exponent",
+            "damping_exponent",
+            "reference",
+            "largest",
+        )
+    )
+    if omega.size != frame.floors:
+        problem = f"{omega.size} of {frame.floors} modes were identified over amplitude"
+        raise UserError(artifact.path, name, problem, "set it to 0")
+    level = np.log1p(amplitude_m * largest / largest.max() / reference)
+    return frame_with_modes(frame, omega * np.exp(-softening * level), zeta * np.exp(growth * level))
