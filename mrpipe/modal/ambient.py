@@ -2,8 +2,9 @@
 
 pyOMA2 estimates the poles at many model orders by covariance-driven stochastic subspace identification (SSI). Poles
 that keep frequency and shape over the orders form clusters, and the choice among these is that of the forced tests.
-Intervals come from leaving out one block of the record at a time (jackknife). Without the input, neither modal masses
-nor participations can be known: the scale of M, C and K then comes from given masses alone.
+Frequency and damping are then refined by maximum likelihood, which also gives their intervals; errors of the shapes
+come from leaving out one block of the record at a time (jackknife). Without the input, neither modal masses nor
+participations can be known: the scale of M, C and K then comes from given masses alone.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from scipy import signal
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError, install_extra
+from mrpipe.modal.ambient_refine import refine_by_spectra
 from mrpipe.modal.lscf import PoleCandidate
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.records import FrameTest
@@ -36,6 +38,10 @@ _LEAST_BLOCK_ROWS = 20
 _FREQUENCY_TOLERANCE = 0.01
 _LEAST_ASSURANCE = 0.9
 _LEAST_COLLINEARITY = 0.5
+_LARGEST_SPREAD = 4.0
+_SEGMENT_PERIODS = 40.0
+_LEAST_COMMON = 0.25
+_MARGIN = 1.15
 _COPY_RANGE = 0.1
 _COPY_ASSURANCE = 0.7
 
@@ -94,13 +100,30 @@ def _lowest_peak_hz(tests: Sequence[FrameTest], low_hz: float) -> float:
     return float(frequency[peaks[0] if peaks.size else int(np.argmax(total))])
 
 
+def _common_motion_ends_hz(test: FrameTest, first_hz: float) -> float:
+    """Return the frequency above which the sensors have no motion in common [Hz].
+
+    At a resonance all sensors move together, so that the largest eigenvalue of their coherence matrix is near the
+    number of sensors; noise of the sensors and local forces leave it near 1.
+    """
+    rate, (samples, sensors) = test.sampling_rate_hz, test.responses.shape
+    length = int(min(samples / 16, _SEGMENT_PERIODS / first_hz * rate))
+    values = test.responses - test.responses.mean(axis=0)
+    frequency, _, segments = signal.stft(values, fs=rate, nperseg=max(length, 16), axis=0, boundary=None)
+    cross = np.einsum("fit,fjt->fij", segments, segments.conj())
+    size = np.sqrt(np.maximum(np.real(np.einsum("fii->fi", cross)), 1e-300))
+    largest = np.linalg.eigvalsh(cross / (size[:, :, None] * size[:, None, :]))[:, -1]
+    common = np.flatnonzero(largest >= 1.0 + _LEAST_COMMON * (sensors - 1))
+    return _MARGIN * max(float(frequency[common[-1]]) if common.size else 0.0, 2.0 * first_hz)
+
+
 def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> _Records:
     """Filter, decimate and cut the responses; a record spans the modes that a chain of floors can have."""
     rate = tests[0].sampling_rate_hz
     first = _lowest_peak_hz(tests, low_hz)
     # the highest mode of a uniform chain lies (4 n + 2)/pi above the lowest; real ones spread more
-    spread = 2.0 * (4.0 * layout.floors + 2.0) / np.pi
-    high = high_hz or min(spread * first, 0.45 * rate)
+    spread = _LARGEST_SPREAD * (4.0 * layout.floors + 2.0) / np.pi
+    high = high_hz or min(spread * first, 0.45 * rate, _common_motion_ends_hz(tests[0], first))
     factor = max(1, int(rate / (2.6 * high)))
     sections = signal.butter(4, max(0.5 * low_hz, 0.2 * first), btype="highpass", fs=rate, output="sos")
     per_test = max(2, round(_BLOCKS / len(tests)))
@@ -305,7 +328,8 @@ def find_ambient_modes(
     if not numbered:
         raise UserError(source, "ambient tests", "no mode found", "record longer, or set identify_frame.band_high_hz")
     candidates = tuple(PoleCandidate(item.angular_frequency, item.damping_ratio, item.orders) for item in clusters)
-    return ModeSearch(fit.only(list(numbered)), (low_hz, records.high_hz), tuple(numbered.values()), candidates)
+    refined = refine_by_spectra(fit.only(list(numbered)), tests)
+    return ModeSearch(refined, (low_hz, records.high_hz), tuple(numbered.values()), candidates)
 
 
 def _response_at(tests: Sequence[FrameTest], firm: Sequence[_Cluster]) -> FloatArray:

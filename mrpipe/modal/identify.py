@@ -18,6 +18,7 @@ from mrpipe.modal.chosen_tests import ChosenTests, choose_tests, training_first,
 from mrpipe.modal.clocks import SensorClock, corrected, expected_clocks
 from mrpipe.modal.damping_choice import choose_damping, decays_of_modes
 from mrpipe.modal.decay import Estimate
+from mrpipe.modal.hidden import with_missing_modes
 from mrpipe.modal.identification import FrameIdentification, GivenShapes
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
@@ -166,6 +167,9 @@ def _identify(
         chosen, clocks = with_clocks(chosen, tests, layout, options)
         findings += _clock_findings(clocks)
         chosen = ChosenTests(without_complex(chosen.search), chosen.tests)
+    if forced and layout.is_chain and len(chosen.search.numbers) < layout.floors:
+        progress(0.4, "hidden modes")
+        chosen = ChosenTests(with_missing_modes(chosen.search, chosen.tests, layout), chosen.tests)
     if options.modes_from == "peak-picking" and chosen.tests:
         picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)
         chosen = replace(chosen, search=replace(chosen.search, fit=picked))
