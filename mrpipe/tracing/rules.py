@@ -454,6 +454,19 @@ class FrameRules(Section):
         description="Expected size of couplings between floors that no storey connects, as a share of the storey "
         "stiffness. It only regularises the stiffness by which the lines are weighted.",
     )
+    better_drift: float = Field(
+        0.5,
+        gt=0.0,
+        lt=1.0,
+        description="The order of the tests explains changes of stiffness only if the squared error of tests left out "
+        "is below this share of that of the amplitude alone.",
+    )
+    least_drift: float = Field(
+        0.01,
+        gt=0.0,
+        description="Least change of stiffness over the order of the tests that is reported; frequencies change by "
+        "half of it.",
+    )
     model_floor: float = Field(
         0.001,
         ge=0.0,

@@ -16,10 +16,12 @@ from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.candidates import Fitted
+from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
 from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.records import FrameData
 from mrpipe.tracing.structure.scores import FrameScore, dependence, flexible_score, frame_score, noise_floor
 from mrpipe.tracing.structure.select import FrameCandidate, FrameSelection, select
+from mrpipe.tracing.structure.spectra import Spectra
 from mrpipe.tracing.verdict import Candidate, Estimate, Interval, LeftOutGain, NamedEffect, Unexplained, Verdict
 
 QUANTITY = (
@@ -46,6 +48,7 @@ class FrameTracing:
     selection: FrameSelection
     before: FrameModel
     after: FrameModel
+    between: StiffnessBetweenTests
 
 
 def trace_frame(
@@ -96,8 +99,15 @@ def trace_frame(
     before = model_of(selection.design, selection.chosen[: selection.declared], about)
     after = model_of(selection.design, chosen, about)
     progress(0.85, "errors on validation tests")
-    summary = _summary(problem, selection, before, after, declared, rules, reason)
-    return FrameTracing(summary, problem, selection, before, after)
+    between = stiffness_between_tests(before, _in_order(problem, data), problem.rules)
+    summary = _summary(problem, selection, before, after, between, declared, rules, reason)
+    return FrameTracing(summary, problem, selection, before, after, between)
+
+
+def _in_order(problem: FrameProblem, data: FrameData) -> list[Spectra]:
+    """Return the spectra of all tests in the order of the campaign."""
+    known = {item.record.name: item for item in (*problem.training, *problem.validation)}
+    return [known[record.name] for record in data.records if record.name in known]
 
 
 def _unnamed(selection: FrameSelection, rules: NamingRules) -> str:
@@ -115,6 +125,7 @@ def _summary(
     selection: FrameSelection,
     before: FrameModel,
     after: FrameModel,
+    between: StiffnessBetweenTests,
     declared: Sequence[StructuralEffect],
     rules: NamingRules,
     reason: str,
@@ -179,6 +190,7 @@ def _summary(
             "frequencies_hz": problem.frequencies_hz.tolist(),
             "storey_stiffness_n_m": problem.storey_stiffness.tolist(),
             "band_hz": [problem.band.low_hz, problem.band.high_hz],
+            "between_tests": between.as_json(),
         },
     }
 

@@ -94,6 +94,7 @@ def trace_structure(
             draws=options.bootstrap_draws, rng=rng, jobs=jobs, progress=progress,
         )  # fmt: skip
         parts.append(Part("frame", frame.summary))
+        findings += [frame.between.finding()] if frame.between.drifts else []
     found = [
         command_part(data.loops, effects, names, rules.delay, options.most_confidence),
         damper_part(

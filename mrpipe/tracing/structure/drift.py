@@ -1,0 +1,194 @@
+"""Whether the stiffness of a structure changes between tests: softening, loosening, wear.
+
+The linear frame is fitted to all training tests together. What it leaves in a single test in phase with its restoring
+forces is a change of stiffness of that test. A structure that softens with amplitude shows smaller stiffness in larger
+tests; a structure that loosens shows smaller stiffness in later tests. Both are fitted to the changes, and the order of
+the tests counts only where it predicts tests that were left out much better than the amplitude does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.tracing.rules import FrameRules
+from mrpipe.tracing.structure.fit import base_rows
+from mrpipe.tracing.structure.model import FrameModel
+from mrpipe.tracing.structure.spectra import Spectra
+
+Kind = Literal["constant", "amplitude", "drift", "step"]
+
+LEAST_TESTS = 4
+"""Numerical technique: with fewer tests a trend over their order cannot be told from scatter."""
+
+
+@dataclass(frozen=True)
+class TestStiffness:
+    """Stiffness of one test relative to that of all tests together.
+
+    Attributes
+    ----------
+    test
+        Name.
+    change
+        Relative change of the stiffness [1]; the change of the frequencies is half of it.
+    error
+        Its standard error [1].
+    drift_m
+        RMS drift of the storey that moves most [m].
+    """
+
+    test: str
+    change: float
+    error: float
+    drift_m: float
+
+
+@dataclass(frozen=True)
+class StiffnessBetweenTests:
+    """Changes of all tests in their order, and what explains them.
+
+    Attributes
+    ----------
+    tests
+        In the order of the campaign.
+    kind
+        `constant`, `amplitude`, `drift` (steady change over the order of the tests) or `step`.
+    change
+        Change of the stiffness from the first to the last test by order alone [1]; 0 for the first two kinds.
+    step_before
+        Test before which the stiffness steps; empty for other kinds.
+    """
+
+    tests: tuple[TestStiffness, ...]
+    kind: Kind
+    change: float
+    step_before: str = ""
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the stiffness changes with the order of the tests."""
+        return self.kind in ("drift", "step")
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the keys of docs/close-loop-json.md."""
+        return {
+            "kind": self.kind,
+            "stiffness_change": self.change,
+            "step_before": self.step_before or None,
+            "tests": [
+                {"name": item.test, "stiffness_change": item.change, "error": item.error, "rms_drift_m": item.drift_m}
+                for item in self.tests
+            ],
+        }
+
+    def finding(self) -> str:
+        """Return one line for the user; empty where the stiffness does not drift."""
+        if not self.drifts:
+            return ""
+        first, last = self.tests[0].test, self.tests[-1].test
+        how = f"steps before test {self.step_before}" if self.kind == "step" else f"drifts from test {first} to {last}"
+        return (
+            f"the stiffness {how} by {100 * self.change:+.1f} % (frequencies {50 * self.change:+.1f} %): joints loosen "
+            "or parts wear; check the bolts, and use tests of one state only"
+        )
+
+
+def _of_test(model: FrameModel, record: Spectra) -> TestStiffness:
+    """Return the change of stiffness of a test: least squares of the residual on the model's restoring forces."""
+    error = (record.target - model.predict(record)) * record.weight
+    moved = record.record.floors if model.base == "linear-frame" else 1
+    restoring = np.stack(
+        [numbers[:moved] @ base_rows(model.base, record, k)[:moved] for k, numbers in enumerate(model.linear)]
+    )
+    restoring = restoring * record.weight
+    power = max(float(np.sum(np.abs(restoring) ** 2)), 1e-300)
+    change = float(np.sum(np.real(np.conj(restoring) * error))) / power
+    left = np.real(np.conj(restoring) * (error - change * restoring))
+    squares = float(np.sum(left**2))
+    drift = float(np.std(record.motion.drift, axis=1).max())
+    return TestStiffness(record.record.name, change, float(np.sqrt(squares)) / power, drift)
+
+
+def stiffness_between_tests(
+    model: FrameModel, records: Sequence[Spectra], rules: FrameRules | None = None
+) -> StiffnessBetweenTests:
+    """Return the stiffness of each test and whether it changes with their order.
+
+    Parameters
+    ----------
+    model
+        Linear frame (with declared effects) fitted to the training tests.
+    records
+        Spectra of all tests, in the order in which they were made.
+    rules
+        Decision thresholds; their defaults if None.
+    """
+    rules = rules or FrameRules()
+    tests = tuple(_of_test(model, record) for record in records)
+    kind, change, before = _explained(tests, rules)
+    return StiffnessBetweenTests(tests, kind, change, before)
+
+
+def _explained(tests: Sequence[TestStiffness], rules: FrameRules) -> tuple[Kind, float, str]:
+    count = len(tests)
+    if count < LEAST_TESTS:
+        return "constant", 0.0, ""
+    values = np.array([item.change for item in tests])
+    # clocks and gains differ between tests by the floor of the model, whatever the noise
+    weights = 1.0 / np.hypot([item.error for item in tests], rules.model_floor)
+    order = np.linspace(-0.5, 0.5, count)
+    sizes = np.log(np.maximum([item.drift_m for item in tests], 1e-300))
+    sizes = (sizes - sizes.mean()) / max(float(np.ptp(sizes)), 1e-12)
+    ones = np.ones(count)
+    plain: dict[Kind, list[FloatArray]] = {"constant": [ones], "amplitude": [ones, sizes]}
+    without = {name: _left_out(columns, values, weights) for name, columns in plain.items()}
+    kind: Kind = "amplitude" if without["amplitude"] < without["constant"] else "constant"
+    steady = [*plain[kind], order]
+    stepped = [*plain[kind], _best_step(plain[kind], values, weights)]
+    errors = {"drift": _left_out(steady, values, weights), "step": _left_out(stepped, values, weights)}
+    # the place of the step was chosen with all tests, so that a step must be much better than a steady drift
+    best: Kind = "step" if errors["step"] < rules.better_drift * errors["drift"] else "drift"
+    columns = stepped if best == "step" else steady
+    change, error = _last_coefficient(columns, values, weights)
+    matters = abs(change) > rules.least_drift and abs(change) > 3.0 * error
+    if not matters or errors[best] > rules.better_drift * without[kind]:
+        return kind, 0.0, ""
+    return best, change, tests[int(np.argmax(columns[-1]))].test if best == "step" else ""
+
+
+def _best_step(base: Sequence[FloatArray], values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the step over the order of the tests that fits best: 0 before it and 1 after it."""
+    count = values.size
+    steps = [(np.arange(count) >= place).astype(np.float64) for place in range(1, count)]
+    costs = []
+    for step in steps:
+        columns = np.column_stack([*base, step]) * weights[:, None]
+        rest = values * weights - columns @ np.linalg.lstsq(columns, values * weights, rcond=None)[0]
+        costs.append(float(rest @ rest))
+    return steps[int(np.argmin(costs))]
+
+
+def _left_out(columns: Sequence[FloatArray], values: FloatArray, weights: FloatArray) -> float:
+    """Return the squared error of each test for a fit to the others, summed, in units of its weight."""
+    matrix, total = np.column_stack(columns), 0.0
+    for index in range(values.size):
+        kept = weights.copy()
+        kept[index] = 0.0
+        numbers = np.linalg.lstsq(matrix * kept[:, None], values * kept, rcond=None)[0]
+        total += float(((values[index] - matrix[index] @ numbers) * weights[index]) ** 2)
+    return total
+
+
+def _last_coefficient(columns: Sequence[FloatArray], values: FloatArray, weights: FloatArray) -> tuple[float, float]:
+    """Return the coefficient of the last column and its standard error from the scatter of the tests."""
+    matrix = np.column_stack(columns) * weights[:, None]
+    numbers = np.linalg.lstsq(matrix, values * weights, rcond=None)[0]
+    rest = values * weights - matrix @ numbers
+    variance = float(rest @ rest) / max(values.size - matrix.shape[1], 1)
+    covariance = np.linalg.pinv(matrix.T @ matrix) * max(variance, 1.0)
+    return float(numbers[-1]), float(np.sqrt(covariance[-1, -1]))
