@@ -62,7 +62,10 @@ def response_by_law(found: Mapping[str, Any]) -> Figure:
     figure, axes = figure_with_axes(2, 1, width=9.0, height=2.9)
     for axis, (key, factor, name) in zip(
         axes[:, 0],
-        (("rms_x_top_m", 1e3, "rms top displacement [mm]"), ("rms_a1_m_s2", 1.0, "rms acceleration, floor 1 [m/s²]")),
+        (
+            ("rms_x_top_m", 1e3, "rms top displacement [mm]"),
+            ("rms_a1_m_s2", 1.0, "rms acceleration relative to the ground, floor 1 [m/s²]"),
+        ),
         strict=True,
     ):
         width = 0.8 / len(shown)

@@ -112,6 +112,7 @@ def test_table_puts_the_thesis_beside_ours() -> None:
     }  # fmt: skip
     text = "\n".join(table_of("wind", summary))
     assert "surrogate model" in text
+    assert "[number]: value that the thesis prints; docs/benchmarks.md and docs/glossary.md explain the indices" in text
     row = next(line for line in text.splitlines() if line.startswith("J1"))
     assert row.split() == ["J1", "0.5", "[0.63]", "0.7"]
     assert "kobe (surrogate model)" in text

@@ -127,6 +127,18 @@ def test_judgement_splits_into_tests_and_kinds_of_drive() -> None:
 
 
 @pytest.mark.property
+def test_a_constant_drive_has_an_error_in_amperes_and_no_relative_one() -> None:
+    history = bench_history("validation")
+    judged = judge(linear_network(np.ones(8), FORWARD), bench_history(), history)
+    rows = {row["test"]: row for row in judged.test_rows("A", span=4.0)}
+    for name, varies in zip(history.names, history.drive_varies, strict=True):
+        row = rows[name]
+        assert "NRMSE" not in row and "fit [%]" not in row
+        assert row["RMS error [% of range]"] == pytest.approx(25.0 * float(row["RMS error [A]"]))
+        assert np.isfinite(float(row["R2 (varying drive)"])) == varies
+
+
+@pytest.mark.property
 def test_free_run_feeds_the_output_back() -> None:
     history = bench_history()
     spec = replace(FORWARD, past_values=2, past_target=True)
