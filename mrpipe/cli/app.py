@@ -89,7 +89,7 @@ def version(
 @app.command(name="help")
 def help_of(
     context: typer.Context,
-    command: Annotated[str | None, typer.Argument(metavar="[COMMAND]", help="Command to explain.")] = None,
+    command: Annotated[str | None, typer.Argument(metavar="COMMAND", help="Command to explain.")] = None,
 ) -> None:
     """Show this help, or that of a command."""
     top = context.find_root()

@@ -93,7 +93,10 @@ def exit_with(error: BaseException, arguments: Sequence[str]) -> int:
         said = getattr(error, "format_message", None)
         if said is None:
             raise error
-        known = MrpipeError(" ".join(str(said()).split()))
+        text = " ".join(str(said()).split())
+        if text.startswith("No such command") and "Did you mean" not in text:
+            text += " `mrpipe help` lists the commands."
+        known = MrpipeError(text)
     if "--json" in arguments:
         with suppress(OSError):
             print(json.dumps({"error": as_document(known)}, indent=2), flush=True)

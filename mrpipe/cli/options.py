@@ -35,8 +35,9 @@ _COMMON: dict[str, tuple[Any, Any]] = {
         Annotated[
             Path | None,
             typer.Option(
+                metavar="FILE",
                 help="Configuration file, or the name of one that comes with the program; also without --config. "
-                "Default: the one in ./configs, else thesis."
+                "Default: the one in ./configs, else thesis.",
             ),
         ],
         None,
@@ -44,7 +45,10 @@ _COMMON: dict[str, tuple[Any, Any]] = {
     "run": (
         Annotated[
             Path | None,
-            typer.Option(help="Run directory. Default: runs/<name of the configuration, or of the campaign given>."),
+            typer.Option(
+                metavar="DIR",
+                help="Run directory. Default: runs/<name of the configuration, or of the campaign given>.",
+            ),
         ],
         None,
     ),
@@ -73,8 +77,11 @@ _COMMON: dict[str, tuple[Any, Any]] = {
         ],
         None,
     ),
-    "jobs": (Annotated[int | None, typer.Option(min=1, help="Processes to use. Default: one a core.")], None),
-    "seed": (Annotated[int | None, typer.Option(min=0, help="Seed of all randomness.")], None),
+    "jobs": (
+        Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes to use. Default: one a core.")],
+        None,
+    ),
+    "seed": (Annotated[int | None, typer.Option(min=0, metavar="N", help="Seed of all randomness.")], None),
     "force": (Annotated[bool, typer.Option("--force", help="Build again even where nothing changed.")], False),
     "quiet": (Annotated[bool, typer.Option("--quiet", help="Print only errors and the result.")], False),
     "json": (Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")], False),
@@ -82,7 +89,7 @@ _COMMON: dict[str, tuple[Any, Any]] = {
 
 
 _POSITIONAL = Annotated[
-    Path | None, typer.Argument(metavar="[CONFIG]", help="Configuration, the same as --config.", show_default=False)
+    Path | None, typer.Argument(metavar="CONFIG", help="Configuration, the same as --config.", show_default=False)
 ]
 
 

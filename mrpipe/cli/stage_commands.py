@@ -215,7 +215,7 @@ def simulate(
 @with_common_options()
 def export(
     options: CommonOptions,
-    what: Annotated[str, typer.Argument(metavar="[WHAT]", help=f"{', '.join(_EXPORTS)}; or all.")] = "controller",
+    what: Annotated[str, typer.Argument(metavar="WHAT", help=f"{', '.join(_EXPORTS)}; or all.")] = "controller",
     law: Annotated[
         str | None, typer.Option(metavar="LAW", help="Control law, to controller/LAW. Default: the setting export.law.")
     ] = None,

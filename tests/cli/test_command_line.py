@@ -45,6 +45,7 @@ def eval_list(text: str) -> list[str]:
 
 MISTAKES = {
     "unknown command": (["trian"], "No such command"),
+    "no command at all": (["xyzzy"], "No such command 'xyzzy'. `mrpipe help` lists the commands."),
     "unknown option": (["prepare", "--cofnig", "x"], "No such option"),
     "missing config": (["run", "nowhere.yaml"], "nowhere.yaml: no such configuration"),
     "unknown setting": (["prepare", "--set", "prepare.cutof_hz=3"], "did you mean cutoff_hz?"),
