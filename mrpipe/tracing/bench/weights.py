@@ -120,8 +120,10 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         left, right = (1.0 - part) ** 2, part**2
         rows.append(np.stack([values[a] + left * values[b] + right * values[c] for values in (force, motion)], axis=1))
         targets.append(np.square(residual[a] - (1.0 - part) * residual[b] - part * residual[c]))
+    used = root > 0.0
     if not rows or sum(map(len, targets)) < rules.least_samples:
-        return AS_SHOWN
+        limit = _limit(residual[used], force[used] + motion[used])
+        return NoiseScale(limit, limit)
     columns, target = np.concatenate(rows), np.concatenate(targets)
     # the scatter of squared differences is proportional to their mean: weight by the mean, and repeat
     expected = columns.sum(axis=1)
@@ -140,12 +142,13 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     # repeated motion repeats the rounding of the force too, so their difference does not show it
     rounding = recordings.force_rounding[recordings.test] ** 2
     force_factor = max(force_factor, float(np.sum(rounding)) / max(float(np.sum(force)), 1e-300))
-    # and noise is no larger than what the model leaves
-    used = root > 0.0
-    variance = (force_factor * force + motion_factor * motion)[used]
-    left = float(np.sum(residual[used] ** 2)) / max(float(np.sum(variance)), 1e-300)
-    limit = min(1.0, left)
+    limit = _limit(residual[used], (force_factor * force + motion_factor * motion)[used])
     return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles))
+
+
+def _limit(residual: FloatArray, variance: FloatArray) -> float:
+    """Return the factor, at most 1, on the variance of the noise: noise is no larger than what the model leaves."""
+    return min(1.0, float(np.sum(residual**2)) / max(float(np.sum(variance)), 1e-300))
 
 
 def _aligned(recordings: Recordings, first: IntArray, second: IntArray) -> tuple[IntArray, float]:

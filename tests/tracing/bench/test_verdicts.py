@@ -13,7 +13,7 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.trace import trace_campaign
 from mrpipe.tracing.options import TracingOptions
-from tests.tracing.bench.rig import RATE
+from tests.tracing.bench.rig import RATE, hysteresis
 from tests.tracing.bench.sines import (
     cut,
     dead_load_cell,
@@ -29,9 +29,13 @@ from tests.tracing.bench.sines import (
 FORMS = ("bouc-wen", "dahl")
 
 
-def traced(tests: list[PreparedTest], names: tuple[str, ...] = ("accumulator", "saturation")) -> dict[str, Any]:
+def traced(
+    tests: list[PreparedTest],
+    names: tuple[str, ...] = ("accumulator", "saturation"),
+    forms: tuple[str, ...] = FORMS,
+) -> dict[str, Any]:
     options = TracingOptions(
-        refits=2, bootstrap_draws=50, yield_order=2, most_effects=1, observation_filter=False, base_forms=FORMS
+        refits=2, bootstrap_draws=50, yield_order=2, most_effects=1, observation_filter=False, base_forms=forms
     )
     library = {name: damper_effects()[name] for name in names}
     return trace_campaign(tests, library, [], options, rng=np.random.default_rng(1)).summary
@@ -205,10 +209,72 @@ def with_hum(test: PreparedTest) -> PreparedTest:
     return replace(test, force_n=test.force_n + hum, force_raw_n=test.force_raw_n + hum)
 
 
+def at_one_drive(test: PreparedTest) -> PreparedTest:
+    return replace(test, drive=np.ones_like(test.drive))
+
+
+def with_force(test: PreparedTest, force: np.ndarray) -> PreparedTest:
+    return replace(test, force_n=force, force_raw_n=force)
+
+
+def with_dropouts(test: PreparedTest) -> PreparedTest:
+    """Set the force to zero in two samples of every hundred, as a loose connector does."""
+    return with_force(test, np.where(np.arange(len(test.force_n)) % 100 < 2, 0.0, test.force_raw_n))
+
+
+def saturated_softly(test: PreparedTest) -> PreparedTest:
+    """Bend the force towards 60 N, as an overloaded amplifier does."""
+    return with_force(test, 60.0 * np.tanh(test.force_raw_n / 60.0))
+
+
+def without_motion(test: PreparedTest) -> PreparedTest:
+    noise = 1e-6 * np.random.default_rng(3).standard_normal(len(test.time_s))
+    zero = np.zeros_like(noise)
+    return replace(test, displacement_m=zero, velocity_m_s=zero, acceleration_m_s2=zero, displacement_raw_m=noise)
+
+
 @pytest.mark.planted
-@pytest.mark.parametrize("harm", [without_drive, with_hum])
+def test_steps_of_a_coarse_load_cell_are_noise() -> None:
+    coarse = [with_force(test, 4.0 * np.round(test.force_raw_n / 4.0)) for test in sines()]
+    found = traced(coarse)
+    assert found["verdict_class"] == "noise"
+    assert found["noise_floor_nrmse"] == pytest.approx(found["before"]["nrmse"], rel=0.25)
+
+
+@pytest.mark.planted
+def test_a_constant_initial_stiffness_is_a_base_form_and_no_effect() -> None:
+    """The yield displacement grows with the yield force: no rate dependence, and nothing that the damper lacks."""
+    found = traced(stiff(), ("stribeck", "migration"), (*FORMS, "bouc-wen-stiffness", "yielding-part"))
+    assert found["verdict_class"] == "base form"
+    assert found["base_form"]["taken"] == "bouc-wen-stiffness"
+    assert found["effects"] == []
+    assert found["after"]["nrmse"] < 1.25 * found["noise_floor_nrmse"]
+
+
+def stiff() -> list[PreparedTest]:
+    """Return tests of a Bouc-Wen damper with 60 N/mm of initial stiffness at every current."""
+    tests = []
+    for number, test in enumerate(sines()):
+        rng = np.random.default_rng(number)
+        yield_force = 20.0 + 8.0 * test.drive[0] + 14.0 * test.drive[0] ** 2
+        viscous = (50.0 + 75.0 * test.drive[0]) * test.velocity_m_s
+        force = yield_force * hysteresis(test.displacement_m, yield_force / 6e4) + viscous
+        tests.append(with_force(test, force + 0.3 * rng.standard_normal(len(force))))
+    return tests
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("harm", [without_drive, at_one_drive, with_hum, with_dropouts, saturated_softly, cut])
 def test_a_fault_of_the_whole_campaign_is_unknown_and_no_effect(harm: Callable[..., PreparedTest]) -> None:
     found = traced(harmed(sines(), tuple(range(10)), harm))
     assert found["verdict_class"] == "unknown"
     assert found["effects"] == []
     assert found["unexplained"]["structured"]
+
+
+@pytest.mark.planted
+def test_a_displacement_of_zero_stops_the_tracing() -> None:
+    found = traced(harmed(sines(), tuple(range(10)), without_motion))
+    assert found["verdict_class"] == "unknown"
+    assert "nothing is traced" in found["verdict"]
+    assert found["effects"] == []
