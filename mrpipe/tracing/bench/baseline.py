@@ -40,7 +40,7 @@ class Baseline:
     scale
         By how much the noise exceeds what the channels show.
     model_error
-        Whether weights go by what a model cannot follow: the base form itself is in question, the noise is not.
+        Whether the weights follow from the error of the model, because it exceeds the noise.
     """
 
     fit: Fit

@@ -53,7 +53,7 @@ class Corrections(KnownFaults):
 
 
 def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Corrections:
-    """Return the corrections that the named faults of sensors ask for.
+    """Return the corrections that the named faults of sensors require.
 
     Parameters
     ----------

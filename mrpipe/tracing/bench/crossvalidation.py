@@ -42,8 +42,8 @@ class Gain:
 def folds_of(recordings: Recordings, folds: int) -> list[list[int]]:
     """Return the tests of each fold: every k-th in the order of drive level, then stroke.
 
-    A campaign steps through its drive levels in turn; folds in its own order could take all of one level away, and
-    what is then learnt of the others says nothing of it.
+    A campaign steps through its drive levels in turn. Folds in the order of the campaign could leave out all tests of
+    one level, and the other levels do not determine it.
     """
     keys = [
         (round(float(np.mean(np.abs(recordings.drive[part]))), 2), float(np.ptp(recordings.displacement[part])))
@@ -57,7 +57,7 @@ def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
     """Return the weighted residual of every training test by a fit that has not seen it, shape (n,).
 
     Zero where motion or drive go beyond all that the fit has seen: an end stop that one test alone touches cannot be
-    known from the others, and what they make of it says nothing against it.
+    found in the others, so their prediction does not refute it.
     """
     problem = found.problem
     recordings = problem.recordings

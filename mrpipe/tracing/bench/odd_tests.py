@@ -13,7 +13,7 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.rules import ValidationRules
 
 SAME_RECORD = "same-record"
-"""Finding for tests that hold the same samples: the second of them is no independent test."""
+"""Finding for tests that hold the same samples: the second of them is not independent."""
 
 
 @dataclass(frozen=True)

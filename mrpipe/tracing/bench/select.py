@@ -258,7 +258,7 @@ def admissible(found: Fit, main_part: float = SelectionRules().main_part) -> boo
             return False
     amplitudes = term.form.amplitudes
     if len(amplitudes) > 1 and amplitudes[0].lower == 0.0 and all(item.lower < 0.0 for item in amplitudes[1:]):
-        # without the part of definite sign only its corrections are left: a spring of no stiffness is no spring
+        # without the part of definite sign only its corrections remain: a spring needs a stiffness
         main, *corrections = (abs(values[p.name]) / found.problem.scales.of(p.scale) for p in amplitudes)
         if main <= main_part * max(corrections):
             return False
@@ -289,8 +289,8 @@ def forward_selection(
 ) -> Selection:
     """Add effects one after another while each recovers a fair share.
 
-    A further term is a cause of its own only where it recovers much of what is left and leads the other families;
-    else it may as well mend the form of the effect before it, and so may all that follow.
+    A further term counts as a separate cause only where it recovers much of the rest and leads the other families.
+    Otherwise it may correct the form of the effect before it, and so may all terms that follow.
     """
     rules = rules or SelectionRules()
     rounds: list[tuple[Candidate, ...]] = []
@@ -314,7 +314,7 @@ def forward_selection(
         )
         able = [item for item in found if admissible(item.fit, rules.main_part)]
         if rounds and rules.lead > 1.0:
-            # beside other effects a parameter that runs to its bound mends a form, and badly where motions are other
+            # with other effects present, a parameter at its bound corrects a form, and it extrapolates badly
             able = [item for item in able if stuck(item.fit) <= stuck(chosen)]
         ordered = tuple(able + [item for item in found if item not in able])
         gain = chosen.chi_square - able[0].fit.chi_square if able else 0.0

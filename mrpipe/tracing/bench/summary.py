@@ -32,7 +32,7 @@ UNATTRIBUTED: dict[str, Any] = {
     "parameters": {},
     "confidence": 0.0,
     "tied_with": [],
-    "physics": "A flexible model of what no named effect explains; it stands for no physics.",
+    "physics": "A flexible model of what no named effect explains; it has no physical meaning.",
     "remedy": "Make the tests that `next_tests` lists.",
     "corrected_in": "nowhere: it is a model of the record and cannot run in a loop",
 }

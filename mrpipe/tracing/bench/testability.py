@@ -48,7 +48,7 @@ def missing(recordings: Recordings, rules: TestabilityRules | None = None) -> di
         ),
         "several-positions": (
             _several_positions(recordings, pieces, rules.turning),
-            "all motions turn round at the same positions: record another amplitude or another middle",
+            "all motions reverse at the same positions: record another amplitude or another middle",
         ),
         "long-tests": (
             _longest_cycles(recordings, pieces) >= rules.long_cycles,
@@ -81,7 +81,7 @@ def _several_frequencies(recordings: Recordings, pieces: Sequence[slice], ratio:
 
 
 def _turns(velocity: FloatArray) -> np.ndarray:
-    """Return the samples after which the motion turns round, shape (turns,)."""
+    """Return the samples after which the motion reverses, shape (turns,)."""
     moving = np.flatnonzero(velocity)
     signs = np.sign(velocity[moving])
     return moving[1:][signs[1:] != signs[:-1]]

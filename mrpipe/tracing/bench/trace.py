@@ -276,7 +276,7 @@ def _named(
     options: TracingOptions,
     rng: np.random.Generator,
 ) -> tuple[Named, ...]:
-    """Return the terms of the chosen fit behind the first `declared` ones, with what is said of them."""
+    """Return the terms of the chosen fit behind the first `declared` ones, with parameters and confidence."""
     chosen = selection.chosen
     named = []
     limits = intervals(chosen) if len(chosen.problem.terms) > declared else []

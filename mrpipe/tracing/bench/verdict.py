@@ -79,7 +79,7 @@ def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
     if not selection.structured:
         return "the residual is noise: nothing is missing"
     if selection.ground is not None and selection.chosen is selection.ground:
-        return f"no effect is named beside the base form {selection.ground.problem.base.name}"
+        return f"no effect is named in addition to the base form {selection.ground.problem.base.name}"
     if not selection.rounds or selection.chosen is selection.base:
         return "no effect of the library changes the error"
     if share_of(selection.without_effects, selection.chosen, selection.noise) < rules.least_share:

@@ -154,7 +154,7 @@ def _limit(residual: FloatArray, variance: FloatArray) -> float:
 def _aligned(recordings: Recordings, first: IntArray, second: IntArray) -> tuple[IntArray, float]:
     """Return the samples before the moments at which the second motion is where the first is, and the part beyond them.
 
-    A period is no whole number of samples. A model's error that is steep in time would not cancel otherwise.
+    A period is rarely a whole number of samples. A model's error that is steep in time would not cancel otherwise.
     """
     dt = recordings.dt[recordings.test[second[0]]]
     step = recordings.velocity[second] * dt
