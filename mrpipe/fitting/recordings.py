@@ -36,6 +36,10 @@ JUMP_RATE_HZ = 500.0
 CUTOFF_MARGIN = 1.5
 """The displacement is cut off at this multiple of the frequency above which it is below its noise."""
 
+FILTER_ORDER = 4
+"""Order of the low-pass of the displacement in each direction: a gentler one attenuates random motion up to its band's
+edge by several percent, which a hysteresis turns into twice the error."""
+
 QUANTISED_SHARE = 0.5
 """A channel with fewer different values than this share of its samples is quantised."""
 
@@ -272,7 +276,7 @@ def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[Prepare
 def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, longest_s: float) -> dict[str, Any]:
     rate = test.sampling_rate_hz
     raw = test.displacement_raw_m + (test.displacement_offset_m - offset)
-    smooth = butterworth_lowpass(raw, cutoff, rate)
+    smooth = butterworth_lowpass(raw, cutoff, rate, order=FILTER_ORDER)
     velocity = np.gradient(smooth, 1.0 / rate)
     acceleration = np.gradient(velocity, 1.0 / rate)
     if _acceleration_was_measured(test):
