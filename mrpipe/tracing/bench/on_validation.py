@@ -138,6 +138,8 @@ def on_validation(
         before = before - (judged.offsets - np.median(judged.offsets))[validation.test]
     force, motion = noise_variances(chosen, validation)
     scale = baseline.scale
+    part = _share_of_residual(recordings, judged.measured - after, scale.force * force + scale.motion * motion)
+    force, motion = part * force, part * motion
     floor = np.sqrt(scale.force * force + scale.motion * motion)
     used = recordings.used
     power = max(_rms(judged.measured[used]), 1e-12)
@@ -150,6 +152,18 @@ def on_validation(
     return OnValidation(
         recordings, validation, judged.measured, before, after, floor, components, shared is None, gains
     )
+
+
+def _share_of_residual(recordings: Recordings, residual: FloatArray, variance: FloatArray) -> FloatArray:
+    """Return a factor, at most 1, on the variance of each sample's noise, one for each test, shape (n,).
+
+    Noise is no larger than what the final model leaves. The noise of a displacement, passed through a damper that
+    follows velocity or acceleration, is known to a factor only.
+    """
+    used, test = recordings.used, recordings.test
+    left = np.bincount(test[used], weights=residual[used] ** 2, minlength=recordings.tests)
+    noise = np.bincount(test[used], weights=variance[used], minlength=recordings.tests)
+    return np.asarray(np.minimum(1.0, left / np.maximum(noise, 1e-300))[test], dtype=np.float64)
 
 
 @dataclass(frozen=True)
