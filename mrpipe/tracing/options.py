@@ -32,7 +32,13 @@ class NamingRules(Section):
         0.99,
         gt=0.0,
         lt=1.0,
-        description="Largest confidence that is reported, because a finite number of tests proves nothing.",
+        description="Largest evidence that counts, because a finite number of tests proves nothing.",
+    )
+    calibration: tuple[tuple[float, float], ...] = Field(
+        ((0.0, 0.0), (0.6, 0.25), (0.8, 0.75), (0.95, 0.95), (1.0, 0.97)),
+        description="Evidence for an effect on the bench (share of resamples that need it, times shares recovered), "
+        "and the probability that an effect with this evidence is really there; linear in between. The probabilities "
+        "are those of the planted benchmark by the rule of succession, see docs/tracing-benchmark.md.",
     )
     noise_share: float = Field(
         0.1,
@@ -40,6 +46,15 @@ class NamingRules(Section):
         description="Differences below this share of the noise do not separate two families, because the noise itself "
         "is not known better.",
     )
+
+    @field_validator("calibration")
+    @classmethod
+    def _calibration_rises(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        evidence, probability = zip(*value, strict=True) if value else ((), ())
+        ordered = list(evidence) == sorted(set(evidence)) and list(probability) == sorted(probability)
+        if len(value) < 2 or not ordered or not all(0.0 <= item <= 1.0 for pair in value for item in pair):
+            raise ValueError("needs at least two pairs of numbers from 0 to 1; both must rise")
+        return value
 
 
 class TracingSettings(NamingRules):

@@ -18,8 +18,8 @@ from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, judge, o
 from mrpipe.tracing.bench.residual_structure import states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.validation import compare, training_agreements
-from mrpipe.tracing.bench.verdict import Named
-from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.bench.verdict import Named, calibrated
+from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import ValidationRules
 
 
@@ -100,7 +100,10 @@ def structured(
     return learnt or structure_p_value(base.residual, states_of(base, training)) < options.rules.validation.whiteness
 
 
-def held(item: Named, judgement: Judgement) -> Named:
-    """Return an effect with its confidence lowered by the share that it does not recover on the validation tests."""
+def held(item: Named, judgement: Judgement, rules: NamingRules) -> Named:
+    """Return an effect with its confidence as a probability.
+
+    The evidence is lowered by the share that is not recovered on the validation tests.
+    """
     share = 1.0 if judgement.verdict.kind == "explained" else judgement.evidence.share
-    return replace(item, confidence=round(item.confidence * share, 3))
+    return replace(item, confidence=calibrated(item.confidence * share, rules))

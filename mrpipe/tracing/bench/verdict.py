@@ -88,7 +88,7 @@ def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
 
 
 def confidence_of(share: float, support: float, gain: Gain | None, rules: NamingRules) -> float:
-    """Return a confidence 0..1.
+    """Return the evidence for an effect, 0 to 1; :func:`calibrated` makes a probability of it.
 
     Parameters
     ----------
@@ -104,6 +104,12 @@ def confidence_of(share: float, support: float, gain: Gain | None, rules: Naming
     proven = min(1.0, share / rules.named_share)
     held = 1.0 if gain is None or gain.significant else rules.doubtful
     return round(float(proven * support * held * rules.most_confidence), 3)
+
+
+def calibrated(evidence: float, rules: NamingRules) -> float:
+    """Return the probability that an effect with this evidence is really there, by the planted benchmark."""
+    known, probability = zip(*rules.calibration, strict=True)
+    return round(float(np.interp(evidence, known, probability)), 3)
 
 
 def parameter_table(

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, recovered
+from mrpipe.tracing.bench.verdict import calibrated
+from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import ValidationRules
 
 RULES = ValidationRules()
@@ -57,3 +62,20 @@ def test_the_share_is_that_of_the_squared_error_beyond_the_ceiling() -> None:
     # a ceiling above the error that is reached is none
     assert recovered(0.1, 0.01, 0.05) == 1.0
     assert recovered(0.01, 0.02, 0.01) == 0.0
+
+
+@pytest.mark.property
+@given(pair=st.lists(st.floats(0.0, 1.0), min_size=2, max_size=2))
+def test_more_evidence_is_never_less_probable(pair: list[float]) -> None:
+    less, more = sorted(pair)
+    rules = NamingRules()
+    assert 0.0 <= calibrated(less, rules) <= calibrated(more, rules) < 1.0
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    "pairs", [((0.0, 0.0),), ((0.0, 0.5), (1.0, 0.2)), ((0.5, 0.1), (0.2, 0.9)), ((0.0, 0.0), (1.0, 2.0))]
+)
+def test_a_calibration_that_falls_or_leaves_0_to_1_is_refused(pairs: tuple[tuple[float, float], ...]) -> None:
+    with pytest.raises(ValidationError, match="rise"):
+        NamingRules(calibration=pairs)
