@@ -58,6 +58,7 @@ NUMBERS: dict[str, dict[str, float]] = {
         "yield_displacement": 8e-4, "gamma_share": 0.7, "spring_rate": 1500.0, "velocity_scale": 0.02,
         "part_force_a": PART,
     },
+    "viscoplastic": {"elastic_rate": 1200.0, "flow_speed": 0.2, "exponent": 1.5},
     "creeping-yield": {"elastic_rate": 1200.0, "creep_speed": 0.01, "creep_exponent": 3.0, "gamma_share": 0.7},
 }  # fmt: skip
 
@@ -151,6 +152,13 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
             return [p["elastic_rate"] * (rate - bends - creeps)]
 
         return YIELD * integrated(creep, [0.0], t)[0] + viscous
+    if name == "viscoplastic":
+
+        def flow(time, state):
+            over = max(abs(state[0]) - 1.0, 0.0)
+            return [p["elastic_rate"] * (speed(time) - p["flow_speed"] * over ** p["exponent"] * np.sign(state[0]))]
+
+        return YIELD * integrated(flow, [0.0], t)[0] + viscous
     late = np.tanh(np.gradient(v, t) / p.get("acceleration_scale", 1.0)) * p.get("hysteresis_velocity", 0.0)
     rest, width = p.get("rest_share", 1.0), p.get("yield_velocity", math.inf)
     if rest < 1.0:

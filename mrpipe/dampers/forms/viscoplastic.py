@@ -1,0 +1,75 @@
+"""Viscoplastic overstress in series with a spring."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import float64, njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
+from mrpipe.dampers.forms.creeping_yield import DAMPING, LONGEST, MOST_PARTS
+from mrpipe.dampers.parameters import Values, shape
+from mrpipe.dampers.plant import FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+
+
+@njit(float64(float64, float64, float64[::1]), cache=True)
+def overstress_rate(z: float, v: float, parameters: FloatArray) -> float:
+    """Return z' [1/s]; parameters as in :func:`viscoplastic_step`."""
+    over = abs(z) - 1.0
+    if over <= 0.0:
+        return parameters[0] * v
+    return parameters[0] * (v - parameters[1] * over ** parameters[2] * (1.0 if z > 0.0 else -1.0))
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: spring rate [1/m], speed of flow at twice the yield force [m/s], exponent. State: z, last velocity.
+
+    Integrated by a Rosenbrock method of second order that damps what is fast (Verwer et al. 1999, ROS2).
+    """
+    if wire[FIRST] > 0.5:
+        state[0] = 0.0
+        state[1] = wire[VELOCITY]
+        wire[HYSTERESIS] = 0.0
+        return
+    rate, flow, power = parameters[0], parameters[1], parameters[2]
+    first, change = state[1], wire[VELOCITY] - state[1]
+    speed = max(abs(first), abs(wire[VELOCITY]))
+    stiff = flow * power * (speed / flow) ** (1.0 - 1.0 / power)
+    parts = min(int(rate * (speed + stiff) * dt / LONGEST) + 1, MOST_PARTS)
+    h, z = dt / parts, state[0]
+    for k in range(parts):
+        v0, v1 = first + change * k / parts, first + change * (k + 1) / parts
+        over = abs(z) - 1.0
+        slope = -rate * flow * power * over ** (power - 1.0) if over > 0.0 else 0.0
+        factor = 1.0 / (1.0 - DAMPING * h * slope)
+        k1 = factor * overstress_rate(z, v0, parameters)
+        k2 = factor * (overstress_rate(z + h * k1, v1, parameters) - 2.0 * k1)
+        z += h * (1.5 * k1 + 0.5 * k2)
+    state[0] = z
+    state[1] = wire[VELOCITY]
+    wire[HYSTERESIS] = z
+
+
+def _steps(values: Values) -> list[Step]:
+    numbers = np.array([values["elastic_rate"], values["flow_speed"], values["exponent"]], dtype=np.float64)
+    return [Step("viscoplastic", Phase.HYSTERESIS, viscoplastic_step, numbers, 2)]
+
+
+def _post_yield(values: Values, at: Strength) -> FloatArray:
+    return rounded_sum(1.0 + (at.speed / values["flow_speed"]) ** (1.0 / values["exponent"]), at)
+
+
+FORM = BaseForm(
+    name="viscoplastic",
+    summary="z' = q (v - v_f <|z| - 1>^n sign z): a spring in series with flow that the force beyond yield drives",
+    source="Perzyna 1966, Fundamental problems in viscoplasticity, Adv. Appl. Mech. 9, 243-377",
+    parameters=(
+        shape("elastic_rate", "1/m", "stiffness over the yield force", "one/stroke", 2.0, 500.0, (20.0, 60.0)),
+        shape("flow_speed", "m/s", "speed of flow at twice the yield force", "speed", 0.02, 50.0, (3.0, 0.5)),
+        shape("exponent", "1", "power of the force beyond yield", "one", 1.0, 6.0, (1.5,)),
+    ),
+    steps=_steps,
+    post_yield=_post_yield,
+    family="rate-dependent-yield",
+)
