@@ -23,7 +23,7 @@ from mrpipe.tracing.structure.spectra import Spectra
 Kind = Literal["constant", "amplitude", "drift", "step"]
 
 LEAST_TESTS = 4
-"""Numerical technique: with fewer tests a trend over their order cannot be told from scatter."""
+"""Numerical technique: with fewer tests a trend over their order cannot be distinguished from scatter."""
 
 
 @dataclass(frozen=True)
