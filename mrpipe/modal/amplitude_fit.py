@@ -259,7 +259,7 @@ def _may_depend(problem: _Problem, constant: FloatArray) -> bool:
 
 
 def _folds(tests: Sequence[FrameTest], common: _Common) -> tuple[list[_Record], list[_Record]]:
-    """Return the records of the fit, and the parts left out in turn: a test, or a half of the only one by its energy."""
+    """Return the records of the fit, and the parts left out in turn: a test, or half the energy of the only one."""
     whole = [_Record(test, common, test.name, np.ones(test.responses.shape[0])) for test in tests]
     if len(whole) > 1:
         return whole, whole
