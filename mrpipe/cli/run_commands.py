@@ -156,10 +156,13 @@ def report(
         print_json({"report": [str(path) for path in paths]})
     else:
         if summary:
+            import shutil
+
             from mrpipe.pipeline.report import run_facts
             from mrpipe.reporting.page import first_screen
 
-            print("\n".join(first_screen(run_facts(pipeline))), end="\n\n")
+            columns = shutil.get_terminal_size((100, 24)).columns
+            print("\n".join(first_screen(run_facts(pipeline), columns)), end="\n\n")
         for path in paths:
             print(f"report: {path}")
 

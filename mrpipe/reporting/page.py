@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import html
 import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,11 +29,24 @@ __all__ = ["ReportStage", "RunFacts", "first_screen", "write_report"]
 _ROWS_SHOWN = 15
 
 
-def first_screen(facts: RunFacts) -> list[str]:
-    """Return the first screen as lines for a terminal."""
-    head = [facts.title, _source_line(facts), ""]
-    width = 11
-    return head + [f"{item.topic:{width}}{item.text.replace('**', '')}" for item in statements(facts)]
+def first_screen(facts: RunFacts, columns: int = 100) -> list[str]:
+    """Return the first screen as lines for a terminal.
+
+    Parameters
+    ----------
+    facts
+        The run.
+    columns
+        Longest line.
+    """
+    lines = [facts.title, _source_line(facts), *([facts.description] if facts.description else []), ""]
+    indent = " " * 12
+    for item in statements(facts):
+        text = item.text.replace("**", "").replace("`", "")
+        lines += textwrap.wrap(
+            f"{item.topic:{len(indent)}}{text}", max(columns, 40), subsequent_indent=indent, break_on_hyphens=False
+        )
+    return lines
 
 
 def _source_line(facts: RunFacts) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,10 @@ import pandas as pd
 
 from mrpipe.artifacts import Artifact
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.front import figures, statements
+from mrpipe.reporting.front import figures, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
-from mrpipe.reporting.words import number, percent, plain, quantity, readable_unit
+from mrpipe.reporting.words import number, percent, quantity
 from mrpipe.reporting.writer import Section
 
 _POINTS_OF_A_LOOP = 700
@@ -62,8 +62,10 @@ def trust(facts: RunFacts) -> Section:
         if statements.proper_effects(loop) and recovered is not None:
             text += f" The named effects recover {percent(recovered)} of what a flexible model of the residual can."
         section.text(text)
-        section.table("rivals", _rivals(loop), "Effects that were tried, each alone with all parameters fitted again.")
-        section.table("forms", _forms(loop), "Base forms that were tried, error on the validation tests.")
+        section.table(
+            "rivals", tables.rivals(loop), "Effects that were tried, each alone with all parameters fitted again."
+        )
+        section.table("forms", tables.forms(loop), "Base forms that were tried, error on the validation tests.")
     inverse = facts.summary("train-inverse")
     if inverse.get("round_trip_nrmse") is not None:
         section.text(
@@ -85,30 +87,6 @@ def _errors_per_test(loop: Mapping[str, Any]) -> Any:
     return errors_per_test(loop["tests"], loop["noise_floor_nrmse"])
 
 
-def _rivals(loop: Mapping[str, Any]) -> pd.DataFrame:
-    return pd.DataFrame(
-        [
-            {
-                "effect": item["name"],
-                "form": item.get("form", ""),
-                "recovers [%]": f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
-                "error then [%]": number(100.0 * item["nrmse"]) if item.get("nrmse") is not None else "-",
-            }
-            for item in loop.get("candidates", [])[:8]
-        ]
-    )
-
-
-def _forms(loop: Mapping[str, Any]) -> pd.DataFrame:
-    errors = (loop.get("base_form") or {}).get("nrmse") or {}
-    rows = [
-        {"base form": name, "error [%]": number(100.0 * value)}
-        for name, value in sorted(errors.items(), key=lambda item: item[1] if item[1] is not None else np.inf)
-        if value is not None
-    ]
-    return pd.DataFrame(rows if len(rows) > 1 else [])
-
-
 def damper(facts: RunFacts) -> Section:
     """Return the damper model: parameters, effects, loops, and the residual over what explains it."""
     section = Section("damper", "Damper")
@@ -119,7 +97,7 @@ def damper(facts: RunFacts) -> Section:
             f"{percent(summary['training_nrmse'])} on the training tests; drive up to "
             f"{quantity(summary['drive_limit'], summary['drive_unit'])}."
         )
-        section.table("parameters", _parameters(summary["parameters"]), "Parameters with standard errors (SI).")
+        section.table("parameters", tables.parameters(summary["parameters"]), "Parameters with standard errors (SI).")
     if _of_structure(loop):
         return section
     _traced_effects(section, loop)
@@ -152,50 +130,13 @@ def _traced_effects(section: Section, loop: Mapping[str, Any]) -> None:
     effects = statements.proper_effects(loop)
     for effect in effects:
         section.text(f"**{effect['name']}** ({effect.get('form', '')}). {effect.get('physics', '')}")
-    section.table("effects", _effects(effects), "Effects that the model lacks, with 95 % intervals.")
+    section.table("effects", tables.effects(effects), "Effects that the model lacks, with 95 % intervals.")
     if loop.get("candidates"):
         section.figure(
             "candidates",
             figures.candidate_shares(loop["candidates"], [effect["name"] for effect in effects]),
             "Share of the recoverable residual that each effect recovers alone; named effects in blue.",
         )
-
-
-def _parameters(parameters: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    rows = []
-    for name, entry in parameters.items():
-        error = entry.get("standard_error")
-        rows.append(
-            {
-                "parameter": plain(name),
-                "value": number(entry["value"], 4),
-                "±": number(error, 2) if error is not None else "fixed",
-                "unit": readable_unit(entry["unit"]),
-                "note": "at its bound" if entry.get("at_bound") else "",
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def _effects(effects: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    rows = []
-    for effect in effects:
-        for name, entry in effect["parameters"].items():
-            if entry.get("value") is None:
-                continue
-            low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
-            rows.append(
-                {
-                    "effect": effect["name"] + (f" at {effect['place']}" if effect.get("place") else ""),
-                    "parameter": plain(name),
-                    "value": number(entry["value"], 3),
-                    "from": number(low, 3),
-                    "to": number(high, 3),
-                    "unit": readable_unit(entry["unit"]),
-                    "confidence": number(effect["confidence"], 2),
-                }
-            )
-    return pd.DataFrame(rows)
 
 
 def _residual(artifact: Artifact, drive_unit: str) -> tuple[list[tuple[str, Any]], Any, Any]:
@@ -308,7 +249,9 @@ def control(facts: RunFacts) -> Section:
     loop = facts.summary("close-loop").get("closed_loop") or {}
     if runs:
         section.text(law_facts.answer(facts))
-        section.table("laws", _laws(facts, runs), "All laws under the same base motion; accelerations are absolute.")
+        section.table(
+            "laws", tables.laws(facts, runs), "All laws under the same base motion; accelerations are absolute."
+        )
         histories: dict[str, law_facts.History] = {}
         for run in runs:
             artifact = facts.artifact(f"response-{run.law}.h5")
@@ -330,35 +273,6 @@ def control(facts: RunFacts) -> Section:
     return section
 
 
-def _laws(facts: RunFacts, runs: Sequence[law_facts.LawRun]) -> pd.DataFrame:
-    bare = next((run for run in runs if run.law == law_facts.UNCONTROLLED), None)
-    gains = facts.summary("calibrate").get("laws") or {}
-    rows = []
-    for run in runs:
-        entry = gains.get(run.law) or {}
-        shown = [
-            f"{name} = {quantity(entry[key], unit)}"
-            for name, key, unit in (("c", "c_n_s_m", "N s/m"), ("k", "k_n_m", "N/m"), ("α", "alpha_n_m", "N/m"))
-            if entry.get(key)
-        ]
-        change = 100.0 * (run.rms_top_m / bare.rms_top_m - 1.0) if bare and run is not bare else float("nan")
-        rows.append(
-            {
-                "law": run.law,
-                "gains": ", ".join(shown),
-                "RMS top [mm]": number(1e3 * run.rms_top_m),
-                "change [%]": number(change),
-                "RMS floor 1 [mm]": number(1e3 * run.rms_first_m),
-                "RMS a top [m/s²]": number(run.rms_a_top_m_s2),
-                "RMS a floor 1 [m/s²]": number(run.rms_a_first_m_s2),
-                "peak force [N]": number(run.peak_force_n),
-                "damping ratio [%]": number(100.0 * run.damping_ratio, 2),
-                "extrapolated [% of time]": number(100.0 * run.outside_share, 2),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
 def next_steps(facts: RunFacts) -> Section:
     """Return what to test and to repair next, and which files to use."""
     section = Section("next", "Next steps")
@@ -368,9 +282,8 @@ def next_steps(facts: RunFacts) -> Section:
         section.text(text)
     wanted = loop.get("next_tests") or {}
     if wanted.get("tests"):
-        frame = pd.DataFrame(wanted["tests"])
-        frame = frame.drop(columns=[name for name in ("later",) if name in frame])
-        section.table("tests", frame, f"Tests that would decide what is open ({wanted['file']}).")
+        caption = f"Tests that would decide what is open ({wanted['file']})."
+        section.table("tests", tables.wanted_tests(wanted["tests"]), caption)
     remedies = [
         f"{effect['name']}: {effect['remedy']}" for effect in statements.proper_effects(loop) if effect.get("remedy")
     ]

@@ -14,6 +14,13 @@ from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.words import duration, listed, number, percent, plain, with_interval
 
+FITTED_ALIKE = 0.1
+"""Two fits of one form whose errors differ by less than this share are reported as one."""
+
+
+_DRIVES = {None: "constant", "constant": "constant", "steps": "stepped", "half-sine": "half-sine", "random": "random"}
+_PARTS = {"pre_yield": "before yield", "post_yield": "after yield", "reversal": "around reversals"}
+
 
 @dataclass(frozen=True)
 class Statement:
@@ -36,9 +43,11 @@ def statements(facts: RunFacts) -> list[Statement]:
     found = [
         Statement("Measured", measured(facts)),
         Statement("Missing", missing(facts)),
+        Statement("Trust", trusted(facts)),
         Statement("Models", models(facts)),
+        Statement("Weak spots", weak_spots(facts)),
         Statement("Structure", structure(facts)),
-        Statement("Control", law_facts.answer(facts)),
+        Statement("Control", law_facts.answer(facts) or _without_laws(facts)),
         Statement("Test next", next_tests(facts)),
         Statement("Distrust", " ".join(doubts(facts)[:4])),
     ]
@@ -102,7 +111,8 @@ def missing(facts: RunFacts) -> str:
         return f"{subject} lacks something that no effect of the library explains.{varies} {errors}"
     named = listed([f"**{effect['name']}**{_value_of(effect)}" for effect in effects])
     sure = listed([_confidence(effect["confidence"]) for effect in effects])
-    text = f"{subject} lacks {named}. Confidence: {sure}. {errors}"
+    meanings = "".join(f" {effect['physics'].rstrip('.')}." for effect in effects if effect.get("physics"))
+    text = f"{subject} lacks {named}. Confidence: {sure}.{meanings} {errors}"
     ceiling = (summary.get("ceiling") or {}).get("nrmse")
     if ceiling is not None:
         text += f" The best any model reached is {percent(ceiling)}."
@@ -135,7 +145,9 @@ def _value_of(effect: Mapping[str, Any]) -> str:
         if entry.get("value") is None:
             continue
         low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
-        return f"{place} ({plain(name)} {with_interval(entry['value'], low, high, entry['unit'])})"
+        value, _, interval = with_interval(entry["value"], low, high, entry["unit"]).partition(" (")
+        level = f"{100.0 * entry.get('interval_level', 0.95):.0f} % interval"
+        return f"{place} ({plain(name)} {value}, {level} {interval.rstrip(')')})"
     return place
 
 
@@ -144,17 +156,92 @@ def _confidence(value: float) -> str:
     return f"{word} ({value:.2f})"
 
 
+def trusted(facts: RunFacts) -> str:
+    """Return what supports the named effects: unseen tests that improve, and how far behind the best rival is."""
+    loop = facts.summary("close-loop")
+    effects = proper_effects(loop)
+    tests = [row for row in loop.get("tests", []) if row.get("nrmse_before") is not None]
+    if not effects or not tests:
+        return ""
+    better = sum(row["nrmse_after"] < row["nrmse_before"] for row in tests)
+    if len(tests) == 1:
+        text = "Unseen test: 1; " + ("its error falls." if better else "its error does not fall.")
+    else:
+        text = f"The error falls in {better} of {len(tests)} unseen tests."
+    names = {effect["name"] for effect in effects}
+    rivals = [
+        (float(item["nrmse"]), str(item["name"]))
+        for item in loop.get("candidates", [])
+        if item["name"] not in names and item.get("nrmse") is not None
+    ]
+    if rivals:
+        error, rival = min(rivals)
+        text += f" The best other explanation, {rival}, leaves {percent(error)}."
+    recovered = (loop.get("ceiling") or {}).get("recovered")
+    if recovered is not None:
+        text += f" {percent(recovered)} of what a flexible model of the residual can explain is explained."
+    return text
+
+
+def weak_spots(facts: RunFacts) -> str:
+    """Return where the final damper model is bad: the worst unseen tests, and what the remaining error varies with."""
+    loop = facts.summary("close-loop")
+    tests = [row for row in loop.get("tests", []) if row.get("nrmse_after") is not None]
+    if not tests or verdict_class(loop) == "validation differs":
+        return ""
+    worst = sorted(tests, key=lambda row: -float(row["nrmse_after"]))[:2]
+    named = listed([f"{row['name']} ({percent(row['nrmse_after'])})" for row in worst])
+    text = f"The error of the final damper model is largest in {'test' if len(worst) == 1 else 'tests'} {named}."
+    states = [str(item["state"]) for item in loop["unexplained"].get("depends_on", [])[:3]]
+    if states and loop["unexplained"]["structured"]:
+        text += f" It varies with {listed(states)}."
+    where = (loop.get("residual") or {}).get("where") or {}
+    if where:
+        part, share = max(where.items(), key=lambda item: float(item[1]))
+        text += f" Before the correction, {percent(share)} of the squared residual lay {_PARTS.get(part, plain(part))}."
+    return text
+
+
+def _without_laws(facts: RunFacts) -> str:
+    """Return why no law is recommended, where a damper was measured or modelled."""
+    if not any(facts.summary(name) for name in ("prepare", "identify-damper", "close-loop")):
+        return ""
+    if facts.laws or facts.summary("calibrate"):
+        return "No law was simulated: `mrpipe simulate --law all` compares them."
+    if "frequencies_hz" in facts.summary("identify-frame"):
+        return "The laws are not calibrated: `mrpipe calibrate` does it, and `mrpipe simulate --law all` compares them."
+    return (
+        "There is no structure in this run, so no law can be recommended. Add a frame campaign, or describe the "
+        "structure in the section `structure`."
+    )
+
+
 def models(facts: RunFacts) -> str:
     """Return the error of every model on unseen tests, with noise floor and linear baseline."""
     rows = [f"{name} {percent(value)}" for name, value, _ in model_errors(facts)]
     inverse = facts.summary("train-inverse")
     text = f"RMS error over RMS force on unseen tests: {', '.join(rows)}." if rows else ""
+    text += _fitted_again(facts)
     if "error_over_range" in inverse:
         text += f" The inverse network misses the drive by {percent(inverse['error_over_range'])} of its range"
         linear = inverse.get("linear_baseline_error_over_range")
         text += f" (linear model {percent(linear)})." if linear is not None else "."
     weak = weak_network({name: facts.summary(name) for name in ("identify-damper", "train-forward")})
     return f"{text} {weak}".strip()
+
+
+def _fitted_again(facts: RunFacts) -> str:
+    """Return why the error of the damper model differs from the one before the effect is added."""
+    damper, loop = facts.summary("identify-damper"), facts.summary("close-loop")
+    if "validation_nrmse" not in damper or "before" not in loop or damper.get("form") != loop.get("model"):
+        return ""
+    identified, before = damper["validation_nrmse"], loop["before"]["nrmse"]
+    if abs(before - identified) <= FITTED_ALIKE * identified:
+        return ""
+    return (
+        f" close-loop fits {damper['form']} again, with weights from the noise and an offset for each test: "
+        f"{percent(before)} before the effect is added."
+    )
 
 
 def model_errors(facts: RunFacts) -> list[tuple[str, float, str]]:
@@ -194,7 +281,8 @@ def next_tests(facts: RunFacts) -> str:
     wanted = facts.summary("close-loop").get("next_tests") or {}
     if wanted.get("tests"):
         questions = "; ".join(item["decides"] for item in wanted["decides"][:3])
-        parts.append(f"{len(wanted['tests'])} tests, listed in {wanted['file']}, would decide {questions}.")
+        number_of = f"{len(wanted['tests'])} tests" if len(wanted["tests"]) > 1 else "1 test"
+        parts.append(f"{number_of} would decide {questions}: {_described(wanted['tests'])} ({wanted['file']}).")
     elif wanted.get("made_already"):
         questions = "; ".join(item["decides"] for item in wanted["decides"][:3])
         parts.append(f"Still open although tests for it were made: {questions}. Longer tests or repeats may decide.")
@@ -204,6 +292,28 @@ def next_tests(facts: RunFacts) -> str:
     if not parts and proper_effects(facts.summary("close-loop")):
         parts.append("No further test is needed to decide which effect is missing.")
     return " ".join(parts)
+
+
+def _described(tests: Sequence[Mapping[str, Any]]) -> str:
+    """Return tests to be made in words: kind of motion and drive, and the span of amplitude and frequency."""
+    named = (
+        f"{test.get('motion', 'any')} motion with {_DRIVES.get(test.get('current'), 'chosen')} drive" for test in tests
+    )
+    kinds = list(dict.fromkeys(named))
+    spans = [
+        _span([factor * test[key] for test in tests if test.get(key)], unit)
+        for key, factor, unit in (("amplitude_m", 1e3, "mm"), ("frequency_hz", 1.0, "Hz"))
+    ]
+    more = "" if len(kinds) < 4 else " and others"
+    return ", ".join([f"{'; '.join(kinds[:3])}{more}", *(span for span in spans if span)])
+
+
+def _span(values: Sequence[float], unit: str) -> str:
+    if not values:
+        return ""
+    low, high = min(values), max(values)
+    shown = number(low, 2) if high <= 1.01 * low else f"{number(low, 2)} to {number(high, 2)}"
+    return f"{shown} {unit}"
 
 
 def doubts(facts: RunFacts) -> list[str]:

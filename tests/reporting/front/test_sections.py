@@ -53,6 +53,9 @@ def test_first_screen_in_the_terminal_has_no_marks(tmp_path: Path) -> None:
     assert "mrpipe" in lines[1]
     assert any(line.startswith("Missing") and "accumulator" in line for line in lines)
     assert not any("**" in line for line in lines)
+    narrow = first_screen(run_in(tmp_path), columns=60)
+    assert max(map(len, narrow)) <= 60
+    assert " ".join(" ".join(narrow).split()) == " ".join(" ".join(lines).split())
 
 
 def test_html_is_small_and_offline(tmp_path: Path) -> None:

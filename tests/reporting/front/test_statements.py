@@ -22,7 +22,8 @@ def answers(directory: Path, **changes: object) -> dict[str, str]:
 
 def test_finding_has_value_interval_confidence_and_errors(tmp_path: Path) -> None:
     text = answers(tmp_path)["Missing"]
-    assert "**accumulator** (stiffness 9.10 kN/m (9.04 to 9.16))" in text
+    assert "**accumulator** (stiffness 9.10 kN/m, 95 % interval 9.04 to 9.16)" in text
+    assert "Gas spring." in text
     assert "high (0.97)" in text
     assert "7.9 % before, 1.5 % after (noise alone: 0.40 %)" in text
     assert "best any model reached is 1.3 %" in text
@@ -95,3 +96,47 @@ def test_tied_effect_is_not_called_sure(tmp_path: Path) -> None:
 def test_the_largest_motion_is_that_of_any_test(tmp_path: Path) -> None:
     """A random test has no amplitude of its cycles, but it may move furthest."""
     assert "up to 12.0 mm, " in answers(tmp_path)["Measured"]
+
+
+def test_what_supports_the_finding_and_where_the_model_is_bad(tmp_path: Path) -> None:
+    rows = [{"name": name, "nrmse_before": 0.08, "nrmse_after": after} for name, after in (("b", 0.01), ("c", 0.09))]
+    rival = {"name": "end-stop", "form": "hard", "share": 0.3, "nrmse": 0.06}
+    found = answers(
+        tmp_path,
+        tests=rows,
+        candidates=[*tracing()["candidates"], rival],
+        unexplained={"structured": True, "share_of_residual": 0.1, "depends_on": [{"state": "drive"}]},
+        residual={"structured": True, "where": {"pre_yield": 0.1, "post_yield": 0.9}},
+    )
+    assert "The error falls in 1 of 2 unseen tests." in found["Trust"]
+    assert "The best other explanation, end-stop, leaves 6.0 %." in found["Trust"]
+    assert "largest in tests c (9.0 %) and b (1.0 %)" in found["Weak spots"]
+    assert "It varies with drive." in found["Weak spots"]
+    assert "90 % of the squared residual lay after yield" in found["Weak spots"]
+
+
+def test_tests_to_be_made_are_described(tmp_path: Path) -> None:
+    made = {"motion": "triangle", "amplitude_m": 0.008, "current": "steps", "name": "x", "role": "training"}
+    wanted = {
+        "file": "next-tests.yaml",
+        "tests": [{**made, "frequency_hz": 0.5}, {**made, "frequency_hz": 1.0}],
+        "decides": [{"decides": "end-stop or accumulator"}],
+        "made_already": False,
+    }
+    text = answers(tmp_path, next_tests=wanted)["Test next"]
+    assert (
+        "2 tests would decide end-stop or accumulator: triangle motion with stepped drive, 8.0 mm, 0.50 to 1.0 Hz"
+        in text
+    )
+
+
+def test_without_a_structure_the_way_to_a_law_is_said(tmp_path: Path) -> None:
+    facts = run_in(tmp_path)
+    bench = [stage for stage in facts.stages if stage.name in ("prepare", "identify-damper", "close-loop")]
+    found = {item.topic: item.text for item in statements(type(facts)(tmp_path, "bench", "", bench))}
+    assert "Add a frame campaign" in found["Control"]
+
+
+def test_two_fits_of_one_form_are_explained(tmp_path: Path) -> None:
+    assert "fits bouc-wen again" in answers(tmp_path, before={"nrmse": 0.05})["Models"]
+    assert "again" not in answers(tmp_path)["Models"]

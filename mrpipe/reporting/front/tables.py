@@ -1,0 +1,145 @@
+"""Tables of the sections before the appendix; cells are texts as the report shows them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mrpipe.reporting.facts import RunFacts
+from mrpipe.reporting.front import laws as law_facts
+from mrpipe.reporting.words import number, plain, quantity, readable_unit
+
+UNDETERMINED = 100.0
+"""An interval whose ends differ by more than this factor does not determine the parameter."""
+
+_COLUMNS = {
+    "name": ("test", None),
+    "role": ("role", None),
+    "motion": ("motion", None),
+    "amplitude_m": ("amplitude [mm]", 1e3),
+    "frequency_hz": ("frequency [Hz]", 1.0),
+    "duration_s": ("duration [s]", 1.0),
+    "pause_s": ("pause [s]", 1.0),
+    "current": ("drive", None),
+    "current_a": ("largest drive", 1.0),
+}
+"""Key of a test of next-tests.yaml -> heading, and factor of the number."""
+
+
+def rivals(loop: Mapping[str, Any]) -> pd.DataFrame:
+    """Return the candidates of the tracing, best first."""
+    return pd.DataFrame(
+        [
+            {
+                "effect": item["name"],
+                "form": item.get("form", ""),
+                "recovers [%]": f"{100.0 * max(float(item.get('share') or 0.0), 0.0):.1f}",
+                "error then [%]": number(100.0 * item["nrmse"]) if item.get("nrmse") is not None else "-",
+            }
+            for item in loop.get("candidates", [])[:8]
+        ]
+    )
+
+
+def forms(loop: Mapping[str, Any]) -> pd.DataFrame:
+    """Return the base forms that were tried, best first."""
+    errors = (loop.get("base_form") or {}).get("nrmse") or {}
+    rows = [
+        {"base form": name, "error [%]": number(100.0 * value)}
+        for name, value in sorted(errors.items(), key=lambda item: item[1] if item[1] is not None else np.inf)
+        if value is not None
+    ]
+    return pd.DataFrame(rows if len(rows) > 1 else [])
+
+
+def parameters(parameters: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """Return the parameters of the damper model with their standard errors."""
+    rows = []
+    for name, entry in parameters.items():
+        error = entry.get("standard_error")
+        rows.append(
+            {
+                "parameter": plain(name),
+                "value": number(entry["value"], 4),
+                "±": number(error, 2) if error is not None else "fixed",
+                "unit": readable_unit(entry["unit"]),
+                "note": "at its bound" if entry.get("at_bound") else "",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def effects(effects: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Return the parameters of the named effects with their intervals."""
+    rows = []
+    for effect in effects:
+        for name, entry in effect["parameters"].items():
+            if entry.get("value") is None:
+                continue
+            low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
+            rows.append(
+                {
+                    "effect": effect["name"] + (f" at {effect['place']}" if effect.get("place") else ""),
+                    "parameter": plain(name),
+                    "value": number(entry["value"], 3),
+                    "from": number(low, 3) if determined(low, high) else "not determined",
+                    "to": number(high, 3) if determined(low, high) else "",
+                    "unit": readable_unit(entry["unit"]),
+                    "confidence": number(effect["confidence"], 2),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def laws(facts: RunFacts, runs: Sequence[law_facts.LawRun]) -> pd.DataFrame:
+    """Return every law of the comparison, with gains and response."""
+    bare = next((run for run in runs if run.law == law_facts.UNCONTROLLED), None)
+    gains = facts.summary("calibrate").get("laws") or {}
+    rows = []
+    for run in runs:
+        entry = gains.get(run.law) or {}
+        shown = [
+            f"{name} = {quantity(entry[key], unit)}"
+            for name, key, unit in (("c", "c_n_s_m", "N s/m"), ("k", "k_n_m", "N/m"), ("α", "alpha_n_m", "N/m"))
+            if entry.get(key)
+        ]
+        change = 100.0 * (run.rms_top_m / bare.rms_top_m - 1.0) if bare and run is not bare else float("nan")
+        rows.append(
+            {
+                "law": run.law,
+                "gains": ", ".join(shown),
+                "RMS top [mm]": number(1e3 * run.rms_top_m),
+                "change [%]": number(change),
+                "RMS floor 1 [mm]": number(1e3 * run.rms_first_m),
+                "RMS a top [m/s²]": number(run.rms_a_top_m_s2),
+                "RMS a floor 1 [m/s²]": number(run.rms_a_first_m_s2),
+                "peak force [N]": number(run.peak_force_n),
+                "damping ratio [%]": number(100.0 * run.damping_ratio, 2),
+                "extrapolated [% of time]": number(100.0 * run.outside_share, 2),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def determined(low: float, high: float) -> bool:
+    """Return whether an interval determines a parameter: finite, and not of one sign over several decades."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return False
+    small, large = sorted((abs(low), abs(high)))
+    return low * high <= 0.0 or large <= UNDETERMINED * small
+
+
+def wanted_tests(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Return tests to be made, with the headings and units that people use."""
+    rows = []
+    for test in tests:
+        row = {}
+        for key, (heading, factor) in _COLUMNS.items():
+            if key in test:
+                row[heading] = number(factor * test[key]) if factor else str(test[key])
+        rows.append(row | {plain(key): str(value) for key, value in test.items() if key not in {*_COLUMNS, "later"}})
+    return pd.DataFrame(rows).fillna("-")

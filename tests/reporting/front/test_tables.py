@@ -1,0 +1,39 @@
+"""Tables of the report: units that people use, and no interval where there is none."""
+
+from __future__ import annotations
+
+import pytest
+
+from mrpipe.reporting.front.tables import determined, effects, wanted_tests
+
+pytestmark = pytest.mark.property
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (9.0, 9.2, True),
+        (-1.0, 2.0, True),
+        (0.01, 0.9, True),
+        (1e-12, 9e11, False),
+        (-9e11, -1e-12, False),
+        (float("nan"), 1.0, False),
+        (0.5, float("inf"), False),
+    ],
+)
+def test_an_interval_over_decades_determines_nothing(low: float, high: float, expected: bool) -> None:
+    assert determined(low, high) is expected
+    effect = {
+        "name": "remanence",
+        "confidence": 0.9,
+        "parameters": {"slip_length": {"value": 1.0, "unit": "m", "interval": [low, high]}},
+    }
+    assert (effects([effect])["from"][0] == "not determined") is not expected
+
+
+def test_tests_to_be_made_are_in_practical_units() -> None:
+    frame = wanted_tests(
+        [{"name": "a", "amplitude_m": 0.0083, "later": True, "current": "steps", "rounds": 3}, {"name": "b"}]
+    )
+    assert list(frame.columns) == ["test", "amplitude [mm]", "drive", "rounds"]
+    assert frame["amplitude [mm]"].tolist() == ["8.30", "-"]
