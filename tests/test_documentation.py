@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import subprocess
@@ -141,6 +142,57 @@ def test_packages_and_files_that_the_architecture_names_exist() -> None:
     names = re.findall(r"`((?:mrpipe/)?(?:\w+/)+\w*(?:\.py)?)`", text)
     missing = [name for name in names if not (root / name).exists() and not (root / "mrpipe" / name).exists()]
     assert [name for name in missing if "<" not in name] == []
+
+
+def test_names_of_code_that_the_architecture_names_exist() -> None:
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    packages = {path.name for path in (ROOT / "mrpipe").iterdir() if (path / "__init__.py").is_file()}
+    dotted = {name for name in re.findall(r"`(\w+(?:\.\w+)+)(?:\(.*?\))?`", text) if name.split(".")[0] in packages}
+    assert len(dotted) >= 5
+    assert sorted(name for name in dotted if not _exists(f"mrpipe.{name}")) == []
+    plain = set(re.findall(r"`([A-Z]\w+)`", text)) - {"EFFECT", "FORM", "STAGE", "LOADS_FROM", "NUMBA_CACHE_DIR"}
+    code = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "mrpipe").rglob("*.py"))
+    assert sorted(name for name in plain if not re.search(rf"\b{name}\b", code)) == []
+
+
+def _exists(dotted: str) -> bool:
+    """Return whether a name leads to a module or to an attribute of one."""
+    parts = dotted.split(".")
+    for count in range(len(parts), 0, -1):
+        try:
+            found: Any = importlib.import_module(".".join(parts[:count]))
+        except ImportError:
+            continue
+        for part in parts[count:]:
+            if not hasattr(found, part):
+                return False
+            found = getattr(found, part)
+        return True
+    return False
+
+
+def test_walks_of_the_architecture_are_there() -> None:
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    walks = re.findall(r"^\*\*(.+?)\.\*\*(.*?)(?=^\*\*|^## )", text, re.MULTILINE | re.DOTALL)
+    named = {title: len(re.findall(r"`[^`]+`", body)) for title, body in walks}
+    assert {"A campaign", "A damper", "An effect", "A stiffness matrix"} <= set(named)
+    assert min(named.values()) >= 3
+
+
+def _anchors(page: Path) -> set[str]:
+    """Return the anchors of the headings of a page, as MkDocs and GitHub write them."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    headings = (re.sub(r"\[(.*?)\]\(.*?\)|[`*]", r"\1", line) for line in re.findall(r"^#+ (.*)$", text, re.MULTILINE))
+    return {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", heading.lower()).strip()) for heading in headings}
+
+
+@pytest.mark.parametrize("page", [*sorted(DOCS.glob("*.md")), *sorted(ROOT.glob("*.md"))], ids=lambda page: page.name)
+def test_no_anchor_is_dead(page: Path) -> None:
+    links = re.findall(r"\]\((?!https?:|data:)([^)#\s]*)#([^)\s]+)\)", page.read_text(encoding="utf-8"))
+    dead = [
+        f"{file}#{anchor}" for file, anchor in links if anchor not in _anchors(page.parent / file if file else page)
+    ]
+    assert dead == []
 
 
 def test_every_stage_has_a_settings_section_that_it_names() -> None:

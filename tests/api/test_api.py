@@ -106,5 +106,5 @@ def test_models_are_exported_by_kind(tmp_path: Path) -> None:
 
 @pytest.mark.property
 def test_every_name_offered_exists() -> None:
-    for name in mrpipe._INTERFACE:
+    for name in mrpipe.api.__all__:
         assert callable(getattr(mrpipe, name))

@@ -1,4 +1,7 @@
-"""A base form and an effect of a structure are one file each: found by name, nothing else has to be edited."""
+"""A base form, an effect, an effect of a structure and a law are one file each: nothing else has to be edited.
+
+Each test puts one new file into a temporary folder and runs the program on it. `test_registry.py` does it with a stage.
+"""
 
 from __future__ import annotations
 
@@ -17,29 +20,34 @@ import mrpipe.effects.structural
 from tests.tracing.structure.rig import MASSES, frame_campaign
 
 PACKAGE = Path(mrpipe.dampers.forms.__file__).parents[2]
-PROGRAM = """
-import sys
-import mrpipe.dampers.forms, mrpipe.effects.structural
-mrpipe.dampers.forms.__path__.append(sys.argv[1])
-mrpipe.effects.structural.__path__.append(sys.argv[2])
+PACKAGES = ("mrpipe.dampers.forms", "mrpipe.effects.structural", "mrpipe.effects", "mrpipe.control.laws")
+PROGRAM = f"""
+import importlib, sys
+for name, folder in zip({PACKAGES}, sys.argv[1:]):
+    importlib.import_module(name).__path__.append(folder)
 from mrpipe.cli import run
-sys.exit(run(sys.argv[3:]))
+sys.exit(run(sys.argv[{len(PACKAGES) + 1}:]))
 """
 
 
 @pytest.fixture
-def folders(tmp_path: Path) -> tuple[Path, Path]:
-    """Return folders with a new base form and a new structural effect: known ones under other names."""
-    forms, effects = tmp_path / "forms", tmp_path / "effects"
-    for folder, source, old, new in (
-        (forms, PACKAGE / "dampers" / "forms" / "dahl.py", "dahl", "slip-friction"),
-        (effects, PACKAGE / "effects" / "structural" / "cubic_stiffness.py", "cubic-stiffness", "stiffening-joint"),
+def folders(tmp_path: Path) -> tuple[Path, ...]:
+    """Return a folder for each of PACKAGES with one new file: a known form, effect or law under another name."""
+    found = []
+    for package, old, new in zip(
+        PACKAGES,
+        ("dahl", "cubic-stiffness", "accumulator", "vd"),
+        ("slip-friction", "stiffening-joint", "gas-cushion", "linear-drag"),
+        strict=True,
     ):
-        folder.mkdir()
+        source = PACKAGE.parent.joinpath(*package.split("."), f"{old.replace('-', '_')}.py")
         text = source.read_text(encoding="utf-8").replace(f'name="{old}"', f'name="{new}"')
         assert new in text
+        folder = tmp_path / package
+        folder.mkdir()
         (folder / f"{new.replace('-', '_')}.py").write_text(text, encoding="utf-8")
-    return forms, effects
+        found.append(folder)
+    return tuple(found)
 
 
 def run(folders: Sequence[Path], *arguments: str) -> dict[str, Any]:
@@ -50,8 +58,8 @@ def run(folders: Sequence[Path], *arguments: str) -> dict[str, Any]:
     return dict(json.loads(done.stdout))
 
 
-def bench(folder: Path) -> Path:
-    """Write a bench campaign of friction with a yield displacement, at two levels of current."""
+def bench(folder: Path, stiffness_n_m: float = 0.0) -> Path:
+    """Write a bench campaign of friction with a yield displacement and a spring, at two levels of current."""
     folder.mkdir()
     time = np.arange(0.0, 4.0, 0.004)
     tests = []
@@ -65,7 +73,7 @@ def bench(folder: Path) -> Path:
         for k in range(1, len(x)):
             step = x[k] - x[k - 1]
             z[k] = z[k - 1] + (step - abs(step) * z[k - 1]) / 4e-4
-        force = (20.0 + 60.0 * current) * z + 100.0 * v
+        force = (20.0 + 60.0 * current) * z + 100.0 * v + stiffness_n_m * x
         rows = np.column_stack([time, x, np.full_like(x, current), force])
         np.savetxt(folder / f"{name}.csv", rows, delimiter=",", header="t,x,i,F", comments="", fmt="%.9g")
         tests.append(f"  - {{name: {name}, file: {name}.csv, role: {role}}}")
@@ -102,7 +110,7 @@ def frame(folder: Path) -> Path:
 
 
 @pytest.mark.planted
-def test_a_new_base_form_is_fitted(folders: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_new_base_form_is_fitted(folders: tuple[Path, ...], tmp_path: Path) -> None:
     found = run(
         folders, "identify-damper", "--campaign", str(bench(tmp_path / "bench")), "--run", str(tmp_path / "run"),
         "--set", "identify_damper.form=slip-friction", "--set", "identify_damper.compare=[slip-friction, bouc-wen]",
@@ -113,9 +121,40 @@ def test_a_new_base_form_is_fitted(folders: tuple[Path, Path], tmp_path: Path) -
 
 
 @pytest.mark.planted
-def test_a_new_effect_of_a_structure_is_named(folders: tuple[Path, Path], tmp_path: Path) -> None:
+def test_a_new_effect_of_a_structure_is_named(folders: tuple[Path, ...], tmp_path: Path) -> None:
     found = run(
         folders, "close-loop", "--campaign", str(frame(tmp_path / "frame")), "--run", str(tmp_path / "run"),
         "--set", "close_loop.candidates=[stiffening-joint]",
     )  # fmt: skip
     assert [item["name"] for item in found["effects"]] == ["stiffening-joint"]
+
+
+@pytest.mark.planted
+def test_a_new_effect_of_a_damper_is_named(folders: tuple[Path, ...], tmp_path: Path) -> None:
+    campaign = bench(tmp_path / "bench", stiffness_n_m=4000.0)
+    found = run(
+        folders, "close-loop", "--campaign", str(campaign), "--run", str(tmp_path / "run"), "--jobs", "1",
+        "--set", "close_loop.candidates=[gas-cushion]", "--set", "close_loop.base_forms=[dahl]",
+        "--set", "close_loop.model=dahl",
+    )  # fmt: skip
+    assert [item["name"] for item in found["effects"]] == ["gas-cushion"]
+
+
+@pytest.mark.planted
+def test_a_new_law_is_calibrated_and_simulated(folders: tuple[Path, ...], tmp_path: Path) -> None:
+    config = tmp_path / "config.yaml"
+    config.write_text(
+        "name: own\nstages: [identify-frame, calibrate, simulate-dampers]\n"
+        "campaigns: {bench: null, frame: null, closed_loop: null}\nstructure:\n  storeys:\n"
+        "    - {mass_kg: 100.0, stiffness_n_m: 8.0e3, repeat: 2}\n  damping_ratio: [0.01]\n"
+        "  dampers:\n    - {name: base, between: [1, ground], law: linear-drag}\n"
+        "calibrate: {damper: set-c, expected_amplitude_m: 0.01}\n"
+        "simulate:\n  plant_rate_hz: 1000\n  controller: {inverse: model}\n"
+        "  excitation: {kind: harmonic, cycles: 8, settling_cycles: 4, decay_s: 3.0}\n",
+        encoding="utf-8",
+    )
+    place = ["--config", str(config), "--run", str(tmp_path / "run")]
+    found = run(folders, "simulate", *place)
+    assert found["rms_x_top_m"] > 0.0
+    (damper,) = found["dampers"]
+    assert damper["law"] == "linear-drag"
