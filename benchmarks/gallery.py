@@ -39,7 +39,7 @@ _HEAD = """\
 
 Three public data sets ([where they are published](public-data.md)). Each model is judged on validation tests that no
 fit has seen. NRMSE is the RMS error over the RMS of the measured force. The declared form is the Bouc-Wen model. The
-traced model contains the effects that `close-loop` names.
+traced model has the base form and the effects that `close-loop` takes.
 
 This page is written by `python -m benchmarks.gallery page > docs/gallery.md` from the results in `docs/gallery`. The
 confidence is a calibrated probability that the effect is really there.
@@ -144,7 +144,7 @@ def _section(name: str, item: dict[str, Any]) -> str:
 where it is not periodic.*
 
 - Verdict: {item["verdict"]}.
-- Named effects: {effects or "none"}.
+- Base form taken: {item["form"]}. Named effects: {effects or "none"}.
 - NRMSE {item["before_nrmse"]:.3f} before and {item["after_nrmse"]:.3f} after. A flexible residual model reaches
   {item["ceiling_nrmse"]:.3f} on the same tests.{ending}
 - Noise floor: {item["noise_floor_nrmse"]:.3f}, estimated from {item["noise_from"]}.{floor}
