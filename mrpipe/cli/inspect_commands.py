@@ -10,7 +10,7 @@ import typer
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
 
-_NOT_FOR_FILES = ("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force", "quiet")
+_NOT_FOR_FILES = ("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force")
 
 
 @with_common_options(*_NOT_FOR_FILES)
@@ -55,7 +55,7 @@ def show(
         print_any(description)
 
 
-@with_common_options("run", "campaign", "jobs", "seed", "force", "quiet")
+@with_common_options("run", "campaign", "jobs", "seed", "force")
 def check(
     options: CommonOptions,
     explain: Annotated[bool, typer.Option("--explain", help="List every setting with its meaning and value.")] = False,

@@ -188,7 +188,7 @@ def _config_of_run(options: CommonOptions) -> CommonOptions:
     return options
 
 
-@with_common_options("jobs", "force", "quiet", "positional")
+@with_common_options("jobs", "force", "positional")
 def status(
     options: CommonOptions,
     directory: Annotated[

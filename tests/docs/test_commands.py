@@ -99,13 +99,6 @@ SMALL = {
     "resonance": {"points": 5, "most_cycles": 20, "tolerance": 0.05, "window_cycles": 2},
     "design": {"laws": ["vd", "fdns"], "amplitude_factors": [1.0], "grid": 3, "evaluations": 3, "draws": 1},
     "close_loop": {"candidates": ["accumulator"], "base_forms": ["bouc-wen"], "bootstrap_draws": 50, "laws": ["vd"]},
-    "benchmark": {
-        "ten_storey": {"motion": {"duration_s": 6.0}, "dampers": [1.0], "structures": ["ten-storey-heavy"],
-                       "laws": ["vd"]},
-        "base_isolated": {"motion": {"duration_s": 6.0}, "dampers": [5.0], "laws": ["vd"], "neural_inverse": False},
-        "wind": {"load": {"duration_s": 20.0}, "laws": ["vd"], "neural_inverse": False, "capacities": [1.0]},
-    },
-    "reproduce": {},
 }  # fmt: skip
 """A configuration of everything that takes seconds; it has no hidden effect, so that the tracing ends early."""
 
@@ -161,8 +154,6 @@ RUNS = {
     "export all": "export all",
     "identify-frame --config structure-example": "identify-frame --config structure-example",
     "run --config two-dampers": "run --config two-dampers --jobs 1 --until calibrate",
-    "benchmark ten-storey": "benchmark ten-storey",
-    "benchmark base-isolated --law vdns --law fdns": "benchmark base-isolated --law vdns --law fdns",
 }
 """Command line as shown -> as it runs here."""
 
@@ -171,11 +162,8 @@ WITH_DATA = {
     "close-loop --config configs/utfsm.yaml --campaign configs/campaigns/utfsm-motion.yaml --json": (
         "prepare --config configs/utfsm.yaml --campaign configs/campaigns/utfsm-motion.yaml --json"
     ),
-    "benchmark base-isolated --all": None,
-    "benchmark wind --model published": "benchmark wind --model published",
-    "benchmark ten-storey --motion elcentro": None,
 }
-"""The same for those that need the public measurements; None where other tests with these data run the same code."""
+"""The same for those that need the public measurements."""
 
 ELSEWHERE = {
     "tests/docs/test_tutorials.py": (
@@ -191,8 +179,13 @@ ELSEWHERE = {
     "tests/cli/test_show.py": ("show ../versuche",),
     "tests/effects/test_checks.py": ("check-effect docs/examples/seal_squeeze.py",),
     "tests/thesis/test_stage.py": ("reproduce",),
+    "tests/cli/test_benchmark_command.py": (
+        "benchmark ten-storey", "benchmark ten-storey --motion elcentro",
+        "benchmark base-isolated --law vdns --law fdns", "benchmark base-isolated --all",
+        "benchmark wind --model published",
+    ),
 }  # fmt: skip
-"""File of tests -> commands that it runs in the same form."""
+"""File of tests -> commands that it runs in the same form, or that differ only in the options of a long benchmark."""
 
 ALONE = {"run", "check", "demo", "design", "reproduce"}
 """Commands that do something without an argument; the bare name of any other one in a text is not a call."""
@@ -245,11 +238,11 @@ def test_command_runs(line: str, here: Path, capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.real
-@pytest.mark.parametrize("line", [line for line, words in WITH_DATA.items() if words])
+@pytest.mark.parametrize("line", WITH_DATA)
 def test_command_runs_on_public_data(
     line: str, here: Path, public_data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(str(WITH_DATA[line]).split()) == 0, capsys.readouterr().err
+    assert run(WITH_DATA[line].split()) == 0, capsys.readouterr().err
 
 
 @pytest.mark.property

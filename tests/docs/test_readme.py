@@ -15,9 +15,8 @@ from mrpipe.cli import run
 from tests.docs.shown import ROOT, shown
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-QUICK = [
-    "--set", "identify_damper.compare=[bouc-wen]", "--set", "identify_damper.starts=1", "--until", "identify-damper",
-]  # fmt: skip
+QUICK = ["--until", "prepare"]
+"""The later stages of a project are run on a small configuration by `test_commands.py`."""
 
 
 def _campaign() -> str:
@@ -26,14 +25,17 @@ def _campaign() -> str:
     return found[1]
 
 
-def _record(path: Path, seed: int) -> None:
-    """Write a test of a damper with friction and viscous force at one level of current, as the README describes it."""
-    rng = np.random.default_rng(seed)
+def _record(path: Path) -> None:
+    """Write a test of a damper with friction and viscous force at the level of current that its name says."""
+    found = re.search(r"(\d+)A", path.stem)
+    assert found is not None
+    current = float(found[1])
+    rng = np.random.default_rng(int(current))
     time = np.arange(0.0, 10.0, 0.002)
     phase = 2.0 * np.pi * time
     displacement, velocity = 10.0 * np.sin(phase), 0.02 * np.pi * np.cos(phase)
-    force = 300.0 * np.tanh(velocity / 0.004) + 900.0 * velocity + rng.normal(0.0, 1.0, len(time))
-    rows = np.column_stack([time, displacement, np.full_like(time, 2.0), force])
+    force = (50.0 + 150.0 * current) * np.tanh(velocity / 0.004) + 900.0 * velocity + rng.normal(0.0, 1.0, len(time))
+    rows = np.column_stack([time, displacement, np.full_like(time, current), force])
     np.savetxt(path, rows, delimiter=",", header="t,x,i,F", comments="", fmt="%.7g")
 
 
@@ -46,12 +48,12 @@ def test_worked_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys:
     monkeypatch.chdir(tmp_path / "my-rig")
     data = tmp_path / "my-rig" / "data" / "my-rig"
     (data / "campaign.yaml").write_text(_campaign(), encoding="utf-8")
-    for seed, test in enumerate(yaml.safe_load(_campaign())["tests"]):
-        _record(data / test["file"], seed)
+    for test in yaml.safe_load(_campaign())["tests"]:
+        _record(data / test["file"])
     for words in block[1:]:
         capsys.readouterr()
         assert run([*words, *(QUICK if words[0] == "run" else [])]) == 0, (words, capsys.readouterr().err)
-    assert "identify-damper      up to date" in capsys.readouterr().out
+    assert "prepare              up to date" in capsys.readouterr().out
 
 
 @pytest.mark.property

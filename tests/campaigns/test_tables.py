@@ -1,0 +1,47 @@
+"""Delimited text as columns: delimiter, decimal sign, header, labels and time stamps are found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mrpipe.campaigns.tables import table_of_text
+from mrpipe.errors import UserError
+
+pytestmark = pytest.mark.property
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "values"),
+    [
+        ("t,x\n0,1.5\n1,2.5\n", ("t", "x"), [1.5, 2.5]),
+        ("Messung 7\n\nZeit [s];Weg [mm]\n0,0;1,5\n0,1;2,5\n", ("Zeit [s]", "Weg [mm]"), [1.5, 2.5]),
+        ("0\t1.5\n1\t2.5\n", ("0", "1"), [1.5, 2.5]),
+        ('"time (s)","Disp, LVDT (mm)"\n0,1.5\n1,2.5\n', ("time (s)", "Disp, LVDT (mm)"), [1.5, 2.5]),
+        ("% a comment of four words\n 0  1.5\n 1  2.5\n", ("0", "1"), [1.5, 2.5]),
+        ("t;x;\n0;1.5;\n1;2.5;\n", ("t", "x"), [1.5, 2.5]),
+    ],
+)
+def test_layouts(text: str, names: tuple[str, ...], values: list[float]) -> None:
+    table = table_of_text(Path("a.csv"), text)
+    assert table.names == names
+    assert table.column(1, "").tolist() == values
+
+
+def test_time_stamps_become_seconds() -> None:
+    text = "when,x\n2026-03-01 12:00:00.000,1\n2026-03-01 12:00:00.250,2\n2026-03-01 12:00:01.500,3\n"
+    assert table_of_text(Path("a.csv"), text).column("when", "").tolist() == [0.0, 0.25, 1.5]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("nothing\nbut words\n", "holds no row of numbers"),
+        ("t,x\n0,1\n1,2,3\n", "line 3: has 3 fields, the rows above have 2"),
+        ("t,x\n0,1\n1,OVL\n2,3\n", "line 3, column x: 'OVL' is not a number"),
+    ],
+)
+def test_a_faulty_row_is_named(text: str, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        table_of_text(Path("a.csv"), text).column(1, "")
