@@ -35,10 +35,15 @@ class NamingRules(Section):
         description="Largest evidence that counts, because a finite number of tests proves nothing.",
     )
     calibration: tuple[tuple[float, float], ...] = Field(
-        ((0.0, 0.0), (0.6, 0.25), (0.8, 0.75), (0.95, 0.95), (1.0, 0.97)),
+        ((0.0, 0.0), (0.5, 0.4), (0.75, 0.75), (0.95, 0.95), (1.0, 0.96)),
         description="Evidence for an effect on the bench (share of resamples that need it, times shares recovered), "
-        "and the probability that an effect with this evidence is really there; linear in between. The probabilities "
-        "are those of the planted benchmark by the rule of succession, see docs/tracing-benchmark.md.",
+        "and the probability that an effect with this evidence is really there, where it is the only one named; linear "
+        "in between. The probabilities are those of the planted benchmark by the rule of succession, see "
+        "docs/tracing-benchmark.md.",
+    )
+    calibration_of_several: tuple[tuple[float, float], ...] = Field(
+        ((0.0, 0.0), (0.8, 0.17), (0.95, 0.75), (1.0, 0.75)),
+        description="The same for each of several named effects: one of them may correct the form of another.",
     )
     noise_share: float = Field(
         0.1,
@@ -47,7 +52,7 @@ class NamingRules(Section):
         "is not known better.",
     )
 
-    @field_validator("calibration")
+    @field_validator("calibration", "calibration_of_several")
     @classmethod
     def _calibration_rises(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
         evidence, probability = zip(*value, strict=True) if value else ((), ())

@@ -100,10 +100,10 @@ def structured(
     return learnt or structure_p_value(base.residual, states_of(base, training)) < options.rules.validation.whiteness
 
 
-def held(item: Named, judgement: Judgement, rules: NamingRules) -> Named:
-    """Return an effect with its confidence as a probability.
+def held(item: Named, judgement: Judgement, rules: NamingRules, *, several: bool) -> Named:
+    """Return an effect with its confidence as a probability; `several` if it is named together with others.
 
     The evidence is lowered by the share that is not recovered on the validation tests.
     """
     share = 1.0 if judgement.verdict.kind == "explained" else judgement.evidence.share
-    return replace(item, confidence=calibrated(item.confidence * share, rules))
+    return replace(item, confidence=calibrated(item.confidence * share, rules, several=several))

@@ -106,9 +106,19 @@ def confidence_of(share: float, support: float, gain: Gain | None, rules: Naming
     return round(float(proven * support * held * rules.most_confidence), 3)
 
 
-def calibrated(evidence: float, rules: NamingRules) -> float:
-    """Return the probability that an effect with this evidence is really there, by the planted benchmark."""
-    known, probability = zip(*rules.calibration, strict=True)
+def calibrated(evidence: float, rules: NamingRules, *, several: bool = False) -> float:
+    """Return the probability that an effect with this evidence is really there, by the planted benchmark.
+
+    Parameters
+    ----------
+    evidence
+        See :func:`confidence_of`.
+    rules
+        They hold the probabilities.
+    several
+        Whether the effect is named together with others.
+    """
+    known, probability = zip(*(rules.calibration_of_several if several else rules.calibration), strict=True)
     return round(float(np.interp(evidence, known, probability)), 3)
 
 

@@ -69,7 +69,10 @@ def test_the_share_is_that_of_the_squared_error_beyond_the_ceiling() -> None:
 def test_more_evidence_is_never_less_probable(pair: list[float]) -> None:
     less, more = sorted(pair)
     rules = NamingRules()
-    assert 0.0 <= calibrated(less, rules) <= calibrated(more, rules) < 1.0
+    for several in (False, True):
+        assert 0.0 <= calibrated(less, rules, several=several) <= calibrated(more, rules, several=several) < 1.0
+    # one of several effects may correct the form of another
+    assert calibrated(more, rules, several=True) <= calibrated(more, rules)
 
 
 @pytest.mark.property
