@@ -112,6 +112,11 @@ def rates(rows: Sequence[Row]) -> str:
             [r["after"] <= 1.25 * r["truth"]["true_model_nrmse"] for r in clean],
             "",
         ),
+        (
+            "effect named first: error after at most 1.25 times the true model's error",
+            [r["after"] <= 1.25 * r["truth"]["true_model_nrmse"] for r in first],
+            "",
+        ),
         ("clean rig: noise floor within 25 % of the true model's error", [floor_is_right(r) for r in clean], "100 %"),
         ("one effect: parameters that can be compared within 15 %", [e <= 0.15 for e in errors], "90 %"),
     ]
