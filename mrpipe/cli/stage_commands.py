@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from mrpipe.pipeline.runner import Outcome, Pipeline
 
 _EXPORTS = ("controller", "damper", "frame", "forward", "inverse", "opensees")
+_ONE_DAMPER = frozenset({"controller", "damper", "frame"})
+"""Exports that contain one damper, its law or its place."""
 _RIGS = ("bench", "frame", "closed-loop")
 
 
@@ -238,6 +240,13 @@ def export(
         raise UserError("export", what, "cannot be exported", f"one of {', '.join((*_EXPORTS, 'all'))}")
     if law is not None and law not in law_names():
         raise UserError("--law", law, "is not a control law", nearest(law, law_names()))
+    if _ONE_DAMPER.intersection(_EXPORTS if what == "all" else (what,)) and _several_dampers(options):
+        raise UserError(
+            "export",
+            what,
+            "is not supported with structure.dampers, because it knows one damper and one law",
+            "export opensees for the structure, or use a configuration with one damper",
+        )
     given = {"simulate.damper": damper, "gains.source": gains}
     overrides = [f"{name}={value}" for name, value in given.items() if value is not None]
     if formats:

@@ -26,6 +26,7 @@ from mrpipe.dampers.hysteresis import hysteresis_step
 from mrpipe.dampers.plant import Chain, build_chain, new_state, sum_step
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import kernel, parts
+from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import Clock, clock_of
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.settings import SensorFaultSettings, SimulateSettings
@@ -236,6 +237,7 @@ def simulate_law(
         If the response grows without bound.
     """
     options = options or LoopOptions()
+    check_loop(frame, options)
     n = frame.floors
     w = _position(frame, position)
     if chain is None and options.tracking == "damper":
@@ -299,16 +301,12 @@ def _position(frame: Frame, position: FloatArray | None) -> FloatArray:
     w = np.asarray(position, dtype=np.float64)
     if w.shape != (n,):
         raise UserError("simulate", "position", f"has {w.size} entries", f"the frame has {n} floors")
-    if np.linalg.matrix_rank(frame.mass) < n:
-        raise UserError(f"frame {frame.name}", "mass", "is singular", "every floor needs a positive mass")
     return w
 
 
 def _run_numbers(
     controller: Controller, options: LoopOptions, clock: Clock
 ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int64]], FloatArray]:
-    if options.delay_s < 0.0 or options.driver_time_constant_s < 0.0:
-        raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
     track = parts.TRACK_DAMPER
     if options.tracking == "ideal":
         if law_named(controller.law).output == "drive":

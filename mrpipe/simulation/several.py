@@ -30,6 +30,7 @@ from mrpipe.dampers.drive import command_place
 from mrpipe.dampers.plant import Chain, build_chain, new_state
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import several_kernel as kernel
+from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import clock_of
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions, Response, add_fault, sensor_noise
@@ -172,10 +173,7 @@ def simulate_dampers(
 def _check(frame: Frame, dampers: Sequence[LoopDamper], options: LoopOptions) -> None:
     if not dampers:
         raise UserError("structure", "dampers", "there is none", "give at least one damper")
-    if options.delay_s < 0.0 or options.driver_time_constant_s < 0.0:
-        raise UserError("simulate", "delay_s or driver_time_constant_s", "is negative", "give 0 or more seconds")
-    if np.linalg.matrix_rank(frame.mass) < frame.floors:
-        raise UserError(f"frame {frame.name}", "mass", "is singular", "every degree of freedom needs a positive mass")
+    check_loop(frame, options)
     for item in dampers:
         where = f"structure.dampers: {item.name}"
         if item.position.shape != (frame.floors,):

@@ -103,6 +103,15 @@ def two_storeys(folder: Path, dampers: list[dict[str, Any]], **more: Any) -> Pat
 
 
 @pytest.mark.property
+@pytest.mark.parametrize("what", ["controller", "damper", "frame"])
+def test_exports_of_one_damper_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str) -> None:
+    path = two_storeys(tmp_path, [{"between": [1, "ground"], "law": "vd"}])
+    common = ["--config", str(path), "--run", str(tmp_path / "run")]
+    assert "is not supported with structure.dampers" in error_of(["export", what, *common], capsys)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.property
 def test_design_of_two_dampers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """With linear devices the calibrated peak is that of the frequency response."""
     path = two_storeys(
