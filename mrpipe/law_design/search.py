@@ -15,6 +15,15 @@ from mrpipe.law_design.options import DesignSettings
 STARTS = 2
 """Points of the coarse grid, the best ones, from which the search of several gains starts."""
 
+NEAR = 0.3
+"""The second search looks at gains within this distance of the first result, in logarithms."""
+
+NEAR_STEP = 0.12
+"""First step of its simplex, in logarithms."""
+
+NEAR_EVALUATIONS = 7
+"""Its most evaluations per free gain."""
+
 Value = Callable[[Gains], float]
 
 
@@ -97,6 +106,63 @@ def search(value: Value, free: Sequence[FreeGain], fixed: Mapping[str, float], o
     if len(free) == 1:
         return _search_one(at, free, fixed, options)
     return _search_several(at, free, fixed, options)
+
+
+def refine(value: Value, free: Sequence[FreeGain], start: Gains, options: SearchOptions) -> Gains:
+    """Return the best gains near a point, by a local search with values that are more accurate than those before.
+
+    The minimum of a largest response is flat, so that a search with coarse values ends beside it by more than the
+    accuracy that it reports.
+
+    Parameters
+    ----------
+    value
+        Accurate objective of a set of gains.
+    free
+        Gains to search; the others keep their values.
+    start
+        Result of the first search.
+    options
+        Accuracy of the gains.
+    """
+    if not free:
+        return start
+    fixed = {name: item for name, item in start.items() if name not in {gain.name for gain in free}}
+    centre = np.log([abs(start[gain.name]) for gain in free])
+    bounds = [
+        (max(low, middle - NEAR), min(high, middle + NEAR))
+        for (low, high), middle in zip((gain.logarithms for gain in free), centre, strict=True)
+    ]
+
+    def at(point: FloatArray) -> float:
+        return value(_gains(free, fixed, point))
+
+    if len(free) == 1:
+        options_of = {"xatol": options.tolerance, "maxiter": NEAR_EVALUATIONS}
+        found = minimize_scalar(
+            lambda part: at(np.array([part])), bounds=bounds[0], method="bounded", options=options_of
+        )
+        point = np.array([found.x])
+    else:
+        # the simplex opens towards the inside of the bounds
+        steps = [
+            NEAR_STEP if middle + NEAR_STEP <= high else -NEAR_STEP
+            for middle, (_, high) in zip(centre, bounds, strict=True)
+        ]
+        found = minimize(
+            at,
+            centre,
+            method="Nelder-Mead",
+            bounds=bounds,
+            options={
+                "initial_simplex": np.vstack([centre, centre + np.diag(steps)]),
+                "xatol": options.tolerance,
+                "fatol": 1e-3,
+                "maxfev": NEAR_EVALUATIONS * len(free),
+            },
+        )
+        point = np.asarray(found.x)
+    return _gains(free, fixed, point) if float(found.fun) < at(centre) else start
 
 
 def _gains(free: Sequence[FreeGain], fixed: Mapping[str, float], point: FloatArray) -> Gains:

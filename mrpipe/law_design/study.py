@@ -12,7 +12,7 @@ from mrpipe.control.gains import Gains
 from mrpipe.errors import DivergedError
 from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Load, Objective, RunOf, evaluate
-from mrpipe.law_design.search import SearchOptions, search
+from mrpipe.law_design.search import SearchOptions, refine, search
 from mrpipe.simulation.response_curve import CurveOptions
 
 COARSE = CurveOptions(
@@ -94,6 +94,15 @@ def design_law(
     if not entry.free:
         return Designed(entry, calibrated, calibrated, ())
     found = search(value, entry.free, fixed, options)
+    near = replace(final, refined=coarse.refined)
+    # without accurate curves there is nothing to refine with
+    if final.tolerance < coarse.tolerance:
+        found = refine(
+            lambda gains: evaluate(loops.accurate, entry.law, gains, searched, objective, near).value,
+            entry.free,
+            found,
+            options,
+        )
     best = evaluate(loops.accurate, entry.law, found, load, objective, final)
     if calibrated.value < best.value:
         # the accurate curves decide; the search saw the coarse ones

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrpipe.control.gains import Gains
-from mrpipe.law_design.search import FreeGain, SearchOptions, search
+from mrpipe.law_design.search import FreeGain, SearchOptions, refine, search
 
 VISCOSITY = FreeGain("c_n_s_m", 10.0, 10000.0)
 STIFFNESS = FreeGain("k_n_m", -20000.0, -200.0)
@@ -54,3 +54,19 @@ def test_two_gains_on_a_function_with_kinks(c: float, k: float) -> None:
 
     found = search(value, [VISCOSITY, STIFFNESS], {}, SearchOptions())
     assert value(found) < 0.05
+
+
+@pytest.mark.property
+def test_a_second_search_moves_a_coarse_result_to_the_minimum() -> None:
+    def value(gains: Gains) -> float:
+        return 1.0 + np.log(gains.c_n_s_m / 650.0) ** 2 + np.log(gains.k_n_m / -4500.0) ** 2
+
+    found = refine(value, [VISCOSITY], Gains(c_n_s_m=532.0, k_n_m=-4500.0), SearchOptions())
+    assert found.c_n_s_m == pytest.approx(650.0, rel=0.03)
+    assert found.k_n_m == -4500.0
+    both = refine(value, [VISCOSITY, STIFFNESS], Gains(c_n_s_m=600.0, k_n_m=-4000.0), SearchOptions())
+    assert value(both) < value(Gains(c_n_s_m=600.0, k_n_m=-4000.0))
+    assert refine(value, [], Gains(c_n_s_m=532.0, k_n_m=-4500.0), SearchOptions()).c_n_s_m == 532.0
+    # what is best already stays
+    best = Gains(c_n_s_m=650.0, k_n_m=-4500.0)
+    assert refine(value, [VISCOSITY], best, SearchOptions()) == best
