@@ -134,7 +134,7 @@ def trace_campaign(
         reason = "the effects that the training tests require do not lower the error on the validation tests"
         found = validated(selection.base, selection.chosen, baseline, training, validation, options)
         judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
-    causes = [held(item, judgement, options, several=len(named) > 1) for item in causes]
+    causes = [held(item, judgement, options, several=len(named) > 1 and item in named) for item in causes]
     report = Summary(selection, baseline, training, offsets, found, judgement, ordered)
     return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared])
 
