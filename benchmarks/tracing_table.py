@@ -226,7 +226,7 @@ def document(all_rows: Sequence[Row]) -> str:
         ("By noise", by_group(rows, lambda r: r["noise"], "noise")),
         ("By sampling rate", by_group(rows, lambda r: f"{r['rate_hz']:g} Hz", "rate")),
         ("By excitation", by_group(rows, lambda r: f"{r['training']} / {r['validation']}", "training / validation")),
-        ("By strength", by_group(rows, lambda r: f"{r['share']:g} of force RMS", "strength asked for")),
+        ("By strength", by_group(rows, lambda r: f"{r['share']:g} of force RMS", "strength wanted")),
         ("Parameters", parameters(rows)),
         ("What the rigs are made of", planted_laws()),
         ("Every case", every_case(rows)),

@@ -111,7 +111,7 @@ def search(value: Value, free: Sequence[FreeGain], fixed: Mapping[str, float], o
 def refine(value: Value, free: Sequence[FreeGain], start: Gains, options: SearchOptions) -> Gains:
     """Return the best gains near a point, by a local search with values that are more accurate than those before.
 
-    The minimum of a largest response is flat, so that a search with coarse values ends beside it by more than the
+    The minimum of a largest response is flat, so that a search with coarse values misses it by more than the
     accuracy that it reports.
 
     Parameters
