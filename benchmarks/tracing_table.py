@@ -23,7 +23,7 @@ Bench campaigns of rigs that share neither code nor formulas with the program (`
 the literature, integrated at 20 kHz; planted effects in functional forms that differ from the library's wherever the
 physics allows it; forces from 100 N to 1 MN; white, coloured, 50 Hz or quantised noise; 500, 1000 or 2000 samples a
 second; validation tests like or unlike the training tests. Each case is one campaign directory, on which
-`mrpipe close-loop --campaign` runs as a user would run it. Each seed is one case, in a fixed layout: a third of the
+`mrpipe close-loop` runs as a user would run it. Each seed is one case, in a fixed layout: a third of the
 cases are clean rigs.
 
     python -m benchmarks.tracing --first-seed {first} --cases {count}

@@ -461,6 +461,12 @@ class FrameRules(Section):
         description="The order of the tests explains changes of stiffness only if the squared error of tests left out "
         "is below this share of that of the amplitude alone.",
     )
+    drift_errors: float = Field(
+        3.0,
+        gt=0.0,
+        description="The change must also exceed its standard error by this factor, which chance does in 3 of 1000 "
+        "cases.",
+    )
     least_drift: float = Field(
         0.01,
         gt=0.0,

@@ -14,7 +14,7 @@ from benchmarks.tracing import run_case
 
 pytestmark = pytest.mark.planted
 
-FIRST, COUNT = 9000, 4
+FIRST, COUNT = 9000, 2
 FAILING: dict[int, str] = {}
 
 

@@ -118,6 +118,7 @@ RUNS = {
     "init DIR --from FOLDER --rig both": "init second --from both --rig both",
     "status runs/demo": "status runs/demo",
     "identify-damper --config demo --json": "identify-damper --config demo --json",
+    "report --summary": f"report --summary --run {RUN}",
     "compare RUN RUN": f"compare {RUN} runs/demo",
     "compare runs/before runs/after": "compare runs/before runs/after",
     "compare runs/before runs/after --plot compare.html": "compare runs/before runs/after --plot compare.html",
@@ -170,7 +171,9 @@ ELSEWHERE = {
         "init my-damper --from versuche", "show data/versuche", "check configs/my-damper.yaml",
         "run configs/my-damper.yaml", "init my-tower --from frame-files", "show data/frame-files",
         "check configs/my-tower.yaml", "run configs/my-tower.yaml", "init DIR --from FOLDER",
+        "init my-rig --rig both --from essais", "show data/essais-bench", "show data/essais-frame",
     ),
+    "tests/stages/test_design.py": ("design --config thesis-design", "design --set simulate.damper=traced"),
     "tests/docs/test_readme.py": (
         "init DIR", "init my-rig", "show data/my-rig", "check configs/my-rig.yaml", "run configs/my-rig.yaml",
         "status runs/my-rig",

@@ -167,7 +167,7 @@ def test_json_of_a_damper_holds_all_its_numbers(tmp_path: Path) -> None:
 
 @pytest.mark.property
 def test_a_format_that_a_model_does_not_have_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no format of a frame"):
+    with pytest.raises(UserError, match="is not a format of a frame"):
         write_export(frame(), tmp_path, ["onnx"])
     assert set(formats_of("network")) == {"c", "json", "matlab", "onnx"}
     assert set(formats_of("damper")) == set(formats_of("frame")) == {"c", "json", "matlab"}

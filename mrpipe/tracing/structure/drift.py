@@ -155,7 +155,7 @@ def _explained(tests: Sequence[TestStiffness], rules: FrameRules) -> tuple[Kind,
     best: Kind = "step" if errors["step"] < rules.better_drift * errors["drift"] else "drift"
     columns = stepped if best == "step" else steady
     change, error = _last_coefficient(columns, values, weights)
-    matters = abs(change) > rules.least_drift and abs(change) > 3.0 * error
+    matters = abs(change) > rules.least_drift and abs(change) > rules.drift_errors * error
     if not matters or errors[best] > rules.better_drift * without[kind]:
         return kind, 0.0, ""
     return best, change, tests[int(np.argmax(columns[-1]))].test if best == "step" else ""
