@@ -50,10 +50,11 @@ from mrpipe.law_design.study import COARSE, Loops, design_law
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.simulation.excitation import Excitation
-from mrpipe.simulation.loop import LoopOptions, Response, SensorNoise
+from mrpipe.simulation.loop import LoopOptions, Response
 from mrpipe.simulation.resonance import BAND
 from mrpipe.simulation.response_curve import CurveOptions, response_curve
 from mrpipe.simulation.rig import Rig
+from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.structures import Frame, frame_from_parameter_set
 from mrpipe.thesis.gains import THESIS_GAINS
 from mrpipe.tracing.bench.summary import Tracing

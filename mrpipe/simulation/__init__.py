@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mrpipe.simulation.excitation import Excitation, amplitude_for, at_rest, harmonic, recorded, sweep
-    from mrpipe.simulation.loop import LoopOptions, Response, SensorNoise, simulate_law
+    from mrpipe.simulation.loop import LoopOptions, Response, simulate_law
+    from mrpipe.simulation.sensors import SensorNoise
 
 LOADS_FROM: tuple[str, ...] = ()  # the modules loaded at first use are those imported above
 
@@ -27,11 +28,10 @@ __all__ = [
     "sweep",
 ]
 
-_IN_LOOP = ("LoopOptions", "Response", "SensorNoise", "simulate_law")
+_PLACES = {"LoopOptions": "loop", "Response": "loop", "SensorNoise": "sensors", "simulate_law": "loop"}
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = "loop" if name in _IN_LOOP else "excitation"
-    return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    return getattr(importlib.import_module(f"{__name__}.{_PLACES.get(name, 'excitation')}"), name)

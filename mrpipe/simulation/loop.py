@@ -11,15 +11,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.controller import Controller
-from mrpipe.control.kernel import (
-    COMMAND_SIZE,
-    MEASURED_ACCELERATION,
-    MEASURED_DISPLACEMENT,
-    MEASURED_FLOORS,
-    MEASURED_FORCE,
-    MEASURED_GROUND,
-    MEASURED_VELOCITY,
-)
+from mrpipe.control.kernel import COMMAND_SIZE
 from mrpipe.control.laws import law_named
 from mrpipe.dampers.drive import command_place, lag_step, polynomial_step
 from mrpipe.dampers.hysteresis import hysteresis_step
@@ -29,62 +21,18 @@ from mrpipe.simulation import kernel, parts
 from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import Clock, clock_of
 from mrpipe.simulation.excitation import Excitation
-from mrpipe.simulation.settings import SensorFaultSettings, SimulateSettings
+from mrpipe.simulation.sensors import SensorFault, SensorNoise, add_fault, sensor_noise
+from mrpipe.simulation.settings import SimulateSettings
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
 Tracking = Literal["damper", "ideal", "continuous", "unclipped"]
 
 
-@dataclass(frozen=True)
-class SensorNoise:
-    """RMS noise of a sample of each sensor; the accelerometers' constant bias.
-
-    Attributes
-    ----------
-    displacement_m
-        Of the laser at the damper.
-    acceleration_m_s2
-        Of each accelerometer.
-    acceleration_bias_m_s2
-        Of the difference of the two accelerometers that give the damper's acceleration.
-    """
-
-    displacement_m: float = 0.0
-    acceleration_m_s2: float = 0.0
-    acceleration_bias_m_s2: float = 0.0
-
-
-MISSING, ZERO, STUCK = float("nan"), float("-inf"), float("inf")
-"""What stands in the noise of a sensor where a reading is missing, zero, or the one before."""
-
-
 RECORD_RATE_HZ = 1000.0
 """Rate of the histories if the settings give none. With a perfect damper, whose force jumps, it is the plant's rate."""
 
-_FAULT, _SETTINGS = SensorFaultSettings(), SimulateSettings()
+_SETTINGS = SimulateSettings()
 """The defaults that the options share with the settings."""
-
-
-@dataclass(frozen=True)
-class SensorFault:
-    """Faulty readings.
-
-    Attributes
-    ----------
-    mark
-        :data:`MISSING`, :data:`ZERO` or :data:`STUCK`.
-    sensor
-        `displacement`, `accelerometers`, `velocity`, `force` or `all`.
-    share
-        Share of the samples that begin a fault [1].
-    samples
-        Length of a fault.
-    """
-
-    mark: float
-    sensor: str = _FAULT.sensor
-    share: float = _FAULT.share
-    samples: int = _FAULT.samples
 
 
 @dataclass(frozen=True)
@@ -338,38 +286,6 @@ def _run_numbers(
     run[parts.R_C], run[parts.R_K] = controller.gains.c_n_s_m, controller.gains.k_n_m
     run[parts.R_CLIPPED] = 0.0 if options.tracking == "unclipped" else 1.0
     return counts, run
-
-
-def sensor_noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generator | None) -> FloatArray:
-    """Return sensor noise, shape (samples, 5 + n); the damper's acceleration is a difference of two sensors."""
-    result = np.zeros((samples, MEASURED_FLOORS + floors))
-    if noise.displacement_m > 0.0 or noise.acceleration_m_s2 > 0.0:
-        if rng is None:
-            raise ValueError("sensor noise needs a generator")
-        result[:, MEASURED_DISPLACEMENT] = noise.displacement_m * rng.standard_normal(samples)
-        accelerations = noise.acceleration_m_s2 * rng.standard_normal((samples, 1 + floors))
-        result[:, MEASURED_GROUND], result[:, MEASURED_FLOORS:] = accelerations[:, 0], accelerations[:, 1:]
-        result[:, MEASURED_ACCELERATION] = noise.acceleration_m_s2 * rng.standard_normal(samples)
-    result[:, MEASURED_ACCELERATION] += noise.acceleration_bias_m_s2
-    return result
-
-
-def add_fault(noise: FloatArray, fault: SensorFault, rng: np.random.Generator | None) -> None:
-    """Mark the faulty readings in the noise; the first sample is good."""
-    if rng is None:
-        raise ValueError("a sensor fault needs a generator")
-    begins = np.flatnonzero(rng.random(len(noise)) < fault.share)
-    faulty = np.zeros(len(noise), dtype=bool)
-    for begin in begins:
-        faulty[max(begin, 1) : begin + fault.samples] = True
-    channels = {
-        "displacement": [MEASURED_DISPLACEMENT],
-        "velocity": [MEASURED_VELOCITY],
-        "force": [MEASURED_FORCE],
-        "accelerometers": [MEASURED_ACCELERATION, MEASURED_GROUND, *range(MEASURED_FLOORS, noise.shape[1])],
-        "all": list(range(noise.shape[1])),
-    }[fault.sensor]
-    noise[np.ix_(faulty, channels)] = fault.mark
 
 
 def _response(

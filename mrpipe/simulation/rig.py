@@ -23,17 +23,8 @@ from mrpipe.simulation import excitation as kinds
 from mrpipe.simulation.adjustment import SETTLED, adjusted_amplitude
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.ground_record import read_ground_record
-from mrpipe.simulation.loop import (
-    MISSING,
-    RECORD_RATE_HZ,
-    STUCK,
-    ZERO,
-    LoopOptions,
-    Response,
-    SensorFault,
-    SensorNoise,
-    simulate_law,
-)
+from mrpipe.simulation.loop import RECORD_RATE_HZ, LoopOptions, Response, simulate_law
+from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault, SensorNoise
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
 from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes, read_frame
 from mrpipe.structures.over_amplitude import frame_at_amplitude

@@ -33,7 +33,8 @@ from mrpipe.simulation import several_kernel as kernel
 from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import clock_of
 from mrpipe.simulation.excitation import Excitation
-from mrpipe.simulation.loop import LoopOptions, Response, add_fault, sensor_noise
+from mrpipe.simulation.loop import LoopOptions, Response
+from mrpipe.simulation.sensors import add_fault, sensor_noise
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
 

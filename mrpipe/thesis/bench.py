@@ -18,8 +18,8 @@ from mrpipe.effects.damper import read_damper
 from mrpipe.simulation import Excitation, LoopOptions, Response, harmonic
 from mrpipe.simulation.adjustment import adjusted_amplitude
 from mrpipe.simulation.indices import indices
-from mrpipe.simulation.loop import SensorNoise
 from mrpipe.simulation.rig import Rig, read_rig
+from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.simulation.settings import SimulateSettings
 from mrpipe.structures import Frame, floor_position
 from mrpipe.thesis.entries import printed_columns, printed_gains

@@ -12,7 +12,7 @@ from mrpipe.control.calibration import CalibrationOptions, calibrate
 from mrpipe.control.kalman import continuous_kalman_gains
 from mrpipe.control.linearisation import clipped_force
 from mrpipe.signals.kalman import kalman_gains, kinematic_kalman
-from mrpipe.simulation.loop import SensorNoise
+from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.structures import Frame, floor_position
 from mrpipe.thesis.bench import OMEGA, Bench, LoopRun, amplitude_of, excite, run_law
 from mrpipe.thesis.claim import Missing, Outcomes, Value

@@ -12,9 +12,9 @@ from mrpipe.dampers.drive import driver_lag_apart
 from mrpipe.dampers.plant import Phase, Step, build_chain, idle_step
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import LoopOptions, SensorNoise, at_rest, harmonic, recorded, simulate_law, sweep
-from mrpipe.simulation.loop import MISSING, STUCK, ZERO, SensorFault
 from mrpipe.simulation.parts import BOUC_WEN
 from mrpipe.simulation.reference import ReferenceController, reference_loop
+from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault
 from mrpipe.structures import Frame, frequency_response, natural_modes, state_space
 from mrpipe.thesis.gains import THESIS_GAINS
 from tests.control.conftest import random_network

@@ -17,7 +17,8 @@ from mrpipe.control.together import LinearDevice, loop_matrix
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
 from mrpipe.simulation.excitation import recorded
-from mrpipe.simulation.loop import LoopOptions, SensorNoise, simulate_law
+from mrpipe.simulation.loop import LoopOptions, simulate_law
+from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.simulation.several import LoopDamper, simulate_dampers
 from mrpipe.structures import discretise_first_order, shear_frame
 from mrpipe.structures.given import device_position

@@ -10,7 +10,7 @@ import pytest
 from mrpipe.control.kernel import COMMAND_FORCE, COMMAND_INVERSE, COMMAND_SWITCHED, COMMAND_UNCLIPPED, COMMAND_VELOCITY
 from mrpipe.networks.network import Network
 from mrpipe.simulation import LoopOptions, Response
-from mrpipe.simulation.loop import SensorNoise
+from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.simulation.training_range import check_damper, check_networks, requests
 from tests.control.conftest import random_network
 
