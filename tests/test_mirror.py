@@ -27,6 +27,7 @@ THROUGH = {
     "laboratory": "laboratory",
     "reporting": "docs/test_commands.py",
     "stages": "docs/test_commands.py",
+    "tracing/rules": "tracing/test_rules.py",
 }
 """Folder of the package whose modules are found by name or run by commands -> tests that run all of them."""
 

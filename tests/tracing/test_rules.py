@@ -26,7 +26,7 @@ TECHNIQUE = "Numerical technique"
 
 def _modules() -> list[Path]:
     found = {path.relative_to(PACKAGE).as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
-    return [path for name, path in found.items() if name != "rules.py"]
+    return [path for name, path in found.items() if not name.startswith("rules/")]
 
 
 def _numbers(node: ast.AST) -> Iterator[float]:
