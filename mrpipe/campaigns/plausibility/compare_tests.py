@@ -10,12 +10,9 @@ import numpy as np
 from mrpipe.campaigns.plausibility.channels import find_spikes, is_dead
 from mrpipe.campaigns.plausibility.duplicates import find_overlaps
 from mrpipe.campaigns.plausibility.finding import Finding, TestArrays
-from mrpipe.campaigns.plausibility.odd_tests import (
-    find_exchanged_columns,
-    find_odd_tests,
-    find_unrelated_force,
-)
+from mrpipe.campaigns.plausibility.odd_tests import find_odd_tests
 from mrpipe.campaigns.plausibility.stuck import find_stuck_displacement, find_stuck_force
+from mrpipe.campaigns.plausibility.whole_campaign import find_exchanged_columns, find_unrelated_force
 
 
 def compare_tests(tests: Sequence[TestArrays]) -> tuple[Finding, ...]:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy import stats
-from scipy.signal import detrend
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.plausibility.agreement import Agreement, agreement, delay, fit, log_gain_of
+from mrpipe.campaigns.plausibility.decades import find_decades, unit_finding
 from mrpipe.campaigns.plausibility.finding import Finding, TestArrays
-from mrpipe.campaigns.plausibility.reference import ReferenceMap, Slow, slow_down
+from mrpipe.campaigns.plausibility.reference import ReferenceMap, Slow, moving_tests
 
 GAIN_SCATTER, PHASE_SCATTER = 0.04, 0.06
 """Standard deviations between tests of a sound rig, before any test is seen: of log(gain), and of phase [rad]."""
@@ -36,22 +35,10 @@ POWERS = 0.29
 """Standard deviation of a power between 0 and 1: beyond the speeds of the other tests, the force of a damper may grow
 with any such power of the speed."""
 
-DECADES = 100.0
-"""Ratio of RMS force or drive between a test and all others from which a unit is suspected by itself."""
-
-LARGE_DRIVE = 20.0
-"""Drive [A or V] above which milliamperes or millivolts are suspected."""
-
-EXCHANGED = 1.05
-"""Mean frequency of displacement over that of force above which the two look exchanged."""
-
 FACTORS = (1000.0, 1e-3)
 
 LOOKED_AT = 4
 """So many tests with the most deviating gains are judged; the oddest is among them."""
-
-UNRELATED = 0.3
-"""Correlation with the predicted force below which a force is unrelated to the motion."""
 
 
 def find_odd_tests(arrays: Sequence[TestArrays]) -> list[Finding]:
@@ -62,72 +49,14 @@ def find_odd_tests(arrays: Sequence[TestArrays]) -> list[Finding]:
     map that the others predict. The oddest is taken out until all that remain agree; for each odd test a wrong unit
     is tried as explanation, else its gain is reported. Tests in which nothing moves are left out.
     """
-    tests = [slow_down(test) for test in arrays if _moves(test)]
+    tests = moving_tests(arrays)
     if len(tests) < 2:
         return []
     findings: list[Finding] = []
-    for check in (_decades, _against_the_work):
+    for check in (find_decades, _against_the_work):
         findings += check(tests)
         tests = [test for test in tests if test.name not in {item.test for item in findings}]
     return findings + (_against_the_map(tests) if len(tests) > 2 else [])
-
-
-def find_exchanged_columns(arrays: Sequence[TestArrays]) -> list[Finding]:
-    """Return a finding where displacement and force look exchanged in most tests of a campaign."""
-    tests = [slow_down(test) for test in arrays if _moves(test)]
-    ratios = [test.frequency_ratio for test in tests]
-    if not ratios or float(np.median(ratios)) <= EXCHANGED:
-        return []
-    return [
-        Finding(
-            name="channels-exchanged",
-            severity="error",
-            sentence="displacement and force look exchanged: the displacement holds higher frequencies than the force "
-            f"(mean frequency {float(np.median(ratios)):.2f} times that of the force), but a damper distorts its force",
-            remedy="exchange the columns of displacement and force in campaign.yaml",
-            numbers={"frequency_ratio": float(np.median(ratios))},
-        )
-    ]
-
-
-def find_unrelated_force(arrays: Sequence[TestArrays]) -> list[Finding]:
-    """Return a finding where the force follows the motion in no test of a campaign.
-
-    A flexible map from motion and drive to force is fitted to the first half of all tests and compared with their
-    second halves. The force of a damper correlates with it; that of a load cell that shows noise does not.
-    """
-    tests = [slow_down(test) for test in arrays if _moves(test)]
-    if not tests:
-        return []
-    halves = [_without_drift(test.part(0.0, 0.5)) for test in tests]
-    halves += [_without_drift(test.part(0.5, 1.0)) for test in tests]
-    reference = ReferenceMap(halves)
-    coefficients = reference.coefficients(range(len(tests), len(halves)))
-    correlations = [fit(part, coefficients)[1] for part in reference.parts[len(tests) :]]
-    highest = max(correlations)
-    if highest > UNRELATED:
-        return []
-    return [
-        Finding(
-            name="force-unrelated",
-            severity="error",
-            channel="force",
-            sentence=f"force follows the motion in no test: its correlation with what displacement, velocity and drive "
-            f"predict is {highest:.2f} at most",
-            remedy="check the load cell, its cable and amplifier, and the columns of force and displacement",
-            numbers={"highest_correlation": highest, "tests": float(len(tests))},
-        )
-    ]
-
-
-def _without_drift(test: Slow) -> Slow:
-    """Return the test without the linear trend of its force, where the motion has at least one cycle to show."""
-    cycles = test.frequency_hz * test.interval_s * test.force.size
-    return replace(test, force=np.asarray(detrend(test.force))) if cycles >= 1.0 else test
-
-
-def _moves(test: TestArrays) -> bool:
-    return bool(test.time_s.size >= 100 and np.std(test.displacement_m) > 0.0 and np.std(test.force_n) > 0.0)
 
 
 def _against_the_work(tests: Sequence[Slow]) -> list[Finding]:
@@ -294,7 +223,7 @@ def _explain(reference: ReferenceMap, tests: Sequence[Slow], index: int, odd: Se
             numbers=numbers,
         )
     for channel, factor in _units(reference, test, without, plain):
-        return _unit_finding(test, channel, factor, f"force is {plain.gain:.3g} times what they predict", numbers)
+        return unit_finding(test, channel, factor, f"force is {plain.gain:.3g} times what they predict", numbers)
     return Finding(
         name="gain-differs",
         severity="warning",
@@ -318,48 +247,6 @@ def _units(reference: ReferenceMap, test: Slow, without: set[int], plain: Agreem
                 found.append((distance, channel, factor))
     before = abs(plain.log_gain) + 2.0 * (1.0 - plain.correlation)
     return [(channel, factor) for distance, channel, factor in sorted(found)[:1] if distance < 0.5 * before]
-
-
-def _unit_finding(test: Slow, channel: str, factor: float, evidence: str, numbers: dict[str, float]) -> Finding:
-    wrong = "small" if factor > 1.0 else "large"
-    return Finding(
-        name="unit-decades",
-        severity="error",
-        test=test.name,
-        channel=channel,
-        sentence=f"{channel} looks 1000 times too {wrong} compared with the other tests ({evidence})",
-        remedy=f"correct the unit of {channel} in this test",
-        numbers={**numbers, "factor_to_correct": factor},
-    )
-
-
-def _decades(tests: Sequence[Slow]) -> list[Finding]:
-    """Return tests whose stroke, force or drive lies decades away from that of most others.
-
-    The tests are parted at the widest gap between their sizes. If it spans decades, the smaller group is named; of
-    groups of equal size the larger values are named, because which of them are wrong cannot be known. A drive can be
-    zero in a test, so only a drive that is far larger than all others is suspected.
-    """
-    findings = []
-    for channel, decades in (("displacement", 3.0 * DECADES), ("force", DECADES), ("drive", DECADES)):
-        sizes = np.array([float(np.sqrt(np.mean(getattr(test, channel) ** 2))) for test in tests])
-        order = [index for index in np.argsort(sizes) if sizes[index] > 0.0]
-        if len(order) < 2:
-            continue
-        ratios = sizes[order[1:]] / sizes[order[:-1]]
-        cut = int(np.argmax(ratios)) + 1
-        ratio = float(ratios[cut - 1])
-        large = channel == "drive" or len(order) - cut <= cut
-        named = order[cut:] if large else order[:cut]
-        # a drive near zero is noise, so ratios alone carry no information
-        suspect = channel != "drive" or (sizes[order[cut]] > LARGE_DRIVE and len(order) - cut <= cut)
-        if not suspect or ratio <= decades:
-            continue
-        times = ratio if large else 1.0 / ratio
-        evidence = f"the RMS is {times:.3g} times that of the nearest of the {len(order) - len(named)} others"
-        for index in sorted(named):
-            findings.append(_unit_finding(tests[index], channel, 1e-3 if large else 1e3, evidence, {"ratio": times}))
-    return findings
 
 
 def _late(reference: ReferenceMap, tests: Sequence[Slow], sound: Sequence[int]) -> list[Finding]:

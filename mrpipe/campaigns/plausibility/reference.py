@@ -136,6 +136,15 @@ def slow_down(test: TestArrays) -> Slow:
     return Slow(test.name, test.role, interval, displacement, velocity, average(test.drive), average(test.force_n))
 
 
+def moving_tests(tests: Sequence[TestArrays]) -> list[Slow]:
+    """Return block averages of the tests in which something moves."""
+    return [
+        slow_down(test)
+        for test in tests
+        if test.time_s.size >= 100 and np.std(test.displacement_m) > 0.0 and np.std(test.force_n) > 0.0
+    ]
+
+
 @dataclass(frozen=True)
 class Normal:
     """Normal equations of one test: mean products of centred features (p, p), with the force (p,), and of the force."""
