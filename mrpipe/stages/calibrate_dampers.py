@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from mrpipe.pipeline.loop_inputs import variant_for_dampers
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
@@ -78,10 +79,5 @@ VARIANTS = (
 
 
 def variant(configuration: RunSettings, _: str = "") -> Stage | None:
-    """Return the stage where the configuration has several dampers, else None."""
-    structure, settings = (getattr(configuration, name, None) for name in ("structure", "calibrate"))
-    if structure is None or settings is None or not structure.dampers:
-        return None
-    if any((entry.damper or settings.damper) == "identified" for entry in structure.dampers):
-        return replace(VARIANTS[0], inputs=("identify-frame", "identify-damper"))
-    return VARIANTS[0]
+    """Return the stage if the configuration has several dampers, else None."""
+    return variant_for_dampers(VARIANTS[0], configuration)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from mrpipe.pipeline.loop_inputs import variant_for_dampers
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
@@ -46,12 +47,5 @@ STAGE = Stage(
 
 
 def variant(configuration: RunSettings, _: str = "") -> Stage | None:
-    """Return the stage with the damper model as an input where a damper of the structure is the identified one."""
-    from dataclasses import replace
-
-    structure, settings = (getattr(configuration, name, None) for name in ("structure", "calibrate"))
-    if structure is None or settings is None:
-        return None
-    if any((entry.damper or settings.damper) == "identified" for entry in structure.dampers):
-        return replace(STAGE, inputs=("identify-frame", "identify-damper", "calibrate"))
-    return None
+    """Return the stage if the configuration has several dampers, else None."""
+    return variant_for_dampers(STAGE, configuration)
