@@ -25,6 +25,7 @@ NEAR_EVALUATIONS = 7
 """Its most evaluations per free gain."""
 
 Value = Callable[[Gains], float]
+AtPoint = Callable[[FloatArray], float]
 
 
 @dataclass(frozen=True)
@@ -93,14 +94,7 @@ def search(value: Value, free: Sequence[FreeGain], fixed: Mapping[str, float], o
     options
         Size of the search.
     """
-    known: dict[tuple[float, ...], float] = {}
-
-    def at(point: FloatArray) -> float:
-        key = tuple(np.round(point, 6).tolist())
-        if key not in known:
-            known[key] = value(_gains(free, fixed, point))
-        return known[key]
-
+    at = _at_points(value, free, fixed)
     if not free:
         return Gains(**fixed)
     if len(free) == 1:
@@ -134,35 +128,28 @@ def refine(value: Value, free: Sequence[FreeGain], start: Gains, options: Search
         for (low, high), middle in zip((gain.logarithms for gain in free), centre, strict=True)
     ]
 
-    def at(point: FloatArray) -> float:
-        return value(_gains(free, fixed, point))
-
+    at = _at_points(value, free, fixed)
+    most = NEAR_EVALUATIONS * len(free)
     if len(free) == 1:
-        options_of = {"xatol": options.tolerance, "maxiter": NEAR_EVALUATIONS}
-        found = minimize_scalar(
-            lambda part: at(np.array([part])), bounds=bounds[0], method="bounded", options=options_of
-        )
-        point = np.array([found.x])
+        found, point = _bounded(at, bounds[0], options.tolerance, most)
     else:
         # the simplex opens towards the inside of the bounds
-        steps = [
-            NEAR_STEP if middle + NEAR_STEP <= high else -NEAR_STEP
-            for middle, (_, high) in zip(centre, bounds, strict=True)
-        ]
-        found = minimize(
-            at,
-            centre,
-            method="Nelder-Mead",
-            bounds=bounds,
-            options={
-                "initial_simplex": np.vstack([centre, centre + np.diag(steps)]),
-                "xatol": options.tolerance,
-                "fatol": 1e-3,
-                "maxfev": NEAR_EVALUATIONS * len(free),
-            },
-        )
-        point = np.asarray(found.x)
-    return _gains(free, fixed, point) if float(found.fun) < at(centre) else start
+        steps = np.where(centre + NEAR_STEP <= [high for _, high in bounds], NEAR_STEP, -NEAR_STEP)
+        found, point = _simplex(at, centre, steps, bounds, options.tolerance, most)
+    return _gains(free, fixed, point) if found < at(centre) else start
+
+
+def _at_points(value: Value, free: Sequence[FreeGain], fixed: Mapping[str, float]) -> AtPoint:
+    """Return the value over logarithms of the free gains; the same point is not evaluated twice."""
+    known: dict[tuple[float, ...], float] = {}
+
+    def at(point: FloatArray) -> float:
+        key = tuple(np.round(point, 6).tolist())
+        if key not in known:
+            known[key] = value(_gains(free, fixed, point))
+        return known[key]
+
+    return at
 
 
 def _gains(free: Sequence[FreeGain], fixed: Mapping[str, float], point: FloatArray) -> Gains:
@@ -170,49 +157,72 @@ def _gains(free: Sequence[FreeGain], fixed: Mapping[str, float], point: FloatArr
     return Gains(**{**fixed, **found})
 
 
-def _search_one(
-    at: Callable[[FloatArray], float], free: Sequence[FreeGain], fixed: Mapping[str, float], options: SearchOptions
-) -> Gains:
+def _search_one(at: AtPoint, free: Sequence[FreeGain], fixed: Mapping[str, float], options: SearchOptions) -> Gains:
     low, high = free[0].logarithms
     grid = np.linspace(low, high, options.grid)
     values = [at(np.array([point])) for point in grid]
     best = int(np.argmin(values))
     bounds = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
-    found = minimize_scalar(
-        lambda part: at(np.array([part])),
-        bounds=bounds,
-        method="bounded",
-        options={"xatol": options.tolerance, "maxiter": options.evaluations},
-    )
-    points = [(values[best], float(grid[best])), (float(found.fun), float(found.x))]
+    found, point = _bounded(at, bounds, options.tolerance, options.evaluations)
+    points = [(values[best], float(grid[best])), (found, float(point[0]))]
     return _gains(free, fixed, np.array([min(points)[1]]))
 
 
-def _search_several(
-    at: Callable[[FloatArray], float], free: Sequence[FreeGain], fixed: Mapping[str, float], options: SearchOptions
-) -> Gains:
+def _search_several(at: AtPoint, free: Sequence[FreeGain], fixed: Mapping[str, float], options: SearchOptions) -> Gains:
     """Search from several points: the largest response over frequency has kinks, where a simplex may come to rest."""
     bounds = [gain.logarithms for gain in free]
     inside = 4 if len(free) == 2 else 3
     axes = [np.linspace(low, high, inside + 2)[1:-1] for low, high in bounds]
     starts = np.array(np.meshgrid(*axes)).reshape(len(free), -1).T
     values = np.array([at(start) for start in starts])
-    ends = [_simplex(at, starts[place], bounds, options) for place in np.argsort(values, kind="stable")[:STARTS]]
+    sizes = np.array([0.25 * (high - low) / 2.0 for low, high in bounds])
+    middles = np.array([0.5 * (low + high) for low, high in bounds])
+    most = options.evaluations * len(free)
+    ends = []
+    for place in np.argsort(values, kind="stable")[:STARTS]:
+        start = starts[place]
+        # the simplex opens towards the middle of the range
+        steps = np.where(start < middles, sizes, -sizes)
+        ends.append(_simplex(at, start, steps, bounds, options.tolerance, most))
     _, point = min([*ends, (float(values.min()), starts[int(np.argmin(values))])], key=lambda item: item[0])
     return _gains(free, fixed, point)
 
 
+def _bounded(at: AtPoint, bounds: tuple[float, float], tolerance: float, most: int) -> tuple[float, FloatArray]:
+    """Return the smallest value that Brent's bounded method finds for one gain, and where."""
+    found = minimize_scalar(
+        lambda part: at(np.array([part])),
+        bounds=bounds,
+        method="bounded",
+        options={"xatol": tolerance, "maxiter": most},
+    )
+    return float(found.fun), np.array([found.x])
+
+
 def _simplex(
-    at: Callable[[FloatArray], float],
+    at: AtPoint,
     start: FloatArray,
+    steps: FloatArray,
     bounds: Sequence[tuple[float, float]],
-    options: SearchOptions,
+    tolerance: float,
+    most: int,
 ) -> tuple[float, FloatArray]:
-    """Return the smallest value that Nelder and Mead's simplex reaches from a point, and where."""
-    steps = np.array([0.25 * (high - low) / 2.0 for low, high in bounds])
-    # the simplex opens towards the middle of the range
-    towards = np.where(start < [0.5 * (low + high) for low, high in bounds], steps, -steps)
-    simplex = np.vstack([start, *(start + step * unit for step, unit in zip(towards, np.eye(len(start)), strict=True))])
+    """Return the smallest value that Nelder and Mead's simplex reaches from a point, and where.
+
+    Parameters
+    ----------
+    at
+        Objective.
+    start, steps
+        First corner of the simplex, and the step to each of the others, shape (r,), in logarithms.
+    bounds
+        Of each logarithm.
+    tolerance
+        Accuracy of a logarithm at which the search ends.
+    most
+        Largest number of evaluations.
+    """
+    simplex = np.vstack([start, start + np.diag(steps)])
     found = minimize(
         at,
         start,
@@ -220,9 +230,9 @@ def _simplex(
         bounds=bounds,
         options={
             "initial_simplex": np.clip(simplex, [low for low, _ in bounds], [high for _, high in bounds]),
-            "xatol": options.tolerance,
+            "xatol": tolerance,
             "fatol": 1e-3,
-            "maxfev": options.evaluations * len(start),
+            "maxfev": most,
         },
     )
     return float(found.fun), np.asarray(found.x)
