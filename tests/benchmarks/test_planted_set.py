@@ -1,8 +1,6 @@
 """A frozen set of cases of the tracing benchmark, traced as a user's `close-loop` traces them.
 
-The seeds are consecutive, so nobody has chosen the cases by their outcome. The expected verdict is the truth. A case
-that fails today is listed in `FAILING` with what the program says instead; the test fails as soon as such a case is
-right, so that the list stays true.
+The seeds are consecutive, so nobody has chosen the cases by their outcome. The expected verdict is the truth.
 """
 
 from typing import Any
@@ -15,18 +13,12 @@ from benchmarks.tracing import run_case
 pytestmark = pytest.mark.planted
 
 FIRST, COUNT = 9000, 2
-FAILING: dict[int, str] = {}
 
 
 def cases_of(kinds: tuple[str, ...]) -> list[Any]:
     chosen = [case for case in map(case_of, range(FIRST, FIRST + COUNT)) if case.kind in kinds]
     return [
-        pytest.param(
-            case,
-            id="-".join([str(case.seed), case.base, *(case.planted or ("clean",))]),
-            marks=pytest.mark.xfail(reason=FAILING[case.seed], strict=True) if case.seed in FAILING else (),
-        )
-        for case in chosen
+        pytest.param(case, id="-".join([str(case.seed), case.base, *(case.planted or ("clean",))])) for case in chosen
     ]
 
 
