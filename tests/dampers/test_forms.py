@@ -250,6 +250,14 @@ def test_every_form_keeps_its_contract(form: BaseForm) -> None:
 
 
 @pytest.mark.property
+def test_no_form_imports_another() -> None:
+    folder = Path(base_forms.__wrapped__.__code__.co_filename).parent / "forms"
+    files = [path for path in folder.glob("*.py") if path.stem != "__init__"]
+    assert len(files) == len(base_forms())
+    assert [path.name for path in files if "mrpipe.dampers.forms" in path.read_text(encoding="utf-8")] == []
+
+
+@pytest.mark.property
 def test_a_users_own_form_is_one_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.py"
     source = Path(base_forms.__wrapped__.__code__.co_filename).parent / "forms" / "biviscous.py"

@@ -9,15 +9,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
 from mrpipe.dampers.parameters import Parameter, Values, shape
 from mrpipe.dampers.plant import FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
-
-DAMPING = 1.0 - 0.5 * 2.0**0.5
-"""Coefficient of the Rosenbrock method, with which it damps the fastest solutions wholly."""
-
-LONGEST = 0.5
-"""Longest part of a step, in time constants of the stiffest solution ..."""
-
-MOST_PARTS = 12
-"""... but at most this number of parts: the method stays stable with longer ones."""
+from mrpipe.dampers.rosenbrock import damping_factor, parts_of_step
 
 
 @njit(float64(float64, float64, float64[::1]), cache=True)
@@ -44,8 +36,8 @@ def creep_slope(z: float, v: float, parameters: FloatArray) -> float:
 def creeping_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: spring rate [1/m], creep speed [m/s], exponent, gamma over gamma plus beta. State: z, last velocity.
 
-    Bouc-Wen's z (2.2) with n = 2, less what creeps under load. The equation is stiff where the spring is, so it is
-    integrated by a Rosenbrock method of second order that damps what is fast (Verwer et al. 1999, ROS2).
+    Bouc-Wen's z (2.2) with n = 2, minus the creep under load. The equation is stiff if the spring is stiff, so it is
+    integrated by the Rosenbrock method of second order of :mod:`mrpipe.dampers.rosenbrock`.
     """
     if wire[FIRST] > 0.5:
         state[0] = 0.0
@@ -54,11 +46,11 @@ def creeping_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
         return
     first, change = state[1], wire[VELOCITY] - state[1]
     fastest = parameters[0] * (2.0 * max(abs(first), abs(wire[VELOCITY])) + parameters[1] * parameters[2])
-    parts = min(int(fastest * dt / LONGEST) + 1, MOST_PARTS)
+    parts = parts_of_step(fastest, dt)
     h, z = dt / parts, state[0]
     for k in range(parts):
         v0, v1 = first + change * k / parts, first + change * (k + 1) / parts
-        factor = 1.0 / (1.0 - DAMPING * h * creep_slope(z, 0.5 * (v0 + v1), parameters))
+        factor = damping_factor(h, creep_slope(z, 0.5 * (v0 + v1), parameters))
         k1 = factor * creep_rate(z, v0, parameters)
         trial = min(max(z + h * k1, -1.0), 1.0)
         k2 = factor * (creep_rate(trial, v1, parameters) - 2.0 * k1)

@@ -8,10 +8,10 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
-from mrpipe.dampers.forms.biviscous import BEND, LARGEST_DRIVE, REST, growth_of, width_of, yield_velocity
 from mrpipe.dampers.parameters import Parameter, Values, shape
 from mrpipe.dampers.plant import ACCELERATION, CURRENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.dampers.viscoplastic import rounded_sign
+from mrpipe.dampers.yield_velocity import BEND, LARGEST_DRIVE, REST, growth_of, width_of, yield_velocity
 
 NUMBERS = ("yield_velocity", "hysteresis_velocity", "acceleration_scale")
 

@@ -7,9 +7,9 @@ from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
-from mrpipe.dampers.forms.creeping_yield import DAMPING, LONGEST, MOST_PARTS
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.rosenbrock import damping_factor, parts_of_step
 
 
 @njit(float64(float64, float64, float64[::1]), cache=True)
@@ -25,7 +25,7 @@ def overstress_rate(z: float, v: float, parameters: FloatArray) -> float:
 def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: spring rate [1/m], speed of flow at twice the yield force [m/s], exponent. State: z, last velocity.
 
-    Integrated by a Rosenbrock method of second order that damps what is fast (Verwer et al. 1999, ROS2).
+    Integrated by the Rosenbrock method of second order of :mod:`mrpipe.dampers.rosenbrock`.
     """
     if wire[FIRST] > 0.5:
         state[0] = 0.0
@@ -36,13 +36,13 @@ def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
     first, change = state[1], wire[VELOCITY] - state[1]
     speed = max(abs(first), abs(wire[VELOCITY]))
     stiff = flow * power * (speed / flow) ** (1.0 - 1.0 / power)
-    parts = min(int(rate * (speed + stiff) * dt / LONGEST) + 1, MOST_PARTS)
+    parts = parts_of_step(rate * (speed + stiff), dt)
     h, z = dt / parts, state[0]
     for k in range(parts):
         v0, v1 = first + change * k / parts, first + change * (k + 1) / parts
         over = abs(z) - 1.0
         slope = -rate * flow * power * over ** (power - 1.0) if over > 0.0 else 0.0
-        factor = 1.0 / (1.0 - DAMPING * h * slope)
+        factor = damping_factor(h, slope)
         k1 = factor * overstress_rate(z, v0, parameters)
         k2 = factor * (overstress_rate(z + h * k1, v1, parameters) - 2.0 * k1)
         z += h * (1.5 * k1 + 0.5 * k2)
