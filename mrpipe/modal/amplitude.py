@@ -20,6 +20,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.modal.records import FrameTest, Place, Sensor
+from mrpipe.structures.over_amplitude import modes_at_amplitude
 
 Measure = Literal["constant", "mode", "motion"]
 
@@ -57,9 +58,13 @@ class AmplitudeLaws:
         amplitude_m
             Amplitude [m]: one for all modes, or shape (r,).
         """
-        level = np.log1p(amplitude_m / self.references_m)
-        omega = self.angular_frequencies * np.exp(-self.softening * level)
-        return np.asarray(omega), np.asarray(self.damping_ratios * np.exp(self.damping_growth * level))
+        return modes_at_amplitude(
+            self.angular_frequencies,
+            self.damping_ratios,
+            self.softening,
+            self.damping_growth,
+            amplitude_m / self.references_m,
+        )
 
     def rows(self) -> FloatArray:
         """Return the laws as the simulation takes them, shape (r, 5)."""

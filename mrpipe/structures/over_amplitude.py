@@ -14,6 +14,29 @@ from mrpipe.structures.frame import Frame
 GROUP = "amplitude"
 
 
+def modes_at_amplitude(
+    angular_frequencies: FloatArray,
+    damping_ratios: FloatArray,
+    softening: FloatArray,
+    damping_growth: FloatArray,
+    relative_amplitude: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return omega_0 (1 + A/A_0)^(-a) [rad/s] and zeta_0 (1 + A/A_0)^b [1] of r modes, each of shape (r,).
+
+    Parameters
+    ----------
+    angular_frequencies, damping_ratios
+        Values at zero amplitude, shape (r,) [rad/s], [1].
+    softening, damping_growth
+        Exponents a and b, shape (r,) [1].
+    relative_amplitude
+        Amplitude over reference amplitude A/A_0, shape (r,) [1].
+    """
+    level = np.log1p(relative_amplitude)
+    omega = angular_frequencies * np.exp(-softening * level)
+    return np.asarray(omega), np.asarray(damping_ratios * np.exp(damping_growth * level))
+
+
 def frame_with_modes(frame: Frame, angular_frequencies: FloatArray, damping_ratios: FloatArray) -> Frame:
     """Return the frame with the same masses and mode shapes, and other frequencies and damping.
 
@@ -37,8 +60,7 @@ def frame_with_modes(frame: Frame, angular_frequencies: FloatArray, damping_rati
 def frame_at_amplitude(artifact: Artifact, frame: Frame, amplitude_m: float) -> Frame:
     """Return the linear frame that is equivalent to the identified one at an amplitude of the motion.
 
-    Where the amplitude of each mode counts, modes share the motion in proportion to the largest amplitudes of the
-    identification.
+    The modes share the motion in proportion to their largest amplitudes in the identification.
 
     Parameters
     ----------
@@ -72,5 +94,5 @@ def frame_at_amplitude(artifact: Artifact, frame: Frame, amplitude_m: float) -> 
     if omega.size != frame.floors:
         problem = f"{omega.size} of {frame.floors} modes were identified over amplitude"
         raise UserError(artifact.path, name, problem, "set it to 0")
-    level = np.log1p(amplitude_m * largest / largest.max() / reference)
-    return frame_with_modes(frame, omega * np.exp(-softening * level), zeta * np.exp(growth * level))
+    relative = amplitude_m * largest / largest.max() / reference
+    return frame_with_modes(frame, *modes_at_amplitude(omega, zeta, softening, growth, relative))
