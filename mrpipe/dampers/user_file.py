@@ -12,6 +12,12 @@ from mrpipe.errors import UserError
 from mrpipe.numba_cache import cache_for
 
 
+def check_is_file(path: Path, setting: str, remedy: str) -> None:
+    """Raise a UserError if there is no such file; arguments as in :func:`module_of_file`."""
+    if not path.is_file():
+        raise UserError(path, setting, "no such file", remedy)
+
+
 def module_of_file(path: Path, setting: str, remedy: str) -> ModuleType:
     """Return the module of a file; its name holds a hash of its content, so that an edited file is a new module.
 
@@ -27,8 +33,7 @@ def module_of_file(path: Path, setting: str, remedy: str) -> ModuleType:
     UserError
         If the file is missing or cannot be run.
     """
-    if not path.is_file():
-        raise UserError(path, setting, "no such file", remedy)
+    check_is_file(path, setting, remedy)
     content = hashlib.sha256(path.read_bytes()).hexdigest()[:16]
     name = f"mrpipe_user_{path.stem}_{content}"
     spec = importlib.util.spec_from_file_location(name, path)

@@ -9,11 +9,15 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+from mrpipe.dampers.user_file import check_is_file
 from mrpipe.errors import UserError
+
+REMEDY = "name a Python file that defines EFFECT"
+"""What a user can do about a file that defines no effect."""
 
 
 def name_in_file(path: Path, setting: str = "close_loop.effect_files") -> str:
-    """Return the name of the effect that a file defines, empty where the name is computed.
+    """Return the name of the effect that a file defines, empty if the name is computed.
 
     Parameters
     ----------
@@ -27,8 +31,7 @@ def name_in_file(path: Path, setting: str = "close_loop.effect_files") -> str:
     UserError
         If the file is missing, is not Python, or assigns no EFFECT.
     """
-    if not path.is_file():
-        raise UserError(path, setting, "no such file", "name a Python file that defines EFFECT")
+    check_is_file(path, setting, REMEDY)
     try:
         tree = ast.parse(path.read_bytes(), filename=str(path))
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
-import importlib.util
 import pkgutil
-import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -15,9 +12,10 @@ from typing import TypeVar
 
 import mrpipe.effects as package
 from mrpipe.artifacts.yaml_source import nearest
+from mrpipe.dampers.user_file import module_of_file
 from mrpipe.effects.contract import Effect
+from mrpipe.effects.file_reading import REMEDY
 from mrpipe.errors import UserError
-from mrpipe.numba_cache import cache_for
 
 LOADS_FROM = ("mrpipe.effects",)
 """Packages that are walked at run time: their modules belong to the code version of a stage."""
@@ -61,25 +59,7 @@ def effect_of_file(path: Path, setting: str = "close_loop.effect_files") -> obje
     UserError
         If the file is missing or cannot be run.
     """
-    if not Path(path).is_file():
-        raise UserError(path, setting, "no such file", "name a Python file that defines EFFECT")
-    content = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16]
-    name = f"mrpipe_user_effect_{Path(path).stem}_{content}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise UserError(path, setting, "is not a Python file", "name a .py file that defines EFFECT")
-    module: ModuleType = importlib.util.module_from_spec(spec)
-    # compiled code that is loaded from the cache looks for its module by name
-    sys.modules[name] = module
-    try:
-        with cache_for(name):
-            spec.loader.exec_module(module)
-    except Exception as error:
-        del sys.modules[name]
-        # a compiler prints pages: the first line names the fault
-        said = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
-        raise UserError(path, setting, f"cannot be run: {said}", "correct the file") from error
-    return getattr(module, "EFFECT", None)
+    return getattr(module_of_file(Path(path), setting, REMEDY), "EFFECT", None)
 
 
 def load_effect_file(path: Path) -> Effect:
