@@ -15,30 +15,20 @@ import pytest
 import yaml
 
 from mrpipe.pipeline.fingerprint import digest_of_artifact
+from tests.small_project import MAIN_JOB
 
 SMALL = {
     "name": "small",
-    "stages": ["record-bench", "prepare", "assemble", "sweep", "train-forward", "train-inverse", "identify-damper",
-               "report"],
-    "campaigns": {"bench": "laboratory", "frame": None, "closed_loop": None},
-    "laboratory": {
-        "hidden_effects": [],
-        "bench": {
-            "plan": "custom",
-            "tests": [
-                {"name": f"{role[0]}-{current}-{level}", "role": role, "current": current, "current_a": level,
-                 "frequency_hz": 1.5, "duration_s": 4.0}
-                for role in ("training", "validation")
-                for current, level in (("constant", 0.0), ("constant", 2.0), ("half-sine", 3.0), ("half-sine", 4.0))
-            ],
-        },
+    **MAIN_JOB,
+    "sweep": {
+        **MAIN_JOB["sweep"],
+        "states": [["velocity"], ["displacement"]],
+        "past_values": [0, 3],
+        "neurons": [3, 6],
     },
-    "sweep": {"states": [["velocity"], ["displacement"]], "past_values": [0, 3], "layers": [2], "neurons": [3, 6],
-              "biases": [False], "starts": 1, "refined": 1, "screen_iterations": 5, "refine_iterations": 5},
-    "train_forward": {"starts": 1, "refined_starts": 1, "subsample_iterations": 10, "iterations": 5},
-    "train_inverse": {"starts": 1, "refined_starts": 1, "subsample_iterations": 10, "iterations": 5},
-    "identify_damper": {"compare": ["bouc-wen"], "starts": 1},
-}  # fmt: skip
+}
+"""A sweep of several networks, so that the job is also killed in the middle of it."""
+
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 

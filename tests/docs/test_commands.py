@@ -17,6 +17,7 @@ from mrpipe.config.loader import load_config
 from mrpipe.control.laws import law_names
 from tests.campaigns.proposal.rigs import bench_folder, frame_folder
 from tests.docs.shown import ROOT, Shown, pages, shown
+from tests.small_project import MAIN_JOB
 
 CALLS = [call for page in pages() for call in shown(page)]
 PLACES = {"DIR", "FOLDER", "CONFIG", "RUN", "LAW", "NAME", "FILE", "WHAT"}
@@ -71,27 +72,10 @@ OWN_PROJECTS = {"configs/my-rig.yaml", "configs/my-damper.yaml", "configs/my-tow
 
 # --- every command runs ----------------------------------------------------------------------------------------------
 SMALL = {
+    **MAIN_JOB,
     "name": "thesis",
     "stages": ["record-bench", "prepare", "assemble", "sweep", "train-forward", "train-inverse", "identify-damper",
                "identify-frame", "calibrate", "simulate-vd", "close-loop", "report"],
-    "campaigns": {"bench": "laboratory", "frame": None, "closed_loop": None},
-    "laboratory": {
-        "hidden_effects": [],
-        "bench": {
-            "plan": "custom",
-            "tests": [
-                {"name": f"{role[0]}-{current}-{level}", "role": role, "current": current, "current_a": level,
-                 "frequency_hz": 1.5, "duration_s": 4.0}
-                for role in ("training", "validation")
-                for current, level in (("constant", 0.0), ("constant", 2.0), ("half-sine", 4.0))
-            ],
-        },
-    },
-    "sweep": {"states": [["velocity"]], "past_values": [0], "layers": [2], "neurons": [3], "biases": [False],
-              "starts": 1, "refined": 1, "screen_iterations": 3, "refine_iterations": 3},
-    "train_forward": {"starts": 1, "refined_starts": 1, "subsample_iterations": 3, "iterations": 3},
-    "train_inverse": {"starts": 1, "refined_starts": 1, "subsample_iterations": 3, "iterations": 3},
-    "identify_damper": {"compare": ["bouc-wen"], "starts": 1},
     "structure": {"storeys": [{"mass_kg": 100.0, "stiffness_n_m": 8.0e3, "repeat": 2}], "damping_ratio": [0.01]},
     "calibrate": {"neural": {"starts": 1, "iterations": 5, "amplitudes": 2, "frequencies": 2}},
     "simulate": {"plant_rate_hz": 1000, "controller": {"inverse": "model"},
@@ -100,7 +84,7 @@ SMALL = {
     "design": {"laws": ["vd", "fdns"], "amplitude_factors": [1.0], "grid": 3, "evaluations": 3, "draws": 1},
     "close_loop": {"candidates": ["accumulator"], "base_forms": ["bouc-wen"], "bootstrap_draws": 50, "laws": ["vd"]},
 }  # fmt: skip
-"""A configuration of everything that takes seconds; it has no hidden effect, so that the tracing ends early."""
+"""A configuration of everything that takes seconds."""
 
 RUN = "runs/thesis"
 RUNS = {
