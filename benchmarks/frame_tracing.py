@@ -9,7 +9,6 @@ that an interrupted run is taken up where it ended.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import tempfile
 import time
@@ -18,6 +17,8 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from benchmarks.results import append_row, read_rows
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
@@ -220,13 +221,6 @@ def traced(case: Case, campaign: Campaign, truth: dict[str, Any]) -> dict[str, A
     }  # fmt: skip
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a results file."""
-    if not path.is_file():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-
-
 def table(rows: list[dict[str, Any]]) -> str:
     """Return the rows as a table for the documentation."""
     lines = [
@@ -273,13 +267,11 @@ def main() -> None:
     options = parser.parse_args()
     if not options.table:
         done = {row["key"] for row in read_rows(options.results)}
-        options.results.parent.mkdir(parents=True, exist_ok=True)
         for case in cases(options.seeds, options.first_seed):
             if case.key in done or (options.names and case.planted not in options.names):
                 continue
             row = run_case(case)
-            with options.results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+            append_row(options.results, row)
             print("ok " if row["right"] else "BAD", row["key"], row.get("verdict", row["error"][-300:]), flush=True)
         return
     print(table(read_rows(options.results)))

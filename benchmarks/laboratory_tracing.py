@@ -21,6 +21,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.results import append_row, read_rows
+
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
@@ -223,25 +225,16 @@ def listed(options: argparse.Namespace) -> Iterator[Case]:
                             yield Case(name, seed, share, noise, rate, excitation)
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a results file."""
-    if not path.is_file():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-
-
 def run(cases: Iterable[Case], path: Path, *, jobs: int, keep: Path | None, duration_s: float) -> None:
     """Run what the results file lacks, two cases at a time with one thread each."""
     import joblib
 
     done = {row["key"] for row in read_rows(path)}
     todo = [case for case in cases if case.key not in done]
-    path.parent.mkdir(parents=True, exist_ok=True)
     parallel = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
     work = (joblib.delayed(run_case)(case, duration_s=duration_s, keep=keep) for case in todo)
     for row in parallel(work):
-        with path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        append_row(path, row)
         mark = "ok " if row["right"] else "BAD"
         print(mark, row["key"], row.get("verdict", row["error"][-200:]), row.get("truth_forms", ""), flush=True)
 

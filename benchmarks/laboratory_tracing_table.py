@@ -12,7 +12,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, TypeVar
 
-from benchmarks.laboratory_tracing import read_rows
+from benchmarks.results import read_rows
 
 Row = dict[str, Any]
 _Item = TypeVar("_Item")

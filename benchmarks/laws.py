@@ -10,7 +10,6 @@ Gains are those of the thesis where it prints some, else the exact optimum of th
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.results import append_row, read_rows
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.case_studies.motion import spectrum_compatible_motion
 from mrpipe.case_studies.ten_storey.structure import ten_storey
@@ -206,7 +206,7 @@ def main() -> None:
     parser.add_argument("--structures", nargs="*", default=list(STUDIES), choices=list(STUDIES))
     parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
-    rows = [json.loads(line) for line in given.results.read_text().splitlines()] if given.results.is_file() else []
+    rows = read_rows(given.results)
     if given.table:
         print(as_markdown(rows))
         return
@@ -216,8 +216,7 @@ def main() -> None:
             if (structure, law) in done:
                 continue
             row = {"structure": structure, "law": law, **STUDIES[structure](law)}
-            with given.results.open("a") as handle:
-                handle.write(json.dumps(row) + "\n")
+            append_row(given.results, row)
             print(structure, law, flush=True)
 
 

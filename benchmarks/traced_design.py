@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.results import append_row, read_rows
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns import load_campaign
 from mrpipe.control.assembly import ControllerFactory, calibrated_from
@@ -212,7 +213,7 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
-    rows = [json.loads(line) for line in given.results.read_text().splitlines()] if given.results.is_file() else []
+    rows = read_rows(given.results)
     if given.table:
         print(as_markdown(rows))
         return
@@ -221,8 +222,7 @@ def main() -> None:
         if seed in done:
             continue
         row = draw_once(seed)
-        with given.results.open("a") as handle:
-            handle.write(json.dumps(row) + "\n")
+        append_row(given.results, row)
         print(json.dumps(row), flush=True)
 
 

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.judging import judged, verdict_row
+from benchmarks.results import append_row, read_rows
 from benchmarks.rigs.bases import BASES
 from benchmarks.rigs.cases import KINDS, Case, case_of
 
@@ -74,13 +75,6 @@ def run_case(case: Case, *, keep: Path | None = None, timeout_s: float = 900.0) 
     return {**row, "error": ""}
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a results file."""
-    if not path.is_file():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-
-
 def selected(options: argparse.Namespace) -> Iterator[Case]:
     """Yield the cases that the command line asks for, by seed."""
     cases = (case_of(seed) for seed in count(options.first_seed))
@@ -127,11 +121,9 @@ def main() -> None:
     done = {row["seed"] for row in read_rows(options.results)}
     until = time.monotonic() + 60.0 * options.minutes
     todo = (case for case in selected(options) if case.seed not in done and time.monotonic() < until)
-    options.results.parent.mkdir(parents=True, exist_ok=True)
     parallel = joblib.Parallel(n_jobs=options.jobs, return_as="generator_unordered", pre_dispatch=options.jobs)
     for row in parallel(joblib.delayed(run_case)(case, keep=options.keep) for case in todo):
-        with options.results.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        append_row(options.results, row)
         print(report_line(row), file=sys.stderr, flush=True)
     print(document(read_rows(options.results)))
 

@@ -241,7 +241,7 @@ def document(all_rows: Sequence[Row]) -> str:
 
 def main() -> None:
     """Print the document."""
-    from benchmarks.tracing import read_rows
+    from benchmarks.results import read_rows
 
     print(document([row for path in sys.argv[1:] for row in read_rows(Path(path))]), end="")
 
