@@ -128,7 +128,7 @@ def test_the_c_code_of_a_new_law_does_the_same(new_law, tmp_path, set_c):
     from mrpipe.control import ControllerOptions, build_controller, inverse_table
 
     options = ControllerOptions(drive_limit=4.0)
-    controller = build_controller(new_law, Gains(drag_n_s2_m2=5000.0), options, inverse=inverse_table(set_c))
+    controller = build_controller(new_law, Gains(drag_n_s2_m2=10000.0), options, inverse=inverse_table(set_c))
     signal = recorded_signal(controller.measured_size, 200.0)
     python, c = in_python(controller, signal), in_c(controller, signal, tmp_path)
     assert np.ptp(python[:, 0]) > 0.1
