@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -94,7 +94,7 @@ class Subject:
     vectors
         Its test vectors.
     details
-        Where it comes from, for the JSON file.
+        Where it comes from, for the JSON file; `left_out` are sentences on what the model does not contain.
     """
 
     kind: str
@@ -103,6 +103,11 @@ class Subject:
     model: Any
     vectors: Vectors
     details: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def left_out(self) -> Sequence[str]:
+        """What the model does not contain, one sentence each."""
+        return tuple(self.details.get("left_out", ()))
 
 
 Files = Mapping[str, str | bytes]

@@ -92,6 +92,8 @@ def _readme(subject: Subject, chosen: Iterable[ExportFormat]) -> str:
         "computes from them. In double precision every format reproduces the outputs to 1e-9 of their largest "
         "magnitude.",
     ]
+    if subject.left_out:
+        parts.append("## Not contained\n\n" + "\n".join(f"- {sentence}." for sentence in subject.left_out))
     parts += [
         item.usage.format(name=subject.name, prefix=subject.prefix, upper=subject.prefix.upper()) for item in chosen
     ]

@@ -211,13 +211,13 @@ class Pipeline:
 
     def _inputs_there(self, stage: Stage) -> dict[str, Path]:
         inputs = {}
-        for name in (*stage.inputs, *stage.optional_inputs):
+        for name in dict.fromkeys((*stage.inputs, *stage.optional_inputs, *stage.known_inputs)):
             path = self.sources.path(name)
             if path is None or not path.exists():
                 if name in stage.inputs and path is not None:
                     inputs[name] = path
                 continue
-            if name in stage.optional_inputs and not self._usable(name):
+            if name not in stage.inputs and not self._usable(name):
                 continue
             inputs[name] = path
         return inputs
@@ -233,7 +233,7 @@ class Pipeline:
 
     def _key(self, stage: Stage, inputs: Mapping[str, Path]) -> StageKey:
         digests = {name: self.sources.digest(name, path) for name, path in inputs.items()}
-        for name in stage.optional_inputs:
+        for name in (*stage.optional_inputs, *stage.known_inputs):
             digests.setdefault(name, ABSENT)
         if stage.public_data:
             digests[PUBLIC_DATA] = self.sources.digest_of_public_data(stage.public_data)

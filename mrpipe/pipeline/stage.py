@@ -113,6 +113,8 @@ class Stage:
         Names of stages whose artifact is read, or `campaign:bench`, `campaign:frame`, `campaign:closed-loop`.
     optional_inputs
         The same, used where they are there.
+    known_inputs
+        The same, used only if they are up to date: they are not built for this stage.
     conditional_inputs
         (dotted setting, value, input): a further input where the setting has this value. The order of the stages
         does not follow from them.
@@ -136,6 +138,7 @@ class Stage:
     run: Callable[[StageContext], Mapping[str, Any]]
     inputs: tuple[str, ...] = ()
     optional_inputs: tuple[str, ...] = ()
+    known_inputs: tuple[str, ...] = ()
     conditional_inputs: tuple[tuple[str, str | None, str], ...] = ()
     settings: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()

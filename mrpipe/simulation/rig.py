@@ -26,8 +26,8 @@ from mrpipe.simulation.ground_record import read_ground_record
 from mrpipe.simulation.loop import RECORD_RATE_HZ, LoopOptions, Response, simulate_law
 from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault, SensorNoise
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
-from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes, read_frame
-from mrpipe.structures.over_amplitude import frame_at_amplitude
+from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
+from mrpipe.structures.over_amplitude import read_frame_at
 
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 """Dampers of a run by name, and the stage whose artifact holds each."""
@@ -125,9 +125,7 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact], ga
         If a parameter set is not there.
     """
     if settings.frame == "identified":
-        frame = read_frame(artifact("identify-frame"))
-        if settings.frame_amplitude_m > 0.0:
-            frame = frame_at_amplitude(artifact("identify-frame"), frame, settings.frame_amplitude_m)
+        frame = read_frame_at(artifact("identify-frame"), settings.frame_amplitude_m)
     else:
         frame = frame_from_parameter_set(settings.frame)
     dampers = {name: partial(artifact, stage) for name, stage in DAMPERS.items()}

@@ -31,7 +31,13 @@ def export_stage(law: str = "") -> Stage:
         run=lambda context: _run(context, law or context.settings.export.law, folder),
         inputs=("identify-frame", "calibrate"),
         conditional_inputs=(*LOOP_INPUTS, ("gains.source", "design", "design")),
-        settings=("gains", "export.prefix" if law else "export", "simulate.controller", "simulate.damper"),
+        settings=(
+            "gains",
+            "export.prefix" if law else "export",
+            "simulate.controller",
+            "simulate.damper",
+            "simulate.frame_amplitude_m",
+        ),
         after=("identify-damper", "train-inverse", "reproduce"),
         family="export",
         outputs=tuple(f"{folder}/{name}" for name in FILES),
@@ -45,10 +51,11 @@ def _run(context: StageContext, law: str, place: str) -> Mapping[str, Any]:
     from mrpipe.effects.damper import damper_named
     from mrpipe.exports.controller import controller_files
     from mrpipe.reporting import export_controller as section
-    from mrpipe.structures import read_frame
+    from mrpipe.structures.over_amplitude import read_frame_at
 
     settings = context.settings.export
-    frame = read_frame(context.artifact("identify-frame"))
+    # the observer of a law knows the frame that was simulated
+    frame = read_frame_at(context.artifact("identify-frame"), context.settings.simulate.frame_amplitude_m)
     damper = damper_named(
         context.settings.simulate.damper,
         {name: partial(context.artifact, stage) for name, stage in DAMPERS.items()},

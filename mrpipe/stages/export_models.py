@@ -15,26 +15,46 @@ DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 """Dampers of this run by name, and the stage whose artifact holds each."""
 
 
+def _tracing(context: StageContext) -> Mapping[str, Any]:
+    """Return the summary of close-loop, empty if the run has no tracing that is up to date."""
+    known = "close-loop" in context.inputs
+    return context.artifact("close-loop").json("summary") if known else {}
+
+
 def _damper(context: StageContext) -> Subject:
     from functools import partial
 
     from mrpipe.effects.damper import damper_named
     from mrpipe.exports.damper import damper_subject
+    from mrpipe.exports.left_out import effects_left_out
 
     name = context.settings.simulate.damper
+    left_out = []
+    if name == "identified":
+        left_out = effects_left_out(_tracing(context), "plant", "export the traced damper with --damper traced")
     found = damper_named(name, {key: partial(context.artifact, stage) for key, stage in DAMPERS.items()})
-    return damper_subject(found, prefix=context.settings.export.prefix, source=name)
+    return damper_subject(found, prefix=context.settings.export.prefix, source=name, left_out=left_out)
 
 
 def _frame(context: StageContext) -> Subject:
     from mrpipe.exports.frame import frame_subject
-    from mrpipe.structures import floor_position, read_frame, storey_position
+    from mrpipe.exports.left_out import frame_left_out
+    from mrpipe.structures import floor_position, storey_position
+    from mrpipe.structures.over_amplitude import read_frame_at
 
     settings = context.settings
-    frame = read_frame(context.artifact("identify-frame"))
+    artifact, amplitude = context.artifact("identify-frame"), settings.simulate.frame_amplitude_m
+    frame = read_frame_at(artifact, amplitude)
     place = storey_position if settings.calibrate.damper_across_storey else floor_position
     position = place(frame.floors, settings.calibrate.damper_floor)
-    return frame_subject(frame, position, prefix=settings.export.prefix, rate_hz=settings.export.frame_rate_hz)
+    return frame_subject(
+        frame,
+        position,
+        prefix=settings.export.prefix,
+        rate_hz=settings.export.frame_rate_hz,
+        amplitude_m=amplitude,
+        left_out=frame_left_out(artifact, amplitude, _tracing(context)),
+    )
 
 
 def _network(context: StageContext, name: str) -> Subject:
@@ -51,10 +71,18 @@ def _run(context: StageContext, name: str, subject_of: Callable[[StageContext], 
     from mrpipe.reporting import export_models as section
 
     subject = subject_of(context)
+    for sentence in subject.left_out:
+        context.warn(sentence)
     folder = context.run_directory / FOLDER / name
     files = write_export(subject, folder, context.settings.export.formats)
     section.describe(context.report, subject, files, f"{FOLDER}/{name}")
-    return {"kind": subject.kind, "name": subject.name, "folder": str(folder), "files": files}
+    return {
+        "kind": subject.kind,
+        "name": subject.name,
+        "folder": str(folder),
+        "files": files,
+        "left_out": list(subject.left_out),
+    }
 
 
 def _stage(
@@ -63,6 +91,7 @@ def _stage(
     inputs: tuple[str, ...],
     settings: tuple[str, ...] = (),
     conditional_inputs: tuple[tuple[str, str | None, str], ...] = (),
+    known_inputs: tuple[str, ...] = (),
 ) -> Stage:
     return Stage(
         name=f"export-{name}",
@@ -70,6 +99,7 @@ def _stage(
         run=lambda context: _run(context, name, subject_of),
         inputs=inputs,
         conditional_inputs=conditional_inputs,
+        known_inputs=known_inputs,
         settings=("export", *settings),
         after=("reproduce",),
         family="export",
@@ -79,9 +109,20 @@ def _stage(
 
 STAGES = (
     _stage(
-        "damper", _damper, ("identify-damper",), ("simulate.damper",), (("simulate.damper", "traced", "close-loop"),)
+        "damper",
+        _damper,
+        ("identify-damper",),
+        ("simulate.damper",),
+        (("simulate.damper", "traced", "close-loop"),),
+        ("close-loop",),
     ),
-    _stage("frame", _frame, ("identify-frame",), ("calibrate.damper_floor", "calibrate.damper_across_storey")),
+    _stage(
+        "frame",
+        _frame,
+        ("identify-frame",),
+        ("calibrate.damper_floor", "calibrate.damper_across_storey", "simulate.frame_amplitude_m"),
+        known_inputs=("close-loop",),
+    ),
     _stage("forward", lambda context: _network(context, "forward"), ("assemble", "train-forward")),
     _stage("inverse", lambda context: _network(context, "inverse"), ("assemble", "train-inverse")),
 )

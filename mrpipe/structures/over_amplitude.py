@@ -9,7 +9,7 @@ import numpy as np
 from mrpipe.artifacts import Artifact, FloatArray
 from mrpipe.errors import UserError
 from mrpipe.structures.dynamics import natural_modes
-from mrpipe.structures.frame import Frame
+from mrpipe.structures.frame import Frame, read_frame
 
 GROUP = "amplitude"
 
@@ -57,6 +57,30 @@ def frame_with_modes(frame: Frame, angular_frequencies: FloatArray, damping_rati
     return replace(frame, damping=damping, stiffness=stiffness)
 
 
+def depends_on_amplitude(artifact: Artifact) -> bool:
+    """Return whether `identify-frame` found modes that depend on the amplitude of the motion."""
+    return f"{GROUP}/angular_frequency" in artifact
+
+
+def read_frame_at(artifact: Artifact, amplitude_m: float) -> Frame:
+    """Return the identified frame, at an amplitude of the motion as :func:`frame_at_amplitude`.
+
+    Parameters
+    ----------
+    artifact
+        frame.h5 of `identify-frame`.
+    amplitude_m
+        Amplitude at the floor that moves most [m]; 0: the frame of constant modes.
+
+    Raises
+    ------
+    UserError
+        If the identification found no dependence on amplitude, or not all modes.
+    """
+    frame = read_frame(artifact)
+    return frame_at_amplitude(artifact, frame, amplitude_m) if amplitude_m > 0.0 else frame
+
+
 def frame_at_amplitude(artifact: Artifact, frame: Frame, amplitude_m: float) -> Frame:
     """Return the linear frame that is equivalent to the identified one at an amplitude of the motion.
 
@@ -77,7 +101,7 @@ def frame_at_amplitude(artifact: Artifact, frame: Frame, amplitude_m: float) -> 
         If the identification found no dependence on amplitude, or not all modes.
     """
     name = "simulate.frame_amplitude_m"
-    if f"{GROUP}/angular_frequency" not in artifact:
+    if not depends_on_amplitude(artifact):
         problem = "identify-frame found no dependence of the modes on amplitude"
         raise UserError(artifact.path, name, problem, "set it to 0")
     omega, zeta, softening, growth, reference, largest = (

@@ -117,6 +117,20 @@ def test_optional_input_is_used_where_it_is_there(make_pipeline: MakePipeline) -
 
 
 @pytest.mark.property
+def test_a_known_input_is_used_if_it_is_up_to_date_and_never_built(make_pipeline: MakePipeline) -> None:
+    stages = {**STAGES, "third": replace(STAGES["third"], optional_inputs=(), known_inputs=("second",))}
+    make_pipeline(stages).build("third")
+    assert CALLS == ["third"]
+    make_pipeline(stages).build("second")
+    assert make_pipeline(stages).status(["third"])["third"] == ["input second is new"]
+    make_pipeline(stages).build("third")
+    assert CALLS == ["third", "first", "second", "third"]
+    # out of date: it is left out again, and not built
+    make_pipeline(stages, prepare={"cutoff_hz": 80.0}).build("third")
+    assert CALLS == ["third", "first", "second", "third", "third"]
+
+
+@pytest.mark.property
 def test_a_setting_may_ask_for_a_further_input(make_pipeline: MakePipeline) -> None:
     conditional = replace(STAGES["third"], optional_inputs=(), conditional_inputs=(("seed", 5, "second"),))
     make_pipeline({**STAGES, "third": conditional}).build("third")

@@ -29,9 +29,9 @@ from mrpipe.networks.network import write_network
 from mrpipe.pipeline.runner import plain
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.stages import calibrate, export_controller, export_models
+from mrpipe.stages import calibrate, export_controller, export_models, export_opensees
 from mrpipe.stages.simulate import STAGES
-from mrpipe.structures import frame_from_parameter_set, shear_frame, write_frame
+from mrpipe.structures import frame_from_parameter_set, natural_modes, shear_frame, write_frame
 from tests.control.conftest import random_network
 
 SIMULATE = {stage.name: stage for stage in STAGES}
@@ -82,6 +82,7 @@ def runner(directory: Path) -> Run:
         "identify-damper": "damper.h5",
         "train-inverse": "inverse.h5",
         "calibrate": "control.h5",
+        "close-loop": "close-loop.h5",
     }
     with ArtifactWriter.create(directory / "frame.h5", Provenance("test")) as artifact:
         write_frame(artifact, frame_from_parameter_set("thesis"))
@@ -95,7 +96,8 @@ def runner(directory: Path) -> Run:
 
     def go(stage: Stage, settings: dict[str, Any] | None = None) -> dict:
         configuration = config_model().model_validate(_laid_over(settings or {}))
-        inputs = stage.for_configuration(configuration).inputs
+        inputs = list(stage.for_configuration(configuration).inputs)
+        inputs += [name for name in stage.known_inputs if (directory / files[name]).exists()]
         context = StageContext(
             stage=stage.name,
             settings=SettingsView(configuration, stage.settings, stage.name),
@@ -269,6 +271,51 @@ def test_export_of_a_model_writes_a_folder_with_the_formats_asked_for(run, name)
     assert files == {*summary["files"]} == {f"{name}.{end}" for end in ("c", "h", "json")} | {
         "self_test.c", "vectors.csv", "README.md",
     }  # fmt: skip
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("name", ["frame", "opensees"])
+def test_the_export_of_a_frame_names_what_it_leaves_out(tmp_path, name):
+    stages = {item.name: item for item in (*export_models.STAGES, export_opensees.STAGE)}
+    run = runner(tmp_path)
+    assert run(stages[f"export-{name}"])["warnings"] == []
+    found = [
+        {"name": "joint-friction", "place": "storey 2", "corrected_in": "structure"},
+        {"name": "remanence", "corrected_in": "plant"},
+    ]
+    with ArtifactWriter.create(tmp_path / "close-loop.h5", Provenance("test")) as artifact:
+        artifact.put_json("summary", {"effects": found})
+    with ArtifactWriter.create(tmp_path / "frame.h5", Provenance("test")) as artifact:
+        frame = frame_from_parameter_set("thesis")
+        write_frame(artifact, frame)
+        laws = {"angular_frequency": natural_modes(frame).angular_frequencies, "damping_ratio": np.full(5, 0.01)}
+        laws |= {"softening_exponent": np.full(5, 0.1), "damping_exponent": np.full(5, 0.3)}
+        for column, values in {**laws, "reference": np.full(5, 1e-3), "largest": np.full(5, 0.01)}.items():
+            artifact.put(f"amplitude/{column}", values, unit="1", dims=("mode",))
+    summary = run(stages[f"export-{name}"])
+    assert summary["warnings"] == summary["left_out"]
+    effects, amplitude = summary["left_out"]
+    assert effects.startswith("close-loop found joint-friction (storey 2), which this export does not contain")
+    assert "set simulate.frame_amplitude_m" in amplitude
+    at_amplitude = run(stages[f"export-{name}"], {"simulate": {"frame_amplitude_m": 0.01}})
+    assert at_amplitude["left_out"] == [effects]
+    if name == "frame":
+        folder = tmp_path / "export" / "frame"
+        content = json.loads((folder / "frame.json").read_text())
+        assert content["left_out"] == [effects] and content["amplitude_m"] == 0.01
+        # softer by the factor (1 + A/A_0)^-a of the law
+        assert content["model"]["frequencies_hz"] == pytest.approx(natural_modes(frame).frequencies_hz * 11.0**-0.1)
+        assert "joint-friction" in (folder / "README.md").read_text()
+
+
+@pytest.mark.golden
+def test_the_export_of_the_identified_damper_names_the_effects_of_the_traced_one(tmp_path):
+    run = runner(tmp_path)
+    with ArtifactWriter.create(tmp_path / "close-loop.h5", Provenance("test")) as artifact:
+        artifact.put_json("summary", {"effects": [{"name": "remanence", "corrected_in": "plant"}]})
+    stage = {item.name: item for item in export_models.STAGES}["export-damper"]
+    (warning,) = run(stage, {"export": {"formats": ["json"]}})["warnings"]
+    assert warning.startswith("close-loop found remanence") and warning.endswith("--damper traced")
 
 
 def _write_other_rig(path: Path) -> None:

@@ -7,8 +7,8 @@ import pytest
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.errors import UserError
-from mrpipe.structures import complex_modes, natural_modes, shear_frame
-from mrpipe.structures.over_amplitude import frame_at_amplitude
+from mrpipe.structures import complex_modes, natural_modes, shear_frame, write_frame
+from mrpipe.structures.over_amplitude import depends_on_amplitude, frame_at_amplitude, read_frame_at
 
 
 def _frame():
@@ -46,5 +46,16 @@ def test_modes_follow_their_laws_and_keep_their_shapes(tmp_path):
 @pytest.mark.property
 def test_constant_modes_leave_nothing_to_take(tmp_path):
     artifact = _artifact(tmp_path / "frame.h5", other=[1.0])
+    assert not depends_on_amplitude(artifact)
     with pytest.raises(UserError, match="found no dependence of the modes on amplitude"):
         frame_at_amplitude(artifact, _frame(), 0.01)
+
+
+@pytest.mark.property
+def test_without_amplitude_the_frame_is_the_identified_one(tmp_path):
+    with ArtifactWriter.create(tmp_path / "frame.h5", Provenance("identify-frame")) as artifact:
+        write_frame(artifact, _frame())
+    read = Artifact(tmp_path / "frame.h5")
+    assert np.array_equal(read_frame_at(read, 0.0).stiffness, _frame().stiffness)
+    with pytest.raises(UserError, match="set it to 0"):
+        read_frame_at(read, 0.01)

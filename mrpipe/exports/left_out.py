@@ -1,0 +1,52 @@
+"""What an exported model does not contain, one sentence each: for the warnings, the README and the JSON file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mrpipe.artifacts import Artifact
+from mrpipe.structures.over_amplitude import depends_on_amplitude
+
+
+def effects_left_out(summary: Mapping[str, Any], where: str, remedy: str) -> list[str]:
+    """Return a sentence that names the effects which close-loop found and the export does not contain.
+
+    Parameters
+    ----------
+    summary
+        Of close-loop.
+    where
+        `structure` or `plant`: where the effects are corrected.
+    remedy
+        What the user can do.
+    """
+    names = [
+        f"{item['name']} ({item['place']})" if item.get("place") else str(item["name"])
+        for item in summary.get("effects", ())
+        if item.get("corrected_in") == where
+    ]
+    if not names:
+        return []
+    return [f"close-loop found {' and '.join(names)}, which this export does not contain: {remedy}"]
+
+
+def frame_left_out(frame: Artifact, amplitude_m: float, tracing: Mapping[str, Any]) -> list[str]:
+    """Return what a linear frame lacks of the identified structure.
+
+    Parameters
+    ----------
+    frame
+        frame.h5 of `identify-frame`.
+    amplitude_m
+        Amplitude at which the frame is taken [m]; 0: constant modes.
+    tracing
+        Summary of close-loop; empty if there is none.
+    """
+    found = effects_left_out(tracing, "structure", "the frame is linear, so add them in the program that uses it")
+    if amplitude_m == 0.0 and depends_on_amplitude(frame):
+        found.append(
+            "the modes depend on the amplitude of the motion, and this frame has constant modes: set "
+            "simulate.frame_amplitude_m to the amplitude that you expect"
+        )
+    return found
