@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -91,8 +92,10 @@ def folds(history: History, count: int, rng: np.random.Generator) -> list[tuple[
     """Split a history `count` times into one for fitting and one for judging, by motion.
 
     Tests with the same motion (frequency and amplitude) stay together, so that a network is judged on motions that it
-    was not fitted to. Motions are distributed over the folds by their number of samples. With fewer than three motions
-    the records are distributed instead, by RMS force; fewer than five records are cut within, as by :func:`hold_out`.
+    was not fitted to. The extreme motions stay in every fit (see :func:`extreme_motions`), because a network is to be
+    judged between the motions of its training, not beyond them. The other motions are distributed over the folds by
+    their number of samples. With fewer than three of them, all motions are distributed; with fewer than three motions
+    the records are distributed instead, and fewer than five records are cut within, as by :func:`hold_out`.
 
     Parameters
     ----------
@@ -105,7 +108,10 @@ def folds(history: History, count: int, rng: np.random.Generator) -> list[tuple[
     """
     records = len(history.names)
     groups = motions(history)
-    if len(groups) < 3:
+    extreme = extreme_motions(history, groups)
+    if len(groups) - len(extreme) >= 3:
+        groups = [group for place, group in enumerate(groups) if place not in extreme]
+    elif len(groups) < 3:
         groups = [[index] for index in range(records)]
     if records < 5 or count < 2:
         share = 1.0 / max(count, 4)
@@ -120,12 +126,32 @@ def folds(history: History, count: int, rng: np.random.Generator) -> list[tuple[
     ]
 
 
+def extreme_motions(history: History, groups: Sequence[Sequence[int]]) -> set[int]:
+    """Return the groups of tests at the corners of the range of amplitude and frequency, four at most.
+
+    Parameters
+    ----------
+    history
+        Training tests.
+    groups
+        Indices of the tests of each motion, as from :func:`motions`.
+    """
+    displacement, velocity = np.log(np.maximum([_size(history, group[0]) for group in groups], 1e-300)).T
+    amplitude, frequency = (
+        item / max(float(np.ptp(item)), float(np.log1p(ALIKE))) for item in (displacement, velocity - displacement)
+    )
+    corners = [amplitude + frequency, amplitude - frequency, frequency - amplitude, -amplitude - frequency]
+    return {int(np.argmax(item)) for item in corners}
+
+
+def _size(history: History, index: int) -> tuple[float, float]:
+    """Return the RMS displacement and the RMS velocity of a test."""
+    return (float(np.std(history.record(index, "displacement"))), float(np.std(history.record(index, "velocity"))))
+
+
 def motions(history: History) -> list[list[int]]:
     """Return the indices of the tests, grouped by motion: RMS displacement and RMS velocity within a twelfth."""
-    sizes = [
-        (float(np.std(history.record(index, "displacement"))), float(np.std(history.record(index, "velocity"))))
-        for index in range(len(history.names))
-    ]
+    sizes = [_size(history, index) for index in range(len(history.names))]
     groups: list[list[int]] = []
     for index, size in enumerate(sizes):
         group = next((item for item in groups if np.allclose(size, sizes[item[0]], rtol=ALIKE, atol=0.0)), None)

@@ -10,7 +10,7 @@ import pytest
 
 from mrpipe.networks.candidates import Candidate, Grid
 from mrpipe.networks.findings import choose, findings, score
-from mrpipe.networks.held_out import folds, motions
+from mrpipe.networks.held_out import extreme_motions, folds, motions
 from mrpipe.networks.options import SweepOptions
 from mrpipe.networks.sweep import Outcome, predicted_costs, sweep
 from tests.networks.rig import bench_history
@@ -205,6 +205,19 @@ def test_splits_leave_whole_motions_out_and_every_test_once() -> None:
     assert len(folds(bench_history(), 3, np.random.default_rng(3))) == 3
     ((fitted, part),) = folds(history.select([0, 1]), 4, np.random.default_rng(3))
     assert fitted.names == part.names and fitted.samples > part.samples > 0
+
+
+@pytest.mark.property
+def test_networks_are_judged_between_the_motions_of_their_training() -> None:
+    history = bench_history(frequencies=(0.5, 0.8, 1.0, 1.3, 1.8))
+    groups = motions(history)
+    tests_at = {name: {test for test in history.names if test.endswith(name)} for name in ("0.5Hz", "1.8Hz")}
+    extreme = {history.names[index] for place in extreme_motions(history, groups) for index in groups[place]}
+    assert extreme == tests_at["0.5Hz"] | tests_at["1.8Hz"]
+    splits = folds(history, 3, np.random.default_rng(3))
+    for fitted, part in splits:
+        assert extreme <= set(fitted.names) and not extreme & set(part.names)
+    assert sorted(name for _, part in splits for name in part.names) == sorted(set(history.names) - extreme)
 
 
 @pytest.mark.planted
