@@ -23,7 +23,7 @@ from mrpipe.tracing.bench.pairs import with_play
 from mrpipe.tracing.bench.race import Model, Race, alone, on_all_tests, race
 from mrpipe.tracing.bench.refine import with_richer_forms
 from mrpipe.tracing.bench.select import Candidate, Selection, draft, forward_selection, share_of
-from mrpipe.tracing.bench.weights import force_deviation, noise_scale
+from mrpipe.tracing.bench.weights import NoiseScale, force_deviation, noise_scale
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
 
@@ -98,7 +98,7 @@ def choose_model(
     if floor > 0.0:
         baseline = _without_nuisances(baseline, options)
     while True:
-        choice = _raced(baseline, effects, options, floor > 0.0, weighed, jobs, progress)
+        choice, extension = _raced(baseline, effects, options, floor > 0.0, weighed, jobs, progress)
         selection = choice.selection
         quieter = None if weighed or floor > 0.0 or choice.race is None else _quieter(choice, options.rules)
         if quieter is not None:
@@ -108,12 +108,13 @@ def choose_model(
         if choice.race is not None:
             selection = with_laws_again(selection, options.yield_order, options.viscosity_order)
         if floor > 0.0:
-            return replace(choice, selection=judged_by_trees(selection, options.rules.model_error))
+            selection = judged_by_trees(selection, options.rules.model_error)
+            return replace(choice, selection=replace(selection, extension=extension()))
         if choice.race is None:
             return choice
         if _near_the_noise(selection, baseline.noise, len(declared), options, rng, jobs):
             baseline, selection = _with_noise_of(selection.chosen, baseline, selection, options.rules.noise)
-            return replace(choice, baseline=baseline, selection=selection)
+            return replace(choice, baseline=baseline, selection=replace(selection, extension=extension()))
         # what remains on the force's own scale becomes the yardstick of a second race
         chosen = selection.chosen
         used = chosen.problem.root_weight > 0.0
@@ -154,13 +155,17 @@ def _raced(
     weighed: bool,
     jobs: int,
     progress: Progress,
-) -> Choice:
-    """Run the race and fit its winner to all training tests; `weighed` if the weights are those of a winner already."""
+) -> tuple[Choice, Callable[[], Fit | None]]:
+    """Run the race and fit its winner to all training tests; `weighed` if the weights are those of a winner already.
+
+    The function that is returned with the choice fits the winner with further terms. It is expensive, and it is called
+    only if the race is not run again.
+    """
     rules = options.rules.selection_by_force if model_error else options.rules.selection
     least = options.rules.selection.nothing_missing
     nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=least)
     if not nothing.structured:
-        return Choice(baseline, nothing)
+        return Choice(baseline, nothing), lambda: None
     forms = {name: form.without_springs() for name, form in forms_named(options.base_forms).items()}
     progress(0.1, "base forms")
     singles = alone(draft(baseline.fit), forms, jobs=jobs)
@@ -181,14 +186,14 @@ def _raced(
     winner = found.winner(options.lead)
     progress(0.7, "fit to all tests")
     selection = promoted(found, winner, base)
+    extension = partial(_extension, found, winner, selection, search, options.rules)
     selection = replace(
         selection,
-        extension=_extension(found, winner, selection, search, options.rules),
         proven=len(winner.effects) - len(found.own),
         tied_forms=found.tied_forms(winner, options.lead),
         nothing_missing=least,
     )
-    return Choice(baseline, selection, found)
+    return Choice(baseline, selection, found), extension
 
 
 def _extension(
@@ -289,7 +294,8 @@ def _with_noise_of_best(
         or best.chi_square > rules.model_error.better_form * base.chi_square
     ):
         return baseline, dict(singles)
-    baseline = _weighed_by(baseline, on_all_tests(best, base.problem, iterations=4), rules.noise)
+    best_on_all = on_all_tests(best, base.problem, iterations=4)
+    baseline = _weighed_by(baseline, best_on_all, noise_scale(best_on_all, rules.noise), rules.noise)
     small = draft(baseline.fit)
     again = {
         name: fit(replace(item.problem, root_weight=small.problem.root_weight), item.theta, iterations=3)
@@ -300,10 +306,9 @@ def _with_noise_of_best(
     return baseline, again
 
 
-def _weighed_by(baseline: Baseline, found: Fit, rules: NoiseRules) -> Baseline:
+def _weighed_by(baseline: Baseline, found: Fit, scale: NoiseScale, rules: NoiseRules) -> Baseline:
     """Return the baseline with the weights and the noise that follow from another fit to all training tests."""
     problem = baseline.fit.problem
-    scale = noise_scale(found, rules)
     root = problem.recordings.used / force_deviation(found, problem.recordings, 0.0, scale, rules)
     noise = noise_level_of(replace(found, problem=replace(found.problem, root_weight=root)), scale)
     base = fit(replace(problem, root_weight=root), baseline.fit.theta, iterations=8)
@@ -320,10 +325,11 @@ def _with_scale(baseline: Baseline, choice: Choice, rules: NoiseRules) -> Baseli
 def _quieter(choice: Choice, rules: TracingRules) -> Baseline | None:
     """Return the baseline weighed by the noise of the chosen model, if that is clearly less; else None."""
     chosen = choice.selection.chosen
-    noise = noise_level_of(chosen, noise_scale(chosen, rules.noise))
+    scale = noise_scale(chosen, rules.noise)
+    noise = noise_level_of(chosen, scale)
     if min(noise, chosen.chi_square) > rules.model_error.better_form * choice.baseline.noise:
         return None
-    return _weighed_by(choice.baseline, chosen, rules.noise)
+    return _weighed_by(choice.baseline, chosen, scale, rules.noise)
 
 
 def _without_nuisances(baseline: Baseline, options: TracingOptions) -> Baseline:

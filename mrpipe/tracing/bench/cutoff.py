@@ -15,8 +15,7 @@ from mrpipe.dampers.library import base_form
 from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.crossvalidation import folds_of
-from mrpipe.tracing.bench.select import DRAFT_SAMPLES, MOST_PARTS
+from mrpipe.tracing.bench.select import draft_tests
 from mrpipe.tracing.rules import NuisanceRules
 
 FORMS = ("bouc-wen", "bingham", "hyperbolic-tangent", "hysteretic-sigmoid")
@@ -65,8 +64,7 @@ def highest_cutoff(
         limit /= RATIO
     if not limits:
         return np.inf
-    parts = min(-(-len(automatic.force) // DRAFT_SAMPLES), MOST_PARTS, max(1, automatic.tests // 4))
-    few = [tests[place] for place in folds_of(automatic, parts)[0]]
+    few = [tests[place] for place in draft_tests(automatic)]
 
     def left(highest: float) -> float:
         recordings = record_tests(few, rate_hz=rate_hz, highest_cutoff_hz=highest)

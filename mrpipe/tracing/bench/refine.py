@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -51,6 +52,7 @@ def with_richer_forms(
     """
     rules = rules or RefinementRules()
     chosen = selection.chosen
+    confirmed = partial(_confirmed, folds=folds, draws=draws, rng=rng, jobs=jobs, rules=rules)
     unseen: FloatArray | None = None
     for place in range(declared, min(declared + selection.proven, len(chosen.problem.terms))):
         if chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
@@ -60,9 +62,8 @@ def with_richer_forms(
             continue
         if unseen is None:
             unseen = left_out_residual(chosen, folds, jobs=jobs)
-        trial = left_out_residual(richer, folds, jobs=jobs)
-        gain = gain_of(unseen, trial, chosen.problem, draws=draws, rng=rng)
-        if gain.significant and gain.share > rules.least_gain:
+        trial = confirmed(unseen, richer)
+        if trial is not None:
             chosen, unseen = richer, trial
     return replace(selection, chosen=chosen)
 
@@ -103,11 +104,26 @@ def with_further_terms(
     longer = fit(problem, start, iterations=15)
     if longer.chi_square > (1.0 - rules.least_gain) * chosen.chi_square:
         return selection
-    left_out = [left_out_residual(item, folds, jobs=jobs) for item in (chosen, longer)]
-    gain = gain_of(left_out[0], left_out[1], problem, draws=draws, rng=rng)
-    if not gain.significant or gain.share < rules.least_gain:
+    unseen = left_out_residual(chosen, folds, jobs=jobs)
+    if _confirmed(unseen, longer, folds=folds, draws=draws, rng=rng, jobs=jobs, rules=rules) is None:
         return selection
     return replace(selection, chosen=longer, named_fit=chosen)
+
+
+def _confirmed(
+    unseen: FloatArray,
+    trial: Fit,
+    *,
+    folds: int,
+    draws: int,
+    rng: np.random.Generator,
+    jobs: int,
+    rules: RefinementRules,
+) -> FloatArray | None:
+    """Return the residual of a trial on tests left out of its fit if it is clearly less than `unseen`; else None."""
+    residual = left_out_residual(trial, folds, jobs=jobs)
+    gain = gain_of(unseen, residual, trial.problem, draws=draws, rng=rng)
+    return residual if gain.significant and gain.share > rules.least_gain else None
 
 
 def _richest(chosen: Fit, place: int) -> Fit | None:

@@ -13,6 +13,7 @@ import numpy as np
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.fitting.engine import Fit, fit, solve, start_of, weighting
 from mrpipe.fitting.problem import Term
+from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.crossvalidation import folds_of
 from mrpipe.tracing.bench.screen import Screened, screen
 from mrpipe.tracing.rules import SelectionRules
@@ -135,13 +136,18 @@ def left_of(found: Fit, noise: float, share: float) -> float:
     return max(found.chi_square - noise, 0.0) + share * noise
 
 
+def draft_tests(recordings: Recordings) -> list[int]:
+    """Return the indices of a share of the tests that still holds every drive level; all where there are few."""
+    parts = min(-(-len(recordings.force) // DRAFT_SAMPLES), MOST_PARTS, recordings.tests // 4)
+    return folds_of(recordings, max(1, parts))[0]
+
+
 def draft(found: Fit) -> Fit:
     """Return the fit on a share of its tests that still holds every drive level: enough to screen and to rank forms."""
     recordings = found.problem.recordings
-    parts = min(-(-len(recordings.force) // DRAFT_SAMPLES), MOST_PARTS, recordings.tests // 4)
-    if parts < 2:
+    keep = draft_tests(recordings)
+    if len(keep) == recordings.tests:
         return found
-    keep = folds_of(recordings, parts)[0]
     within = np.isin(recordings.test, keep)
     problem = replace(found.problem, recordings=recordings.subset(keep), root_weight=found.problem.root_weight[within])
     return fit(problem, found.theta, iterations=4)
