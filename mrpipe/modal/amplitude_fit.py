@@ -182,9 +182,7 @@ class _Problem:
         return float(np.sum(np.abs(error * record.scale) ** 2) / max(record.power, 1e-300))
 
 
-def _jacobian(
-    problem: _Problem, theta: FloatArray, free: Sequence[int], start: FloatArray | None = None
-) -> FloatArray:
+def _jacobian(problem: _Problem, theta: FloatArray, free: Sequence[int], start: FloatArray | None = None) -> FloatArray:
     """Return the derivatives of the residual with respect to the free parameters; `start` is the residual itself."""
     start = problem.residual(theta) if start is None else start
     columns = []
