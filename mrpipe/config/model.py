@@ -17,10 +17,10 @@ from pydantic import BaseModel, Field, create_model
 
 import mrpipe.config.sections
 from mrpipe.config.errors import model_in
-from mrpipe.config.section import Section
 from mrpipe.config.sections.campaigns import CampaignsSettings
 from mrpipe.config.sections.execution import ExecutionSettings
 from mrpipe.config.sections.report import ReportSettings
+from mrpipe.options import Section
 
 DEFAULT_STAGES = (
     "record-bench",

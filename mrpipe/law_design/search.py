@@ -135,7 +135,7 @@ def refine(value: Value, free: Sequence[FreeGain], start: Gains, options: Search
     else:
         # the simplex opens towards the inside of the bounds
         steps = np.where(centre + NEAR_STEP <= [high for _, high in bounds], NEAR_STEP, -NEAR_STEP)
-        found, point = _simplex(at, centre, steps, bounds, options.tolerance, most)
+        found, point = simplex_search(at, centre, steps, bounds, options.tolerance, most)
     return _gains(free, fixed, point) if found < at(centre) else start
 
 
@@ -183,7 +183,7 @@ def _search_several(at: AtPoint, free: Sequence[FreeGain], fixed: Mapping[str, f
         start = starts[place]
         # the simplex opens towards the middle of the range
         steps = np.where(start < middles, sizes, -sizes)
-        ends.append(_simplex(at, start, steps, bounds, options.tolerance, most))
+        ends.append(simplex_search(at, start, steps, bounds, options.tolerance, most))
     _, point = min([*ends, (float(values.min()), starts[int(np.argmin(values))])], key=lambda item: item[0])
     return _gains(free, fixed, point)
 
@@ -199,7 +199,7 @@ def _bounded(at: AtPoint, bounds: tuple[float, float], tolerance: float, most: i
     return float(found.fun), np.array([found.x])
 
 
-def _simplex(
+def simplex_search(
     at: AtPoint,
     start: FloatArray,
     steps: FloatArray,

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.gains import Gains
@@ -15,7 +14,7 @@ from mrpipe.control.laws import law_named
 from mrpipe.law_design.kept import Designed, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Limits, Load, Objective, RunOf, evaluate
 from mrpipe.law_design.options import DesignSettings
-from mrpipe.law_design.search import FreeGain
+from mrpipe.law_design.search import FreeGain, simplex_search
 from mrpipe.law_design.study import COARSE, reference_evaluation
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
@@ -27,6 +26,9 @@ TOGETHER = "dampers"
 
 FACTORS = (0.1, 10.0)
 """Smallest and largest factor on the calibrated gain of a damper."""
+
+TOLERANCE = 0.02
+"""Accuracy of the logarithm of a factor at which the search ends."""
 
 FIRST_STEP = -0.5
 """First step of the logarithm of a factor. It is downwards, because a real damper saturates above."""
@@ -109,14 +111,8 @@ def _search(value: Callable[[FloatArray], float], count: int, evaluations: int) 
     grid would grow with a power of the number of dampers.
     """
     low, high = np.log(FACTORS)
-    simplex = np.vstack([np.zeros(count), FIRST_STEP * np.eye(count)])
-    minimize(
-        value,
-        np.zeros(count),
-        method="Nelder-Mead",
-        bounds=[(low, high)] * count,
-        options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 1e-3, "maxfev": evaluations * count},
-    )
+    steps = np.full(count, FIRST_STEP)
+    simplex_search(value, np.zeros(count), steps, [(low, high)] * count, TOLERANCE, evaluations * count)
 
 
 def _runs(rig: DampersRig, seed: int) -> RunOf:

@@ -46,7 +46,7 @@ SECTION_FILE = '''
 
 from pydantic import Field
 
-from mrpipe.config.section import Section
+from mrpipe.options import Section
 
 
 class CountTestsSettings(Section):

@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from mrpipe.config.section import Section
 from mrpipe.networks.scaling import NORMALISATION, Normalisation
+from mrpipe.options import Section
 
 ForwardInput = Literal["displacement", "velocity", "acceleration", "drive"]
 InverseInput = Literal["displacement", "velocity", "acceleration", "force"]

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from mrpipe.case_studies.options import LqgWeights, WindClimate
-from mrpipe.config.section import Section
+from mrpipe.options import Section
 
 
 class MotionSettings(Section):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from mrpipe.config.section import Section
+from mrpipe.options import Section
 
 LABORATORY = "laboratory"
 

@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from mrpipe.config.section import Section
 from mrpipe.control.laws import known_law, law_names
+from mrpipe.options import Section
 
 
 class ExportSettings(Section):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from mrpipe.config.section import Section
 from mrpipe.control.gains import GainsSource
+from mrpipe.options import Section
 
 
 class GainsSettings(Section):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from mrpipe.config.section import Section
 from mrpipe.modal.options import IdentificationOptions
+from mrpipe.options import Section
 
 
 class IdentifyFrameSettings(Section, IdentificationOptions):

@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from mrpipe.config.section import Section
 from mrpipe.control.laws import known_law
 from mrpipe.laboratory.options import BenchRig, CustomTest, FrameRig, LoopRig
+from mrpipe.options import Section
 
 
 class PlantedEffect(Section):

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from mrpipe.config.section import Section
+from mrpipe.options import Section
 
 
 class ReportSettings(Section):
