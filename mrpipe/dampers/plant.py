@@ -203,27 +203,22 @@ CHAIN_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGT
 """The compiled type of a chain's functions, for the signatures of kernels that run it."""
 
 
-@njit(
-    void(CHAIN_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64),
-    cache=True,
-)
-def advance(
-    functions: Any,
-    parameters: FloatArray,
-    parameter_offsets: IntArray,
-    state_offsets: IntArray,
-    state: FloatArray,
-    wire: FloatArray,
-    dt: float,
-) -> None:
-    """Advance the chain by one step: set TIME, FIRST and the motion and drive on the wire first, read FORCE after.
+@njit(void(float64[::1], int64, float64[::1], float64), cache=True)
+def begin_step(state: FloatArray, memory: int, wire: FloatArray, dt: float) -> None:
+    """Prepare the wire for the steps of a chain, from the motion and the drive on it and the bookkeeping of the state.
 
-    `state` holds the chain's state followed by numbers of bookkeeping (see :func:`new_state`); WORK, SLIP,
-    SINCE_REVERSAL and PAST_CURRENT are kept here for all steps to read. WORK counts the force of the step before. At
-    the start FORCE is the force of the step before, and everything else that steps write is 0: the force depends on
-    `state`, motion and drive alone, whatever a solver has tried on the same wire.
+    Parameters
+    ----------
+    state
+        Of the chain, with its bookkeeping from `memory` on: work, slip, time since reversal, largest current so far,
+        last velocity other than 0, last force.
+    memory
+        Length of the chain's own state.
+    wire
+        Holds time, mark of the first sample, displacement, velocity, acceleration and drive.
+    dt
+        Time since the last sample [s].
     """
-    memory = state_offsets[-1]
     if wire[FIRST] > 0.5:
         for index in range(memory, memory + BOOKKEEPING):
             state[index] = 0.0
@@ -245,6 +240,38 @@ def advance(
     wire[PAST_CURRENT] = state[memory + 3]
     wire[CURRENT] = wire[DRIVE]
     wire[RATE_YIELD] = 1.0
+
+
+@njit(void(float64[::1], int64, float64[::1], float64), cache=True)
+def end_step(state: FloatArray, memory: int, wire: FloatArray, dt: float) -> None:
+    """Bring the bookkeeping up to date after the steps of a chain; arguments as in :func:`begin_step`."""
+    state[memory] += (wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]) * wire[VELOCITY] * dt
+    state[memory + 3] = max(state[memory + 3], abs(wire[CURRENT]))
+    state[memory + 5] = wire[FORCE]
+
+
+@njit(
+    void(CHAIN_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64),
+    cache=True,
+)
+def advance(
+    functions: Any,
+    parameters: FloatArray,
+    parameter_offsets: IntArray,
+    state_offsets: IntArray,
+    state: FloatArray,
+    wire: FloatArray,
+    dt: float,
+) -> None:
+    """Advance the chain by one step: set TIME, FIRST and the motion and drive on the wire first, read FORCE after.
+
+    `state` holds the chain's state followed by numbers of bookkeeping (see :func:`new_state`); WORK, SLIP,
+    SINCE_REVERSAL and PAST_CURRENT are kept here for all steps to read. WORK counts the force of the step before. At
+    the start FORCE is the force of the step before, and everything else that steps write is 0: the force depends on
+    `state`, motion and drive alone, whatever a solver has tried on the same wire.
+    """
+    memory = state_offsets[-1]
+    begin_step(state, memory, wire, dt)
     for index in range(parameter_offsets.shape[0] - 1):
         functions[index](
             wire,
@@ -252,9 +279,7 @@ def advance(
             parameters[parameter_offsets[index] : parameter_offsets[index + 1]],
             dt,
         )
-    state[memory] += (wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]) * wire[VELOCITY] * dt
-    state[memory + 3] = max(state[memory + 3], abs(wire[CURRENT]))
-    state[memory + 5] = wire[FORCE]
+    end_step(state, memory, wire, dt)
 
 
 @njit(

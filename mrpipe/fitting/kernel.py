@@ -1,4 +1,8 @@
-"""One compiled loop over all tests that records what a fit needs of a chain: few columns, and the share of steps."""
+"""One compiled loop over all tests that records what a fit needs of a chain: few columns, and the share of steps.
+
+The steps are prepared and ended by the same functions as in :func:`mrpipe.dampers.plant.advance`. The loop over the
+steps is its own, because it looks between them: after the step of the coefficients and after each tapped step.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.drive import COEFFICIENT_STEPS
 from mrpipe.dampers.plant import (
     ACCELERATION,
+    BOOKKEEPING,
     CHAIN_FUNCTIONS,
     CURRENT,
     DISPLACEMENT,
@@ -19,21 +24,17 @@ from mrpipe.dampers.plant import (
     FIRST,
     FORCE,
     HYSTERESIS,
-    HYSTERETIC_FORCE,
     PART,
-    PAST_CURRENT,
     RATE_YIELD,
-    SINCE_REVERSAL,
-    SLIP,
     SUM_VELOCITY,
     TIME,
     VELOCITY,
     VISCOSITY,
-    VISCOUS_FORCE,
     WIRE_SIZE,
-    WORK,
     YIELD_FORCE,
     Chain,
+    begin_step,
+    end_step,
 )
 from mrpipe.dampers.timing import look_ahead
 from mrpipe.fitting.recordings import Recordings
@@ -82,44 +83,19 @@ def _run(
 ) -> None:
     memory = state_offsets[-1]
     count = parameter_offsets.shape[0] - 1
-    state = np.zeros(memory + 1)
+    state = np.zeros(memory + BOOKKEEPING)
     wire = np.zeros(WIRE_SIZE)
     for test in range(starts.shape[0] - 1):
         step = dt[test]
         state[:] = 0.0
-        wire[:] = 0.0
-        last = 0.0
-        slip = 0.0
-        since = 0.0
-        work = 0.0
-        past = 0.0
         for index in range(starts[test], starts[test + 1]):
-            first = index == starts[test]
-            v = velocity[index]
-            if not first:
-                if v * last < 0.0:
-                    slip = 0.0
-                    since = 0.0
-                slip += abs(v) * step
-                since += step
-            if v != 0.0:
-                last = v
-            # as in `advance`: only the force of the step before stays
-            force = wire[FORCE]
-            wire[:] = 0.0
-            wire[FORCE] = force
             wire[TIME] = (index - starts[test]) * step
-            wire[FIRST] = 1.0 if first else 0.0
+            wire[FIRST] = 1.0 if index == starts[test] else 0.0
             wire[DISPLACEMENT] = displacement[index]
-            wire[VELOCITY] = v
+            wire[VELOCITY] = velocity[index]
             wire[ACCELERATION] = acceleration[index]
             wire[DRIVE] = drive[index]
-            wire[CURRENT] = drive[index]
-            wire[WORK] = work
-            wire[SLIP] = slip
-            wire[SINCE_REVERSAL] = since
-            wire[PAST_CURRENT] = past
-            wire[RATE_YIELD] = 1.0
+            begin_step(state, memory, wire, step)
             yields = 1.0
             viscous = 1.0
             tap = 0
@@ -137,15 +113,14 @@ def _run(
                 if tap < tapped.shape[0] and k == tapped[tap]:
                     result[COLUMNS + tap, index] = wire[FORCE] - before
                     tap += 1
-            work += (wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]) * wire[VELOCITY] * step
-            past = max(past, abs(wire[CURRENT]))
+            end_step(state, memory, wire, step)
             result[CURRENT_AT, index] = wire[CURRENT]
             result[VELOCITY_AT, index] = wire[VELOCITY]
             result[HYSTERESIS_AT, index] = wire[HYSTERESIS] * wire[RATE_YIELD]
             result[YIELD_AT, index] = wire[YIELD_FORCE] / yields if abs(yields) > 1e-12 else 1.0
             result[VISCOSITY_AT, index] = wire[VISCOSITY] / viscous if abs(viscous) > 1e-12 else 1.0
             result[FORCE_AT, index] = wire[FORCE]
-            result[WORK_AT, index] = work
+            result[WORK_AT, index] = state[memory]
             result[DISPLACEMENT_AT, index] = wire[DISPLACEMENT]
             result[SUM_VELOCITY_AT, index] = wire[SUM_VELOCITY]
             result[PART_AT, index] = wire[PART]
