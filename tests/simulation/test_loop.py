@@ -8,11 +8,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from mrpipe.control import ControllerOptions, Gains, build_controller
-from mrpipe.dampers.drive import driver_lag_apart
-from mrpipe.dampers.plant import Phase, Step, build_chain, idle_step
+from mrpipe.dampers.plant import build_chain
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import LoopOptions, SensorNoise, at_rest, harmonic, recorded, simulate_law, sweep
-from mrpipe.simulation.parts import BOUC_WEN
 from mrpipe.simulation.reference import ReferenceController, reference_loop
 from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault
 from mrpipe.structures import Frame, frequency_response, natural_modes, state_space
@@ -118,37 +116,6 @@ def test_compiled_loop_equals_the_plain_one(rig, law, request_form):
     np.testing.assert_allclose(ours.drive[1:], drive[:-1], atol=1e-3 * rig.damper.drive_limit)
     np.testing.assert_allclose(ours.displacement, displacement, atol=2e-5 * np.max(np.abs(displacement)))
     np.testing.assert_allclose(ours.force[1:], force[1:], atol=1e-3 * np.max(np.abs(force)))
-
-
-@pytest.mark.property
-@pytest.mark.parametrize("driver_lag_s", [0.0, 0.004])
-def test_the_plain_damper_runs_as_any_chain(rig, driver_lag_s):
-    """Its loop has no function pointers: a chain with a step that does nothing takes the common way."""
-    damper = rig.damper
-    steps = [step for step in damper.steps() if step.name != "sum"]
-    common = build_chain([*steps, Step("nothing", Phase.FORCE_EFFECT, idle_step, np.zeros(0))])
-    assert damper.chain().names == BOUC_WEN and common.names != BOUC_WEN
-    options = LoopOptions(driver_time_constant_s=driver_lag_s)
-    ours, theirs = (
-        simulate_law(rig.frame, chain, rig.controller("vdns"), rig.excitation(0.7, 6), options)
-        for chain in (damper.chain(), common)
-    )
-    np.testing.assert_allclose(ours.force, theirs.force, atol=1e-9 * np.max(np.abs(theirs.force)))
-
-
-@pytest.mark.property
-def test_a_driver_that_lags_apart_with_equal_rates_is_the_plain_one(rig):
-    """It has the plain chain's names and one parameter more."""
-    plain = rig.damper.chain()
-    others = [step for step in rig.damper.steps() if step.name not in ("sum", "driver-lag")]
-    eta = float(plain.parameters[0])
-    apart = build_chain([driver_lag_apart(eta, eta), *others])
-    assert apart.names == plain.names
-    ours, theirs = (
-        simulate_law(rig.frame, chain, rig.controller("vd"), rig.excitation(0.7, 4), LoopOptions())
-        for chain in (apart, plain)
-    )
-    np.testing.assert_allclose(ours.force, theirs.force, atol=1e-9 * np.max(np.abs(theirs.force)))
 
 
 @pytest.mark.property
