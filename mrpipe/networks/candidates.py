@@ -104,7 +104,8 @@ class Grid:
     def crossings(self, scores: Mapping[Candidate, float]) -> list[Candidate]:
         """Return what a star leaves out: the best of each axis put together, two axes at a time and more.
 
-        A star shows which single change helps. The best network usually combines several of them.
+        A star shows which single change helps. The best network usually combines several of them. A further input
+        can help only a network that is large enough to use it, so all inputs are tried with the best layers too.
 
         Parameters
         ----------
@@ -118,7 +119,9 @@ class Grid:
             best[axis] = getattr(min(along, key=lambda item: scores[item], default=at), axis)
         moved = [axis for axis, value in best.items() if value != getattr(at, axis)]
         groups = [group for count in range(2, len(moved) + 1) for group in combinations(moved, count)]
-        return [replace(at, **{axis: best[axis] for axis in group}) for group in groups]
+        combined = [replace(at, **{axis: best[axis] for axis in group}) for group in groups]
+        widened = [replace(at, states=states, hidden=best["hidden"]) for states in self.states]
+        return [item for item in _once([*combined, *widened]) if item not in scores]
 
     @property
     def most_crossings(self) -> int:
@@ -132,7 +135,7 @@ class Grid:
             (at.biases, self.biases),
         )
         moving = sum(any(value != own for value in values) for own, values in axes)
-        return 2**moving - 1 - moving
+        return 2**moving - 1 - moving + len(self.states)
 
 
 def _once(candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -124,6 +125,29 @@ def folds(history: History, count: int, rng: np.random.Generator) -> list[tuple[
         (history.select([index for index in range(records) if index not in fold]), history.select(sorted(fold)))
         for fold in held
     ]
+
+
+def splits(history: History, share: float, count: int, rng: np.random.Generator) -> list[tuple[History, History]]:
+    """Split a history `count` times; half of the splits leave out whole motions, the others single tests.
+
+    A network is used at the motions of its training and between them. Splits of the first kind alone reject inputs that
+    need many motions, those of the second kind alone accept networks that fail between the motions.
+
+    Parameters
+    ----------
+    history
+        Training tests.
+    share
+        Share of the tests left out of each split.
+    count
+        Number of splits at most, at least 1.
+    rng
+        Decides which split holds which tests.
+    """
+    by_motion = folds(history, max(2, round(1.0 / share)), rng)[: max(1, -(-count // 2))]
+    by_test = [hold_out(history, share, rng) for _ in range(count - len(by_motion))]
+    pairs = itertools.zip_longest(by_motion, by_test)
+    return [item for pair in pairs for item in pair if item is not None]
 
 
 def extreme_motions(history: History, groups: Sequence[Sequence[int]]) -> set[int]:

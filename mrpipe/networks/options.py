@@ -64,8 +64,8 @@ class SweepOptions(Section):
         0.25,
         gt=0.0,
         lt=0.9,
-        description="Share of the training tests left out of the fit of each start (tests with the same motion "
-        "together); 0.25 gives four splits, which the starts share.",
+        description="Share of the training tests left out of the fit of each start. 0.25 gives four splits, which the "
+        "starts share; every second split leaves out all tests with the same motion together.",
     )
     held_out_failures: int = Field(
         10, ge=1, description="Consecutive iterations without gain on the held-out records that end a fit."

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from mrpipe.artifacts import FloatArray, IntArray, Progress, atomic_path, no_progress
 from mrpipe.networks.assembly import History, rows_at, window_starts
 from mrpipe.networks.candidates import Candidate
-from mrpipe.networks.held_out import folds
+from mrpipe.networks.held_out import splits
 from mrpipe.networks.levenberg_marquardt import fit
 from mrpipe.networks.options import SweepOptions
 from mrpipe.networks.problem import Problem
@@ -85,10 +85,10 @@ def sweep(
     progress: Progress = no_progress,
     tell: Callable[[str], None] = lambda _: None,
 ) -> SweepRun:
-    """Compare candidates on training records by cross-validation over motions.
+    """Compare candidates on training records by cross-validation over motions and tests.
 
-    Each start of a candidate is fitted to one split of the records (see :func:`mrpipe.networks.held_out.folds`) and
-    judged on motions that it was not fitted to.
+    Each start of a candidate is fitted to one split of the records (see :func:`mrpipe.networks.held_out.splits`) and
+    judged on motions or tests that it was not fitted to.
 
     Parameters
     ----------
@@ -206,11 +206,11 @@ def _splits(
     rng = np.random.default_rng([seed, 1])
     longest = max(candidate.past_values for candidate in candidates)
     count = min(options.starts, max(2, round(1.0 / options.held_out_share)))
-    splits = []
-    for fitted, held in folds(history, count, rng):
+    found = []
+    for fitted, held in splits(history, options.held_out_share, count, rng):
         shuffled = rng.permutation(window_starts(fitted, longest))
         judged = rng.permutation(window_starts(held, longest))
-        splits.append(
+        found.append(
             _Data(
                 fit=fitted,
                 held=held,
@@ -220,7 +220,7 @@ def _splits(
                 normalisation=normalisation,
             )
         )
-    return splits
+    return found
 
 
 def _fit_all(

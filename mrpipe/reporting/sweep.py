@@ -42,9 +42,9 @@ def describe(sink: Sink, result: SweepResult) -> None:
     sink.text(
         f"{len(outcomes)} architectures, each from {len(chosen.screened)} random starts, were screened on few rows; "
         f"{sum(outcome.is_refined for outcome in outcomes)} were trained further. Each start is judged on training "
-        f"tests that were left out of its fit, in {len(result.run.held_out)} splits. Tests of one motion are "
-        "left out together, so that a network is judged on unseen motions. Chosen is the smallest network "
-        "that is worse than the best by less than the standard error of their ratio and by less than "
+        f"tests that were left out of its fit, in {len(result.run.held_out)} splits. Every second "
+        "split leaves out all tests of one motion together, so that unseen motions count too. Chosen is the smallest "
+        "network that is worse than the best by less than the standard error of their ratio and by less than "
         f"{100.0 * WORTHWHILE:.0f} %: {chosen.candidate.label}."
     )
     sink.table("findings", _verdicts(result.verdicts), "General statements on architectures, checked on this campaign.")
