@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,8 @@ from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_probl
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, force_deviation, noise_scale, sensor_deviation
 from mrpipe.tracing.rules import NoiseRules
 
-LISTED = ("bouc-wen", "bouc-wen-n", "dahl", "yielding-part")
+LISTED_FORMS = ("bouc-wen", "bouc-wen-n", "dahl", "yielding-part")
+"""Base forms whose errors are always listed."""
 
 DEFAULT_OF_FAMILY = {"rate-dependent-yield": "yielding-part"}
 """The form that stands for a family where the settings name the family."""
@@ -140,11 +141,16 @@ def noise_level_of(found: Fit, scale: NoiseScale) -> float:
     return float(np.mean((root[used] * sensor_deviation(found, found.problem.recordings, scale)[used]) ** 2))
 
 
-def in_form(found: Fit, name: str) -> Fit:
-    """Return the fit with another base form of the library; the same fit where it has that form already."""
-    return found if found.problem.base.name == name else fit_with_form(found, base_form(name), iterations=8)
+def ladder(found: Fit, known: Mapping[str, Fit] | None = None) -> dict[str, Fit]:
+    """Return fits of the base forms that are always listed, the form of the fit first.
 
-
-def ladder(found: Fit) -> dict[str, Fit]:
-    """Return fits of the base forms that the verdict lists."""
-    return {name: in_form(found, name) for name in dict.fromkeys((found.problem.base.name, *LISTED))}
+    Parameters
+    ----------
+    found
+        Fit of the declared form.
+    known
+        Fits of forms to the same tests that exist already.
+    """
+    known = {**(known or {}), found.problem.base.name: found}
+    names = dict.fromkeys((found.problem.base.name, *LISTED_FORMS))
+    return {name: known.get(name) or fit_with_form(found, base_form(name), starts=1, iterations=8) for name in names}

@@ -7,7 +7,7 @@ them, and they are compared on all training tests: on most samples a model then 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
@@ -29,6 +29,9 @@ SCREENED = 8
 
 COMPARED = 60
 """Numerical technique: models, the best ones on the draft, that are compared on all training tests."""
+
+LISTED_STEPS = 3
+"""Numerical technique: iterations of fits that are only listed; they begin at the fit to the draft."""
 
 Search = Callable[[Fit], Selection]
 
@@ -159,6 +162,13 @@ class Race:
             if model.form == winner.form and model.effects[:count] == winner.effects
         ]
         return self.models[min(able, key=lambda place: float(costs[place]))]
+
+    def alone_on_all_tests(self, problem: Problem, names: Collection[str]) -> dict[str, Fit]:
+        """Return base forms without effects that were searched, fitted to all tests of a problem."""
+        drafted = {model.form: model.fit for model in self.models if model.effects == self.own and model.form in names}
+        return {
+            name: on_all_tests(item, problem, self.coupled, iterations=LISTED_STEPS) for name, item in drafted.items()
+        }
 
     def support(self, effect: str, lead: float, *, draws: int, rng: np.random.Generator) -> float:
         """Return the share of resamples in which the winner has an effect; tests are drawn with replacement."""

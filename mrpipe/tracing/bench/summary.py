@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.fitting.engine import predict
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.tracing.bench.baseline import Baseline, ladder
+from mrpipe.tracing.bench.baseline import LISTED_FORMS, Baseline, ladder
 from mrpipe.tracing.bench.ceiling import flexible_residual
 from mrpipe.tracing.bench.error_measures import Score, score
 from mrpipe.tracing.bench.judgement import recovered
@@ -19,6 +19,7 @@ from mrpipe.tracing.bench.nuisances import RecordGain, mean_drives, record_gains
 from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.offsets import OffsetFinding
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, open_tests
+from mrpipe.tracing.bench.race import Race
 from mrpipe.tracing.bench.residual_structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.verdict import Named, ranking
@@ -72,6 +73,7 @@ class Summary:
     found: OnValidation
     judgement: Judgement
     sorted_tests: SortedTests
+    race: Race | None = None
 
     def build(
         self,
@@ -218,7 +220,7 @@ class Summary:
 
     def _ladder(self, options: TracingOptions, measured: FloatArray) -> dict[str, Any]:
         base = self.selection.base
-        fits = ladder(base)
+        fits = ladder(base, {} if self.race is None else self.race.alone_on_all_tests(base.problem, LISTED_FORMS))
         judged = self.found.recordings
         errors = {name: score(judged, measured, predict(f, judged)).nrmse for name, f in fits.items()}
         if options.model not in errors:

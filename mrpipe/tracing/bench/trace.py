@@ -135,7 +135,7 @@ def trace_campaign(
         found = validated(selection.base, selection.chosen, baseline, training, validation, options)
         judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
     causes = [held(item, judgement, options, several=len(named) > 1 and item in named) for item in causes]
-    report = Summary(selection, baseline, training, offsets, found, judgement, ordered)
+    report = Summary(selection, baseline, training, offsets, found, judgement, ordered, choice.race)
     return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared])
 
 
