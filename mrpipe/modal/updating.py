@@ -210,7 +210,8 @@ def _collect(problem: _Problem, theta: FloatArray, jacobian: FloatArray, cost: f
     freedom = max(1, jacobian.shape[0] - theta.size)
     spread = _NORMAL_95 * np.sqrt(np.diag(covariance) * max(cost / freedom, 1e-30))
     # directions that the data do not determine have no variance in the pseudo-inverse: their parameters are unknown
-    _, singular, right = np.linalg.svd(jacobian, full_matrices=False)
+    rows = np.zeros((max(0, theta.size - jacobian.shape[0]), theta.size))
+    _, singular, right = np.linalg.svd(np.vstack([jacobian, rows]), full_matrices=False)
     blind = right[singular < 1e-6 * singular[0]]
     spread = np.where(np.any(np.abs(blind) > 0.1, axis=0), _RANGE, spread) if blind.size else spread
     count = parameters.size
