@@ -1,33 +1,32 @@
 """Modes from responses alone: ambient vibration, or earthquakes without a ground channel.
 
-pyOMA2 estimates the poles at many model orders by covariance-driven stochastic subspace identification (SSI). Poles
+pyOMA2 estimates the poles at many model orders (stochastic subspace identification or pLSCF). Poles
 that keep frequency and shape over the orders form clusters, and the choice among these is that of the forced tests.
 Frequency and damping are then refined by maximum likelihood, which also gives their intervals; errors of the shapes
-come from leaving out one block of the record at a time (jackknife). Without the input, neither modal masses nor
-participations can be known: the scale of M, C and K then comes from given masses alone.
+come from leaving out one block of the record at a time (jackknife). Tests with other sensors are set-ups of their own
+and are merged by the sensors that they share. Without the input, neither modal masses nor participations can be known:
+the scale of M, C and K then comes from given masses alone.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
-import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError, install_extra
+from mrpipe.modal.ambient_poles import ESTIMATORS, Estimator, Pole, Records
 from mrpipe.modal.ambient_refine import refine_by_spectra
+from mrpipe.modal.ambient_setups import SetUp, merge_set_ups, pooled_poles
 from mrpipe.modal.lscf import PoleCandidate
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.search import ModeSearch
-from mrpipe.modal.selection import LARGEST_DAMPING, Layout, complete_set, largest_set
+from mrpipe.modal.selection import Layout, complete_set, largest_set
 from mrpipe.modal.spectra import ComplexArray
 
 _BLOCKS = 8
@@ -47,16 +46,6 @@ _COPY_ASSURANCE = 0.7
 
 
 @dataclass(frozen=True)
-class _Pole:
-    """A pole at one model order."""
-
-    angular_frequency: float
-    damping_ratio: float
-    shape: ComplexArray
-    order: int
-
-
-@dataclass(frozen=True)
 class _Cluster:
     """Poles of several orders that are one: medians, shape turned to real, and how many orders have it."""
 
@@ -65,29 +54,6 @@ class _Cluster:
     shape: FloatArray
     collinearity: float
     orders: int
-
-
-@dataclass(frozen=True)
-class _Records:
-    """Blocks of the responses, each (s, m), at the rate of the analysis."""
-
-    blocks: tuple[FloatArray, ...]
-    rate_hz: float
-    block_rows: int
-    high_hz: float
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep the progress bars and log lines of pyOMA2 out of the program's own output."""
-    logger = logging.getLogger("pyoma2")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        logger.setLevel(level)
 
 
 def _lowest_peak_hz(tests: Sequence[FrameTest], low_hz: float) -> float:
@@ -117,7 +83,7 @@ def _common_motion_ends_hz(test: FrameTest, first_hz: float) -> float:
     return _MARGIN * max(float(frequency[common[-1]]) if common.size else 0.0, 2.0 * first_hz)
 
 
-def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> _Records:
+def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> Records:
     """Filter, decimate and cut the responses; a record spans the modes that a chain of floors can have."""
     rate = tests[0].sampling_rate_hz
     first = _lowest_peak_hz(tests, low_hz)
@@ -135,56 +101,18 @@ def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz:
         blocks += [np.ascontiguousarray(part.T) for part in np.array_split(values, per_test)]
     own_rate = rate / factor
     rows = int(np.clip(round(_PERIODS * own_rate / first), _LEAST_BLOCK_ROWS, _MOST_BLOCK_ROWS))
-    return _Records(tuple(blocks), own_rate, rows, high)
-
-
-def _hankel(block: FloatArray, rows: int) -> FloatArray:
-    from pyoma2.functions import ssi
-
-    # one lag between the two, because white noise of the sensors is correlated at lag zero only
-    with _quiet():
-        hankel, _ = ssi.build_hank(block[:, 1:], block[:, :-1], rows, "cov_R")
-    return np.asarray(hankel, dtype=np.float64)
-
-
-def _ssi_poles(hankel: FloatArray, records: _Records, orders: Sequence[int]) -> list[_Pole]:
-    from pyoma2.functions import ssi
-
-    channels = records.blocks[0].shape[0]
-    highest = max(orders)
-    with _quiet():
-        _, state, output, _ = ssi.SSI_fast(hankel, records.block_rows, highest)
-    found = []
-    for order in orders:
-        values, vectors = np.linalg.eig(state[order])
-        poles = np.asarray(np.log(values.astype(np.complex128)) * records.rate_hz, dtype=np.complex128)
-        shapes = np.asarray(output[order])[:channels] @ vectors
-        found += _physical(poles, shapes, order, records)
-    return found
-
-
-def _physical(
-    poles: NDArray[np.complex128], shapes: NDArray[np.complex128], order: int, records: _Records
-) -> list[_Pole]:
-    found = []
-    for pole, shape in zip(poles, shapes.T, strict=True):
-        omega = float(abs(pole))
-        zeta = float(-pole.real / omega) if omega > 0.0 else 1.0
-        inside = 0.0 < omega < 2.0 * np.pi * min(records.high_hz, 0.49 * records.rate_hz)
-        if pole.imag > 0.0 and inside and 0.0 < zeta < LARGEST_DAMPING:
-            found.append(_Pole(omega, zeta, np.asarray(shape / np.linalg.norm(shape)), order))
-    return found
+    return Records(tuple(blocks), own_rate, rows, high)
 
 
 def _assurance(first: ComplexArray, second: ComplexArray) -> float:
     return float(np.abs(np.vdot(first, second)) ** 2)
 
 
-def _clusters(poles: Sequence[_Pole]) -> list[_Cluster]:
+def _clusters(poles: Sequence[Pole]) -> list[_Cluster]:
     """Group poles of neighbouring frequency and equal shape, at most one of each order in a group."""
-    groups: list[list[_Pole]] = []
+    groups: list[list[Pole]] = []
     for pole in sorted(poles, key=lambda item: item.order, reverse=True):
-        best: list[_Pole] | None = None
+        best: list[Pole] | None = None
         for group in groups:
             centre = float(np.median([item.angular_frequency for item in group]))
             near = abs(pole.angular_frequency - centre) < _FREQUENCY_TOLERANCE * centre
@@ -198,7 +126,7 @@ def _clusters(poles: Sequence[_Pole]) -> list[_Cluster]:
     return [_summary(group) for group in groups]
 
 
-def _summary(group: Sequence[_Pole]) -> _Cluster:
+def _summary(group: Sequence[Pole]) -> _Cluster:
     reference = group[0].shape
     turned = np.mean([item.shape * np.exp(-1j * np.angle(np.vdot(reference, item.shape))) for item in group], axis=0)
     # the phase that makes the shape as real as it can be
@@ -230,15 +158,20 @@ def _matched(clusters: Sequence[_Cluster], pole: _Cluster) -> _Cluster | None:
 
 
 def _jackknife(
-    hankels: Sequence[FloatArray], records: _Records, orders: Sequence[int], firm: Sequence[_Cluster]
+    statistics: Sequence[ComplexArray | FloatArray],
+    records: Records,
+    estimator: Estimator,
+    orders: Sequence[int],
+    firm: Sequence[_Cluster],
 ) -> tuple[FloatArray, FloatArray]:
     """Return the covariance of (ln omega, ln zeta), shape (2r, 2r), and errors of the shapes, shape (s, r)."""
     modes, sensors = len(firm), firm[0].shape.size
     logs, shapes = [], []
-    total = np.sum(hankels, axis=0)
+    total = np.sum(np.array(statistics), axis=0)
     few = orders[:: max(1, len(orders) // 3)]
-    for left_out in hankels:
-        clusters = _clusters(_ssi_poles((total - left_out) / (len(hankels) - 1), records, few))
+    for left_out in statistics:
+        mean = (total - left_out) / (len(statistics) - 1)
+        clusters = _clusters(estimator.poles(mean, records, few))
         row, sheet = np.full(2 * modes, np.nan), np.full((sensors, modes), np.nan)
         for index, pole in enumerate(firm):
             match = _matched(clusters, pole)
@@ -248,7 +181,7 @@ def _jackknife(
                 sheet[:, index] = match.shape * np.sign(match.shape @ pole.shape)
         logs.append(row)
         shapes.append(sheet)
-    count = len(hankels)
+    count = len(statistics)
     spread = np.sqrt((count - 1) * np.nanvar(np.array(logs), axis=0))
     errors = np.sqrt((count - 1) * np.nanvar(np.array(shapes), axis=0))
     return np.diag(np.nan_to_num(spread, nan=1.0) ** 2), np.nan_to_num(errors, nan=1.0)
@@ -283,53 +216,83 @@ def _as_fit(
 
 
 def find_ambient_modes(
-    tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float, source: Path
+    tests: Sequence[FrameTest],
+    layout: Layout,
+    low_hz: float,
+    high_hz: float,
+    source: Path,
+    method: str = "ssi",
 ) -> ModeSearch:
     """Return the modes that the responses of ambient tests show.
 
     Parameters
     ----------
     tests
-        With the same sensors and sampling rate.
+        Tests with the same sensors and sampling rate form a set-up. Set-ups must share sensors.
     layout
         Floors and masses.
     low_hz, high_hz
         Band; 0 for `high_hz` takes a band that follows from the lowest peak and the number of floors.
     source
         campaign.yaml, for messages.
+    method
+        Name in :data:`~mrpipe.modal.ambient_poles.ESTIMATORS`.
 
     Raises
     ------
     UserError
-        If pyOMA2 is not installed, tests differ in sensors, or no mode is found.
+        If pyOMA2 is not installed, a set-up shares no sensor with the others, or no mode is found.
     """
     try:
         import pyoma2  # noqa: F401
     except ImportError as error:
         place = f"tests.{tests[0].name}"
         raise UserError(source, place, "ambient tests need pyOMA2", install_extra("ambient")) from error
-    if len({(test.sensors, test.sampling_rate_hz) for test in tests}) > 1:
-        problem = "ambient tests differ in sensors or sampling rate"
-        raise UserError(source, "tests", problem, "identify each set-up by itself, or give all the same sensors")
-    records = _records(tests, layout, low_hz, high_hz)
-    orders = range(2 * layout.floors, 2 * layout.floors + 32, 2)
-    hankels = [_hankel(block, records.block_rows) for block in records.blocks]
-    poles = _ssi_poles(np.mean(hankels, axis=0), records, orders)
-    clusters = [item for item in _clusters(poles) if item.angular_frequency > 2.0 * np.pi * low_hz]
-    most = max((item.orders for item in clusters), default=0)
-    firm = [item for item in clusters if item.orders >= 0.5 * most and item.collinearity > _LEAST_COLLINEARITY]
-    firm = _without_copies(firm)
-    if not firm:
-        raise UserError(source, "ambient tests", "no stable pole", "record longer, or set identify_frame.band_high_hz")
-    covariance, errors = _jackknife(hankels, records, orders, firm)
-    fit = _as_fit(tests[0], firm, covariance, errors, _response_at(tests, firm))
+    groups: dict[object, list[FrameTest]] = {}
+    for test in tests:
+        groups.setdefault((test.sensors, test.sampling_rate_hz), []).append(test)
+    set_ups, candidates, tops = [], [], []
+    for group in groups.values():
+        set_up, found, top = _set_up(group, layout, (low_hz, high_hz), source, ESTIMATORS[method])
+        set_ups.append(set_up)
+        candidates += found
+        tops.append(top)
+    merged = merge_set_ups(set_ups, source) if len(set_ups) > 1 else None
+    fit = set_ups[0].fit if merged is None else merged.fit
     chosen = complete_set(fit, layout)
     numbered = dict(zip(chosen, range(1, len(chosen) + 1), strict=True)) if chosen else largest_set(fit, layout)
     if not numbered:
         raise UserError(source, "ambient tests", "no mode found", "record longer, or set identify_frame.band_high_hz")
-    candidates = tuple(PoleCandidate(item.angular_frequency, item.damping_ratio, item.orders) for item in clusters)
-    refined = refine_by_spectra(fit.only(list(numbered)), tests)
-    return ModeSearch(refined, (low_hz, records.high_hz), tuple(numbered.values()), candidates)
+    modes = list(numbered)
+    if merged is None:
+        refined = refine_by_spectra(fit.only(modes), set_ups[0].tests)
+    else:
+        refined = pooled_poles(merged.fit.only(modes), [
+            (positions, refine_by_spectra(item.fit.only(own), item.tests))
+            for item, positions, own in merged.parts(modes)
+        ])  # fmt: skip
+    return ModeSearch(refined, (low_hz, max(tops)), tuple(numbered.values()), tuple(candidates))
+
+
+def _set_up(
+    tests: Sequence[FrameTest], layout: Layout, band_hz: tuple[float, float], source: Path, estimator: Estimator
+) -> tuple[SetUp, list[PoleCandidate], float]:
+    """Return the stable poles of tests with the same sensors, all candidates, and the end of the band [Hz]."""
+    records = _records(tests, layout, *band_hz)
+    orders = estimator.orders(layout.floors, len(tests[0].sensors))
+    statistics = [estimator.statistic(block, records) for block in records.blocks]
+    poles = estimator.poles(np.mean(np.array(statistics), axis=0), records, orders)
+    clusters = [item for item in _clusters(poles) if item.angular_frequency > 2.0 * np.pi * band_hz[0]]
+    most = max((item.orders for item in clusters), default=0)
+    firm = [item for item in clusters if item.orders >= 0.5 * most and item.collinearity > _LEAST_COLLINEARITY]
+    firm = _without_copies(firm)
+    if not firm:
+        remedy = "record longer, or set identify_frame.band_high_hz"
+        raise UserError(source, f"tests.{tests[0].name}", "no stable pole in an ambient test", remedy)
+    covariance, errors = _jackknife(statistics, records, estimator, orders, firm)
+    fit = _as_fit(tests[0], firm, covariance, errors, _response_at(tests, firm))
+    found = [PoleCandidate(item.angular_frequency, item.damping_ratio, item.orders) for item in clusters]
+    return SetUp(tuple(tests), fit), found, records.high_hz
 
 
 def _response_at(tests: Sequence[FrameTest], firm: Sequence[_Cluster]) -> FloatArray:

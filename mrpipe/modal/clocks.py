@@ -3,8 +3,8 @@
 A proportionally damped structure has real mode shapes: at a resonance all floors move in phase or in opposite phase. A
 sensor whose clock is late by tau turns its residue at frequency omega by exp(-i omega tau), so one delay explains the
 phases of all its modes. The response of each sensor is therefore fitted with real residues and a delay that is
-constant, changes linearly with time, or steps once. The poles are those of a fit without this restriction. The
-Bayesian information criterion decides among these delays and none.
+constant, changes linearly with time, or steps once. The poles are those of a fit without this restriction. A delay
+counts only if it predicts the phases of modes that were left out of its estimate.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.clock_proof import LeftOut, parts_by_mode
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.projection import Problem, stack
 from mrpipe.modal.records import FrameTest, Sensor
 from mrpipe.modal.spectra import RecordSpectrum
 
 _ITERATIONS = 4
+_STEP_ITERATIONS = 1
 _STEP_PLACES = 15
 _SMOOTHED_LINES = 41
 _LEAST_PHASE = 0.02
@@ -67,7 +69,13 @@ class _SensorFit:
     """Residual of one sensor in one test as a function of its delay, with real residues and the poles of a fit."""
 
     def __init__(
-        self, test: FrameTest, spectrum: RecordSpectrum, column: int, basis: FloatArray, line_weight: FloatArray
+        self,
+        test: FrameTest,
+        spectrum: RecordSpectrum,
+        column: int,
+        basis: FloatArray,
+        line_weight: FloatArray,
+        poles: FloatArray,
     ) -> None:
         samples = test.responses.shape[0]
         self.time = np.arange(samples) / test.sampling_rate_hz
@@ -78,26 +86,40 @@ class _SensorFit:
         norms = np.linalg.norm(weighted, axis=0)
         self.q = np.linalg.qr(weighted / np.where(norms > 0.0, norms, 1.0))[0]
 
-    def project(self, histories: Sequence[FloatArray]) -> FloatArray:
-        """Return what the basis does not explain of some histories, shape (2 lines, count)."""
-        values = np.column_stack([np.fft.rfft(item)[self.lines] for item in histories])
-        columns = stack(values) * self.weight
-        return np.asarray(columns - self.q @ (self.q.T @ columns))
+        self.left_out = LeftOut(self.q, parts_by_mode(spectrum.omega, poles, self.q.shape[1]))
 
     def linearised(self, delay: FloatArray, changes: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the residual at a delay, shape (2 lines,), and its derivative by each change of the delay."""
         moved = np.clip(self.time + delay, self.time[0], self.time[-1])
         slope = self.spline(moved, 1)
-        columns = self.project([self.spline(moved), *(slope * change for change in changes)])
+        histories = [self.spline(moved), *(slope * change for change in changes)]
+        values = np.column_stack([np.fft.rfft(item)[self.lines] for item in histories])
+        columns = stack(values) * self.weight
+        columns = columns - self.q @ (self.q.T @ columns)
         return columns[:, 0], columns[:, 1:]
+
+    def left_out_costs(self, forms: Sequence[tuple[Sequence[FloatArray], FloatArray]]) -> FloatArray:
+        """Return the cost of each part of the lines for a delay that is estimated from the other parts.
+
+        Parameters
+        ----------
+        forms
+            Changes of the delay and their coefficients from all lines; of several forms the other parts choose one.
+        """
+        trials = []
+        for changes, value in forms:
+            delay = np.tensordot(value, np.array(changes), axes=1) if changes else np.zeros(self.time.size)
+            residual, derivative = self.linearised(np.asarray(delay), changes)
+            trials.append(np.column_stack([residual, derivative]))
+        return self.left_out.costs(trials)
 
 
 def _minimise(
-    fit: _SensorFit, changes: Sequence[FloatArray], start: FloatArray
+    fit: _SensorFit, changes: Sequence[FloatArray], start: FloatArray, iterations: int = _ITERATIONS
 ) -> tuple[FloatArray, float, FloatArray]:
     """Return coefficients of the changes, the cost at them, and their standard errors (Gauss-Newton)."""
     value = start.copy()
-    for _ in range(_ITERATIONS):
+    for _ in range(iterations):
         residual, derivative = fit.linearised(np.tensordot(value, np.array(changes), axes=1), changes)
         value = value - np.linalg.lstsq(derivative, residual, rcond=None)[0]
     residual, derivative = fit.linearised(np.tensordot(value, np.array(changes), axes=1), changes)
@@ -108,43 +130,41 @@ def _minimise(
 
 
 def _sensor_clock(fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highest: float) -> SensorClock:
+    """Return the delay of a sensor: none, constant, drifting or with a step, each proven against the simpler ones."""
     ones, time = np.ones(fit.time.size), fit.time
-    residual, _ = fit.linearised(np.zeros(time.size), [ones])
-    freedom = max(residual.size - fit.q.shape[1], 1)
-    price = float(np.log(freedom))
-
-    def criterion(cost: float, parameters: int) -> float:
-        return freedom * float(np.log(max(cost, 1e-300))) + parameters * price
-
-    value, cost, spread = _minimise(fit, [ones], np.zeros(1))
-    best = SensorClock(name, sensor, float(value[0]), float(spread[0]))
-    score = criterion(cost, 1)
-    offset = value
-    value, cost, spread = _minimise(fit, [ones, time], np.array([offset[0], 0.0]))
-    if criterion(cost, 2) < score:
-        best = SensorClock(name, sensor, float(value[0]), float(spread[0]), float(value[1]))
-        score = criterion(cost, 2)
+    offset, _, spread = _minimise(fit, [ones], np.zeros(1))
+    best = SensorClock(name, sensor, 0.0, float(spread[0]))
+    if len(fit.left_out.rows) < 2:
+        return best
+    cost = fit.left_out_costs([([], np.zeros(0))])
+    own = fit.left_out_costs([([ones], offset)])
+    if fit.left_out.proves(own, cost):
+        best, cost = SensorClock(name, sensor, float(offset[0]), float(spread[0])), own
+    value, _, spread = _minimise(fit, [ones, time], np.array([offset[0], 0.0]))
+    own = fit.left_out_costs([([ones, time], value)])
+    if fit.left_out.proves(own, cost):
+        best, cost = SensorClock(name, sensor, float(value[0]), float(spread[0]), float(value[1])), own
     if steps:
-        places = np.linspace(time[0], time[-1], _STEP_PLACES + 2)[1:-1]
-        found = min((_step_cost(fit, offset, float(at)), float(at)) for at in places)
-        if criterion(found[0], 3) < score:
-            after = (time >= found[1]).astype(np.float64)
-            value, cost, spread = _minimise(fit, [ones, after], np.array([offset[0], 0.0]))
-            if criterion(cost, 3) < score:
-                best = SensorClock(name, sensor, float(value[0]), float(spread[0]), 0.0, float(value[1]), found[1])
-                score = criterion(cost, 3)
-    small = float(np.abs(best.delay(time)).max()) * highest < _LEAST_PHASE
-    if small or criterion(float(residual @ residual), 0) <= score:
+        forms = _step_forms(fit, offset)
+        own = fit.left_out_costs([(changes, value) for changes, value, *_ in forms])
+        if fit.left_out.proves(own, cost):
+            _, value, spread, _, at = min(forms, key=lambda item: item[3])
+            best = SensorClock(name, sensor, float(value[0]), float(spread[0]), 0.0, float(value[1]), at)
+    if float(np.abs(best.delay(time)).max()) * highest < _LEAST_PHASE:
         return SensorClock(name, sensor, 0.0, best.offset_error_s)
     return best
 
 
-def _step_cost(fit: _SensorFit, offset: FloatArray, at: float) -> float:
-    """Return the cost that a step at one place would have, from one linear step."""
-    ones, after = np.ones(fit.time.size), (fit.time >= at).astype(np.float64)
-    residual, derivative = fit.linearised(offset[0] * ones, [ones, after])
-    rest = residual - derivative @ np.linalg.lstsq(derivative, residual, rcond=None)[0]
-    return float(rest @ rest)
+def _step_forms(
+    fit: _SensorFit, offset: FloatArray
+) -> list[tuple[list[FloatArray], FloatArray, FloatArray, float, float]]:
+    """Return for each place of a step: changes of the delay, their coefficients and errors, cost, and the place [s]."""
+    forms = []
+    for at in np.linspace(fit.time[0], fit.time[-1], _STEP_PLACES + 2)[1:-1]:
+        changes = [np.ones(fit.time.size), (fit.time >= at).astype(np.float64)]
+        value, cost, spread = _minimise(fit, changes, np.array([offset[0], 0.0]), _STEP_ITERATIONS)
+        forms.append((changes, value, spread, cost, float(at)))
+    return forms
 
 
 def estimate_clocks(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool = True) -> list[SensorClock]:
@@ -174,7 +194,7 @@ def estimate_clocks(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool =
             for column, sensor in enumerate(test.sensors):
                 if sensor.is_displacement == is_displacement:
                     weight = 1.0 / np.sqrt(np.maximum(variance[:, column], 1e-300))
-                    own = _SensorFit(test, spectrum, column, basis, weight)
+                    own = _SensorFit(test, spectrum, column, basis, weight, fit.angular_frequencies)
                     highest = float(fit.angular_frequencies[-1])
                     found.append(_sensor_clock(own, test.name, sensor, steps, highest))
     return found

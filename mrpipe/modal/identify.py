@@ -156,7 +156,8 @@ def _identify(
     clocks: tuple[SensorClock, ...] = ()
     if not forced:
         band = (options.band_low_hz, options.band_high_hz)
-        chosen = ChosenTests(find_ambient_modes(tests.ambient, layout, *band, tests.source), ())
+        search = find_ambient_modes(tests.ambient, layout, *band, tests.source, options.ambient_method)
+        chosen = ChosenTests(search, ())
         findings = _ambient_findings(tests)
     else:
         chosen, findings = choose_tests(forced, tests, layout, options)
@@ -197,7 +198,8 @@ def _identify(
     inside = (band[0], min(band[1], 1.15 * float(fit.angular_frequencies[-1]) / (2.0 * np.pi)))
     frame = assembly.frame
     amplitude = None
-    if forced and options.amplitude_dependence:
+    # errors of picked modes are those of the lines of the spectrum; a law over amplitude would only explain these
+    if forced and options.amplitude_dependence and options.modes_from == "fit":
         progress(0.85, "amplitude")
         amplitude = find_amplitude_dependence(fit, [test for test in chosen.tests if test.excitation is not None])
         findings += [] if amplitude is None else [amplitude_finding(amplitude)]

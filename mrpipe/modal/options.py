@@ -35,6 +35,11 @@ class IdentificationOptions(BaseModel):
         description="Frequencies and shapes: multi-mode fit of all forced tests, or as the thesis: magnitude and phase "
         "at the peaks of the transfer functions (3.4). Peaks need a measured excitation.",
     )
+    ambient_method: Literal["ssi", "plscf"] = Field(
+        "ssi",
+        description="Estimator of the poles of ambient tests, both of pyOMA2: covariance-driven stochastic subspace "
+        "identification (`ssi`) or the polyreference least-squares complex frequency estimator (`plscf`).",
+    )
     stiffness_form: Literal["modal", "tridiagonal"] = Field(
         "modal", description="K from the modes, (3.14) to (3.16), or the tri-diagonal shear frame nearest to them."
     )
@@ -50,5 +55,6 @@ class IdentificationOptions(BaseModel):
     amplitude_dependence: bool = Field(
         True,
         description="Look for modes whose frequency and damping depend on the amplitude; used where they predict tests "
-        "that were left out of the fit better than constant modes. M, C and K remain those of constant modes.",
+        "that were left out of the fit better than constant modes. M, C and K remain those of constant modes. Not done "
+        "with `modes_from: peak-picking`, because picked modes are no more exact than a line of the spectrum.",
     )
