@@ -29,10 +29,16 @@ def assurance(first, second):
     return float(np.abs(first @ second) ** 2 / (first @ first) / (second @ second))
 
 
-def forced_draw(seed, rate=50.0, duration_s=600.0):
+def rate_for(tower, least=50.0):
+    """Return a sampling rate [Hz] that shows all modes; some draws have modes beyond 25 Hz."""
+    return max(least, float(np.ceil(2.5 * tower.frequencies_hz[-1])))
+
+
+def forced_draw(seed, duration_s=600.0):
     """Return the tower, its tests and a label."""
     rng = np.random.default_rng(seed)
     tower, floor = tower_with_hidden_modes(rng)
+    rate = rate_for(tower)
     missing = set(rng.choice(tower.floors, rng.integers(1, 3), replace=False) + 1)
     if tower.floors - len(missing) < 4:
         missing = {min(missing)}
@@ -47,10 +53,11 @@ def forced_draw(seed, rate=50.0, duration_s=600.0):
     return tower, FrameTests(tuple(tests), (), tower.mass, Path("tower")), label
 
 
-def ambient_draw(seed, rate=50.0, duration_s=3600.0):
+def ambient_draw(seed, duration_s=3600.0):
     """Return the tower, its ambient test and a label."""
     rng = np.random.default_rng(seed)
     tower = random_tower(rng)
+    rate = rate_for(tower)
     seen = ambient_test(tower, rng, Sensors(noise=0.03, crosstalk=0.03), rate=rate, duration_s=duration_s)
     places = tuple(Place(i + 1) for i in range(tower.floors))
     test = FrameTest("ambient", "ambient", rate, None, seen, (False,) * tower.floors, places=places)

@@ -155,6 +155,7 @@ class TestEntry(Entry):
     about: dict[str, Any] = Field(default_factory=dict)
 
     mode: int | None = Field(default=None, ge=1)
+    added_masses_kg: dict[int, float] | None = None
     law: str | None = None
     gains: dict[str, float] | None = None
     repeat_of: str | None = None
@@ -186,6 +187,13 @@ class TestEntry(Entry):
             raise ValueError("a path of at most 4000 characters expected")
         return value
 
+    @field_validator("added_masses_kg")
+    @classmethod
+    def _masses_on_floors(cls, value: dict[int, float] | None) -> dict[int, float] | None:
+        if value is not None and (not value or any(floor < 1 or not mass > 0.0 for floor, mass in value.items())):
+            raise ValueError("floor: mass in kg expected, such as {4: 250}, floors from 1 and masses above zero")
+        return value
+
     @field_validator("segments_s", mode="before")
     @classmethod
     def _segments_are_pairs(cls, value: Any) -> Any:
@@ -211,7 +219,17 @@ class TestEntry(Entry):
 
     def details(self) -> dict[str, Any]:
         """Return what describes the test and steers nothing of its reading."""
-        named = ("mode", "law", "gains", "repeat_of", "excitation", "frequency_hz", "amplitude_m", "notes")
+        named = (
+            "mode",
+            "added_masses_kg",
+            "law",
+            "gains",
+            "repeat_of",
+            "excitation",
+            "frequency_hz",
+            "amplitude_m",
+            "notes",
+        )
         given = {key: getattr(self, key) for key in named if getattr(self, key) is not None}
         return {**self.about, **given}
 

@@ -116,12 +116,21 @@ class PolyreferenceEstimator:
         return range(least, least + 11)
 
     def statistic(self, block: FloatArray, records: Records) -> ComplexArray:
-        """Return the half spectra, shape (s, s, lines): correlation functions under an exponential window."""
-        from pyoma2.functions import fdd
+        """Return the half spectra, shape (s, s, lines): correlation functions under an exponential window.
 
-        with _quiet():
-            _, spectrum = fdd.SD_est(block, block, 1.0 / records.rate_hz, _segment(records), "cor")
-        return np.asarray(spectrum, dtype=np.complex128)
+        The correlation functions have no bias, because a taper of finite segments would add to the damping.
+        """
+        sensors, samples = block.shape
+        lags = _segment(records)
+        spectrum = np.fft.rfft(block, 2 * samples, axis=1)
+        # white noise of the sensors is correlated at lag zero only
+        count = samples - np.arange(1, lags + 1)
+        window = 0.01 ** (np.arange(lags) / lags)
+        correlation = np.empty((sensors, sensors, lags))
+        for reference in range(sensors):
+            whole = np.fft.irfft(spectrum * spectrum[reference].conj(), axis=1)
+            correlation[:, reference] = whole[:, 1 : lags + 1] / count * window
+        return np.asarray(np.fft.rfft(correlation, axis=2), dtype=np.complex128)
 
     def poles(self, statistic: ComplexArray | FloatArray, records: Records, orders: Sequence[int]) -> list[Pole]:
         """Return the physical poles of the matrix polynomials, without the damping of the window."""

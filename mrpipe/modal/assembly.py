@@ -36,7 +36,11 @@ class PartialModes:
     scaled_residues
         Shape (r,) [1/kg]: acceleration over force at the floor `driven`, nan where unknown.
     driven
-        Floor (from 0) where a measured force acts; -1 if none does.
+        Floor (from 0) where a measured force acts or whose motion is scaled by an added mass; -1 if there is none.
+    scale_errors
+        Shape (r,): relative standard errors of `scaled_residues`; None: the usual error.
+    scaled_by
+        What gives the scale, for messages.
     """
 
     angular_frequencies: FloatArray
@@ -47,6 +51,8 @@ class PartialModes:
     possible_numbers: tuple[tuple[int, int], ...]
     scaled_residues: FloatArray | None = None
     driven: int = -1
+    scale_errors: FloatArray | None = None
+    scaled_by: str = "the measured force"
 
 
 @dataclass(frozen=True)
@@ -102,6 +108,7 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
         modes.measured,
         scaled_residues=modes.scaled_residues if not np.isfinite(masses).all() else None,
         driven=modes.driven,
+        scale_error=0.05 if modes.scale_errors is None else np.maximum(0.5 * modes.scale_errors, 0.005),
     )
     updated = fit_partial(masses, data, modes.possible_numbers)
     findings = _findings(updated, modes, layout, unknown_rows)
@@ -168,7 +175,7 @@ def _findings(updated: UpdatedModel, modes: PartialModes, layout: Layout, unknow
         mode = updated.numbers[int(np.argmax(np.abs(updated.frequency_error)))]
         findings.append(f"the storey model misses the frequency of mode {mode} by {100.0 * worst:.1f} %")
     if modes.driven >= 0 and np.any(updated.mass_high > updated.mass_low):
-        findings.append("unknown masses were scaled by the measured force")
+        findings.append(f"unknown masses were scaled by {modes.scaled_by}")
     return findings
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from mrpipe.errors import UserError
 from mrpipe.modal.checks import LARGEST_COUPLING, modal_coupling
 from mrpipe.modal.clocks import SensorClock, added, corrected, estimate_clocks
+from mrpipe.modal.hidden import with_missing_modes
 from mrpipe.modal.multimode import MultiModeFit, fit_modes
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
@@ -18,6 +19,7 @@ from mrpipe.modal.spectra import record_spectrum, thinned
 
 _ENOUGH_COHERENCE = 0.9
 _CLOCK_ROUNDS = 3
+_SEARCHES = 3
 _CLOCK_LINES = 4000
 
 
@@ -97,28 +99,50 @@ def _imaginary_part(fit: MultiModeFit) -> float:
 def with_clocks(
     chosen: ChosenTests, tests: FrameTests, layout: Layout, options: IdentificationOptions
 ) -> tuple[ChosenTests, tuple[SensorClock, ...]]:
-    """Correct the clocks of the sensors where that makes the mode shapes real, and search again."""
+    """Correct the clocks of the sensors where that makes the mode shapes real, and search again.
+
+    The modes are searched again after the correction, and the clocks are estimated again with these modes, because a
+    mode that was missing before disturbs the phases. Modes that only wrong clocks produced disappear by it.
+    """
     clocks: list[SensorClock] = []
-    moved = chosen.tests
-    fit = chosen.search.fit
+    best = chosen
+    for attempt in range(_SEARCHES):
+        more, moved = _estimated(best.search.fit, chosen.tests, clocks, steps=attempt == 0)
+        if more is None:
+            break
+        band = (options.band_low_hz, options.band_high_hz)
+        again = find_modes(moved, layout, *band, tests.source, tests.decays)
+        if layout.is_chain and len(again.numbers) < layout.floors:
+            again = with_missing_modes(again, moved, layout)
+        complete_before = len(best.search.numbers) == layout.floors == len(again.numbers)
+        best, clocks = ChosenTests(again, moved), more
+        if complete_before:
+            break
+    return best, tuple(clocks)
+
+
+def _estimated(
+    fit: MultiModeFit, tests: tuple[FrameTest, ...], clocks: list[SensorClock], steps: bool
+) -> tuple[list[SensorClock] | None, tuple[FrameTest, ...]]:
+    """Return the delays of the sensors and the corrected tests; None where no further delay makes the shapes real."""
     before = _imaginary_part(fit)
+    start = len(clocks)
+    total = clocks
+    moved = tuple(corrected(test, total) for test in tests)
     for round_number in range(_CLOCK_ROUNDS):
-        new = [item for item in estimate_clocks(fit, moved, steps=round_number == 0) if not item.is_zero]
+        new = [item for item in estimate_clocks(fit, moved, steps and round_number == 0) if not item.is_zero]
         if not new:
             break
-        clocks = added(clocks, new)
-        moved = tuple(corrected(test, clocks) for test in chosen.tests)
+        total = added(total, new)
+        moved = tuple(corrected(test, total) for test in tests)
         lines = [(item.omega[0], item.omega[-1]) for item in fit.spectra]
         band = (min(low for low, _ in lines) / (2.0 * np.pi), max(high for _, high in lines) / (2.0 * np.pi))
         spectra = thinned([record_spectrum(test, band) for test in moved], _CLOCK_LINES)
         fit = fit_modes(spectra, fit.angular_frequencies, fit.damping_ratios, passes=2, evaluations=10)
-    cost = 2.0 * len(clocks) * np.log(max(fit.residues.size, 2))
-    if not clocks or _imaginary_part(fit) + cost > before:
-        return chosen, ()
-    again = find_modes(moved, layout, options.band_low_hz, options.band_high_hz, tests.source, tests.decays)
-    if len(again.numbers) < len(chosen.search.numbers):
-        return chosen, ()
-    return ChosenTests(again, moved), tuple(clocks)
+    cost = 2.0 * max(len(total) - start, 1) * np.log(max(fit.residues.size, 2))
+    if total is clocks or _imaginary_part(fit) + cost > before:
+        return None, tests
+    return total, moved
 
 
 def without_complex(search: ModeSearch) -> ModeSearch:

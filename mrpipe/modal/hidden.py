@@ -22,6 +22,10 @@ _LINES = 24000
 _ROUNDS = 2
 _SPARE = 2
 _BAND = 1.25
+_UNCERTAIN = 0.02
+"""Relative standard error of a damping ratio from which all lines are used."""
+_SAME = 0.005
+"""Relative change of a frequency up to which a fit has found the same mode again."""
 
 
 def with_missing_modes(search: ModeSearch, tests: Sequence[FrameTest], layout: Layout) -> ModeSearch:
@@ -46,6 +50,22 @@ def with_missing_modes(search: ModeSearch, tests: Sequence[FrameTest], layout: L
             break
         best = found
     return best
+
+
+def sharpened(search: ModeSearch, tests: Sequence[FrameTest]) -> ModeSearch:
+    """Return the modes fitted to all lines of the spectra where a damping ratio is uncertain; else the same modes.
+
+    A part of the lines is enough for modes with a peak. It wastes data on a mode that hardly rises above the noise.
+    """
+    modes = search.fit.angular_frequencies.size
+    uncertain = float(np.sqrt(np.diag(search.fit.covariance)[modes:].max())) > _UNCERTAIN
+    spectra = _spectra(search, tests)
+    used = sum(item.omega.size for item in search.fit.spectra)
+    if not uncertain or sum(item.omega.size for item in spectra) < 1.3 * used:
+        return search
+    fit = fit_modes(spectra, search.fit.angular_frequencies, search.fit.damping_ratios, passes=2, evaluations=8)
+    near = np.abs(fit.angular_frequencies / search.fit.angular_frequencies - 1.0) < _SAME
+    return replace(search, fit=fit) if near.all() else search
 
 
 def _spectra(search: ModeSearch, tests: Sequence[FrameTest]) -> tuple[RecordSpectrum, ...]:

@@ -18,12 +18,13 @@ from mrpipe.modal.chosen_tests import ChosenTests, choose_tests, training_first,
 from mrpipe.modal.clocks import SensorClock, corrected, expected_clocks
 from mrpipe.modal.damping_choice import choose_damping, decays_of_modes
 from mrpipe.modal.decay import Estimate
-from mrpipe.modal.hidden import with_missing_modes
+from mrpipe.modal.hidden import sharpened, with_missing_modes
 from mrpipe.modal.identification import FrameIdentification, GivenShapes
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.peak_picking import pick_peaks
 from mrpipe.modal.records import FrameTest, FrameTests
+from mrpipe.modal.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.search import ModeSearch, check_channels
 from mrpipe.modal.selection import (
     LEAST_COHERENCE,
@@ -52,7 +53,8 @@ _LOOSE_SIGNS = 0.03
 
 
 def _ambient_findings(tests: FrameTests) -> list[str]:
-    scale = "given floor masses" if np.isfinite(tests.floor_masses).any() else "nothing"
+    given = np.isfinite(tests.floor_masses).any()
+    scale = "given floor masses" if given else "the added masses" if tests.with_added_masses else "nothing"
     return [
         "the excitation was not measured: modal masses and participations cannot be known; the scale of M, C and K "
         f"comes from {scale}"
@@ -171,6 +173,8 @@ def _identify(
     if forced and layout.is_chain and len(chosen.search.numbers) < layout.floors:
         progress(0.4, "hidden modes")
         chosen = ChosenTests(with_missing_modes(chosen.search, chosen.tests, layout), chosen.tests)
+    if forced:
+        chosen = ChosenTests(sharpened(chosen.search, chosen.tests), chosen.tests)
     if options.modes_from == "peak-picking" and chosen.tests:
         picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)
         chosen = replace(chosen, search=replace(chosen.search, fit=picked))
@@ -189,7 +193,9 @@ def _identify(
     findings += notes
     progress(0.6, "matrices")
     zeta = np.array([item.value for item in damping])
-    assembly, notes = _assemble(chosen.search, zeta, tests, layout, options, given)
+    scale, notes = find_scale(chosen.search.fit, tests, layout, options)
+    findings += notes
+    assembly, notes = _assemble(chosen.search, zeta, tests, layout, options, given, scale)
     findings += notes
     progress(0.75, "verification")
     shown = _shown(forced, chosen, clocks)
@@ -254,12 +260,22 @@ def _assemble(
     layout: Layout,
     options: IdentificationOptions,
     given: GivenShapes | None,
+    scale: Scale,
 ) -> tuple[Assembly, list[str]]:
     """Return the structure: by (3.14) to (3.18) where modes and sensors are complete, else by a storey model."""
     fit = search.fit
+    if layout.masses is None and given is None:
+        masses = masses_of(fit, layout, tests.floor_masses, scale)
+        if masses is not None:
+            known = replace(tests, floor_masses=masses.masses)
+            assembly, findings = _assemble(
+                search, zeta, known, replace(layout, masses=masses.masses), options, None, scale
+            )
+            text = f"unknown masses follow from the orthogonality of the modes and from {scale.source}"
+            return replace(assembly, mass_intervals=masses.intervals), [text, *findings]
     complete = search.numbers == tuple(range(1, layout.floors + 1)) and all_floors_measured(fit, layout)
     if layout.masses is None or not (complete or given is not None):
-        assembly = assemble_partial(_partial(search, zeta, layout), tests.floor_masses, layout, tests.source)
+        assembly = assemble_partial(_partial(search, zeta, layout, scale), tests.floor_masses, layout, tests.source)
         return assembly, list(assembly.findings)
     mass = mass_matrix(layout.masses, source=tests.source)
     measured, errors = floor_shapes(fit, layout)
@@ -281,7 +297,7 @@ def _assemble(
     return Assembly(frame, shapes, search.numbers, storeys, layout.masses, intervals, ()), findings
 
 
-def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout) -> PartialModes:
+def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout, scale: Scale) -> PartialModes:
     fit = search.fit
     if not layout.is_chain:
         rows = tuple(range(len(fit.sensors)))
@@ -290,19 +306,18 @@ def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout) -> PartialMod
     shapes, errors = floor_shapes(fit, layout)
     measured = tuple(sorted({sensor.floor - 1 for sensor in fit.sensors}))
     possible = tuple((low + 1, high + 1) for low, high in sign_ranges(fit, layout, _LOOSE_SIGNS))
-    scaled, driven = _scaled_residues(fit)
-    return PartialModes(fit.angular_frequencies, zeta, shapes, errors, measured, possible, scaled, driven)
-
-
-def _scaled_residues(fit: MultiModeFit) -> tuple[FloatArray | None, int]:
-    """Return acceleration over force [1/kg] of each mode at a floor where a measured force acts and a sensor is."""
-    for column, place in enumerate(fit.inputs):
-        rows = [i for i, sensor in enumerate(fit.sensors) if sensor[:2] == place[:2] and place.floor > 0]
-        if rows:
-            values = fit.input_residues[rows[0], column].real
-            # the sign of a recorded force is a matter of convention: the driving point always follows the force
-            return np.asarray(values * np.sign(np.nansum(values))), place.floor - 1
-    return None, -1
+    return PartialModes(
+        angular_frequencies=fit.angular_frequencies,
+        damping_ratios=zeta,
+        shapes=shapes,
+        errors=errors,
+        measured=measured,
+        possible_numbers=possible,
+        scaled_residues=scale.residues,
+        driven=scale.floor - 1,
+        scale_errors=scale.errors,
+        scaled_by=scale.source,
+    )
 
 
 def _assurance(fit: MultiModeFit, layout: Layout, assembly: Assembly) -> FloatArray:

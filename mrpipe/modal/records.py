@@ -65,6 +65,8 @@ class FrameTest:
         Place and values of the further excitations.
     direction
         Direction of the first excitation; empty where the campaign has one direction only.
+    added_masses
+        Floor (from 1) and known mass [kg] that was added to it in this test.
     """
 
     name: str
@@ -80,6 +82,7 @@ class FrameTest:
     places: tuple[Place, ...] = ()
     further_inputs: tuple[tuple[Place, FloatArray], ...] = ()
     direction: str = ""
+    added_masses: tuple[tuple[int, float], ...] = ()
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
@@ -212,7 +215,20 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
         places=tuple(Place(sensor.floor, sensor.direction) for sensor in sensors),
         further_inputs=() if recording.kind == "ambient" else tuple(inputs[1:]),
         direction=first.direction,
+        added_masses=_added_masses(recording, source, n, {sensor.floor for sensor in sensors}),
     )
+
+
+def _added_masses(recording: Recording, source: Path, floors: int, measured: set[int]) -> tuple[tuple[int, float], ...]:
+    added = {int(floor): float(mass) for floor, mass in (recording.details.get("added_masses_kg") or {}).items()}
+    place = f"tests.{recording.name}.added_masses_kg"
+    for floor in sorted(added):
+        if floor > floors:
+            raise UserError(source, place, f"names floor {floor}", f"the frame has floors 1 to {floors}")
+        if floor not in measured:
+            remedy = "add a sensor on this floor, because its motion determines the inertia force of the added mass"
+            raise UserError(source, place, f"floor {floor} has no sensor in this test", remedy)
+    return tuple(sorted(added.items()))
 
 
 @dataclass(frozen=True)
@@ -231,6 +247,8 @@ class FrameTests:
         campaign.yaml, for messages.
     ambient
         Tests whose excitation was not measured.
+    with_added_masses
+        Forced and ambient tests with known added masses. They give the scale of the modes of the other tests.
     """
 
     forced: tuple[FrameTest, ...]
@@ -238,6 +256,7 @@ class FrameTests:
     floor_masses: FloatArray
     source: Path
     ambient: tuple[FrameTest, ...] = ()
+    with_added_masses: tuple[FrameTest, ...] = ()
 
 
 def frame_tests(campaign: Campaign) -> FrameTests:
@@ -262,9 +281,17 @@ def frame_tests(campaign: Campaign) -> FrameTests:
         masses = np.full(floors, np.nan)
 
     def of_kind(*kinds: str) -> tuple[FrameTest, ...]:
-        return tuple(frame_test(item, source, floors) for item in campaign.recordings if item.kind in kinds)
+        found = [frame_test(item, source, floors) for item in campaign.recordings if item.kind in kinds]
+        return tuple(test for test in found if not test.added_masses)
 
-    return FrameTests(of_kind("sweep", "random"), of_kind("free-decay"), masses, source, of_kind("ambient"))
+    every = [frame_test(item, source, floors) for item in used]
+    changed = tuple(test for test in every if test.added_masses)
+    if len(changed) == len(every):
+        place = f"tests.{changed[0].name}.added_masses_kg"
+        raise UserError(
+            source, place, "all tests have added masses", "record a sweep, random or ambient test without them as well"
+        )
+    return FrameTests(of_kind("sweep", "random"), of_kind("free-decay"), masses, source, of_kind("ambient"), changed)
 
 
 def _check_masses(masses: FloatArray, tests: Sequence[FrameTest], source: Path) -> None:

@@ -77,7 +77,7 @@ class MeasuredModes:
     driven
         Degree of freedom (from 0) where the measured force acts; -1 if there is none.
     frequency_error, shape_error, scale_error
-        Standard errors for the weights: relative; of a shape of unit norm; relative.
+        Standard errors for the weights: relative; of a shape of unit norm; relative, one for all modes or shape (r,).
     """
 
     angular_frequencies: FloatArray
@@ -88,7 +88,7 @@ class MeasuredModes:
     driven: int = -1
     frequency_error: float = 1e-3
     shape_error: float = 2e-2
-    scale_error: float = 0.05
+    scale_error: float | FloatArray = 0.05
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,8 @@ class _Problem:
         if modes.scaled_residues is not None and modes.driven >= 0:
             known = np.isfinite(modes.scaled_residues) & (modes.scaled_residues > 0.0)
             own = np.maximum(shapes[modes.driven, known] ** 2, 1e-300)
-            parts.append(0.5 * (np.log(own) - np.log(modes.scaled_residues[known])) / modes.scale_error)
+            error = np.broadcast_to(modes.scale_error, known.shape)[known]
+            parts.append(0.5 * (np.log(own) - np.log(modes.scaled_residues[known])) / error)
         return np.concatenate(parts)
 
 
@@ -214,6 +215,7 @@ def _collect(problem: _Problem, theta: FloatArray, jacobian: FloatArray, cost: f
     _, singular, right = np.linalg.svd(np.vstack([jacobian, rows]), full_matrices=False)
     blind = right[singular < 1e-6 * singular[0]]
     spread = np.where(np.any(np.abs(blind) > 0.1, axis=0), _RANGE, spread) if blind.size else spread
+    spread = np.minimum(spread, _RANGE)
     count = parameters.size
     mass_spread = np.zeros(masses.size)
     mass_spread[problem.unknown] = spread[count:]
