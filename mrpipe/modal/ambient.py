@@ -3,9 +3,9 @@
 pyOMA2 estimates the poles at many model orders (stochastic subspace identification or pLSCF). Poles
 that keep frequency and shape over the orders form clusters, and the choice among these is that of the forced tests.
 Frequency and damping are then refined by maximum likelihood, which also gives their intervals; errors of the shapes
-come from leaving out one block of the record at a time (jackknife). Tests with other sensors are set-ups of their own
-and are merged by the sensors that they share. Without the input, neither modal masses nor participations can be known:
-the scale of M, C and K then comes from given masses alone.
+come from leaving out one block of the record at a time (jackknife). Tests with different sensors are separate set-ups,
+which are merged by the sensors that they share. Without the input, neither modal masses nor participations can be
+known: the scale of M, C and K then comes from given masses or from added masses.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Merging of ambient set-ups: sensors that move from test to test, and reference sensors that stay.
 
-Ambient shapes have no scale. Each set-up therefore gives shapes with a factor of its own for every mode, and the
+Ambient shapes have no scale. Each set-up therefore gives shapes with an unknown factor for every mode, and the
 sensors that two set-ups share (reference sensors) determine the ratio of these factors. Modes of different set-ups
 belong together where frequencies are near and the shapes at the shared sensors are alike. A set-up that does not show a
 mode as a stable pole gives its shape by the strongest singular vector of the spectral densities at the frequency of the
