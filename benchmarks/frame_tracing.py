@@ -54,7 +54,7 @@ class Case:
 
     @property
     def key(self) -> str:
-        """Return what tells it from all others."""
+        """Return the key of the case in the results."""
         return f"{self.planted}-{self.strength}-{self.seed}"
 
 

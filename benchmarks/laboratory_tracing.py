@@ -44,7 +44,7 @@ class Case:
 
     @property
     def key(self) -> str:
-        """Return what tells it from all others."""
+        """Return the key of the case in the results."""
         return f"{self.planted}-{self.seed}-{self.share:g}-{self.noise}-{self.rate_hz:g}-{self.excitation}"
 
 
@@ -207,7 +207,7 @@ PRESETS = {"core": core, "conditions": conditions}
 
 
 def listed(options: argparse.Namespace) -> Iterator[Case]:
-    """Yield the cases that the command line asks for."""
+    """Yield the cases that the command line selects."""
     from mrpipe.effects.library import damper_effects
 
     if options.preset:
@@ -240,7 +240,7 @@ def run(cases: Iterable[Case], path: Path, *, jobs: int, keep: Path | None, dura
 
 
 def main() -> None:
-    """Run the cases that the command line asks for and print how many were right."""
+    """Run the cases that the command line selects and print how many were right."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--preset", nargs="+", choices=sorted(PRESETS), default=[])
     parser.add_argument("--seeds", type=int, default=2)

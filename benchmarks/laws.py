@@ -63,7 +63,7 @@ def reference(frame: Frame, alpha_n_m: float, amplitude_m: float) -> ReferenceNe
         tuple(float(omega[0]) / (2.0 * np.pi) * np.geomspace(0.625, 1.6, 7)),
         starts=2,
         rounding_m_s=speed / 6.0,
-        # what lies above a quarter of the rate is no motion to the network
+        # frequencies above a quarter of the rate contain no motion for the network
         disturbances_rad_s=tuple(omega[1:][omega[1:] < 0.5 * np.pi * RATE_HZ]),
     )
     return train_reference(learning, np.random.default_rng(1))

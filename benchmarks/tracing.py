@@ -76,7 +76,7 @@ def run_case(case: Case, *, keep: Path | None = None, timeout_s: float = 900.0) 
 
 
 def selected(options: argparse.Namespace) -> Iterator[Case]:
-    """Yield the cases that the command line asks for, by seed."""
+    """Yield the cases that the command line selects, by seed."""
     cases = (case_of(seed) for seed in count(options.first_seed))
     wanted = (
         case
@@ -102,7 +102,7 @@ def report_line(row: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Run the cases that the command line asks for and print their table."""
+    """Run the cases that the command line selects and print their table."""
     import joblib
 
     from benchmarks.tracing_table import document

@@ -22,7 +22,7 @@ from mrpipe.simulation.response_curve import CurveOptions, Run
 from mrpipe.simulation.several_rig import DampersRig
 
 TOGETHER = "dampers"
-"""Name under which all dampers with their laws stand in the place of a single law."""
+"""Name of the set of all dampers where functions for a single law need the name of a law."""
 
 FACTORS = (0.1, 10.0)
 """Smallest and largest factor on the calibrated gain of a damper."""

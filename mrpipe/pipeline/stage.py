@@ -31,7 +31,7 @@ class StageContext:
         Attribute access to the declared sections: `context.settings.prepare.cutoff_hz`. Others raise LookupError.
     inputs
         Declared input -> path. Stage inputs are artifacts (`prepare` -> …/prepared.h5), campaign inputs are directories
-        (`campaign:bench`). Optional inputs that are not there are missing from the mapping.
+        (`campaign:bench`). Optional inputs that do not exist are missing from the mapping.
     run_directory
         The run directory; outputs are named relative to it.
     rng
@@ -39,7 +39,7 @@ class StageContext:
     jobs
         How many processes may be used (does not change results).
     progress
-        Called with the share done and a text.
+        Called with the share of the work that is done, and a text.
     report
         The stage's part of the report.
     log
@@ -51,9 +51,9 @@ class StageContext:
     provenance
         Written into every artifact.
     warnings
-        What the stage warned of so far.
+        Warnings of the stage so far.
     failures
-        What went wrong in parts of the stage so far.
+        Failures of parts of the stage so far.
     """
 
     stage: str
@@ -107,12 +107,12 @@ class Stage:
     summary
         One line for help texts and the report.
     run
-        Does the work and returns the summary that `--json` prints (JSON-able, SI, keys with unit suffix). To say that
-        there are no data to work on it raises :class:`~mrpipe.errors.StageSkipped`.
+        Does the work and returns the summary that `--json` prints: values of JSON in SI units, keys with the unit as
+        suffix. It raises :class:`~mrpipe.errors.StageSkipped` if it has no data.
     inputs
         Names of stages whose artifact is read, or `campaign:bench`, `campaign:frame`, `campaign:closed-loop`.
     optional_inputs
-        The same, used where they are there.
+        The same. They are built if that is possible, and used if they exist.
     known_inputs
         The same, used only if they are up to date: they are not built for this stage.
     conditional_inputs
@@ -130,7 +130,7 @@ class Stage:
     family
         Command that this stage is one choice of (`simulate` for `simulate-vd`). Empty: the stage is a command itself.
     check
-        Looks at the declared settings before anything is built for the stage; raises UserError where it cannot work.
+        Checks the declared settings before anything is built for the stage; raises UserError if they are wrong.
     """
 
     name: str

@@ -45,12 +45,12 @@ class LoopOptions:
         Steps of the plant a second; raised to the next multiple of the controller's rate.
     tracking
         `damper`: the chain gives the force. `ideal`: the damper gives the clipped desired force of the controller and
-        holds it from sample to sample, as errata section B has it. `continuous`: the law acts on the true motion at
-        every instant and its force is never active, which is for vd, vdps and vdns only: the others have a memory,
-        and no step is small enough for what fdns then does (docs/numerics.md). `unclipped`: as `continuous`, but the
-        force may be active, so that the loop is linear; this serves comparison with the exact frequency response.
+        holds it from sample to sample. `continuous`: the law acts on the true motion at every instant, and its force
+        is clipped where it would add energy. Only vd, vdps and vdns can do this, because the other laws have a memory
+        (docs/numerics.md). `unclipped`: as `continuous` without clipping. The loop is then linear, so that it can be
+        compared with the exact frequency response.
     delay_s
-        From sampling to output of the controller.
+        Time from sampling to output of the controller.
     driver_time_constant_s
         Lag of the current driver in addition to that of the damper's model; 0: none.
     noise
@@ -72,7 +72,7 @@ class LoopOptions:
 
 @dataclass(frozen=True)
 class Response:
-    """What the loop did; every history has shape (m,) or (m, n), SI, on the clock `time_s`.
+    """Response of the loop; every history has shape (m,) or (m, n), in SI units, on the clock `time_s`.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Response:
 
     @property
     def energy_balance_error(self) -> float:
-        """What the balance of energies misses in the end over all that was stored or dissipated on the way [1]."""
+        """Largest error of the energy balance, relative to the energy that was stored or dissipated [1]."""
         missing = self.energy[0] + self.work_in - self.work_damper - self.work_frame - self.energy
         turned_over = float(np.max(self.energy) + np.max(np.abs(self.work_damper)) + self.work_frame[-1])
         return float(np.max(np.abs(missing))) / turned_over if turned_over > 0.0 else 0.0
@@ -136,9 +136,9 @@ def no_damper() -> Chain:
 
 
 def is_plain(chain: Chain) -> bool:
-    """Return whether a chain is the plain one of (2.1) to (2.4), whose parameters the compiled loop reads in place.
+    """Return whether a chain is the plain one of (2.1) to (2.4), whose parameters the compiled loop reads directly.
 
-    Steps of other make share names with these: a driver that lags apart, rising and falling, has two rates.
+    The names do not decide it, because a driver with different rates for rising and falling drive has the same name.
     """
     return chain.names == parts.BOUC_WEN and chain.functions[:4] == (
         lag_step, polynomial_step, hysteresis_step, sum_step

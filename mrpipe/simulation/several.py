@@ -68,7 +68,7 @@ class LoopDamper:
 
 @dataclass(frozen=True)
 class DampersResponse:
-    """What the loop did.
+    """Response of the loop.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class DampersResponse:
 
     @property
     def energy_balance_error(self) -> float:
-        """What the balance of energies misses over all that was stored or dissipated on the way [1]."""
+        """Largest error of the energy balance, relative to the energy that was stored or dissipated [1]."""
         return replace(self.first, work_damper=self.work_dampers).energy_balance_error
 
     @property

@@ -1,7 +1,7 @@
 """`export controller [--law LAW]`: calibrated controllers as C and JSON for a real-time target.
 
-Without a law, the one of the setting `export.law` is written to `controller/`. Each law that is named has its own stage
-and folder, `controller/LAW/`, so that the export of one law leaves those of the others in place.
+Without a law, the controller of the setting `export.law` is written to `controller/`. Each law that is named has its
+own stage and its own folder `controller/LAW/`, so that the export of one law does not remove that of another.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FILES = ("controller.json", "controller.c", "controller.h", "self_test.c", "vect
 
 
 def export_stage(law: str = "") -> Stage:
-    """Return the stage that writes the controller of a law; that of `export.law` where none is named."""
+    """Return the stage that writes the controller of a law; that of `export.law` if none is named."""
     folder = f"{FOLDER}/{law}" if law else FOLDER
     return Stage(
         name=f"export-controller-{law}" if law else "export-controller",

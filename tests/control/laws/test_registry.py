@@ -55,7 +55,7 @@ LAW = Law(
 
 @pytest.fixture
 def new_law(tmp_path, monkeypatch):
-    """The new law in a folder that is looked into beside the package's own."""
+    """Add a folder with the new law to the folders that are searched for laws."""
     folder = tmp_path / "laws"
     folder.mkdir()
     (folder / "drag_law.py").write_text(NEW_LAW)
