@@ -6,7 +6,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from mrpipe.artifacts import Artifact
+from mrpipe.artifacts.plain import plain
 from mrpipe.structures.over_amplitude import depends_on_amplitude
+
+KEPT = ("name", "form", "place", "parameters", "confidence", "physics", "source")
+"""Keys of an effect of close-loop that the JSON file of an export repeats."""
+
+
+def effects_as_data(summary: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
+    """Return the effects of :func:`effects_left_out` with their parameters, for the JSON file of the export."""
+    found = (item for item in summary.get("effects", ()) if item.get("corrected_in") == where)
+    return [plain({key: item[key] for key in KEPT if key in item}) for item in found]
 
 
 def effects_left_out(summary: Mapping[str, Any], where: str, remedy: str) -> list[str]:
@@ -23,8 +33,7 @@ def effects_left_out(summary: Mapping[str, Any], where: str, remedy: str) -> lis
     """
     names = [
         f"{item['name']} ({item['place']})" if item.get("place") else str(item["name"])
-        for item in summary.get("effects", ())
-        if item.get("corrected_in") == where
+        for item in effects_as_data(summary, where)
     ]
     if not names:
         return []
@@ -43,7 +52,9 @@ def frame_left_out(frame: Artifact, amplitude_m: float, tracing: Mapping[str, An
     tracing
         Summary of close-loop; empty if there is none.
     """
-    found = effects_left_out(tracing, "structure", "the frame is linear, so add them in the program that uses it")
+    found = effects_left_out(
+        tracing, "structure", "the frame is linear; the JSON file of `export frame` has their parameters"
+    )
     if amplitude_m == 0.0 and depends_on_amplitude(frame):
         found.append(
             "the modes depend on the amplitude of the motion, and this frame has constant modes: set "

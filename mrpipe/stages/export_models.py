@@ -38,7 +38,7 @@ def _damper(context: StageContext) -> Subject:
 
 def _frame(context: StageContext) -> Subject:
     from mrpipe.exports.frame import frame_subject
-    from mrpipe.exports.left_out import frame_left_out
+    from mrpipe.exports.left_out import effects_as_data, frame_left_out
     from mrpipe.structures import floor_position, storey_position
     from mrpipe.structures.over_amplitude import read_frame_at
 
@@ -47,13 +47,15 @@ def _frame(context: StageContext) -> Subject:
     frame = read_frame_at(artifact, amplitude)
     place = storey_position if settings.calibrate.damper_across_storey else floor_position
     position = place(frame.floors, settings.calibrate.damper_floor)
+    tracing = _tracing(context)
     return frame_subject(
         frame,
         position,
         prefix=settings.export.prefix,
         rate_hz=settings.export.frame_rate_hz,
         amplitude_m=amplitude,
-        left_out=frame_left_out(artifact, amplitude, _tracing(context)),
+        left_out=frame_left_out(artifact, amplitude, tracing),
+        traced_effects=effects_as_data(tracing, "structure"),
     )
 
 

@@ -280,7 +280,7 @@ def test_the_export_of_a_frame_names_what_it_leaves_out(tmp_path, name):
     run = runner(tmp_path)
     assert run(stages[f"export-{name}"])["warnings"] == []
     found = [
-        {"name": "joint-friction", "place": "storey 2", "corrected_in": "structure"},
+        {"name": "joint-friction", "place": "storey 2", "corrected_in": "structure", "parameters": {"force": 2.0}},
         {"name": "remanence", "corrected_in": "plant"},
     ]
     with ArtifactWriter.create(tmp_path / "close-loop.h5", Provenance("test")) as artifact:
@@ -303,6 +303,8 @@ def test_the_export_of_a_frame_names_what_it_leaves_out(tmp_path, name):
         folder = tmp_path / "export" / "frame"
         content = json.loads((folder / "frame.json").read_text())
         assert content["left_out"] == [effects] and content["amplitude_m"] == 0.01
+        (friction,) = content["traced_effects"]
+        assert friction == {"name": "joint-friction", "place": "storey 2", "parameters": {"force": 2.0}}
         # softer by the factor (1 + A/A_0)^-a of the law
         assert content["model"]["frequencies_hz"] == pytest.approx(natural_modes(frame).frequencies_hz * 11.0**-0.1)
         assert "joint-friction" in (folder / "README.md").read_text()
