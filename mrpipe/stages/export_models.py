@@ -78,13 +78,7 @@ def _run(context: StageContext, name: str, subject_of: Callable[[StageContext], 
     folder = context.run_directory / FOLDER / name
     files = write_export(subject, folder, context.settings.export.formats)
     section.describe(context.report, subject, files, f"{FOLDER}/{name}")
-    return {
-        "kind": subject.kind,
-        "name": subject.name,
-        "folder": str(folder),
-        "files": files,
-        "left_out": list(subject.left_out),
-    }
+    return {"kind": subject.kind, "name": subject.name, "folder": str(folder), "files": files}
 
 
 def _stage(

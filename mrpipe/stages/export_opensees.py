@@ -19,15 +19,14 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     artifact, amplitude = context.artifact("identify-frame"), context.settings.simulate.frame_amplitude_m
     frame = read_frame_at(artifact, amplitude)
     tracing = context.artifact("close-loop").json("summary") if "close-loop" in context.inputs else {}
-    left_out = frame_left_out(artifact, amplitude, tracing)
-    for sentence in left_out:
+    for sentence in frame_left_out(artifact, amplitude, tracing):
         context.warn(sentence)
     path = context.run_directory / FILE
     atomic_write_text(path, opensees_script(frame))
     context.report.text(
         f"The structure as an openseespy script: {FILE}. Run it, or import `build` and `shake` from it."
     )
-    return {"file": str(path), "degrees_of_freedom": list(frame.names), "left_out": left_out}
+    return {"file": str(path), "degrees_of_freedom": list(frame.names)}
 
 
 STAGE = Stage(
