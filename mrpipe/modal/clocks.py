@@ -141,15 +141,16 @@ def _sensor_clock(fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highe
     if fit.left_out.proves(own, cost):
         best, cost = SensorClock(name, sensor, float(offset[0]), float(spread[0])), own
     value, _, spread = _minimise(fit, [ones, time], np.array([offset[0], 0.0]))
-    own = fit.left_out_costs([([ones, time], value)])
-    if fit.left_out.proves(own, cost):
-        best, cost = SensorClock(name, sensor, float(value[0]), float(spread[0]), float(value[1])), own
-    if steps:
-        forms = _step_forms(fit, offset)
-        own = fit.left_out_costs([(changes, value) for changes, value, *_ in forms])
-        if fit.left_out.proves(own, cost):
-            _, value, spread, _, at = min(forms, key=lambda item: item[3])
-            best = SensorClock(name, sensor, float(value[0]), float(spread[0]), 0.0, float(value[1]), at)
+    drift = fit.left_out_costs([([ones, time], value)])
+    changes = fit.left_out.proves(drift, cost)
+    forms = _step_forms(fit, offset) if steps else []
+    step = fit.left_out_costs([(shape, size) for shape, size, *_ in forms]) if forms else cost
+    if forms and fit.left_out.proves(step, cost) and fit.left_out.proves(step, drift):
+        _, value, spread, _, at = min(forms, key=lambda item: item[3])
+        best = SensorClock(name, sensor, float(value[0]), float(spread[0]), 0.0, float(value[1]), at)
+    elif changes or (forms and fit.left_out.proves(step, cost)):
+        # where only a step is proven against a constant delay, but not against a drift, the drift has fewer parameters
+        best = SensorClock(name, sensor, float(value[0]), float(spread[0]), float(value[1]))
     if float(np.abs(best.delay(time)).max()) * highest < _LEAST_PHASE:
         return SensorClock(name, sensor, 0.0, best.offset_error_s)
     return best

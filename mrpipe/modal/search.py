@@ -24,6 +24,8 @@ _LAST_BAND = 1.25
 _ROUNDS = 3
 _SEARCH_LINES = 2500
 _FIT_LINES = 6000
+_SAME_POLE = 0.02
+"""Relative change of a frequency in the last fit up to which a pole counts as the same."""
 
 
 @dataclass(frozen=True)
@@ -172,8 +174,8 @@ def find_modes(
         spectra = tuple(record_spectrum(test, band) for test in tests)
         found = _look(spectra, layout, band, decays)
         if found is not None and found.keep:
-            refined = _only(found, found.keep, decays)
-            if not contradicts(refined, layout):
+            refined, left = _only(found, found.keep, decays)
+            if len(left) == layout.floors and not contradicts(refined, layout):
                 numbers = tuple(range(1, layout.floors + 1))
                 return ModeSearch(refined, band, numbers, found.candidates)
         if found is not None and (
@@ -195,15 +197,17 @@ def _incomplete(
     """Return the modes of a set that is not complete, without those whose shape the last fit makes doubtful."""
     if len(chosen) < layout.floors:
         check_channels(best.fit.coherence[:, list(chosen)], [item.floor for item in best.fit.sensors], source)
-    refined = _only(best, list(chosen), decays)
+    refined, left = _only(best, list(chosen), decays)
     if not contradicts(refined, layout):
-        return ModeSearch(refined, best.band_hz, tuple(chosen.values()), best.candidates)
+        return ModeSearch(refined, best.band_hz, tuple(chosen[pole] for pole in left), best.candidates)
     kept = largest_set(refined, layout) or {0: 1}
     return ModeSearch(refined.only(list(kept)), best.band_hz, tuple(kept.values()), best.candidates)
 
 
-def _only(found: _Found, keep: Sequence[int], decays: Sequence[FrameTest]) -> MultiModeFit:
+def _only(found: _Found, keep: Sequence[int], decays: Sequence[FrameTest]) -> tuple[MultiModeFit, tuple[int, ...]]:
     """Fit again with the poles of the modes and with other real peaks up to a little above the highest mode.
+
+    Returns the fit of the modes and which of `keep` they are. A pole that has moved to another one is left out.
 
     Without the peak of a flexible support its response would be attributed to the frame. The band ends just above the
     highest mode, because a peak just beyond the band is not a power series inside it.
@@ -216,8 +220,14 @@ def _only(found: _Found, keep: Sequence[int], decays: Sequence[FrameTest]) -> Mu
     top = _LAST_BAND * float(fit.angular_frequencies[list(keep)].max())
     spectra = thinned([item.below(top) for item in found.spectra], _FIT_LINES)
     refined = fit_modes(spectra, fit.angular_frequencies[both], fit.damping_ratios[both])
-    place = [int(np.argmin(np.abs(refined.angular_frequencies - fit.angular_frequencies[i]))) for i in keep]
-    return with_decays(refined, decays).only(place)
+    places: dict[int, int] = {}
+    apart = sound(refined)
+    for i in sorted(keep):
+        distance = np.abs(refined.angular_frequencies[apart] / fit.angular_frequencies[i] - 1.0)
+        nearest = int(np.argmin(distance))
+        if distance[nearest] < _SAME_POLE and apart[nearest] not in places.values():
+            places[i] = apart[nearest]
+    return with_decays(refined, decays).only(list(places.values())), tuple(places)
 
 
 def check_channels(coherence: FloatArray, floors: Sequence[int], source: Path) -> None:
