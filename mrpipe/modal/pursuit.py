@@ -80,7 +80,13 @@ def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, ze
         return -np.inf
     q = np.linalg.qr(basis)[0]
     before = target - q @ (q.T @ target)
-    added = _unit(stack(own))
+    # in a long record the transients of a weak mode are below the noise and not worth their parameters
+    driven = own[:, : 2 * len(problem.inputs)]
+    return max(_improvement(before, _unit(stack(columns)), q) for columns in (driven, own))
+
+
+def _improvement(before: FloatArray, added: FloatArray, q: FloatArray) -> float:
+    """Return the improvement of the information criterion by columns that are added to a basis q."""
     added = added - q @ (q.T @ added)
     left, singular, _ = np.linalg.svd(added, full_matrices=False)
     left = left[:, singular > 1e-8]
@@ -88,7 +94,7 @@ def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, ze
     # each sensor has its own local noise, because noise of the excitation is larger at a resonance
     first, second = np.sum(before**2, axis=0), np.sum(after**2, axis=0)
     seen = first > 0.0
-    count = target.shape[0]
+    count = before.shape[0]
     likelihood = float(np.sum(count * np.log(first[seen] / np.maximum(second[seen], 1e-12 * first[seen]))))
     return likelihood - (left.shape[1] * int(seen.sum()) + 2) * float(np.log(count * int(seen.sum())))
 
@@ -99,7 +105,7 @@ def _unit(columns: FloatArray) -> FloatArray:
 
 
 def hidden_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: int) -> list[HiddenPole]:
-    """Return up to `number` poles that the residual of a fit supports, best first, none close to another."""
+    """Return up to `number` poles that the residual of a fit supports, best first, one between two known modes."""
     residuals = _residuals(fit)
     tried: list[HiddenPole] = []
     for zeta in _TRIAL_DAMPING:
@@ -109,11 +115,14 @@ def hidden_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: int
             if np.all(distance > np.maximum(fit.damping_ratios * fit.angular_frequencies, 0.002 * omega)):
                 tried.append(HiddenPole(float(omega), zeta, _gain(fit, residuals, float(omega), zeta)))
     chosen: list[HiddenPole] = []
+    gaps: set[int] = set()
     for pole in sorted(tried, key=lambda item: -item.gain):
         omega = pole.angular_frequency
-        apart = all(abs(omega - other.angular_frequency) > 0.03 * other.angular_frequency for other in chosen)
-        if pole.gain > 0.0 and apart:
+        # one pole between two known modes: what a strong mode leaves near its peak must not take all places
+        gap = int(np.searchsorted(fit.angular_frequencies, omega))
+        if pole.gain > 0.0 and gap not in gaps:
             chosen.append(pole)
+            gaps.add(gap)
         if len(chosen) == number:
             break
     return chosen
