@@ -213,6 +213,22 @@ def _relative(predicted: FloatArray, measured: FloatArray) -> float:
     return float(np.sqrt(np.mean((predicted - measured) ** 2) / max(float(np.var(measured)), 1e-300)))
 
 
+def _vertex(shifts: FloatArray, errors: FloatArray, step: float) -> float:
+    """Return the shift of least error between the steps, from a parabola through the squared errors around the least.
+
+    The squared error of a shifted signal is a parabola near its minimum, so the lag is known better than one step.
+    """
+    place = int(np.argmin(errors))
+    near = np.abs(shifts - shifts[place]) < (COARSE - 0.5) * step
+    if np.count_nonzero(near) < 4 or place == 0:
+        return float(shifts[place])
+    offset = (shifts[near] - shifts[place]) / step
+    curve = np.polynomial.Polynomial.fit(offset, errors[near] ** 2, 2).convert().coef
+    if curve.size < 3 or curve[2] <= 0.0:
+        return float(shifts[place])
+    return float(shifts[place] + step * np.clip(-0.5 * curve[1] / curve[2], -1.0, 1.0))
+
+
 def _least(
     errors: Callable[[float], FloatArray], part: str, granted: float, period: float, rules: DelayRules
 ) -> DelayFinding:
@@ -226,8 +242,8 @@ def _least(
             table[float(shift)] = errors(float(shift))
     shifts = np.array(sorted(table))
     values = np.stack([table[shift] for shift in shifts])
-    own = shifts[np.argmin(values, axis=0)]
-    lag = float(shifts[int(np.argmin(values.mean(axis=1)))])
+    own = np.array([_vertex(shifts, column, step) for column in values.T])
+    lag = _vertex(shifts, np.sqrt(np.mean(values**2, axis=1)), step)
     before = float(values[shifts <= granted].mean(axis=1).min())
     spread = float(np.std(own)) / np.sqrt(len(own)) if len(own) > 1 else step
     half = max(2.0 * spread, step)
