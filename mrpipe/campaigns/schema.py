@@ -120,9 +120,11 @@ class TextEntry(Entry):
 
 
 class FrameEntry(Entry):
-    """What is known of a frame."""
+    """What is known of a frame; `sensor_positions_m` holds x and y of the sensors by the suffix of their channels."""
 
     floor_masses_kg: tuple[float | None, ...] = ()
+    floor_inertias_kg_m2: tuple[float, ...] = ()
+    sensor_positions_m: dict[str, tuple[float, float]] = Field(default_factory=dict)
     about: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("floor_masses_kg")
@@ -130,6 +132,21 @@ class FrameEntry(Entry):
     def _positive(cls, value: tuple[float | None, ...]) -> tuple[float | None, ...]:
         if any(mass is not None and not mass > 0.0 for mass in value):
             raise ValueError("masses above zero expected (null where a mass is unknown)")
+        return value
+
+    @field_validator("floor_inertias_kg_m2")
+    @classmethod
+    def _positive_inertias(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if any(not inertia > 0.0 for inertia in value):
+            raise ValueError("moments of inertia above zero expected")
+        return value
+
+    @field_validator("sensor_positions_m")
+    @classmethod
+    def _axes(cls, value: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        wrong = [name for name in value if not name.startswith(("x", "y"))]
+        if wrong:
+            raise ValueError(f"{wrong[0]}: suffix of a channel expected that begins with its axis, x or y")
         return value
 
 

@@ -24,6 +24,7 @@ from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.peak_picking import pick_peaks
 from mrpipe.modal.records import FrameTest, FrameTests
+from mrpipe.modal.rigid_floors import RigidShapes, assemble_rigid, rigid_shapes
 from mrpipe.modal.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.search import ModeSearch, check_channels
 from mrpipe.modal.selection import (
@@ -143,6 +144,8 @@ def identify_frame(
 
 def _layout(tests: FrameTests) -> Layout:
     directions = {sensor.direction for test in (*tests.forced, *tests.ambient) for sensor in test.sensors}
+    if tests.positions:
+        return Layout(3 * tests.floor_masses.size, None, is_chain=False)
     masses = tests.floor_masses if np.isfinite(tests.floor_masses).all() else None
     return Layout(tests.floor_masses.size, masses, is_chain=len(directions) <= 1)
 
@@ -195,7 +198,13 @@ def _identify(
     zeta = np.array([item.value for item in damping])
     scale, notes = find_scale(chosen.search.fit, tests, layout, options)
     findings += notes
-    assembly, notes = _assemble(chosen.search, zeta, tests, layout, options, given, scale)
+    rigid = rigid_shapes(fit, tests.positions, tests.source) if tests.positions else None
+    if rigid is None:
+        assembly, notes = _assemble(chosen.search, zeta, tests, layout, options, given, scale)
+    else:
+        axis = next((place.direction for place in fit.inputs if place.direction), "x")
+        assembly = assemble_rigid(fit, rigid, zeta, tests.floor_masses, tests.inertias, axis)
+        notes = list(assembly.findings)
     findings += notes
     progress(0.75, "verification")
     shown = _shown(forced, chosen, clocks)
@@ -203,6 +212,8 @@ def _identify(
     band = chosen.search.band_hz
     inside = (band[0], min(band[1], 1.15 * float(fit.angular_frequencies[-1]) / (2.0 * np.pi)))
     frame = assembly.frame
+    # the simulation of tests knows one direction
+    verified = frame if rigid is None and forced else None
     amplitude = None
     # errors of picked modes are those of the lines of the spectrum; a law over amplitude would only explain these
     if forced and options.amplitude_dependence and options.modes_from == "fit":
@@ -216,12 +227,12 @@ def _identify(
         damping_source=sources,
         sweep_damping=sweep,
         mode_shapes=assembly.shapes,
-        mac=_assurance(fit, layout, assembly),
+        mac=_assurance(fit, layout, assembly, rigid),
         decays=decays,
         fit=fit,
         tridiagonal=assembly.storeys,
-        in_time=() if frame is None or not forced else tuple(verify_in_time(frame, test, inside) for test in shown),
-        in_frequency=None if frame is None or not forced else verify_in_frequency(frame, fit, inside),
+        in_time=() if verified is None else tuple(verify_in_time(verified, test, inside) for test in shown),
+        in_frequency=None if verified is None else verify_in_frequency(verified, fit, inside),
         phase_scatter=np.abs(fit.residues.imag).max(axis=0) / np.abs(fit.residues).max(axis=0),
         tests=shown,
         band_hz=band,
@@ -229,7 +240,7 @@ def _identify(
         numbers=assembly.numbers,
         clocks=clocks,
         candidates=chosen.search.candidates,
-        degrees_of_freedom=_names(fit, layout),
+        degrees_of_freedom=_names(fit, layout) if rigid is None else rigid.names,
         masses=assembly.masses,
         mass_intervals=assembly.mass_intervals,
         amplitude=amplitude,
@@ -320,8 +331,10 @@ def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout, scale: Scale)
     )
 
 
-def _assurance(fit: MultiModeFit, layout: Layout, assembly: Assembly) -> FloatArray:
+def _assurance(fit: MultiModeFit, layout: Layout, assembly: Assembly, rigid: RigidShapes | None = None) -> FloatArray:
     """Return the modal assurance of measured shapes against the same modes of the frame, at the measured floors."""
+    if rigid is not None and assembly.frame is not None:
+        return modal_assurance(rigid.shapes, natural_modes(assembly.frame).mode_shapes)
     if assembly.frame is None:
         return modal_assurance(fit.residues.real, fit.residues.real)
     rows = sorted({sensor.floor - 1 for sensor in fit.sensors})

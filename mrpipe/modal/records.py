@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -249,6 +249,10 @@ class FrameTests:
         Tests whose excitation was not measured.
     with_added_masses
         Forced and ambient tests with known added masses. They give the scale of the modes of the other tests.
+    positions
+        Direction of a sensor -> its x and y on the floor [m]; empty where floors move in one direction only.
+    inertias
+        Shape (n,) [kg m^2]: moment of inertia of each floor about the origin of the positions; empty where unknown.
     """
 
     forced: tuple[FrameTest, ...]
@@ -257,6 +261,8 @@ class FrameTests:
     source: Path
     ambient: tuple[FrameTest, ...] = ()
     with_added_masses: tuple[FrameTest, ...] = ()
+    positions: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    inertias: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
 def frame_tests(campaign: Campaign) -> FrameTests:
@@ -291,7 +297,30 @@ def frame_tests(campaign: Campaign) -> FrameTests:
         raise UserError(
             source, place, "all tests have added masses", "record a sweep, random or ambient test without them as well"
         )
-    return FrameTests(of_kind("sweep", "random"), of_kind("free-decay"), masses, source, of_kind("ambient"), changed)
+    positions, inertias = _plan(campaign, used, floors, source)
+    return FrameTests(
+        of_kind("sweep", "random"), of_kind("free-decay"), masses, source, of_kind("ambient"), changed, positions,
+        inertias,
+    )  # fmt: skip
+
+
+def _plan(
+    campaign: Campaign, used: Sequence[Recording], floors: int, source: Path
+) -> tuple[dict[str, tuple[float, float]], FloatArray]:
+    """Return positions of the sensors by direction, and moments of inertia of the floors."""
+    known = campaign.declared.get("frame") or {}
+    given = known.get("sensor_positions_m") or {}
+    positions = {str(name): (float(x), float(y)) for name, (x, y) in given.items()}
+    inertias = np.asarray(known.get("floor_inertias_kg_m2") or (), dtype=np.float64)
+    directions = {sensor.direction for item in used for sensor in _sensors(item)}
+    missing = sorted(directions - set(positions))
+    if positions and missing:
+        place = "frame.sensor_positions_m"
+        raise UserError(source, place, f"has no entry {missing[0]!r}", "give x and y of every sensor's suffix in m")
+    if inertias.size and inertias.size != floors:
+        place = "frame.floor_inertias_kg_m2"
+        raise UserError(source, place, f"has {inertias.size} entries", f"give one for each of the {floors} floors")
+    return positions, inertias
 
 
 def _check_masses(masses: FloatArray, tests: Sequence[FrameTest], source: Path) -> None:
