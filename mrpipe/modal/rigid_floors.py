@@ -99,7 +99,7 @@ def assemble_rigid(
         Direction of the ground motion for the influence vector of the frame.
     """
     findings = [
-        f"mode {mode + 1}: {100.0 * share:.0f} % of the shape is no motion of rigid floors (check positions and signs)"
+        f"mode {mode + 1}: {100.0 * share:.0f} % of the shape does not fit rigid floors (check positions and signs)"
         for mode, share in enumerate(rigid.misfit)
         if share > _LARGEST_MISFIT
     ]
