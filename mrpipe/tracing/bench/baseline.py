@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.laws import Law, constant_law
 from mrpipe.dampers.library import base_form
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.drive_laws import adequate_laws
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Base, Term
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.reference import own_laws
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, fit_with_form, polynomial_laws
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, force_deviation, noise_scale, sensor_deviation
 from mrpipe.tracing.rules import NoiseRules
@@ -111,17 +111,8 @@ def _weighted(
     found: Fit, recordings: Recordings, model_error_share: float, rules: NoiseRules, scale: NoiseScale = AS_SHOWN
 ) -> Fit:
     deviation = force_deviation(found, recordings, model_error_share, scale, rules)
-    problem = replace(found.problem, root_weight=recordings.used / deviation, reference=positive(found))
+    problem = replace(found.problem, root_weight=recordings.used / deviation, reference=own_laws(found))
     return fit(problem, found.theta, iterations=12)
-
-
-def positive(found: Fit) -> tuple[Law, ...]:
-    """Return the fitted laws as reference of effects; a viscosity that is zero everywhere is raised above it."""
-    forces, viscosity, *rest = found.laws
-    drive = np.linspace(0.0, found.problem.scales.drive, 20)
-    if float(np.mean(viscosity(drive))) <= 0.0 and not found.problem.base.form.coupled:
-        viscosity = constant_law(0.01 * found.problem.scales.force / max(found.problem.scales.speed, 1e-9))
-    return forces, viscosity, *rest
 
 
 def _with_declared(before: Fit, effect: Effect) -> Fit:

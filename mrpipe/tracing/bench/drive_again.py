@@ -7,6 +7,7 @@ from dataclasses import replace
 from mrpipe.fitting.drive_laws import adequate_laws
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Base
+from mrpipe.fitting.reference import with_own_laws
 from mrpipe.fitting.start import distinct_levels, polynomial_laws
 from mrpipe.tracing.bench.select import Selection
 
@@ -41,4 +42,4 @@ def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int
 
 def _with_laws(found: Fit, base: Base) -> Fit:
     problem = replace(found.problem, base=base)
-    return fit(problem, start_of(problem, found.base_values, found.term_values), iterations=12)
+    return with_own_laws(fit(problem, start_of(problem, found.base_values, found.term_values), iterations=12))

@@ -17,6 +17,7 @@ from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.dampers.form import BaseForm
 from mrpipe.fitting.engine import Fit, centred, fit, regressors, start_of, weighting
 from mrpipe.fitting.problem import Problem
+from mrpipe.fitting.reference import with_own_laws
 from mrpipe.fitting.start import fit_with_form
 from mrpipe.tracing.bench.select import Selection, left_of
 from mrpipe.tracing.rules import RaceRules
@@ -287,7 +288,8 @@ def alone(small: Fit, forms: Mapping[str, BaseForm], *, jobs: int = 1) -> dict[s
     own = small.problem.base.name
     names = [name for name in forms if name != own]
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        fits = pool.map(lambda name: fit_with_form(small, forms[name], starts=1, iterations=8), names)
+        # effects scale with the laws of the form that they are added to, not with those of the declared form
+        fits = pool.map(lambda name: with_own_laws(fit_with_form(small, forms[name], starts=1, iterations=8)), names)
         return {own: small, **dict(zip(names, fits, strict=True))}
 
 
@@ -320,7 +322,7 @@ def on_all_tests(drafted: Fit, problem: Problem, coupled: frozenset[str] = froze
     if base.name in coupled:
         base = replace(base, form=replace(base.form, coupled=True))
     whole = replace(drafted.problem, base=base).on_samples_of(problem)
-    return fit(whole, drafted.theta, iterations=iterations)
+    return with_own_laws(fit(whole, drafted.theta, iterations=iterations))
 
 
 def _without(found: Fit, place: int) -> Fit:

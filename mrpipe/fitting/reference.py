@@ -1,0 +1,62 @@
+"""The laws of the drive that effects scale with: those of the fit itself.
+
+An effect that changes the yield force by a share reads the yield force of the reference laws, because the laws of the
+base form are solved for afterwards. If the reference is not the law that the fit finds, the share means another force
+at each level of the drive, and the damper that is written, which has only the fitted laws, differs from the fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mrpipe.dampers.laws import Law, constant_law
+from mrpipe.fitting.engine import Fit, fit
+
+PASSES = 3
+"""Numerical technique: fits, at most, until reference and fitted laws agree."""
+
+SAME = 0.01
+"""Numerical technique: difference, as a share of the largest value, up to which laws agree."""
+
+LEVELS = 20
+"""Numerical technique: levels of the drive at which laws are compared."""
+
+
+def own_laws(found: Fit) -> tuple[Law, ...]:
+    """Return the fitted laws as reference of effects; a viscosity that is zero everywhere is raised above it."""
+    forces, viscosity, *rest = found.laws
+    drive = np.linspace(0.0, found.problem.scales.drive, LEVELS)
+    if float(np.mean(viscosity(drive))) <= 0.0 and not found.problem.base.form.coupled:
+        viscosity = constant_law(0.01 * found.problem.scales.force / max(found.problem.scales.speed, 1e-9))
+    return forces, viscosity, *rest
+
+
+def with_own_laws(found: Fit, *, iterations: int = 6) -> Fit:
+    """Return a fit whose effects scale with its own laws of the drive.
+
+    Parameters
+    ----------
+    found
+        Fit with or without effects.
+    iterations
+        Iterations of each search.
+    """
+    if found.problem.base.form.coupled:
+        return found
+    for _ in range(PASSES):
+        laws = own_laws(found)
+        problem = replace(found.problem, reference=laws)
+        if not found.problem.terms:
+            return replace(found, problem=problem)
+        if _alike(laws, found.problem.reference, found.problem.scales.drive):
+            break
+        found = fit(problem, found.theta, iterations=iterations)
+    return found
+
+
+def _alike(laws: tuple[Law, ...], others: tuple[Law, ...], limit: float) -> bool:
+    drive = np.linspace(0.0, limit, LEVELS)
+    pairs = [(np.asarray(law(drive)), np.asarray(other(drive))) for law, other in zip(laws, others, strict=False)]
+    return all(float(np.max(np.abs(one - other))) <= SAME * float(np.max(np.abs(one))) for one, other in pairs)
