@@ -2,16 +2,19 @@
 
 A spectrum shows where a displacement sinks into its white noise. It cannot separate motion from hum of the mains, and
 it does not show what the remaining noise does to a force that follows velocity or acceleration. Therefore the limit is
-chosen by the error of models.
+chosen by the error of models. Before a model is chosen, simple base forms judge the filter. They can prefer a limit
+that hides what they lack, so the chosen model judges it again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mrpipe.dampers.library import base_form
+from mrpipe.fitting.engine import Fit, fit
 from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
@@ -23,7 +26,13 @@ FORMS = ("bouc-wen", "bingham", "hyperbolic-tangent", "hysteretic-sigmoid")
 acceleration."""
 
 RATIO = 2.0
-"""Numerical technique: ratio of successive limits."""
+"""Numerical technique: ratio of successive limits that simple base forms judge."""
+
+FINE_RATIO = 1.4
+"""Numerical technique: ratio of successive limits that the chosen model judges."""
+
+FINE_ITERATIONS = 3
+"""Numerical technique: iterations of each fit of the chosen model."""
 
 HARMONICS = 4.0
 """Numerical technique: the lowest limit in multiples of the frequency of the motion."""
@@ -57,11 +66,7 @@ def highest_cutoff(
         Decision thresholds; their defaults if None.
     """
     rules = rules or NuisanceRules()
-    lowest, limit = _lowest(automatic), float(np.max(automatic.cutoff_hz)) / RATIO
-    limits = []
-    while limit > lowest:
-        limits.append(limit)
-        limit /= RATIO
+    limits = _limits(automatic, RATIO)
     if not limits:
         return np.inf
     few = [tests[place] for place in draft_tests(automatic)]
@@ -76,6 +81,52 @@ def highest_cutoff(
         if error < least:
             best, least = item, error
     return best
+
+
+def better_limit(
+    found: Fit,
+    tests: Sequence[PreparedTest],
+    automatic: Recordings,
+    highest: float,
+    *,
+    rate_hz: float,
+    rules: NuisanceRules | None = None,
+) -> float:
+    """Return the limit [Hz] with which a chosen model leaves clearly less than with the present one; else that one.
+
+    Parameters
+    ----------
+    found
+        Chosen model, fitted to the training tests.
+    tests, automatic
+        Training tests, and the same with cut-offs by criterion.
+    highest
+        Present limit [Hz].
+    rate_hz
+        Rate at which models are fitted [Hz].
+    rules
+        Decision thresholds; their defaults if None.
+    """
+    rules = rules or NuisanceRules()
+    def left(limit: float) -> float:
+        recordings = record_tests(tests, rate_hz=rate_hz, highest_cutoff_hz=limit)
+        weight = recordings.used / found.problem.scales.force
+        problem = replace(found.problem, recordings=recordings, root_weight=weight)
+        return float(np.sqrt(fit(problem, found.theta, iterations=FINE_ITERATIONS).chi_square))
+
+    errors = {limit: left(limit) for limit in (np.inf, *_limits(automatic, FINE_RATIO))}
+    best = min(errors, key=lambda limit: errors[limit])
+    return best if errors[best] < (1.0 - rules.filter_again) * left(highest) else highest
+
+
+def _limits(recordings: Recordings, ratio: float) -> list[float]:
+    """Return the limits that are tried [Hz], the highest first."""
+    lowest, limit = _lowest(recordings), float(np.max(recordings.cutoff_hz)) / ratio
+    limits = []
+    while limit > lowest:
+        limits.append(limit)
+        limit /= ratio
+    return limits
 
 
 def _lowest(recordings: Recordings) -> float:

@@ -10,9 +10,11 @@ import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.contract import Effect
+from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import (
     MOST_JUDGED,
+    MOST_SAMPLES,
     Recordings,
     enough_tests,
     record_tests,
@@ -22,7 +24,7 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline
 from mrpipe.tracing.bench.choose import Choice, choose_model, judged_by_trees
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
-from mrpipe.tracing.bench.cutoff import highest_cutoff
+from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
 from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
@@ -65,15 +67,12 @@ def trace_campaign(
     progress
         Called with the share done and a text.
     """
-    rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
     rules = options.rules
     ordered = sort_tests(tests, rules.validation)
     usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))
     unseen = [t for t in ordered.tests if t.role == "validation"]
     training, highest = _training(usable, options)
-    validation = record_tests(
-        unseen, rate_hz=rate, cutoff_hz=cutoff, highest_cutoff_hz=highest, most_samples=MOST_JUDGED
-    )
+    validation = _recorded(unseen, highest, options, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
     able, reasons = untestable(training, effects, rules.testability)
     first = _first_baseline(training, declared, options)
@@ -89,6 +88,16 @@ def trace_campaign(
             f"{refusal}: nothing is traced", ordered, found, first, training, reasons, declared, options, jobs
         )
     choice = choose_model(first, training, able, list(declared), options, rng=rng, jobs=jobs, progress=progress)
+    limit = _limit_of(choice.selection.chosen, usable, highest, options)
+    if limit != highest:
+        # the filter had hidden or feigned what the models lack, so nothing that was chosen with it is kept
+        training, validation = (
+            _recorded(usable, limit, options),
+            _recorded(unseen, limit, options, most_samples=MOST_JUDGED),
+        )
+        able, reasons = untestable(training, effects, rules.testability)
+        first = _first_baseline(training, declared, options)
+        choice = choose_model(first, training, able, list(declared), options, rng=rng, jobs=jobs, progress=progress)
     baseline, selection = choice.baseline, choice.selection
     window = selection.base.problem.window_share
     if not baseline.model_error:
@@ -97,7 +106,7 @@ def trace_campaign(
     reason = unnamed_reason(selection, options)
     if reason:
         selection = replace(selection, chosen=selection.without_effects)
-    elif not baseline.model_error:
+    else:
         selection = _refined(selection, len(declared), options, rng, jobs)
     selection = with_further_terms(
         selection,
@@ -141,21 +150,39 @@ def trace_campaign(
 
 def _training(tests: Sequence[PreparedTest], options: TracingOptions) -> tuple[Recordings, float]:
     """Return the training tests and the limit of the cut-offs of their displacement [Hz]."""
-    rate, cutoff = options.fit_rate_hz, options.displacement_cutoff_hz
-    automatic = record_tests(tests, rate_hz=rate, cutoff_hz=cutoff)
-    if cutoff > 0.0:
+    automatic = _recorded(tests, np.inf, options)
+    if options.displacement_cutoff_hz > 0.0:
         return automatic, np.inf
     highest = highest_cutoff(
         tests,
         automatic,
-        rate_hz=rate,
+        rate_hz=options.fit_rate_hz,
         yield_order=options.yield_order,
         viscosity_order=options.viscosity_order,
         rules=options.rules.nuisances,
     )
-    if not np.isfinite(highest):
-        return automatic, highest
-    return record_tests(tests, rate_hz=rate, highest_cutoff_hz=highest), highest
+    return (automatic if not np.isfinite(highest) else _recorded(tests, highest, options)), highest
+
+
+def _limit_of(chosen: Fit, tests: Sequence[PreparedTest], highest: float, options: TracingOptions) -> float:
+    """Return the limit of the cut-offs [Hz] with which the chosen model leaves clearly less, else the present one."""
+    if options.displacement_cutoff_hz > 0.0:
+        return highest
+    automatic = _recorded(tests, np.inf, options)
+    return better_limit(chosen, tests, automatic, highest, rate_hz=options.fit_rate_hz, rules=options.rules.nuisances)
+
+
+def _recorded(
+    tests: Sequence[PreparedTest], highest: float, options: TracingOptions, *, most_samples: int = MOST_SAMPLES
+) -> Recordings:
+    """Return tests end to end, with the displacement filtered by criterion and up to a limit [Hz]."""
+    return record_tests(
+        tests,
+        rate_hz=options.fit_rate_hz,
+        cutoff_hz=options.displacement_cutoff_hz,
+        highest_cutoff_hz=highest,
+        most_samples=most_samples,
+    )
 
 
 def _first_baseline(training: Recordings, declared: Sequence[Effect], options: TracingOptions) -> Baseline:

@@ -55,6 +55,13 @@ class NuisanceRules(Section):
         description="The displacement is filtered below the cut-off that its spectrum suggests if a base form then "
         "leaves an error that is smaller by this share.",
     )
+    filter_again: float = Field(
+        0.05,
+        ge=0.0,
+        lt=1.0,
+        description="The displacement is filtered with another limit, and everything is chosen again, if the chosen "
+        "model then leaves an error that is smaller by this share.",
+    )
     fewest_of_session: int = Field(
         3, ge=2, description="Number of records that must agree on a gain before it counts as a gain of the session."
     )

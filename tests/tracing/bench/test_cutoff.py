@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import signal
 
+from mrpipe.dampers.library import base_form
+from mrpipe.fitting.engine import fit
 from mrpipe.fitting.recordings import Recordings, record_tests
+from mrpipe.fitting.start import base_of, best_fit, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.cutoff import highest_cutoff
+from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff
 from tests.tracing.bench.rig import hysteresis
 
 RATE = 1000.0
@@ -76,3 +81,18 @@ def test_a_limit_lowers_only_the_cut_offs_above_it() -> None:
     tests = recorded([random_motion(0.002, 60.0, 1), sine(0.01, 0.5)], "velocity")
     automatic, limited = (record_tests(tests, rate_hz=250.0, highest_cutoff_hz=value) for value in (np.inf, 40.0))
     np.testing.assert_allclose(limited.cutoff_hz, np.minimum(automatic.cutoff_hz, 40.0))
+
+
+@pytest.mark.planted
+def test_the_chosen_model_finds_that_a_limit_rounds_the_corners_of_triangles() -> None:
+    time = np.arange(int(SECONDS * RATE)) / RATE
+    motions = [0.006 * signal.sawtooth(2.0 * np.pi * speed * time, 0.5) for speed in (0.6, 0.8, 1.0, 1.2)]
+    tests = recorded(motions, "hysteresis")
+    automatic, low = (record_tests(tests, rate_hz=250.0, highest_cutoff_hz=limit) for limit in (np.inf, 6.0))
+    form = base_form("bouc-wen")
+    found = best_fit(first_problem(low, base_of(low, form, polynomial_laws(form, 3, 2, 1))), starts=1, iterations=6)
+    better = better_limit(found, tests, automatic, 6.0, rate_hz=250.0)
+    assert better > 20.0
+    # without a limit nothing is lost, so none is set
+    problem = replace(found.problem, recordings=automatic, root_weight=automatic.used / found.problem.scales.force)
+    assert better_limit(fit(problem, found.theta), tests, automatic, np.inf, rate_hz=250.0) == np.inf
