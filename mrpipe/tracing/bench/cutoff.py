@@ -108,6 +108,7 @@ def better_limit(
         Decision thresholds; their defaults if None.
     """
     rules = rules or NuisanceRules()
+
     def left(limit: float) -> float:
         recordings = record_tests(tests, rate_hz=rate_hz, highest_cutoff_hz=limit)
         weight = recordings.used / found.problem.scales.force

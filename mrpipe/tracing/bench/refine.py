@@ -127,14 +127,19 @@ def _confirmed(
 
 
 def _richest(chosen: Fit, place: int) -> Fit | None:
-    """Return the best fit with a richer form of one term, on all tests; None where there is none to be had."""
-    effect = chosen.problem.terms[place].effect
-    if not effect.refinements:
+    """Return the best fit with another form of one term, on all tests; None where there is none to be had.
+
+    The forms of the search are tried as well as the richer ones: before the other terms and the laws were final,
+    another of them may have looked best.
+    """
+    term = chosen.problem.terms[place]
+    forms = [form for form in (*term.effect.refinements, *term.effect.forms) if form.name != term.form.name]
+    if not forms:
         return None
     small = draft(chosen)
     trials = [
         _trial(small, place, form, given)
-        for form in effect.refinements
+        for form in forms
         for given in _starts(form, small.term_values[place], small.problem.scales)
     ]
     best = min(trials, key=lambda item: item.cost)
