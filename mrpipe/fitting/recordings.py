@@ -43,8 +43,11 @@ edge by several percent, which a hysteresis turns into twice the error."""
 QUANTISED_SHARE = 0.5
 """A channel with fewer different values than this share of its samples is quantised."""
 
-ACCELERATION_CUTOFF_HZ = 40.0
-"""Least cut-off of a measured acceleration."""
+DISPLACEMENT_HARMONICS = 8.0
+"""Least cut-off of a displacement, in multiples of the frequency of the motion."""
+
+ACCELERATION_HARMONICS = 25.0
+"""Least cut-off of a measured acceleration, in multiples of the frequency of the motion."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,21 @@ class Recordings:
         """Time since the beginning of each test [s], shape (n,)."""
         index = np.arange(len(self.force)) - self.starts[self.test]
         return index * self.dt[self.test]
+
+    @property
+    def motion_period_s(self) -> FloatArray:
+        """Period of the motion, also where it is not periodic: 2 pi RMS displacement over RMS velocity, (tests,)."""
+        pieces = [slice(int(a), int(b)) for a, b in itertools.pairwise(self.starts)]
+        sizes = [(np.std(self.displacement[piece]), np.std(self.velocity[piece])) for piece in pieces]
+        lengths = np.diff(self.starts) * self.dt
+        periods = [2.0 * np.pi * x / v if v > 0.0 else length for (x, v), length in zip(sizes, lengths, strict=True)]
+        return np.minimum(periods, lengths)
+
+    def blocks(self, periods: float) -> IntArray:
+        """Return the block of each sample, shape (n,): parts of a test that last so many periods of its motion."""
+        length = np.maximum(1, np.round(periods * self.motion_period_s / self.dt).astype(np.int64))
+        within = (np.arange(len(self.force)) - self.starts[self.test]) // length[self.test]
+        return np.asarray(self.test * 100_000 + within)
 
     @property
     def force_rms(self) -> float:
@@ -281,7 +299,9 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
     acceleration = np.gradient(velocity, 1.0 / rate)
     if _acceleration_was_measured(test):
         # an accelerometer is far quieter than a displacement differentiated twice
-        acceleration = butterworth_lowpass(test.acceleration_m_s2, max(1.5 * cutoff, ACCELERATION_CUTOFF_HZ), rate)
+        acceleration = butterworth_lowpass(
+            test.acceleration_m_s2, max(1.5 * cutoff, ACCELERATION_HARMONICS * motion_frequency(test)), rate
+        )
     length = min(len(raw), int(longest_s * rate))
     stride = max(1, round(rate / max(rate_hz, 5.0 * min(cutoff, 0.1 * rate))))
     chosen = np.arange(0, length, stride)
@@ -346,4 +366,10 @@ def displacement_cutoff(test: PreparedTest) -> float:
     found = cutoff_by_criterion(raw, rate, velocity_share=0.9995, margin=CUTOFF_MARGIN)
     # remaining noise is differentiated twice if an effect needs the acceleration
     found = min(found, CUTOFF_MARGIN * signal_end(raw, rate))
-    return float(min(max(found, 12.0), 0.25 * test.sampling_rate_hz, 250.0))
+    return float(min(max(found, DISPLACEMENT_HARMONICS * motion_frequency(test)), 0.25 * rate, 250.0))
+
+
+def motion_frequency(test: PreparedTest) -> float:
+    """Return the frequency of a motion [Hz]: RMS velocity over RMS displacement, over 2 pi; 0 without motion."""
+    motion = float(np.std(test.displacement_m))
+    return float(np.std(test.velocity_m_s)) / (2.0 * np.pi * motion) if motion > 0.0 else 0.0

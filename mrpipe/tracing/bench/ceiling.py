@@ -14,8 +14,8 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.crossvalidation import folds_of
 from mrpipe.tracing.bench.residual_structure import states_of
 
-LAGS_S = (0.01, 0.03, 0.1, 0.3)
-"""Numerical technique: lags [s] of the states that the flexible model sees."""
+LAGS = (0.015, 0.045, 0.15, 0.45)
+"""Numerical technique: lags of the states that the flexible model sees, in periods of the middle training test."""
 
 MOST_ROWS = 15_000
 """Numerical technique: samples that the flexible model is trained on."""
@@ -150,8 +150,10 @@ def lagged_states(found: Fit, recordings: Recordings) -> FloatArray:
     """Return states of the simulated damper and their past, shape (n, features); no measured force among them."""
     values = states_of(found, recordings).values
     columns = [values[name] for name in values if name != "direction"]
-    for lag in LAGS_S:
-        shift = np.round(lag / recordings.dt).astype(np.int64)[recordings.test]
+    # the same times in all tests, because delays of a rig do not depend on the motion
+    period = float(np.median(found.problem.recordings.motion_period_s))
+    for lag in LAGS:
+        shift = np.round(lag * period / recordings.dt).astype(np.int64)[recordings.test]
         index = np.maximum(np.arange(len(recordings.force)) - shift, recordings.starts[recordings.test])
         columns += [recordings.displacement[index], recordings.velocity[index], recordings.drive[index]]
     return np.column_stack(columns)

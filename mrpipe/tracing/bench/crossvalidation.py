@@ -12,7 +12,7 @@ from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.fitting.engine import Fit, centred, fit, jacobian_of, predict, regressors, weighting
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.tracing.bench.residual_structure import BLOCK_S
+from mrpipe.tracing.bench.residual_structure import BLOCK
 
 BEYOND = 0.01
 """Numerical technique: tolerance at the ends of the range that a fit has seen, as a share of the range."""
@@ -105,10 +105,7 @@ def _without_offsets(error: FloatArray, test: IntArray, root_weight: FloatArray)
 
 def gain_of(before: FloatArray, after: FloatArray, problem: Problem, *, draws: int, rng: np.random.Generator) -> Gain:
     """Return the share of the left-out squared error that goes from `before` to `after`, with its interval."""
-    recordings = problem.recordings
-    length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
-    within = (np.arange(len(before)) - recordings.starts[recordings.test]) // length[recordings.test]
-    block = np.unique(recordings.test * 100_000 + within, return_inverse=True)[1]
+    block = np.unique(problem.recordings.blocks(BLOCK), return_inverse=True)[1]
     first = np.bincount(block, weights=before**2)
     second = np.bincount(block, weights=after**2)
     chosen = rng.integers(len(first), size=(draws, len(first)))
@@ -127,10 +124,7 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
     searched = jacobian_of(problem, found.theta, residual, w, low, high)
     linear = centred(regressors(problem, found.theta)[:, w.at], w)[0]
     first = problem.base.columns
-    recordings = problem.recordings
-    length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
-    within = ((np.arange(len(recordings.force)) - recordings.starts[recordings.test]) // length[recordings.test])[w.at]
-    block = np.unique(recordings.test[w.at] * 100_000 + within, return_inverse=True)[1]
+    block = np.unique(problem.recordings.blocks(BLOCK)[w.at], return_inverse=True)[1]
     rows = np.concatenate([-searched, linear])
     inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
     scores = np.stack([np.bincount(block, weights=row * residual) for row in rows])

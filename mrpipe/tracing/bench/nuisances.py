@@ -12,7 +12,7 @@ from scipy import stats
 from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.tracing.bench.residual_structure import BLOCK_S
+from mrpipe.tracing.bench.residual_structure import BLOCK
 from mrpipe.tracing.rules import NuisanceRules, ValidationRules
 
 WINDOW_SHARES = (0.05, 0.1, 0.15)
@@ -57,14 +57,16 @@ def record_gains(
         Difference from 1 that is reported.
     """
     found = {}
+    blocks = recordings.blocks(BLOCK)
     for index, name in enumerate(recordings.names):
         own = np.flatnonzero(recordings.used & (recordings.test == index) & (True if part is None else part))
         power = float(simulated[own] @ simulated[own])
         if power <= 0.0:
             continue
         gain = float(measured[own] @ simulated[own]) / power
-        block = (own - own[0]) // max(1, round(BLOCK_S / recordings.dt[index]))
-        scores = np.bincount(block, weights=simulated[own] * (measured[own] - gain * simulated[own]))
+        scores = np.bincount(
+            blocks[own] - blocks[own[0]], weights=simulated[own] * (measured[own] - gain * simulated[own])
+        )
         half = 1.96 * float(np.sqrt(scores @ scores)) / power
         found[name] = RecordGain(gain, (gain - half, gain + half), least)
     return found

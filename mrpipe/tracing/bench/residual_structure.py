@@ -13,8 +13,8 @@ from mrpipe.fitting.kernel import CURRENT_AT, HYSTERESIS_AT, WORK_AT, run_record
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.rules import LocationRules
 
-BLOCK_S = 0.4
-"""Numerical technique: length [s] of the blocks whose means are taken as independent."""
+BLOCK = 0.6
+"""Numerical technique: length, in periods of the motion, of the blocks whose means are taken as independent."""
 
 BINS = 16
 """Numerical technique: steps of the step function of a state."""
@@ -56,10 +56,7 @@ def states_of(found: Fit, recordings: Recordings) -> States:
         "time in test": recordings.time,
         "work": wires[WORK_AT],
     }
-    length = np.maximum(1, np.round(BLOCK_S / recordings.dt).astype(np.int64))
-    within = (np.arange(len(x)) - recordings.starts[recordings.test]) // length[recordings.test]
-    block = recordings.test * 100_000 + within
-    return States(values, block)
+    return States(values, recordings.blocks(BLOCK))
 
 
 def memory_of(recordings: Recordings) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

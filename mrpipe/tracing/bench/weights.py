@@ -21,8 +21,8 @@ MOST_SHIFT = 3.0
 SHORTEST_CYCLE = 8
 """Numerical technique: cycles of fewer samples are not compared sample by sample."""
 
-AVERAGED_S = 0.02
-"""Numerical technique: time [s] over which the simulated variance of the noise is averaged."""
+AVERAGED = 0.03
+"""Numerical technique: time, in periods of the motion, over which the simulated variance of the noise is averaged."""
 
 TOP = 0.9
 """Numerical technique: quantile above which a part of the noise counts as large."""
@@ -207,9 +207,10 @@ def _noisy_motion(recordings: Recordings, rng: np.random.Generator) -> tuple[Flo
 
 def _locally_averaged(values: FloatArray, recordings: Recordings) -> FloatArray:
     result = np.empty_like(values)
+    times = AVERAGED * recordings.motion_period_s
     for test in range(recordings.tests):
         piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
-        width = 2 * max(1, round(0.5 * AVERAGED_S / recordings.dt[test])) + 1
+        width = 2 * max(1, round(0.5 * times[test] / recordings.dt[test])) + 1
         result[piece] = ndimage.uniform_filter1d(values[piece], width, mode="nearest")
     return result
 

@@ -1,0 +1,57 @@
+"""Times of the tracing follow from the motion of each test, not from fixed seconds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrpipe.fitting.recordings import Recordings, displacement_cutoff, motion_frequency, record_tests
+from mrpipe.signals.prepared import PreparedTest
+
+pytestmark = pytest.mark.property
+
+RATE = 500.0
+
+
+def sine(name: str, frequency_hz: float, seconds: float = 20.0) -> PreparedTest:
+    """Return a sine of 10 mm with a force that follows its velocity, and white noise of 2 micrometres."""
+    time = np.arange(int(seconds * RATE)) / RATE
+    omega = 2.0 * np.pi * frequency_hz
+    x, v = 0.01 * np.sin(omega * time), 0.01 * omega * np.cos(omega * time)
+    raw = x + 2e-6 * np.random.default_rng(1).standard_normal(len(x))
+    return PreparedTest(
+        name, "training", RATE, time, x, v, -(omega**2) * x, np.ones_like(x), 100.0 * v, raw, 100.0 * v,
+        np.array([], dtype=np.int64), "A", "periodic",
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def recordings() -> Recordings:
+    return record_tests([sine("slow", 0.2), sine("fast", 2.0)], rate_hz=250.0)
+
+
+def test_the_period_is_that_of_the_motion(recordings: Recordings) -> None:
+    np.testing.assert_allclose(recordings.motion_period_s, [5.0, 0.5], rtol=0.02)
+    assert motion_frequency(sine("one", 1.3)) == pytest.approx(1.3, rel=1e-3)
+
+
+def test_no_period_is_longer_than_its_test(recordings: Recordings) -> None:
+    still = replace(recordings, velocity=np.zeros_like(recordings.velocity))
+    np.testing.assert_allclose(still.motion_period_s, np.diff(still.starts) * still.dt)
+
+
+def test_blocks_last_the_same_share_of_every_period(recordings: Recordings) -> None:
+    blocks = recordings.blocks(0.5)
+    counts = [len(np.unique(blocks[recordings.test == test])) for test in range(2)]
+    # 20 s are 4 periods of the slow test and 40 of the fast one
+    assert counts[0] == pytest.approx(8, abs=1)
+    assert counts[1] == pytest.approx(80, abs=2)
+    assert not set(blocks[recordings.test == 0]) & set(blocks[recordings.test == 1])
+
+
+def test_the_least_cut_off_rises_with_the_frequency_of_the_motion() -> None:
+    slow, fast = (displacement_cutoff(sine("one", frequency)) for frequency in (0.2, 4.0))
+    assert slow < 10.0
+    assert fast >= 32.0

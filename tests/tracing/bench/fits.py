@@ -1,0 +1,24 @@
+"""Fits of a plain Bouc-Wen model to the rig of these tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.recordings import record_tests
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
+from tests.tracing.bench.rig import campaign
+
+
+def fit_of(tests: Sequence[PreparedTest]) -> Fit:
+    """Return the weighted fit of the declared model to the training tests and repeats."""
+    recordings = record_tests([test for test in tests if test.role != "validation"], rate_hz=250.0)
+    return fit_baseline(recordings, declared_base(recordings, "bouc-wen", 2, 1)).fit
+
+
+@cache
+def plain_fit(effect: str) -> Fit:
+    """Return the fit to a campaign with this effect, which the model lacks."""
+    return fit_of(campaign(effect))
