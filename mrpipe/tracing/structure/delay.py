@@ -24,6 +24,9 @@ STEP_PERIODS = 0.00125
 COARSE = 4
 """Numerical technique: the search starts with every fourth step."""
 
+FITTED = 4
+"""Numerical technique: shifts that a parabola is fitted to, at least."""
+
 BINS = (16, 10)
 """Numerical technique: bins of the table over desired force and velocity."""
 
@@ -220,13 +223,13 @@ def _vertex(shifts: FloatArray, errors: FloatArray, step: float) -> float:
     """
     place = int(np.argmin(errors))
     near = np.abs(shifts - shifts[place]) < (COARSE - 0.5) * step
-    if np.count_nonzero(near) < 4 or place == 0:
+    if np.count_nonzero(near) < FITTED or place == 0:
         return float(shifts[place])
     offset = (shifts[near] - shifts[place]) / step
-    curve = np.polynomial.Polynomial.fit(offset, errors[near] ** 2, 2).convert().coef
-    if curve.size < 3 or curve[2] <= 0.0:
+    curvature, slope, _ = np.polyfit(offset, errors[near] ** 2, 2)
+    if curvature <= 0.0:
         return float(shifts[place])
-    return float(shifts[place] + step * np.clip(-0.5 * curve[1] / curve[2], -1.0, 1.0))
+    return float(shifts[place] + step * np.clip(-0.5 * slope / curvature, -1.0, 1.0))
 
 
 def _least(
