@@ -366,7 +366,9 @@ def displacement_cutoff(test: PreparedTest) -> float:
     found = cutoff_by_criterion(raw, rate, velocity_share=0.9995, margin=CUTOFF_MARGIN)
     # remaining noise is differentiated twice if an effect needs the acceleration
     found = min(found, CUTOFF_MARGIN * signal_end(raw, rate))
-    return float(min(max(found, DISPLACEMENT_HARMONICS * motion_frequency(test)), 0.25 * rate, 250.0))
+    # a channel without motion has no frequency, and nothing in it is worth a filter
+    least = DISPLACEMENT_HARMONICS * motion_frequency(test) or 0.25 * rate
+    return float(min(max(found, least), 0.25 * rate, 250.0))
 
 
 def motion_frequency(test: PreparedTest) -> float:

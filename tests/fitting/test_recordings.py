@@ -55,3 +55,11 @@ def test_the_least_cut_off_rises_with_the_frequency_of_the_motion() -> None:
     slow, fast = (displacement_cutoff(sine("one", frequency)) for frequency in (0.2, 4.0))
     assert slow < 10.0
     assert fast >= 32.0
+
+
+def test_a_channel_without_motion_still_has_a_cut_off() -> None:
+    still = sine("still", 1.0)
+    zero = np.zeros_like(still.time_s)
+    still = replace(still, displacement_m=zero, velocity_m_s=zero, displacement_raw_m=zero)
+    assert displacement_cutoff(still) == 0.25 * RATE
+    assert np.all(np.isfinite(record_tests([still]).displacement))

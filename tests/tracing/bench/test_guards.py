@@ -25,11 +25,7 @@ def test_a_gain_whose_interval_holds_zero_is_not_significant() -> None:
 
 
 def blocks(tests: int = 4, samples: int = 400) -> Any:
-    recordings = SimpleNamespace(
-        dt=np.full(tests, 0.01),
-        starts=np.arange(tests + 1) * samples,
-        test=np.repeat(np.arange(tests), samples),
-    )
+    recordings = SimpleNamespace(blocks=lambda _: np.arange(tests * samples) // 40)
     return SimpleNamespace(recordings=recordings)
 
 
