@@ -115,9 +115,9 @@ def better_limit(
         problem = replace(found.problem, recordings=recordings, root_weight=weight)
         return float(np.sqrt(fit(problem, found.theta, iterations=FINE_ITERATIONS).chi_square))
 
-    errors = {limit: left(limit) for limit in (np.inf, *_limits(automatic, FINE_RATIO))}
-    best = min(errors, key=lambda limit: errors[limit])
-    return best if errors[best] < (1.0 - rules.filter_again) * left(highest) else highest
+    errors = {limit: left(limit) for limit in {highest, np.inf, *_limits(automatic, FINE_RATIO)}}
+    best = min(errors, key=lambda limit: (errors[limit], -limit))
+    return best if errors[best] < (1.0 - rules.filter_again) * errors[highest] else highest
 
 
 def _limits(recordings: Recordings, ratio: float) -> list[float]:
@@ -132,12 +132,7 @@ def _limits(recordings: Recordings, ratio: float) -> list[float]:
 
 def _lowest(recordings: Recordings) -> float:
     """Return the lowest limit that is tried [Hz]: a few times the frequency of the fastest motion."""
-    frequencies = []
-    for test in range(recordings.tests):
-        own = recordings.test == test
-        motion = float(np.std(recordings.displacement[own]))
-        frequencies.append(float(np.std(recordings.velocity[own])) / (2.0 * np.pi * max(motion, 1e-300)))
-    return HARMONICS * max(frequencies)
+    return HARMONICS / float(np.min(recordings.motion_period_s))
 
 
 def _left(recordings: Recordings, name: str, yield_order: int, viscosity_order: int) -> float:
