@@ -6,8 +6,6 @@ steps is its own, because it looks between them: after the step of the coefficie
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import float64, int64, njit, void
 
@@ -16,7 +14,6 @@ from mrpipe.dampers.drive import COEFFICIENT_STEPS
 from mrpipe.dampers.plant import (
     ACCELERATION,
     BOOKKEEPING,
-    CHAIN_FUNCTIONS,
     CURRENT,
     DISPLACEMENT,
     DRIVE,
@@ -35,6 +32,7 @@ from mrpipe.dampers.plant import (
     Chain,
     begin_step,
     end_step,
+    step_at,
 )
 from mrpipe.dampers.timing import look_ahead
 from mrpipe.fitting.recordings import Recordings
@@ -49,7 +47,7 @@ force of the base form that no linear coefficient scales."""
 
 @njit(
     void(
-        CHAIN_FUNCTIONS,
+        int64[::1],
         float64[::1],
         int64[::1],
         int64[::1],
@@ -67,7 +65,7 @@ force of the base form that no linear coefficient scales."""
     nogil=True,
 )
 def _run(
-    functions: Any,
+    addresses: IntArray,
     parameters: FloatArray,
     parameter_offsets: IntArray,
     state_offsets: IntArray,
@@ -101,7 +99,7 @@ def _run(
             tap = 0
             for k in range(count):
                 before = wire[FORCE]
-                functions[k](
+                step_at(addresses[k])(
                     wire,
                     state[state_offsets[k] : state_offsets[k + 1]],
                     parameters[parameter_offsets[k] : parameter_offsets[k + 1]],
@@ -149,7 +147,8 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
     if chain.ahead_s:
         motion = look_ahead(*motion, recordings.starts, recordings.dt, chain.ahead_s)
     _run(
-        *chain.arguments,
+        chain.addresses,
+        *chain.arguments[1:],
         *motion,
         recordings.drive,
         recordings.starts,
