@@ -136,7 +136,7 @@ def on_true_rig(damper: TrueDamper, frame: Frame, controller: Controller, band: 
         table = np.zeros_like(histories.displacement)
         return Response(
             histories.time_s, histories.displacement, table, table, histories.acceleration, moved, none,
-            histories.force, histories.drive, histories.desired, histories.ground, none, none, none, none,
+            histories.force, histories.drive, histories.desired, histories.ground, none, none, none, none, none,
             np.zeros((0, 0)), np.zeros(0), 0.0,
         )  # fmt: skip
 

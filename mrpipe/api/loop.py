@@ -234,7 +234,7 @@ def design(
         jobs=jobs,
         progress=silent,
     )
-    summary = design_as_json(result, chosen.weights)
+    summary = design_as_json(result, chosen)
     best = result.designed[result.best].best
     return Designed(best.law, best.gains, summary, result)
 

@@ -16,7 +16,7 @@ from mrpipe.artifacts import atomic_write_text
 from mrpipe.control.gains import Gains
 from mrpipe.law_design.objective import Evaluation
 from mrpipe.law_design.search import FreeGain
-from mrpipe.simulation.response_curve import ResponseCurve
+from mrpipe.simulation.response_curve import QUANTITIES, ResponseCurve
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,8 @@ def _evaluation(content: Mapping[str, Any]) -> Evaluation:
         )
         for curve in content["curves"]
     )
+    if any(curve.values.shape != (len(curve.frequency_rad_s), len(QUANTITIES)) for curve in curves):
+        raise ValueError("the result has other quantities")
     value = float(content["value"])
     if math.isnan(value):
         raise ValueError("the value of a design is not a number")

@@ -9,9 +9,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mrpipe.control.gains import Gains
+from mrpipe.law_design.options import DesignSettings
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import CurveOptions, ResponseCurve, Run, response_curve
+from mrpipe.simulation.response_curve import (
+    QUANTITIES,
+    CurveOptions,
+    ResponseCurve,
+    Run,
+    response_curve,
+    values_between,
+)
 
 RunOf = Callable[[str, Gains], Run]
 """From a law and its gains to the function that runs the loop under an excitation."""
@@ -21,18 +29,44 @@ UNACCEPTABLE = 1e6
 simplex of an optimiser must be able to compare it; any stable loop is far below."""
 
 
+PENALTY = 10.0
+"""Factor on the excess over a limit. A design gives way to one that keeps the limit unless its objective is smaller by
+more than ten times the excess; the response of a structure never depends so strongly on one of these quantities."""
+
+
 @dataclass(frozen=True)
 class Limits:
-    """What the damper allows; a design that exceeds them is penalised in proportion.
+    """Largest values that damper and structure allow, over band, amplitudes and motions; infinite: not limited.
 
     Attributes
     ----------
     stroke_m
-        Largest displacement of the damper [m]; infinite: not limited. Drive and force are limited by the damper model
-        itself, which saturates.
+        Displacement across the damper [m].
+    force_n
+        Force of the damper [N].
+    rms_drive
+        RMS value of the drive, the continuous rating of coil and driver [A or V]. The largest drive needs no limit
+        here, because the controller never exceeds it.
     """
 
     stroke_m: float = math.inf
+    force_n: float = math.inf
+    rms_drive: float = math.inf
+
+    @classmethod
+    def of(cls, settings: DesignSettings) -> Limits:
+        """Return the limits of the settings."""
+        given = (settings.stroke_limit_m, settings.force_limit_n, settings.rms_drive_limit)
+        return cls(*(math.inf if value is None else value for value in given))
+
+    def excess(self, peaks: Mapping[str, float]) -> dict[str, float]:
+        """Return by how much a design exceeds each limit, relative to it [1]; 0 where it keeps the limit."""
+        pairs = {
+            "max_stroke_m": self.stroke_m,
+            "max_force_n": self.force_n,
+            "rms_drive": self.rms_drive,
+        }
+        return {name: max(0.0, peaks[name] / limit - 1.0) for name, limit in pairs.items() if math.isfinite(limit)}
 
 
 @dataclass(frozen=True)
@@ -62,7 +96,7 @@ class Load:
     amplitudes_m_s2
         Amplitudes of the harmonic base acceleration [m/s^2].
     motions
-        Recorded motions; their response is the RMS value over the record.
+        Recorded motions; their response is the RMS or largest value over the record.
     """
 
     band_rad_s: tuple[float, float]
@@ -82,7 +116,7 @@ class Objective:
     reference
         Quantity -> largest value of the reference design, which makes quantities with different units comparable.
     limits
-        Of the damper.
+        Of damper and structure.
     """
 
     weights: Mapping[str, float]
@@ -92,8 +126,7 @@ class Objective:
     def value(self, peaks: Mapping[str, float]) -> float:
         """Return the objective of a design from its largest responses [1]."""
         total = sum(weight * peaks[name] / self.reference.get(name, 1.0) for name, weight in self.weights.items())
-        excess = peaks["rms_stroke_m"] * math.sqrt(2.0) / self.limits.stroke_m - 1.0
-        total *= 1.0 + max(0.0, excess)
+        total *= 1.0 + PENALTY * sum(self.limits.excess(peaks).values())
         return min(total, UNACCEPTABLE) if math.isfinite(total) else UNACCEPTABLE
 
 
@@ -108,7 +141,7 @@ class Evaluation:
     curves
         Response over frequency, one per amplitude.
     motions
-        Motion -> RMS values.
+        Motion -> RMS and largest values.
     value
         Of the objective.
     """
@@ -132,8 +165,6 @@ class Evaluation:
 
 def largest(curves: Sequence[ResponseCurve], motions: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     """Return the largest value of each quantity over all curves and motions."""
-    from mrpipe.simulation.response_curve import QUANTITIES
-
     return {
         name: max([curve.peak(name) for curve in curves] + [values[name] for values in motions.values()])
         for name in QUANTITIES
@@ -159,13 +190,11 @@ def evaluate(
     run = run_of(law, gains)
     amplitudes = sorted(load.amplitudes_m_s2)
     curves = tuple(response_curve(run, amplitude, load.band_rad_s, options) for amplitude in amplitudes)
-    motions = {motion.name: _rms_of(run(motion.excitation), options.absolute) for motion in load.motions}
+    motions = {motion.name: _values_of(run(motion.excitation), options.absolute) for motion in load.motions}
     found = Evaluation(law, gains, curves, motions)
     return Evaluation(law, gains, curves, motions, objective.value(found.peaks))
 
 
-def _rms_of(response: Response, absolute: bool) -> dict[str, float]:
-    from mrpipe.simulation.response_curve import QUANTITIES, rms_between
-
-    values = rms_between(response, np.array([0.0, float(response.time_s[-1])]), absolute)[0]
+def _values_of(response: Response, absolute: bool) -> dict[str, float]:
+    values = values_between(response, np.array([0.0, float(response.time_s[-1])]), absolute)[0]
     return dict(zip(QUANTITIES, values.tolist(), strict=True))

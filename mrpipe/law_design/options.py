@@ -24,8 +24,9 @@ class DesignSettings(Section):
     weights: dict[str, float] = Field(
         {"rms_x_top_m": 1.0},
         min_length=1,
-        description="Weights of the largest values of rms_x_top_m, rms_x1_m, rms_a1_m_s2, rms_a_top_m_s2 and "
-        "rms_stroke_m, each relative to law vd at its calibrated gains.",
+        description="Quantity -> weight of its largest value over band, amplitudes and motions, relative to law vd at "
+        "its calibrated gains. Quantities: x_top_m, x1_m, drift_m (largest storey drift), stroke_m, a1_m_s2, "
+        "a_top_m_s2 and base_shear_n, each with rms_ or max_ in front.",
     )
     amplitude_factors: tuple[float, ...] = Field(
         (0.75, 1.0),
@@ -36,7 +37,18 @@ class DesignSettings(Section):
         None, description="Lowest and highest frequency; null: that of `resonance`, by default around the target mode."
     )
     motions: tuple[MotionSettings, ...] = Field((), description="Recorded base motions, in addition.")
-    stroke_limit_m: float | None = Field(None, gt=0.0, description="Largest stroke of the damper; null: not limited.")
+    stroke_limit_m: float | None = Field(
+        None, gt=0.0, description="Limit of the largest displacement across the damper; null: not limited."
+    )
+    force_limit_n: float | None = Field(
+        None, gt=0.0, description="Limit of the largest damper force; null: not limited."
+    )
+    rms_drive_limit: float | None = Field(
+        None,
+        gt=0.0,
+        description="Limit of the RMS drive, A or V, such as the continuous rating of the coil; null: not limited. The "
+        "largest drive is limited by `simulate.controller.drive_limit`.",
+    )
     fixed_gains: dict[str, dict[str, float]] = Field(
         {}, description="Gains that are not searched: law -> gain -> value, such as {vdns: {k_n_m: -4500}}."
     )

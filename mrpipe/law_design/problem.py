@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import GainRange, Plant
 from mrpipe.control.laws import all_laws
-from mrpipe.dampers.model import DamperModel, parameter_unit
+from mrpipe.dampers.model import DamperModel
 from mrpipe.errors import UserError
 from mrpipe.law_design.kept import LawUnderDesign
 from mrpipe.law_design.options import DesignSettings
@@ -19,7 +19,7 @@ from mrpipe.law_design.search import FreeGain
 from mrpipe.law_design.uncertainty import Draw
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import QUANTITIES, Run
+from mrpipe.simulation.response_curve import Run
 from mrpipe.simulation.rig import Rig
 
 SMALLEST_SHARE = 0.02
@@ -65,12 +65,22 @@ class LoopOf:
 
 
 def scaled_force(damper: DamperModel, factor: float) -> DamperModel:
-    """Return the damper with all its force coefficients times a factor."""
+    """Return the damper with all force coefficients of base form and effects times a factor."""
     parameters = {
-        name: value * factor if parameter_unit(name, damper.drive_unit).startswith("N") else value
+        name: value * factor if damper.unit(name).startswith("N") else value
         for name, value in damper.parameters.items()
     }
-    return replace(damper, parameters=parameters)
+    effects = [
+        replace(
+            item,
+            values={
+                name: value * factor if item.units.get(name, "").startswith("N") else value
+                for name, value in item.values.items()
+            },
+        )
+        for item in damper.effects
+    ]
+    return replace(damper, parameters=parameters, effects=tuple(effects))
 
 
 def laws_in_the_race(
@@ -96,9 +106,6 @@ def laws_in_the_race(
     for name in (*settings.laws, *settings.fixed_gains):
         if name not in known:
             raise UserError("design.laws", name, "is not a control law", f"one of {', '.join(known)}")
-    for name in settings.weights:
-        if name not in QUANTITIES:
-            raise UserError("design.weights", name, "is not a quantity", f"one of {', '.join(QUANTITIES)}")
     entries, free_entries, left_out = [], [], {}
     for name in settings.laws or known:
         law = known[name]

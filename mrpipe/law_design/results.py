@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from mrpipe.artifacts import ArtifactWriter
 from mrpipe.control.laws import law_named
 from mrpipe.law_design.kept import Designed
-from mrpipe.law_design.objective import Evaluation
+from mrpipe.law_design.objective import Evaluation, Limits
+from mrpipe.law_design.options import DesignSettings
 from mrpipe.law_design.run import Confirmation, Result
 from mrpipe.law_design.uncertainty import test_for
 from mrpipe.simulation.storage import write_curves
@@ -17,8 +20,8 @@ MOST_SENSITIVITIES = 5
 """Uncertain quantities that are listed."""
 
 
-def law_as_json(found: Designed) -> dict[str, Any]:
-    """Return what was found for one law."""
+def law_as_json(found: Designed, limits: Limits) -> dict[str, Any]:
+    """Return what was found for one law; `exceeds_limits` is the excess over each limit that it does not keep [1]."""
     law = law_named(found.entry.law)
     best, calibrated = found.best, found.calibrated
     return {
@@ -26,6 +29,7 @@ def law_as_json(found: Designed) -> dict[str, Any]:
         **{f"peak_{name}": value for name, value in best.peaks.items()},
         "resonance_rad_s": best.resonance_rad_s,
         "objective": best.value,
+        "exceeds_limits": {name: value for name, value in limits.excess(best.peaks).items() if value > 0.0},
         "calibrated": {
             "gains": law.gains_as_json(calibrated.gains),
             **{f"peak_{name}": value for name, value in calibrated.peaks.items()},
@@ -48,27 +52,28 @@ def point_as_json(item: Evaluation) -> dict[str, Any]:
     }
 
 
-def design_as_json(result: Result, weights: Mapping[str, float]) -> dict[str, Any]:
+def design_as_json(result: Result, settings: DesignSettings) -> dict[str, Any]:
     """Return what `mrpipe design --json` prints, without wall-clock times.
 
     Parameters
     ----------
     result
         Of the design.
-    weights
-        Of the objective.
+    settings
+        Of the design.
     """
-    ranking = result.ranking
+    ranking, limits, weights = result.ranking, Limits.of(settings), settings.weights
     laws = {}
     for label, found in result.designed.items():
-        laws[label] = law_as_json(found)
+        laws[label] = law_as_json(found, limits)
         laws[label]["probability_best"] = None if ranking is None else ranking.probability_best[label]
         if label in result.free:
-            laws[label]["unrestricted"] = law_as_json(result.free[label])
+            laws[label]["unrestricted"] = law_as_json(result.free[label], limits)
     summary: dict[str, Any] = {
         "objective": " + ".join(f"{weight:g} x largest {name}" for name, weight in weights.items())
         + ", relative to law vd at its calibrated gains",
         "weights": dict(weights),
+        "limits": {name: value for name, value in asdict(limits).items() if math.isfinite(value)},
         "best": result.best,
         "laws": laws,
         "pareto": [point_as_json(item) for item in result.front],

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from joblib import Parallel, delayed
 
-from mrpipe.artifacts import Artifact, FloatArray, Progress
+from mrpipe.artifacts import Progress
 from mrpipe.control.law import Plant
 from mrpipe.errors import UserError
 from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
@@ -23,7 +23,6 @@ from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.ground_record import read_ground_record
 from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, ResponseCurve, steady_values
 from mrpipe.simulation.rig import Rig
-from mrpipe.structures import Frame, natural_modes
 
 AROUND = (0.97, 1.0, 1.03)
 """Frequencies over the resonance at which a drawn loop is run: a draw moves the resonance by a few percent."""
@@ -133,8 +132,11 @@ def load_of(settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[f
     Raises
     ------
     UserError
-        If the band is empty or a record cannot be read.
+        If the band is empty, a record cannot be read, or a weight is for a quantity that does not exist.
     """
+    for name in settings.weights:
+        if name not in QUANTITIES:
+            raise UserError("design.weights", name, "is not a quantity", f"one of {', '.join(QUANTITIES)}")
     if not 0.0 < band_rad_s[0] < band_rad_s[1]:
         raise UserError(
             "design", "band_rad_s", f"{band_rad_s[0]:g} to {band_rad_s[1]:g}", "give a positive rising band"
@@ -145,6 +147,12 @@ def load_of(settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[f
         motions.append(Motion(Path(item.file).stem, recorded(time_s, acceleration, scale=item.scale)))
     amplitudes = tuple(factor * amplitude_m_s2 for factor in sorted(settings.amplitude_factors))
     return Load(band_rad_s, amplitudes, tuple(motions))
+
+
+def accurate_curves(settings: DesignSettings, *, absolute: bool) -> CurveOptions:
+    """Return how the curves of results are measured: the maxima of all quantities of the objective are refined."""
+    plain = CurveOptions(points=15, tolerance=5e-3, most_cycles=80, absolute=absolute)
+    return replace(plain, refined=tuple(dict.fromkeys((*plain.refined, *settings.weights))))
 
 
 def run_design(
@@ -189,10 +197,9 @@ def run_design(
     entries, free_entries, left_out = laws_in_the_race(settings, plant, calibrated)
     run_of = LoopOf(rig, int(rng.integers(2**32)))
     loops = Loops(run_of, run_of.at_rate(SEARCH_RATE))
-    limits = Limits() if settings.stroke_limit_m is None else Limits(settings.stroke_limit_m)
-    final = CurveOptions(points=15, tolerance=5e-3, most_cycles=80, absolute=absolute)
+    final = accurate_curves(settings, absolute=absolute)
     reference = reference_evaluation(run_of, LAW_OF_REFERENCE, calibrated[LAW_OF_REFERENCE], load, final)
-    objective = Objective(settings.weights, reference.peaks, limits)
+    objective = Objective(settings.weights, reference.peaks, Limits.of(settings))
 
     def part(start: float, share: float) -> Progress:
         return lambda done, text="": progress(start + share * done, text)
@@ -212,7 +219,9 @@ def run_design(
     best = min(designed, key=lambda label: designed[label].best.value)
     ranking = None
     if settings.draws and len(designed) > 1:
-        draws = [draw(rig.frame, rig.damper, *uncertainty, rng) for _ in range(settings.draws)]
+        # without uncertainty all draws are the same
+        count = settings.draws if any(item.exists for item in uncertainty) else 1
+        draws = [draw(rig.frame, rig.damper, *uncertainty, rng) for _ in range(count)]
         bests = {label: item.best for label, item in designed.items()}
         coarse = run_of.at_rate(SEARCH_RATE)
         ranking = _rank(coarse, bests, best, draws, load, objective, absolute, jobs, part(0.75, 0.13))
@@ -320,34 +329,3 @@ def resonances(curve: ResponseCurve) -> list[float]:
         if values[place] >= DRAWN_SHARE * values.max() and all(abs(omega / known - 1.0) > APART for known in found):
             found.append(omega)
     return found
-
-
-def frame_uncertainty(artifact: Artifact, frame: Frame) -> FrameUncertainty:
-    """Return the standard deviations of the modes from their 95 % intervals in frame.h5; zero where there are none."""
-    n = frame.floors
-    members = set(artifact.members("modes")) if "modes" in artifact.members() else set()
-
-    def deviations(name: str) -> FloatArray:
-        if f"{name}_interval" not in members:
-            return np.zeros(n)
-        bounds = artifact.array(f"modes/{name}_interval")
-        if bounds.shape != (n, 2):
-            return np.zeros(n)
-        return np.asarray(np.nan_to_num(np.abs(bounds[:, 1] - bounds[:, 0])) / (2.0 * 1.96))
-
-    omega = natural_modes(frame).angular_frequencies
-    return FrameUncertainty(deviations("angular_frequency") / omega, deviations("damping_ratio"))
-
-
-def damper_uncertainty(artifact: Artifact) -> DamperUncertainty:
-    """Return the covariance of the parameters in damper.h5, and the model error on tests that no fit has seen."""
-    members = set(artifact.members())
-    error = 0.0
-    if "comparison" in members:
-        form = str(artifact.attributes("damper").get("form", ""))
-        rows = [row for row in artifact.json("comparison") if row.get("form") == form]
-        error = float((rows[0].get("validation_nrmse") if rows else None) or 0.0)
-    if not {"covariance", "parameter_names"} <= members:
-        return DamperUncertainty((), np.zeros((0, 0)), error)
-    names = tuple(str(name) for name in artifact.json("parameter_names"))
-    return DamperUncertainty(names, np.nan_to_num(artifact.array("covariance")), error)

@@ -14,11 +14,12 @@ from mrpipe.control.laws import law_named
 from mrpipe.law_design.kept import Designed, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Limits, Load, Objective, RunOf, evaluate
 from mrpipe.law_design.options import DesignSettings
+from mrpipe.law_design.run import accurate_curves
 from mrpipe.law_design.search import FreeGain, simplex_search
 from mrpipe.law_design.study import COARSE, reference_evaluation
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import CurveOptions, Run
+from mrpipe.simulation.response_curve import Run
 from mrpipe.simulation.several_rig import DampersRig
 
 TOGETHER = "dampers"
@@ -56,7 +57,7 @@ def design_dampers(
     """Search factors on the tuned gains of all dampers together.
 
     The objective is that of a single law: the weighted largest responses over band, amplitudes and motions, relative to
-    those at the calibrated gains. The stroke is that of the damper with the largest RMS displacement.
+    those at the calibrated gains. Stroke, force and drive are those of the damper with the largest RMS displacement.
 
     Parameters
     ----------
@@ -78,11 +79,10 @@ def design_dampers(
         if law_named(item.known.law).tuned_gain and any(item.gains.values())
     )
     start = Gains(**{gain.name: 1.0 for gain in free})
-    final = CurveOptions(points=15, tolerance=5e-3, most_cycles=80, absolute=absolute)
+    final = accurate_curves(settings, absolute=absolute)
     run_of = _runs(rig, seed)
     reference = reference_evaluation(run_of, TOGETHER, start, load, final)
-    limits = Limits() if settings.stroke_limit_m is None else Limits(settings.stroke_limit_m)
-    objective = Objective(settings.weights, reference.peaks, limits)
+    objective = Objective(settings.weights, reference.peaks, Limits.of(settings))
     entry = LawUnderDesign(TOGETHER, start, free, TOGETHER)
     tried: list[Evaluation] = []
     coarse = replace(COARSE, absolute=absolute, refined=tuple(settings.weights))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,11 @@ class FrameUncertainty:
     frequency_relative: FloatArray
     damping_ratio: FloatArray
 
+    @property
+    def exists(self) -> bool:
+        """Whether anything is uncertain."""
+        return bool(self.frequency_relative.any() or self.damping_ratio.any())
+
 
 @dataclass(frozen=True)
 class DamperUncertainty:
@@ -41,11 +46,19 @@ class DamperUncertainty:
     force_relative
         Standard deviation of a common factor on the force [1]: the error of the model on tests that it was not fitted
         to. The covariance alone says only how well this form of model is determined.
+    effects
+        `<effect>.<parameter>` -> standard deviation of a parameter of a traced effect, in its unit.
     """
 
     names: tuple[str, ...]
     covariance: FloatArray
     force_relative: float = 0.0
+    effects: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def exists(self) -> bool:
+        """Whether anything is uncertain."""
+        return bool(self.covariance.any() or self.force_relative or self.effects)
 
 
 @dataclass(frozen=True)
@@ -120,21 +133,39 @@ def _drawn_frame(
 def _drawn_damper(
     damper: DamperModel, uncertainty: DamperUncertainty, rng: np.random.Generator, numbers: dict[str, float]
 ) -> DamperModel:
-    """Draw the parameters from their covariance; a parameter keeps its sign and at least a tenth of its size."""
-    if not uncertainty.names:
-        return damper
+    """Draw the parameters of base form and effects; a parameter keeps its sign and at least a tenth of its size."""
+    parameters = _drawn_base(damper.parameters, uncertainty, rng, numbers) if uncertainty.names else damper.parameters
+    effects = []
+    for item in damper.effects:
+        values = dict(item.values)
+        for name, nominal in item.values.items():
+            key = f"{item.name}.{name}"
+            sigma = uncertainty.effects.get(key, 0.0)
+            if sigma > 0.0:
+                numbers[key] = float(rng.standard_normal())
+                values[name] = _kept_sign(nominal, nominal + sigma * numbers[key])
+        effects.append(replace(item, values=values))
+    return replace(damper, parameters=parameters, effects=tuple(effects))
+
+
+def _drawn_base(
+    known: Mapping[str, float], uncertainty: DamperUncertainty, rng: np.random.Generator, numbers: dict[str, float]
+) -> dict[str, float]:
     deviation = np.sqrt(np.maximum(np.diag(uncertainty.covariance), 0.0))
     values, vectors = np.linalg.eigh(uncertainty.covariance)
     step = vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(values)))
-    parameters = dict(damper.parameters)
+    parameters = dict(known)
     for name, change, sigma in zip(uncertainty.names, step, deviation, strict=True):
         if name not in parameters or sigma == 0.0:
             continue
         numbers[name] = float(change / sigma)
-        nominal = parameters[name]
-        changed = nominal + float(change)
-        parameters[name] = changed if changed * nominal > 0.1 * nominal**2 else 0.1 * nominal
-    return replace(damper, parameters=parameters)
+        parameters[name] = _kept_sign(parameters[name], parameters[name] + float(change))
+    return parameters
+
+
+def _kept_sign(nominal: float, changed: float) -> float:
+    """Return a drawn value that keeps the sign and at least a tenth of the size of the nominal one."""
+    return changed if changed * nominal > 0.1 * nominal**2 else 0.1 * nominal
 
 
 @dataclass(frozen=True)
@@ -213,4 +244,7 @@ def test_for(parameter: str) -> str:
         return "steps of the drive at constant velocity of the damper"
     if parameter.startswith("c0"):
         return "triangular motion of the damper at several speeds, at the drive of operation"
+    if "." in parameter:
+        effect = parameter.partition(".")[0]
+        return f"more bench tests that excite {effect}; the documentation of the effects says which"
     return "slow triangular motion of the damper at drives between zero and the limit"

@@ -43,8 +43,11 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         f"The best law is {summary['best']} ({gains}): over the frequency band and all amplitudes its largest RMS top "
         f"displacement is {1e3 * best['peak_rms_x_top_m']:.1f} mm, at {best['resonance_rad_s']:.2f} rad/s."
     ]
+    sentences.append(f"The objective is {summary['objective']}; it is {best['objective']:.3f}.")
     if best["improvement"] > 0.005:
-        sentences.append(f"This is {best['improvement']:.0%} better than its calibrated gains.")
+        sentences.append(f"This is {best['improvement']:.0%} better than at its calibrated gains.")
+    for name, excess in best["exceeds_limits"].items():
+        sentences.append(f"No design keeps all limits: this one exceeds that of {name} by {excess:.1%}.")
     others = sorted(
         ((name, item) for name, item in summary["laws"].items() if name != summary["best"]),
         key=lambda entry: float(entry[1]["objective"]),
@@ -58,7 +61,9 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     if "before_tracing" in summary:
         sentences.append(_against_untraced(summary["before_tracing"]))
     uncertainty = summary.get("uncertainty")
-    if uncertainty:
+    if uncertainty and uncertainty["draws"] == 1:
+        sentences.append("Structure and damper are given without uncertainty, so that no others are drawn.")
+    elif uncertainty:
         sentences.append(
             f"In {uncertainty['draws']} structures and dampers drawn from their uncertainty, {summary['best']} is the "
             f"best law with probability {best['probability_best']:.2f}; its mean regret is {uncertainty['regret']:.1%}."

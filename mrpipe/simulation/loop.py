@@ -88,6 +88,8 @@ class Response:
         Damper force [N], drive at the damper [A or V], force desired by the controller [N].
     ground_acceleration
         Of the base.
+    base_shear
+        r' M times the absolute accelerations, shape (m,): the force of structure and dampers on the ground [N].
     work_in, work_damper, work_frame, energy
         Work of the base, dissipated by damper and frame, and energy stored in the frame [J] since the start.
     commands
@@ -109,6 +111,7 @@ class Response:
     drive: FloatArray
     desired_force: FloatArray
     ground_acceleration: FloatArray
+    base_shear: FloatArray
     work_in: FloatArray
     work_damper: FloatArray
     work_frame: FloatArray
@@ -217,7 +220,7 @@ def simulate_law(
     seconds = time.perf_counter() - began
     if not np.all(np.isfinite(record)):
         raise DivergedError(f"law {controller.law}: the response grows without bound; lower the negative stiffness")
-    return _response(record, commands, w, frame.ground_influence, dt * clock.every, dt * clock.per_sample, seconds)
+    return _response(record, commands, w, frame, dt * clock.every, dt * clock.per_sample, seconds)
 
 
 def _plant(frame: Frame, w: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -292,7 +295,7 @@ def _response(
     record: FloatArray,
     commands: FloatArray,
     w: FloatArray,
-    influence: FloatArray,
+    frame: Frame,
     dt: float,
     command_dt: float,
     seconds: float,
@@ -305,7 +308,7 @@ def _response(
         time_s=dt * np.arange(len(record), dtype=np.float64),
         displacement=record[:, :n],
         velocity=record[:, n : 2 * n],
-        acceleration=absolute - np.outer(ground, influence),
+        acceleration=absolute - np.outer(ground, frame.ground_influence),
         absolute_acceleration=absolute,
         # not by BLAS, whose second thread spins on after a product of this length
         damper_displacement=np.einsum("tf,f->t", record[:, :n], w),
@@ -314,6 +317,7 @@ def _response(
         drive=tail[:, parts.T_DRIVE],
         desired_force=tail[:, parts.T_DESIRED],
         ground_acceleration=ground,
+        base_shear=np.einsum("tf,f->t", absolute, frame.mass.T @ frame.ground_influence),
         work_in=tail[:, parts.T_WORK_IN],
         work_damper=tail[:, parts.T_WORK_DAMPER],
         work_frame=tail[:, parts.T_WORK_FRAME],

@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import DivergedError
@@ -21,8 +20,21 @@ from mrpipe.simulation.excitation import Excitation, harmonic
 from mrpipe.simulation.loop import Response
 from mrpipe.simulation.settings import ResonanceSettings
 
-QUANTITIES = ("rms_x_top_m", "rms_x1_m", "rms_a1_m_s2", "rms_a_top_m_s2", "rms_stroke_m")
-"""The steady quantities of one frequency, in the order of the columns of `ResponseCurve.values`."""
+DISPLAYED = ("rms_x_top_m", "rms_x1_m", "rms_a1_m_s2", "rms_a_top_m_s2", "rms_stroke_m")
+"""RMS values that decide whether a response is steady, and that every response curve shows."""
+
+QUANTITIES = (
+    *DISPLAYED,
+    "rms_drift_m", "rms_base_shear_n", "rms_drive",
+    "max_x_top_m", "max_x1_m", "max_a1_m_s2", "max_a_top_m_s2", "max_stroke_m",
+    "max_drift_m", "max_base_shear_n", "max_force_n",
+)  # fmt: skip
+"""The steady quantities of one frequency, in the order of the columns of `ResponseCurve.values`.
+
+`rms_` is the RMS value and `max_` the largest absolute value. The stroke is the displacement across the damper. The
+drift is the difference of displacement between successive floors, of the storey where it is largest. The base shear is
+the sum of the floors' masses times absolute accelerations. The drive is in the unit of the damper, A or V.
+"""
 
 SMALLEST_GROUP = 3
 """Fewest windows whose scatter says how far sensor noise reaches."""
@@ -89,7 +101,7 @@ class ResponseCurve:
     frequency_rad_s
         Ascending, shape (m,) [rad/s]: the grid and the refined frequencies.
     values
-        RMS values, shape (m, len(QUANTITIES)) [m] and [m/s^2].
+        Of QUANTITIES, shape (m, len(QUANTITIES)), SI units.
     steady
         Whether the response became steady at each frequency, shape (m,).
     """
@@ -115,14 +127,14 @@ class ResponseCurve:
     def as_json(self) -> dict[str, object]:
         """Return the peaks, the resonance and the curve with the names that the command line prints."""
         curve: dict[str, object] = {"frequency_rad_s": self.frequency_rad_s.tolist()}
-        curve.update({name: self.column(name).tolist() for name in QUANTITIES})
+        curve.update({name: self.column(name).tolist() for name in DISPLAYED})
         return {**self.peaks_as_json(), "response_curve": curve}
 
     def peaks_as_json(self) -> dict[str, object]:
         """Return amplitude, resonance and the largest values over the band."""
         result: dict[str, object] = {"base_amplitude_m_s2": self.base_amplitude_m_s2}
         result["resonance_rad_s"] = self.resonance_rad_s
-        result.update({f"peak_{name}": self.peak(name) for name in QUANTITIES})
+        result.update({f"peak_{name}": self.peak(name) for name in DISPLAYED})
         return result
 
 
@@ -153,7 +165,7 @@ class Steady:
     Attributes
     ----------
     values
-        RMS values in the order of QUANTITIES.
+        In the order of QUANTITIES.
     steady
         Whether they are steady.
     cycles
@@ -196,7 +208,7 @@ def steady_values(
             return Steady(np.full(len(QUANTITIES), math.inf), False, shortest)
         count = (cycles - settling) // window
         edges = period * (cycles - window * np.arange(count, -1, -1, dtype=np.float64))
-        windows = rms_between(response, edges, options.absolute)
+        windows = values_between(response, edges, options.absolute)
         values = settled(windows, options.tolerance)
         if values is not None:
             # the shortest run whose windows would have been enough
@@ -208,33 +220,35 @@ def steady_values(
 
 
 def settled(windows: FloatArray, tolerance: float) -> FloatArray | None:
-    """Return the steady RMS values of successive windows, shape (q,), or None while they still change.
+    """Return the steady values of successive windows, shape (q,), or None while they still change.
 
-    Two successive windows that agree within the tolerance are steady. Sensor noise makes the windows scatter; then the
-    values are steady once the means of the last two groups of windows differ by no more than their scatter explains and
-    the mean of both groups is known within the tolerance.
+    The first columns, those of :data:`DISPLAYED`, decide; the others follow them. Two successive windows that agree
+    within the tolerance are steady. Sensor noise makes the windows scatter; then the values are steady once the means
+    of the last two groups of windows differ by no more than their scatter explains and the mean of both groups is known
+    within the tolerance.
 
     Parameters
     ----------
     windows
-        RMS values of each window, shape (k, q), k at least 2.
+        Values of each window, shape (k, q), k at least 2.
     tolerance
         Relative.
     """
-    last = windows[-1]
-    if np.all(np.abs(last - windows[-2]) <= tolerance * np.abs(last)):
-        return np.asarray(last)
+    judged = windows[:, : len(DISPLAYED)]
+    last = judged[-1]
+    if np.all(np.abs(last - judged[-2]) <= tolerance * np.abs(last)):
+        return np.asarray(windows[-1])
     size = len(windows) // 2
     if size < SMALLEST_GROUP:
         return None
-    first, second = windows[-2 * size : -size], windows[-size:]
+    first, second = judged[-2 * size : -size], judged[-size:]
     mean = 0.5 * (first.mean(axis=0) + second.mean(axis=0))
     scatter = np.sqrt(0.5 * (first.var(axis=0, ddof=1) + second.var(axis=0, ddof=1)))
     error = scatter / math.sqrt(2.0 * size)
     drift = np.abs(second.mean(axis=0) - first.mean(axis=0))
     # the standard error of the difference of the two means is twice that of the mean of both
     if np.all(drift <= np.maximum(4.0 * error, tolerance * np.abs(mean))) and np.all(error <= tolerance * np.abs(mean)):
-        return np.asarray(mean)
+        return np.asarray(windows[-2 * size :].mean(axis=0))
     return None
 
 
@@ -272,28 +286,34 @@ def response_curve(
     return ResponseCurve(amplitude_m_s2, omegas, values, steady)
 
 
-def rms_between(response: Response, edges_s: FloatArray, absolute: bool) -> FloatArray:
-    """Return the RMS values between successive times, shape (len(edges_s) - 1, len(QUANTITIES)).
+def values_between(response: Response, edges_s: FloatArray, absolute: bool) -> FloatArray:
+    """Return the QUANTITIES between successive times, shape (len(edges_s) - 1, len(QUANTITIES)).
 
     The integral of the square is interpolated at the edges, because a period is not a whole number of samples.
     """
     t = response.time_s
     edges = np.minimum(edges_s, float(t[-1]))
+    start = max(int(np.searchsorted(t, edges[0])) - 1, 0)
+    clock = t[start:]
+    places = np.searchsorted(clock, edges[:-1])
+    half_steps = 0.5 * np.diff(clock)
+
+    def rms(history: FloatArray) -> FloatArray:
+        square = history[start:] ** 2
+        integral = np.concatenate([[0.0], np.cumsum(half_steps * (square[1:] + square[:-1]))])
+        return np.sqrt(np.maximum(np.diff(np.interp(edges, clock, integral)) / np.diff(edges), 0.0))
+
+    def largest(history: FloatArray) -> FloatArray:
+        return np.asarray(np.maximum.reduceat(np.abs(history[start:]), places))
+
     accelerations = response.absolute_acceleration if absolute else response.acceleration
-    histories = (
-        response.displacement[:, -1],
-        response.displacement[:, 0],
-        accelerations[:, 0],
-        accelerations[:, -1],
-        response.damper_displacement,
-    )
-    first = max(int(np.searchsorted(t, edges[0])) - 1, 0)
-    clock = t[first:]
-    columns = []
-    for history in histories:
-        integral = cumulative_trapezoid(history[first:] ** 2, clock, initial=0.0)
-        power = np.diff(np.interp(edges, clock, integral)) / np.diff(edges)
-        columns.append(np.sqrt(np.maximum(power, 0.0)))
+    x, stroke, shear = response.displacement, response.damper_displacement, response.base_shear
+    drifts = [x[:, 0], *(x[:, floor] - x[:, floor - 1] for floor in range(1, x.shape[1]))]
+    histories = (x[:, -1], x[:, 0], accelerations[:, 0], accelerations[:, -1], stroke)
+    columns = [rms(history) for history in histories]
+    columns += [np.max([rms(drift) for drift in drifts], axis=0), rms(shear), rms(response.drive)]
+    columns += [largest(history) for history in histories]
+    columns += [np.max([largest(drift) for drift in drifts], axis=0), largest(shear), largest(response.force)]
     return np.column_stack(columns)
 
 

@@ -301,6 +301,7 @@ def _response(
     tail = record[:, 3 * n + k * kernel.T_DEVICE :]
     ground = tail[:, kernel.T_GROUND]
     absolute = record[:, 2 * n : 3 * n]
+    shear = np.einsum("tf,f->t", absolute, frame.mass.T @ frame.ground_influence)
     found: dict[str, Response] = {}
     for place, item in enumerate(dampers):
         own = record[:, 3 * n + place * kernel.T_DEVICE :]
@@ -316,6 +317,7 @@ def _response(
             drive=own[:, kernel.T_DRIVE],
             desired_force=own[:, kernel.T_DESIRED],
             ground_acceleration=ground,
+            base_shear=shear,
             work_in=tail[:, kernel.T_WORK_IN],
             work_damper=own[:, kernel.T_WORK],
             work_frame=tail[:, kernel.T_WORK_FRAME],

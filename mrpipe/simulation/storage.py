@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import QUANTITIES, ResponseCurve
+from mrpipe.simulation.response_curve import DISPLAYED, ResponseCurve
 
 _FLOORS = {
     "displacement": "m",
@@ -82,7 +82,7 @@ def write_curves(artifact: ArtifactWriter, curves: Sequence[ResponseCurve], with
         artifact.put(f"{group}/base_amplitude", curve.base_amplitude_m_s2, unit="m/s^2")
         artifact.put(f"{group}/frequency", curve.frequency_rad_s, unit="rad/s", dims=("frequency",))
         artifact.put(f"{group}/resonance", curve.resonance_rad_s, unit="rad/s")
-        for name in QUANTITIES:
+        for name in DISPLAYED:
             unit = "m/s^2" if name.endswith("_m_s2") else "m"
             plain = name.removesuffix("_m_s2").removesuffix("_m")
             artifact.put(f"{group}/{plain}", curve.column(name), unit=unit, dims=("frequency",))

@@ -54,7 +54,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     )
     for law, why in result.left_out.items():
         context.warn(f"law {law} is not in the race, because {why}")
-    summary = design_as_json(result, settings.weights)
+    summary = design_as_json(result, settings)
     with context.write("design.h5") as artifact:
         write_design(artifact, result, summary)
     report.describe(context.report, result, summary)
@@ -83,7 +83,7 @@ def _amplitude(details: Mapping[str, Any]) -> float:
 def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, DamperUncertainty]:
     import numpy as np
 
-    from mrpipe.law_design.run import damper_uncertainty, frame_uncertainty
+    from mrpipe.law_design.identified import damper_uncertainty, frame_uncertainty, traced_damper_uncertainty
     from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
 
     simulate = context.settings.simulate
@@ -94,6 +94,8 @@ def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, Dam
     damper = DamperUncertainty((), np.zeros((0, 0)))
     if simulate.damper == "identified":
         damper = damper_uncertainty(context.artifact("identify-damper"))
+    elif simulate.damper == "traced":
+        damper = traced_damper_uncertainty(context.artifact("identify-damper"), context.artifact("close-loop"))
     return frame, damper
 
 

@@ -18,7 +18,7 @@ ENTRY = LawUnderDesign("vd", Gains(650.0), (FreeGain("c_n_s_m", 10.0, 2000.0),),
 
 
 def evaluation(c: float, peak: float) -> Evaluation:
-    curve = ResponseCurve(0.79, np.array([8.0, 9.0]), np.full((2, 5), peak), np.array([True, False]))
+    curve = ResponseCurve(0.79, np.array([8.0, 9.0]), np.full((2, len(QUANTITIES)), peak), np.array([True, False]))
     return Evaluation("vd", Gains(c), (curve,), {"quake": dict.fromkeys(QUANTITIES, 0.02)}, 0.9)
 
 

@@ -8,7 +8,15 @@ import pytest
 from mrpipe.control.gains import Gains
 from mrpipe.errors import UserError
 from mrpipe.simulation import LoopOptions, simulate_law
-from mrpipe.simulation.response_curve import CurveOptions, ResponseCurve, response_curve, settled, steady_values
+from mrpipe.simulation.response_curve import (
+    DISPLAYED,
+    QUANTITIES,
+    CurveOptions,
+    ResponseCurve,
+    response_curve,
+    settled,
+    steady_values,
+)
 from mrpipe.structures import Frame, frequency_response
 
 from .conftest import Rig
@@ -48,11 +56,22 @@ def test_an_unclipped_linear_law_follows_the_exact_frequency_response(rig: Rig, 
 
     for omega in (7.0, 9.2):
         found = steady_values(run, 0.79, omega, EXACT)
-        exact = np.abs(frequency_response(controlled, [omega], absolute_acceleration=False)[0]) * 0.79 / np.sqrt(2.0)
+        motion = frequency_response(controlled, [omega], absolute_acceleration=False)[0] * 0.79 / np.sqrt(2.0)
+        exact = np.abs(motion)
         assert found.steady
         # relative accelerations of harmonic motion are omega^2 times the displacements
         expected = [exact[-1], exact[0], omega**2 * exact[0], omega**2 * exact[-1], exact[0]]
-        np.testing.assert_allclose(found.values, expected, rtol=1e-6)
+        np.testing.assert_allclose(found.values[: len(DISPLAYED)], expected, rtol=1e-6)
+        drift = np.abs(np.diff(motion, prepend=0.0)).max()
+        shear = abs(rig.frame.mass.sum(axis=0) @ (0.79 / np.sqrt(2.0) - omega**2 * motion))
+        named = dict(zip(QUANTITIES, found.values, strict=True))
+        assert named["rms_drift_m"] == pytest.approx(drift, rel=1e-6)
+        assert named["rms_base_shear_n"] == pytest.approx(shear, rel=1e-6)
+        # the largest value of a sine is the square root of 2 times its RMS value
+        for name in ("x_top_m", "x1_m", "a1_m_s2", "a_top_m_s2", "stroke_m", "drift_m", "base_shear_n"):
+            assert named[f"max_{name}"] == pytest.approx(np.sqrt(2.0) * named[f"rms_{name}"], rel=1e-5)
+        force = np.hypot(gains.k_n_m, omega * gains.c_n_s_m) * exact[0]
+        assert named["max_force_n"] == pytest.approx(np.sqrt(2.0) * force, rel=1e-5)
 
 
 @pytest.mark.property

@@ -1,0 +1,103 @@
+"""Uncertainty of structure and damper from the artifacts of their identification and tracing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, load_parameter_set
+from mrpipe.dampers.model import Addition, DamperModel, damper_from_parameter_set, write_damper
+from mrpipe.law_design import uncertainty as uncertain
+from mrpipe.law_design.identified import damper_uncertainty, frame_uncertainty, traced_damper_uncertainty
+from mrpipe.law_design.problem import scaled_force
+from mrpipe.law_design.uncertainty import FrameUncertainty, draw
+from mrpipe.structures import frame_from_parameter_set
+
+pytestmark = pytest.mark.property
+
+NAMES = ("yield_displacement", "c0_a")
+COVARIANCE = np.array([[1e-10, 0.0], [0.0, 0.25]])
+SUMMARY = {
+    "after": {"nrmse": 0.004},
+    "effects": [
+        {
+            "name": "remanence",
+            "parameters": {
+                "share": {"value": 0.6, "interval": [0.6 - 1.96 * 0.05, 0.6 + 1.96 * 0.05]},
+                "fade_time": {"value": 0.4, "interval": None},
+            },
+        }
+    ],
+}
+
+
+@pytest.fixture
+def damper() -> DamperModel:
+    return damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+
+
+def _identified(path: Path, damper: DamperModel) -> Artifact:
+    with ArtifactWriter.create(path, Provenance("identify-damper")) as artifact:
+        write_damper(artifact, damper)
+        artifact.put_json("parameter_names", list(NAMES))
+        artifact.put("covariance", COVARIANCE, unit="1", dims=("parameter", "parameter_of_column"))
+        artifact.put_json("comparison", [{"form": damper.form, "validation_nrmse": 0.02}])
+    return Artifact(path)
+
+
+def _traced(path: Path, damper: DamperModel, summary: dict[str, Any]) -> Artifact:
+    with ArtifactWriter.create(path, Provenance("close-loop")) as artifact:
+        write_damper(artifact, damper)
+        artifact.put_json("summary", summary)
+    return Artifact(path)
+
+
+def test_a_damper_has_its_covariance_and_the_error_on_validation_tests(tmp_path: Path, damper: DamperModel) -> None:
+    found = damper_uncertainty(_identified(tmp_path / "damper.h5", damper))
+    assert found.names == NAMES and found.force_relative == 0.02 and found.effects == {}
+    np.testing.assert_array_equal(found.covariance, COVARIANCE)
+
+
+def test_a_traced_damper_has_the_intervals_of_its_effects_and_the_error_after(
+    tmp_path: Path, damper: DamperModel
+) -> None:
+    identified = _identified(tmp_path / "damper.h5", damper)
+    found = traced_damper_uncertainty(identified, _traced(tmp_path / "a.h5", damper, SUMMARY))
+    assert found.names == NAMES and found.force_relative == 0.004
+    assert found.effects == {"remanence.share": pytest.approx(0.05)}
+    # the covariance of another base form says nothing
+    other = _traced(tmp_path / "b.h5", replace(damper, form="bouc-wen-n"), SUMMARY)
+    assert traced_damper_uncertainty(identified, other).names == ()
+
+
+def test_effects_are_drawn_and_their_forces_scaled(tmp_path: Path, damper: DamperModel) -> None:
+    effect = Addition(
+        "remanence", "relaxing", {"share": 0.6, "force": 8.0}, {"share": "1", "force": "N"}, False, lambda _: []
+    )
+    traced = replace(damper, effects=(effect,))
+    identified = _identified(tmp_path / "damper.h5", damper)
+    uncertainty = traced_damper_uncertainty(identified, _traced(tmp_path / "a.h5", damper, SUMMARY))
+    rng = np.random.default_rng(2)
+    frame = frame_from_parameter_set("thesis")
+    certain = FrameUncertainty(np.zeros(5), np.zeros(5))
+    draws = [draw(frame, traced, certain, uncertainty, rng) for _ in range(200)]
+    shares = np.array([item.damper.effects[0].values["share"] for item in draws])
+    assert np.std(shares) == pytest.approx(0.05, rel=0.15)
+    assert {item.damper.effects[0].values["force"] for item in draws} == {8.0}
+    assert np.std([item.damper.parameters["c0_a"] for item in draws]) == pytest.approx(0.5, rel=0.15)
+    np.testing.assert_allclose([item.numbers["remanence.share"] for item in draws], (shares - 0.6) / 0.05, rtol=1e-9)
+    scaled = scaled_force(traced, 1.5)
+    assert scaled.effects[0].values == {"share": 0.6, "force": 12.0}
+    assert "excite remanence" in uncertain.test_for("remanence.share")
+
+
+def test_a_frame_without_intervals_is_certain(tmp_path: Path) -> None:
+    frame = frame_from_parameter_set("thesis")
+    with ArtifactWriter.create(tmp_path / "frame.h5", Provenance("identify-frame")) as artifact:
+        artifact.put_json("structure", {})
+    found = frame_uncertainty(Artifact(tmp_path / "frame.h5"), frame)
+    assert not found.frequency_relative.any() and not found.damping_ratio.any()
