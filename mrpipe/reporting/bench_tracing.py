@@ -168,16 +168,16 @@ def errors_per_test(rows: Sequence[Mapping[str, Any]], noise_floor: float) -> Fi
     figure, axes = figure_with_axes(1, 1, height=0.22 * max(len(shown), 6) + 1.0)
     axis = axes[0, 0]
     place = np.arange(len(shown))[::-1]
-    before, after = ([row[f"nrmse_{when}"] for row in shown] for when in ("before", "after"))
+    before, after = ([100.0 * row[f"nrmse_{when}"] for row in shown] for when in ("before", "after"))
     axis.hlines(place, after, before, color="#bbbbbb", lw=1.5, zorder=1)
     axis.scatter(before, place, s=22, color=MODEL, label="before", zorder=2)
     axis.scatter(after, place, s=22, color=AFTER, label="after", zorder=2)
-    axis.axvline(noise_floor, color="k", lw=0.8, ls="--", label="noise floor")
+    axis.axvline(100.0 * noise_floor, color="k", lw=0.8, ls="--", label="noise floor")
     axis.set_yticks(place, [row["name"] for row in shown], fontsize=7)
     axis.set_xlim(left=0.0)
     axis.grid(axis="y", visible=False)
     axis.legend(fontsize=8, loc="lower right")
-    label(axis, "NRMSE [1]", "")
+    label(axis, "RMS error over RMS value [%]", "")
     return figure
 
 

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mrpipe.reporting.words import listed
+
 WHEN = ("before", "after", "recalibrated")
 """How a law was simulated."""
+
+EQUAL = "; laws whose responses hardly differ count as equal"
+"""Said where two such laws have changed places."""
 
 WORTH_SAYING = 0.01
 """Relative change of a law's response below which it is not mentioned."""
@@ -14,8 +19,13 @@ WORTH_SAYING = 0.01
 
 def in_words(found: Mapping[str, Any]) -> str:
     """Return what the closed loop says, in plain words."""
+    return " ".join(in_points(found))
+
+
+def in_points(found: Mapping[str, Any]) -> list[str]:
+    """Return what the closed loop says, a few sentences for each question."""
     if "laws" not in found:
-        return f"Closed loop {found['status']}."
+        return [f"Closed loop {found['status']}."]
     effects = found["plant"]["effects"]
     parts = [f"Closed loop, {found['status']}."]
     if "rms_x_top_error" in found:
@@ -24,8 +34,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     parts += [f"The effect {name} is not in the plant: {why}." for name, why in found["plant"]["left_out"].items()]
     if effects and "controller" in found:
         parts.append(controller_in_words(found))
-    parts += _doubts([*found["laws"], *found["over_band"]["laws"]])
-    return " ".join(parts)
+    return parts + _doubts([*found["laws"], *found["over_band"]["laws"]])
 
 
 def errors_in_words(found: Mapping[str, Any]) -> str:
@@ -66,19 +75,20 @@ def _doubts(laws: Sequence[Mapping[str, Any]]) -> list[str]:
 def ranking_in_words(found: Mapping[str, Any]) -> str:
     """Return whether the effect changes the order of the laws over the frequency band."""
     order = found["ranking"]
-    listed = ", ".join(order["after"])
+    names = ", ".join(order["after"])
     low, high = found["over_band"]["band_rad_s"]
     over = (
         f"by the largest RMS top displacement from {low:.3g} to {high:.3g} rad/s at a base acceleration of "
         f"{found['over_band']['base_amplitude_m_s2']:.3g} m/s^2"
     )
     if not found["plant"]["effects"]:
-        return f"The damper stays as it is, and so does the ranking of the laws {over}: {listed} (the best first)."
+        return f"The damper stays as it is, and so does the ranking of the laws {over}: {names} (the best first)."
     if found["ranking_changes"]:
         swaps = ", ".join(f"{a} is now ahead of {b}" for a, b in found["reversed_pairs"])
-        said = f"The effect changes the ranking of the laws {over} ({swaps}): {listed} (the best first)."
+        said = f"The effect changes the ranking of the laws {over} ({swaps}): {names} (the best first)."
     else:
-        said = f"The effect does not change the ranking of the laws {over}: {listed} (the best first)."
+        equal = "" if order.get("before", order["after"]) == order["after"] else EQUAL
+        said = f"The effect does not change the ranking of the laws {over}: {names} (the best first{equal})."
     if "recorded_ranking" in found:
         agrees = found["ranking_agrees_with_measured"]
         words = {(True, True): "both before and after", (True, False): "before only", (False, True): "only after"}
@@ -92,24 +102,42 @@ def ranking_in_words(found: Mapping[str, Any]) -> str:
 
 
 def controller_in_words(found: Mapping[str, Any]) -> str:
-    """Return what was renewed in the controller and what it brings."""
+    """Return which changes of the controller were tried, which laws take them, and what that brings."""
     new = found["controller"]
     gains = ", ".join(
         f"{law} x {value:.2f}" for law, value in new["gain_factors"].items() if abs(value - 1.0) > WORTH_SAYING
     )
+    tried = (
+        f"To adapt the controller to the effect, three changes were tried, each in addition to the one before: "
+        f"{_inverse_in_words(new['inverse'])}; a switch at {new['switch_force_after_n']:.1f} N instead of "
+        f"{new['switch_force_before_n']:.1f} N (the residual force is {new['residual_force_after_n']:.1f} N, without "
+        f"the effect {new['residual_force_before_n']:.1f} N); "
+        f"{'gains ' + gains if gains else 'gains, which stay within 1 %'}."
+    )
     parts: dict[str, list[str]] = {}
     for law, renewed in new["renewed"].items():
-        if renewed != "nothing":
-            parts.setdefault(renewed, []).append(law)
+        parts.setdefault(renewed, []).append(law)
+    kept = parts.pop("nothing", [])
+    if not parts:
+        return (
+            f"{tried} None of them lowers the simulated response of a law, so every law keeps its controller: the "
+            "effect matters for prediction, not for control."
+        )
     taken = "; ".join(f"{renewed} for {', '.join(laws)}" for renewed, laws in parts.items())
-    text = (
-        f"A controller that knows the effect has its inverse {new['inverse']}, a switch at "
-        f"{new['switch_force_after_n']:.1f} N in place of {new['switch_force_before_n']:.1f} N (the residual force is "
-        f"{new['residual_force_after_n']:.1f} N, without the effect {new['residual_force_before_n']:.1f} N) and "
-        f"{'gains ' + gains if gains else 'the gains it had'}. Each law uses the changes that lower its simulated "
-        f"response: {taken or 'no law uses any'}."
-    )
+    text = f"{tried} A law takes a change only if its simulated response falls: {taken}."
+    if kept:
+        text += f" {listed(kept)} {'keep their controllers' if len(kept) > 1 else 'keeps its controller'}."
     return f"{text} {gain_in_words(found['over_band']['laws'])}"
+
+
+def _inverse_in_words(inverse: str) -> str:
+    """Return what became of the inverse of the controller."""
+    words, _, why = inverse.partition(": ")
+    if words != "kept":
+        return f"an inverse {inverse}"
+    if why == "the better of both":
+        return "the present inverse, because a retrained one was no better"
+    return f"the present inverse, because {why} only"
 
 
 def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
@@ -126,9 +154,9 @@ def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
             "Retuning for the effect changes the largest RMS top displacement of no law by more than 1 %: the effect "
             "matters for prediction, not for control."
         )
-    listed = ", ".join(f"{law} {100.0 * change:+.0f} %" for law, change in changed.items())
+    named = ", ".join(f"{law} {100.0 * change:+.0f} %" for law, change in changed.items())
     return (
-        f"On the damper with the effect it changes the largest RMS top displacement: {listed}; the other laws stay "
+        f"On the damper with the effect it changes the largest RMS top displacement: {named}; the other laws stay "
         "within 1 %."
     )
 

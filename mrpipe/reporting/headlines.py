@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mrpipe.reporting.words import duration
+
 
 def headline(stage: str, summary: Mapping[str, Any]) -> str:
     """Return a line that says what a stage found, from its summary."""
@@ -12,7 +14,12 @@ def headline(stage: str, summary: Mapping[str, Any]) -> str:
         return _simulation(summary)
     if stage.startswith("train-"):
         return _training(summary)
+    if stage.startswith("record-") and summary:
+        return f"{summary.get('tests')} tests, {duration(float(summary.get('duration_s') or 0.0))}"
     lines = {
+        "prepare": _prepared,
+        "assemble": _assembled,
+        "sweep": _sweep,
         "identify-damper": _damper,
         "identify-frame": _frame,
         "calibrate": _calibration,
@@ -25,6 +32,24 @@ def _number(value: Any, factor: float = 1.0, digits: int = 3) -> str:
     return "-" if value is None else f"{value * factor:.{digits}g}"
 
 
+def _prepared(summary: Mapping[str, Any]) -> str:
+    return (
+        f"campaign {summary.get('campaign', '')}: {summary.get('test_count')} tests at "
+        f"{_number(summary.get('sampling_rate_hz'), digits=4)} Hz, drive in {summary.get('drive_unit', '')}"
+    )
+
+
+def _assembled(summary: Mapping[str, Any]) -> str:
+    return (
+        f"{summary.get('training_samples')} samples of {summary.get('training_tests')} training tests, "
+        f"{summary.get('validation_samples')} of {summary.get('validation_tests')} validation tests"
+    )
+
+
+def _sweep(summary: Mapping[str, Any]) -> str:
+    return f"of {summary.get('candidates')} networks, {summary.get('choice')} is chosen"
+
+
 def _training(summary: Mapping[str, Any]) -> str:
     return (
         f"{summary.get('architecture', '')}: validation NRMSE {_number(summary.get('validation_nrmse'))}, "
@@ -35,7 +60,8 @@ def _training(summary: Mapping[str, Any]) -> str:
 def _simulation(summary: Mapping[str, Any]) -> str:
     return (
         f"rms x_top {_number(summary.get('rms_x_top_m'), 1e3)} mm, x1 {_number(summary.get('rms_x1_m'), 1e3)} mm, "
-        f"a1 {_number(summary.get('rms_a1_m_s2'))} m/s2, damping ratio {_number(summary.get('damping_ratio'))}"
+        f"a1 {_number(summary.get('rms_a1_m_s2'))} m/s2 relative to the ground, "
+        f"damping ratio {_number(summary.get('damping_ratio'))}"
     )
 
 

@@ -28,6 +28,9 @@ __all__ = ["ReportStage", "RunFacts", "first_screen", "write_report"]
 
 _ROWS_SHOWN = 15
 
+_NUMBER_AND_UNIT = re.compile(r"(\d) (?=(?:%|[µmk]?(?:m|N|A|V|s|g|Hz|rad|kg|min|h|J)(?:/|\b)))")
+"""A space that a line must not break at, because the unit belongs to the number."""
+
 
 def first_screen(facts: RunFacts, columns: int = 100) -> list[str]:
     """Return the first screen as lines for a terminal.
@@ -39,13 +42,13 @@ def first_screen(facts: RunFacts, columns: int = 100) -> list[str]:
     columns
         Longest line.
     """
-    lines = [facts.title, _source_line(facts), *([facts.description] if facts.description else []), ""]
-    indent = " " * 12
+    indent, width = " " * 12, max(columns, 40)
+    lines = [facts.title, _source_line(facts), *textwrap.wrap(facts.description, width), ""]
     for item in statements(facts):
         text = item.text.replace("**", "").replace("`", "")
-        lines += textwrap.wrap(
-            f"{item.topic:{len(indent)}}{text}", max(columns, 40), subsequent_indent=indent, break_on_hyphens=False
-        )
+        kept_together = _NUMBER_AND_UNIT.sub("\\1\N{NO-BREAK SPACE}", f"{item.topic:{len(indent)}}{text}")
+        wrapped = textwrap.wrap(kept_together, width, subsequent_indent=indent, break_on_hyphens=False)
+        lines += [line.replace("\N{NO-BREAK SPACE}", " ") for line in wrapped]
     return lines
 
 
@@ -221,4 +224,7 @@ def _inline(text: str) -> str:
     escaped = html.escape(text)
     escaped = re.sub(r"`([^`]+)`", r"<code>\1</code>", escaped)
     escaped = re.sub(r"\*\*([^*]+)\*\*", r"<strong>\1</strong>", escaped)
-    return re.sub(r"(?<!\*)\*([^*\s][^*]*)\*(?!\*)", r"<em>\1</em>", escaped)
+    escaped = re.sub(r"(?<!\*)\*([^*\s][^*]*)\*(?!\*)", r"<em>\1</em>", escaped)
+    pieces = re.split(r"(<code>.*?</code>)", escaped)
+    pieces[::2] = [_NUMBER_AND_UNIT.sub("\\1\N{NO-BREAK SPACE}", piece) for piece in pieces[::2]]
+    return "".join(pieces)

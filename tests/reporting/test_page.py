@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -74,3 +75,12 @@ def test_a_cell_that_holds_a_list_is_written_as_words(tmp_path: Path) -> None:
     (path,) = write_report(RunFacts(tmp_path, "T", "", [stage]), ["markdown"])
     text = path.read_text(encoding="utf-8")
     assert "| dahl | k0, c1 |" in text and "[" not in (tmp_path / "tables" / "identify-damper-forms.csv").read_text()
+
+
+def test_a_number_is_not_parted_from_its_unit(tmp_path: Path, stages: list[ReportStage]) -> None:
+    facts = RunFacts(
+        tmp_path, "T", "", [replace(stages[0], items=[{"kind": "text", "text": "1.8 % of 34 N, 5 of 7 A."}])]
+    )
+    (path,) = write_report(facts, ["html"])
+    text = path.read_text(encoding="utf-8")
+    assert "1.8\N{NO-BREAK SPACE}% of 34\N{NO-BREAK SPACE}N, 5 of 7\N{NO-BREAK SPACE}A." in text

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mrpipe.artifacts import Artifact, BoolArray, FloatArray
+from mrpipe.control.laws import law_named, law_names
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.words import listed, number, percent
 from mrpipe.structures import read_frame
@@ -116,9 +117,15 @@ def _bare(facts: RunFacts, time: FloatArray, ground: FloatArray, window: BoolArr
         _rms(response.absolute_acceleration[inside, -1]),
         _rms(response.absolute_acceleration[inside, 0]),
         nan,
-        _or_nan(min(facts.summary("identify-frame").get("damping_ratios", [nan]))),
+        _or_nan(_of_first_mode(facts.summary("identify-frame"))),
         0.0,
     )
+
+
+def _of_first_mode(frame: Mapping[str, Any]) -> float | None:
+    """Return the damping ratio of the mode of the lowest frequency, which governs the free decay; None if unknown."""
+    frequencies, ratios = frame.get("frequencies_hz") or [], frame.get("damping_ratios") or []
+    return float(ratios[int(np.argmin(frequencies))]) if len(frequencies) == len(ratios) > 0 else None
 
 
 def last_cycles(artifact: Artifact, summary: Mapping[str, Any], cycles: float = 3.0) -> History:
@@ -141,6 +148,11 @@ def last_cycles(artifact: Artifact, summary: Mapping[str, Any], cycles: float = 
     )
 
 
+def meanings(laws: Iterable[str]) -> dict[str, str]:
+    """Return law -> what it does, in a few words."""
+    return {law: law_named(law).summary for law in laws if law in law_names()}
+
+
 def answer(facts: RunFacts) -> str:
     """Return which law is best for this structure, and by how much."""
     design = facts.summary("design")
@@ -158,12 +170,16 @@ def answer(facts: RunFacts) -> str:
     best = (damps or laws)[0]
     omega = (next(iter(facts.laws.values())).get("excitation") or {}).get("frequency_rad_s")
     motion = f"under harmonic base motion at {number(omega)} rad/s" if omega else "under this excitation"
+    over_band = _over_band(facts)
+    if over_band and omega:
+        motion = f"at {number(omega)} rad/s alone"
     text = (
         f"Of the laws that add damping, **{best.law}** is best {motion}"
         if len(damps) < len(laws)
         else (f"**{best.law}** is the best law {motion}")
     )
     text += f": RMS top displacement {_millimetres(best.rms_top_m)}"
+    text = f"{over_band} {text}".strip()
     compared = []
     if bare is not None:
         compared.append(f"{_millimetres(bare.rms_top_m)} without a damper ({_change(best.rms_top_m, bare.rms_top_m)})")
@@ -182,6 +198,32 @@ def answer(facts: RunFacts) -> str:
             f" {run.law} moves less ({_millimetres(run.rms_top_m)}) but damps free vibration by "
             f"{percent(run.damping_ratio)} only: it shifts the resonance away from this one frequency."
         )
+    return text
+
+
+def _over_band(facts: RunFacts) -> str:
+    """Return which law has the smallest peak over the frequency band of `close-loop`; empty where it was not computed.
+
+    A ranking at one frequency misleads, because a law can shift the resonance away from that frequency.
+    """
+    band = (facts.summary("close-loop").get("closed_loop") or {}).get("over_band") or {}
+    peaks = {
+        row["law"]: row["after"]["peak_rms_x_top_m"]
+        for row in band.get("laws", [])
+        if "peak_rms_x_top_m" in row.get("after", {})
+    }
+    if len(peaks) < 2:
+        return ""
+    best, *others = sorted(peaks, key=lambda law: peaks[law])
+    low, high = band["band_rad_s"]
+    rest = ", ".join(f"{law} {number(1e3 * peaks[law])}" for law in others)
+    text = (
+        f"Over harmonic base motion from {number(low)} to {number(high)} rad/s, **{best}** has the smallest peak of "
+        f"the RMS top displacement: {_millimetres(peaks[best])} ({rest} mm)."
+    )
+    absent = [law for law in facts.laws if law not in peaks]
+    if absent:
+        text += f" This comparison leaves out {listed(absent)} (`mrpipe simulate --law {absent[0]} --resonance`)."
     return text
 
 
@@ -220,7 +262,10 @@ def doubts(facts: RunFacts) -> list[str]:
         found.append(f"The predicted response grows without bound under {listed(grows)}.")
     limited = [line.partition(":")[0] for line in facts.warnings("calibrate") if "residual force" in line]
     if limited:
-        found.append(f"The force of the unpowered damper limits {listed(limited)}: they cannot release it fully.")
+        found.append(
+            f"The unpowered damper limits {listed(limited)}: in part of each cycle they ask for less force than it "
+            "gives without drive."
+        )
     return found
 
 

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 
 from mrpipe.artifacts import Artifact
+from mrpipe.reporting.closed_loop_words import in_points
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import figures, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
-from mrpipe.reporting.words import number, percent, quantity
+from mrpipe.reporting.words import listed, number, percent, quantity
 from mrpipe.reporting.writer import Section
 
 _POINTS_OF_A_LOOP = 700
@@ -40,7 +41,11 @@ def result(facts: RunFacts) -> Section:
         )
     runs = law_facts.comparison(facts)
     if runs:
-        section.figure("laws", figures.law_bars(runs), "Response of the structure by control law.")
+        section.figure(
+            "laws",
+            figures.law_bars(runs),
+            "Response of the structure by control law, to the base motion of the simulation; grey: constant drive.",
+        )
     return section
 
 
@@ -69,8 +74,8 @@ def trust(facts: RunFacts) -> Section:
     inverse = facts.summary("train-inverse")
     if inverse.get("round_trip_nrmse") is not None:
         section.text(
-            f"Inverse and forward network in series (force to drive to force) miss the desired force by "
-            f"{percent(inverse['round_trip_nrmse'])}."
+            f"Inverse and forward network in series (desired force to drive, and back to force) miss the desired force "
+            f"by {percent(inverse['round_trip_nrmse'])} of its RMS value{_by_regime(inverse)}."
         )
     if loop.get("tests"):
         section.figure(
@@ -79,6 +84,13 @@ def trust(facts: RunFacts) -> Section:
             "Error of the validation tests before and after; the largest errors where there are many tests.",
         )
     return section
+
+
+def _by_regime(inverse: Mapping[str, Any]) -> str:
+    """Return the error of inverse and forward network in series by the part of the cycle, if it is known."""
+    errors = inverse.get("round_trip_regime_nrmse") or {}
+    parts = [f"{percent(errors[key])} {words}" for key, words in statements.PARTS.items() if key in errors]
+    return f" ({listed(parts)})" if parts else ""
 
 
 def _errors_per_test(loop: Mapping[str, Any]) -> Any:
@@ -129,7 +141,13 @@ def _traced_effects(section: Section, loop: Mapping[str, Any]) -> None:
     """Add the effects that the model lacks, and how much each candidate recovers."""
     effects = statements.proper_effects(loop)
     for effect in effects:
-        section.text(f"**{effect['name']}** ({effect.get('form', '')}). {effect.get('physics', '')}")
+        section.text(f"**{effect['name']}** (form {effect.get('form', '')}). {effect.get('physics', '')}")
+        first = next((item.get("form") for item in loop.get("candidates", []) if item["name"] == effect["name"]), None)
+        if first and effect.get("form") and first != effect["form"]:
+            section.text(
+                f"Among the candidates {effect['name']} stands with its best single form, {first}. Once it was named, "
+                f"all its forms were fitted again, and {effect['form']} did better."
+            )
     section.table("effects", tables.effects(effects), "Effects that the model lacks, with 95 % intervals.")
     if loop.get("candidates"):
         section.figure(
@@ -250,27 +268,35 @@ def control(facts: RunFacts) -> Section:
     if runs:
         section.text(law_facts.answer(facts))
         section.table(
-            "laws", tables.laws(facts, runs), "All laws under the same base motion; accelerations are absolute."
+            "laws",
+            tables.laws(facts, runs),
+            "All laws under the same base motion: RMS displacement relative to the ground (change: compared with no "
+            "damper), RMS absolute acceleration, largest damper force, damping ratio in free decay, and share of the "
+            "time in which the damper model is extrapolated.",
         )
+        section.text("; ".join(f"`{law}`: {meaning}" for law, meaning in law_facts.meanings(facts.laws).items()) + ".")
         histories: dict[str, law_facts.History] = {}
         for run in runs:
             artifact = facts.artifact(f"response-{run.law}.h5")
             if artifact is not None and len(histories) < 6:
                 histories[run.law] = law_facts.last_cycles(artifact, facts.laws[run.law])
-        section.figure("cycles", figures.last_cycles(histories), "The last three cycles under each law.")
+        section.figure("cycles", figures.last_cycles(histories), _caption_of_cycles(len(histories), len(facts.laws)))
     measured = [item for item in loop.get("laws", []) if item.get("measured")]
+    if "over_band" in loop:
+        section.text("What the traced damper changes in the closed loop:")
+        section.points(in_points(loop))
     if measured:
-        error = loop.get("rms_x_top_error") or {}
-        section.text(
-            f"Against the recordings of the closed loop, the model misses the RMS top displacement by "
-            f"{percent(error.get('before'))} before and {percent(error.get('after'))} after the effect is added."
-        )
         section.figure(
             "measured",
             figures.measured_and_predicted(loop),
-            "Closed loop: recorded, and predicted before and after.",
+            "Closed loop: recorded, and predicted before and after the effect is added.",
         )
     return section
+
+
+def _caption_of_cycles(shown: int, laws: int) -> str:
+    first = f" (the {shown} laws of smallest response)" if shown < laws else ""
+    return f"The last three cycles under each law{first}: top floor, damper force over time and over stroke."
 
 
 def next_steps(facts: RunFacts) -> Section:

@@ -19,7 +19,8 @@ FITTED_ALIKE = 0.1
 
 
 _DRIVES = {None: "constant", "constant": "constant", "steps": "stepped", "half-sine": "half-sine", "random": "random"}
-_PARTS = {"pre_yield": "before yield", "post_yield": "after yield", "reversal": "around reversals"}
+PARTS = {"pre_yield": "before yield", "post_yield": "after yield", "reversal": "around reversals"}
+"""Part of the cycle -> the words for it."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +191,8 @@ def weak_spots(facts: RunFacts) -> str:
     if not tests or verdict_class(loop) == "validation differs":
         return ""
     worst = sorted(tests, key=lambda row: -float(row["nrmse_after"]))[:2]
-    named = listed([f"{row['name']} ({percent(row['nrmse_after'])})" for row in worst])
+    made = _conditions(facts)
+    named = listed([f"{row['name']} ({percent(row['nrmse_after'])}{made.get(str(row['name']), '')})" for row in worst])
     text = f"The error of the final damper model is largest in {'test' if len(worst) == 1 else 'tests'} {named}."
     states = [str(item["state"]) for item in loop["unexplained"].get("depends_on", [])[:3]]
     if states and loop["unexplained"]["structured"]:
@@ -198,8 +200,33 @@ def weak_spots(facts: RunFacts) -> str:
     where = (loop.get("residual") or {}).get("where") or {}
     if where:
         part, share = max(where.items(), key=lambda item: float(item[1]))
-        text += f" Before the correction, {percent(share)} of the squared residual lay {_PARTS.get(part, plain(part))}."
+        text += f" Before the correction, {percent(share)} of the squared residual lay {PARTS.get(part, plain(part))}."
+    recordings = [row for row in (loop.get("closed_loop") or {}).get("tests", []) if _history_error(row) is not None]
+    if recordings:
+        row = max(recordings, key=lambda item: _history_error(item) or 0.0)
+        text += (
+            f" In the closed loop, the history of the top floor is missed most in recording {row['test']}: by "
+            f"{percent(_history_error(row))} of its RMS value."
+        )
     return text
+
+
+def _history_error(row: Mapping[str, Any]) -> float | None:
+    """Return the error of the predicted history of the top floor in a recording of the closed loop."""
+    return (row.get("after") or {}).get("nrmse_x_top") if row.get("recorded") else None
+
+
+def _conditions(facts: RunFacts) -> dict[str, str]:
+    """Return test -> what was done in it: `; 5.0 mm, 1.0 Hz, mean drive 0.50 A`; only for tests of one frequency."""
+    prepared = facts.summary("prepare")
+    unit = prepared.get("drive_unit") or "A"
+    made = {}
+    for test in prepared.get("tests", []):
+        if test.get("frequency_hz") and test.get("excitation", "periodic") == "periodic" and "drive_mean" in test:
+            motion = f"{number(1e3 * test['amplitude_m'], 2)} mm, {number(test['frequency_hz'], 2)} Hz"
+            drive = round(float(test["drive_mean"]), 2) + 0.0  # no minus sign before a zero
+            made[str(test["name"])] = f"; {motion}, mean drive {drive:.2f} {unit}"
+    return made
 
 
 def _without_laws(facts: RunFacts) -> str:

@@ -111,15 +111,15 @@ def laws(facts: RunFacts, runs: Sequence[law_facts.LawRun]) -> pd.DataFrame:
         rows.append(
             {
                 "law": run.law,
-                "gains": ", ".join(shown),
-                "RMS top [mm]": number(1e3 * run.rms_top_m),
+                "x top [mm]": number(1e3 * run.rms_top_m),
                 "change [%]": number(change),
-                "RMS floor 1 [mm]": number(1e3 * run.rms_first_m),
-                "RMS a top [m/s²]": number(run.rms_a_top_m_s2),
-                "RMS a floor 1 [m/s²]": number(run.rms_a_first_m_s2),
-                "peak force [N]": number(run.peak_force_n),
-                "damping ratio [%]": number(100.0 * run.damping_ratio, 2),
-                "extrapolated [% of time]": number(100.0 * run.outside_share, 2),
+                "x floor 1 [mm]": number(1e3 * run.rms_first_m),
+                "a top [m/s²]": number(run.rms_a_top_m_s2),
+                "a floor 1 [m/s²]": number(run.rms_a_first_m_s2),
+                "force [N]": number(run.peak_force_n),
+                "damping [%]": number(100.0 * run.damping_ratio, 2),
+                "extrapolated [%]": number(100.0 * run.outside_share, 2),
+                "gains": ", ".join(shown),
             }
         )
     return pd.DataFrame(rows)

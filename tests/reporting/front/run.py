@@ -96,7 +96,7 @@ def run_in(directory: Path, loop: Mapping[str, Any] | None = None) -> RunFacts:
     identified = {
         "campaign": "my-frame",
         "frequencies_hz": frequencies,
-        "damping_ratios": [0.005] * 3,
+        "damping_ratios": [0.005, 0.004, 0.003],
         "mode_shapes": modes.mode_shapes.tolist(),
         "frequency_intervals_hz": [[value - 0.01, value + 0.01] for value in frequencies],
         "damping_ratio_intervals": [[0.004, 0.006]] * 3,

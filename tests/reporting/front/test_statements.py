@@ -68,6 +68,42 @@ def test_uncontrolled_structure_is_the_linear_one(tmp_path: Path) -> None:
     runs = laws.comparison(run_in(tmp_path))
     assert [run.law for run in runs] == ["passive-on", "vd", "passive-off", laws.UNCONTROLLED]
     assert runs[-1].rms_top_m > 0.05  # at resonance with half a percent of damping
+    assert runs[-1].damping_ratio == 0.005  # of the first mode, although the others have less
+
+
+def _peaks(law: str, peak: float) -> dict[str, object]:
+    return {"law": law, "after": {"peak_rms_x_top_m": peak}}
+
+
+def test_the_ranking_over_a_band_of_frequencies_comes_before_that_at_one(tmp_path: Path) -> None:
+    """passive-on is best at one frequency and worst over the band."""
+    band = {"band_rad_s": [6.0, 12.5], "laws": [_peaks("passive-on", 0.131), _peaks("vd", 0.0348)]}
+    text = answers(tmp_path, closed_loop={"status": "replayed", "over_band": band})["Control"]
+    assert text.startswith("Over harmonic base motion from 6.00 to 12.5 rad/s, **vd** has the smallest peak")
+    assert "34.8 mm (passive-on 131 mm)" in text
+    assert "leaves out passive-off (`mrpipe simulate --law passive-off --resonance`)" in text
+    assert "rad/s alone" in text
+
+
+def test_the_worst_tests_are_named_with_what_was_done_in_them(tmp_path: Path) -> None:
+    facts = run_in(tmp_path, tracing(tests=[{"name": "b", "nrmse_before": 0.08, "nrmse_after": 0.02}]))
+    prepared = dict(facts.summaries["prepare"])
+    made = {"name": "b", "excitation": "periodic", "frequency_hz": 1.0, "amplitude_m": 0.005, "drive_mean": -0.0013}
+    prepared["tests"] = [{**prepared["tests"][1], **made}]
+    prepared["drive_unit"] = "V"
+    facts.summaries["prepare"] = prepared
+    text = {item.topic: item.text for item in statements(facts)}["Weak spots"]
+    assert "test b (2.0 %; 5.0 mm, 1.0 Hz, mean drive 0.00 V)" in text
+
+
+def test_the_recording_that_is_predicted_worst_is_named(tmp_path: Path) -> None:
+    rows = [
+        {"test": "vd-a", "recorded": True, "after": {"nrmse_x_top": 0.05}},
+        {"test": "passive-on-b", "recorded": True, "after": {"nrmse_x_top": 0.34}},
+        {"test": "fdns", "recorded": False, "after": {}},
+    ]
+    text = answers(tmp_path, closed_loop={"status": "replayed", "tests": rows})["Weak spots"]
+    assert "missed most in recording passive-on-b: by 34 % of its RMS value" in text
 
 
 def test_doubts_name_rivals_and_extrapolation(tmp_path: Path) -> None:
