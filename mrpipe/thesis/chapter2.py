@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import Artifact, FloatArray, load_parameter_set
-from mrpipe.dampers.model import DamperModel, bouc_wen_limits, damper_from_parameter_set, parameter_unit
+from mrpipe.dampers.model import DamperModel, bouc_wen_limits, damper_from_parameter_set
 from mrpipe.networks.assembly import read_history
 from mrpipe.networks.evaluation import Judgement, error_figures, judge
 from mrpipe.networks.network import Network, read_network
@@ -17,6 +17,7 @@ from mrpipe.networks.tracking import emulate_viscous
 from mrpipe.signals.prepared import PreparedTest, read_prepared
 from mrpipe.thesis.bench import Bench
 from mrpipe.thesis.claim import Missing, Outcomes, Value
+from mrpipe.units import same_unit_dimension
 
 FREQUENCIES_HZ = (0.5, 1.0, 1.27, 1.8, 2.2)
 AMPLITUDES_M = (5e-3, 10e-3)
@@ -48,6 +49,12 @@ def _ends(values: FloatArray) -> FloatArray:
     return values[[0, -1]]
 
 
+def unit_of_gamma(n: int) -> str:
+    """Return the unit with which gamma |v| |z|^(n-1) z of (2.2) is a velocity, as Table 2.2 writes units."""
+    units = ("1", *(f"1/{base}^{power}" for base in ("m", "s") for power in (1, 2, 3)))
+    return next(unit for unit in units if same_unit_dimension(f"({unit})*(m/s)*m^{n}", "m/s"))
+
+
 def _parameter_sets() -> Outcomes:
     printed = load_parameter_set("dampers", "thesis-printed")
     model = damper_from_parameter_set(printed)
@@ -61,7 +68,7 @@ def _parameter_sets() -> Outcomes:
         "A1a": Value(_ends(peak_forces(model, 0.0)), by, small),
         "A1b": Value(peak_forces(model, model.drive_limit)[-1], by, small),
         "A1c": Value(limits[0], by),
-        "A2": Value(parameter_unit("gamma", "A"), "units of the terms of (2.2)"),
+        "A2": Value(unit_of_gamma(int(printed.scalar("n"))), "units of the terms of (2.2)"),
         "C-yield": Value(set_c.parameters["yield_displacement"], "damper set C"),
     }
     for drive in range(5):

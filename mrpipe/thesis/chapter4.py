@@ -10,7 +10,6 @@ from mrpipe.artifacts import Artifact, FloatArray
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration import CalibrationOptions, calibrate
 from mrpipe.control.kalman import continuous_kalman_gains
-from mrpipe.control.linearisation import clipped_force
 from mrpipe.signals.kalman import kalman_gains, kinematic_kalman
 from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.structures import Frame, floor_position
@@ -73,10 +72,10 @@ def _closed_forms(frame: Frame) -> Outcomes:
         "P2-nu-k": modes.nu * k,
         "T4.30": limits.optimal_force_ratio(modes) * modes.nu,
     }
-    return {name: Value(value, by) for name, value in values.items()} | _formulas(modes, c, k)
+    return {name: Value(value, by) for name, value in values.items()} | _formulas(modes, k)
 
 
-def _formulas(modes: limits.LimitingModes, c: float, k: float) -> Outcomes:
+def _formulas(modes: limits.LimitingModes, k: float) -> Outcomes:
     """Return what the misprinted formulas give."""
     # (omega_inf^2 - omega_0^2)/u_0^2, the right-hand form of P2 (13) for k = 0, over its left-hand form
     right = (modes.omega_inf**2 - modes.omega_0**2) / modes.u_0**2
@@ -86,16 +85,10 @@ def _formulas(modes: limits.LimitingModes, c: float, k: float) -> Outcomes:
     force = 250.0 * v + k * x
     as_printed = np.where(force < 0.0, 0.0, force)  # the second case of (4.17)
     active = float(np.mean(as_printed * v < -1e-12))
-    corrected = float(np.mean(clipped_force(250.0, k, x, v) * v < -1e-12))
-    # the line above P4 (16): the imaginary part of a difference of two real frequencies
-    as_written = complex(modes.omega_inf - modes.omega_0).imag / modes.omega_0
-    estimate = limits.damping_estimate_thesis(modes, 0.0, c * modes.omega_0)
     by = "the printed formula, evaluated"
     return {
         "A12a": Value(right / left, by),
         "A12b": Value(active, by),
-        "A12c": Value(corrected, "P2 (22), evaluated"),
-        "A12d": Value(as_written, by, f"(16) gives {estimate:.3f}"),
     }
 
 

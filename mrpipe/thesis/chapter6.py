@@ -26,7 +26,7 @@ from mrpipe.structures import Frame, floor_position, shear_stiffness, state_spac
 from mrpipe.structures.records import GroundMotion
 from mrpipe.thesis.claim import Missing, Outcomes, Value
 from mrpipe.thesis.entries import printed_columns, table_id
-from mrpipe.units import same_dimension
+from mrpipe.units import same_unit_dimension
 
 _FLOORS, _MASS, _STIFFNESS = 10, 5000.0, 1.5e7
 _RATED_N = 1.0e6
@@ -100,12 +100,18 @@ def _device() -> BinghamDevice:
     return BinghamDevice(*(values.scalar(part) for part in parts))
 
 
+def unit_of_command(coefficient: str, product: str) -> str:
+    """Return the unit of a command, A or V, that times a coefficient gives a product; all three as units."""
+    return next(unit for unit in ("A", "V") if same_unit_dimension(f"({coefficient})*{unit}", product))
+
+
 def _units() -> Outcomes:
     values = load_parameter_set("dampers", "bingham-1000kn")
-    same = same_dimension("A", "voltage")
     said = f"it is taken in {values.units['drive_limit']}, 0 to {values.scalar('drive_limit'):g}"
-    words = "A and V are one unit" if same else "A and V differ"
-    return {"A17": Value(words, "dimensions of the units", said)}
+    # f_b and c_b of Table 6.1 are slopes of force and viscosity over the command
+    found = sorted({unit_of_command("kN/A", "kN"), unit_of_command("kN*s/m/V", "kN*s/m")})
+    words = "one unit" if len(found) == 1 else " and ".join(found)
+    return {"A17": Value(words, "units of the terms with the command", said)}
 
 
 def _regulator(frame: Frame) -> Outcomes:
