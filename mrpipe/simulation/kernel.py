@@ -23,7 +23,7 @@ from mrpipe.control.kernel import (
     controller_step,
 )
 from mrpipe.dampers.drive import advance_lag
-from mrpipe.dampers.hysteresis import advance_hysteresis
+from mrpipe.dampers.hysteresis import follow_hysteresis
 from mrpipe.dampers.plant import (
     ACCELERATION,
     CHAIN_FUNCTIONS,
@@ -161,7 +161,8 @@ def run_loop(
     velocities = after[n:size]
     drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
     # the plain chain in separate numbers: reading arrays through its function pointers takes longer than its sums
-    u, yielding, viscous, zeta, hysteretic, rod, rod_end = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    u, yielding, viscous, zeta, hysteretic = 0.0, 0.0, 0.0, 0.0, 0.0
+    rod, rod_end, rod_speed, speed_end = 0.0, 0.0, 0.0, 0.0
     eta_dt, yield_displacement, gamma_share, exponent = 0.0, 1.0, 0.5, 2.0
     y0, y1, y2, y3, v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if track == TRACK_BOUC_WEN:
@@ -212,7 +213,7 @@ def run_loop(
                 )  # fmt: skip
                 for index in range(damper.shape[0]):
                     damper[index] = trial[index]
-                rod, hysteretic = x, 0.0
+                rod, rod_speed, hysteretic = x, v, 0.0
             elif track == TRACK_LAW:
                 force = ideal_force(run, x, v)
             else:
@@ -262,9 +263,11 @@ def run_loop(
         for iteration in range(60):
             x_end, v_end = x_free + end_x * guess, v_free + end_v * guess
             if track == TRACK_BOUC_WEN:
-                zeta = advance_hysteresis(hysteretic, x_end - rod, yield_displacement, gamma_share, exponent)
+                zeta = follow_hysteresis(
+                    hysteretic, rod, rod_speed, x_end, v_end, dt, yield_displacement, gamma_share, exponent
+                )
                 found = yielding * zeta + viscous * v_end
-                rod_end = x_end
+                rod_end, speed_end = x_end, v_end
             elif track == TRACK_DAMPER:
                 found = _damper_force(
                     functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, time, x_end, v_end,
@@ -315,7 +318,7 @@ def run_loop(
         for index in range(size):
             before[index] = after[index]
         if track == TRACK_BOUC_WEN:
-            hysteretic, rod = zeta, rod_end
+            hysteretic, rod, rod_speed = zeta, rod_end, speed_end
         elif real:
             for index in range(damper.shape[0]):
                 damper[index] = trial[index]

@@ -117,15 +117,30 @@ class ReferenceDamper:
     model: DamperModel
     zeta: float = 0.0
     current: float = 0.0
+    speed: float = 0.0
 
     def moved(self, increment: float, velocity: float, command: float, dt: float) -> tuple[float, ReferenceDamper]:
         """Return the force after a step, and the damper then."""
         numbers = self.model.parameters
-        zeta = _hysteresis(self.zeta, increment, numbers["yield_displacement"], numbers["gamma_share"])
+        turn = _turning_point(increment, self.speed, velocity, dt)
+        zeta = self.zeta
+        for part in (turn, increment - turn):
+            zeta = _hysteresis(zeta, part, numbers["yield_displacement"], numbers["gamma_share"])
         # the command is held over the step
         current = command + (self.current - command) * np.exp(-numbers["eta"] * dt)
         force = self.model.yield_force(current) * zeta + self.model.viscosity(current) * velocity
-        return float(force), ReferenceDamper(self.model, zeta, float(current))
+        return float(force), ReferenceDamper(self.model, zeta, float(current), velocity)
+
+
+def _turning_point(increment: float, speed_before: float, speed_after: float, dt: float) -> float:
+    """Return the path [m] to the point at which the motion turns within the step; `increment` if it does not."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    if speed_before * speed_after >= 0.0:
+        return increment
+    path = CubicHermiteSpline([0.0, dt], [0.0, increment], [speed_before, speed_after])
+    turns = path.derivative().roots(extrapolate=False)
+    return float(path(turns[0])) if len(turns) else increment
 
 
 def _hysteresis(zeta: float, increment: float, yield_displacement: float, gamma_share: float) -> float:

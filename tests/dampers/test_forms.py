@@ -29,6 +29,7 @@ NUMBERS: dict[str, dict[str, float]] = {
     "bouc-wen-free": {
         "yield_displacement": 8e-4, "gamma_share": 0.7, "exponent": 1.4, "growth": 0.6, "reference_force": 60.0,
     },
+    "elastic-plastic": {"initial_stiffness": 8e4, "exponent": 6.0},
     "dahl": {"yield_displacement": 8e-4},
     "dahl-stiffness": {"initial_stiffness": 8e4},
     "bingham": {"transition_velocity": 0.01},

@@ -9,6 +9,7 @@ from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.hysteresis import displacement_between, turning_share
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import (
     DISPLACEMENT,
@@ -71,20 +72,30 @@ def advance_spring(deformation: float, speed: float, dt: float, yield_deformatio
 
 @njit(STEP_SIGNATURE, cache=True)
 def bingham_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: stiffness of the spring [N/m]. State: last displacement [m], deformation of the spring [m].
+    """Parameters: stiffness of the spring [N/m]. State: last displacement [m], deformation of the spring [m], last
+    velocity [m/s].
 
     The velocity of the Bingham element takes the place of the rod's.
     """
-    wire[OUTER_VELOCITY] = wire[VELOCITY]
+    x, v = wire[DISPLACEMENT], wire[VELOCITY]
+    wire[OUTER_VELOCITY] = v
     if wire[FIRST] > 0.5:
-        state[0] = wire[DISPLACEMENT]
+        state[0] = x
         state[1] = 0.0
+        state[2] = v
     stiffness = parameters[0]
     strength = max(wire[YIELD_FORCE], 0.0)
     viscosity = max(wire[VISCOSITY], 0.0)
-    speed = (wire[DISPLACEMENT] - state[0]) / dt
-    state[1] = advance_spring(state[1], speed, dt, strength / stiffness, viscosity / stiffness)
-    state[0] = wire[DISPLACEMENT]
+    share = turning_share(state[0], state[2], x, v, dt)
+    turn = displacement_between(share, state[0], state[2], x, v, dt)
+    limit, relaxation = strength / stiffness, viscosity / stiffness
+    speed = (turn - state[0]) / (share * dt)
+    state[1] = advance_spring(state[1], speed, share * dt, limit, relaxation)
+    if share < 1.0:
+        speed = (x - turn) / ((1.0 - share) * dt)
+        state[1] = advance_spring(state[1], speed, (1.0 - share) * dt, limit, relaxation)
+    state[0] = x
+    state[2] = v
     force = stiffness * state[1]
     excess = max(abs(force) - strength, 0.0)
     yielded = abs(force) >= strength * (1.0 - 1e-9) and force * speed > 0.0
@@ -98,7 +109,7 @@ def bingham_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
 
 def _steps(values: Values) -> list[Step]:
     numbers = np.array([values["spring_stiffness"]])
-    return [Step("bingham-spring", Phase.HYSTERESIS, bingham_spring_step, numbers, 2), outer_velocity()]
+    return [Step("bingham-spring", Phase.HYSTERESIS, bingham_spring_step, numbers, 3), outer_velocity()]
 
 
 FORM = BaseForm(

@@ -1,0 +1,55 @@
+"""Elastic-plastic friction with a constant stiffness, whose force stays when the yield force changes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.hysteresis import follow_hysteresis
+from mrpipe.dampers.parameters import Values, shape
+from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def elastic_plastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: stiffness [N/m], exponent. State: last displacement [m], force of the element [N], last
+    velocity [m/s].
+
+    The force is the state. When the yield force rises, the element first has to be strained to the new yield force.
+    When the yield force falls below the force, the element slips until its force is the yield force.
+    """
+    x, v = wire[DISPLACEMENT], wire[VELOCITY]
+    if wire[FIRST] > 0.5:
+        state[0] = x
+        state[1] = 0.0
+        state[2] = v
+    # a lower limit keeps the share of the yield force defined where the damper has no yield force
+    limit = max(wire[YIELD_FORCE], 1e-9)
+    length = limit / parameters[0]
+    share = min(max(state[1] / limit, -1.0), 1.0)
+    share = follow_hysteresis(share, state[0], state[2], x, v, dt, length, 0.5, parameters[1])
+    state[0] = x
+    state[1] = share * limit
+    state[2] = v
+    wire[HYSTERESIS] = share
+
+
+def _steps(values: Values) -> list[Step]:
+    numbers = np.array([values["initial_stiffness"], values["exponent"]])
+    return [Step("elastic-plastic", Phase.HYSTERESIS, elastic_plastic_step, numbers, state_size=3)]
+
+
+FORM = BaseForm(
+    name="elastic-plastic",
+    summary="F' = k v (1 - |F/F_y(u)|^n) while loading, F' = k v while unloading; F does not jump with the current",
+    source="Prandtl 1928, Z. angew. Math. Mech. 8, 85-106 (n without limit); Ozdemir 1976, PhD thesis, Berkeley",
+    parameters=(
+        shape("initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)),
+        shape("exponent", "1", "sharpness of the change from elastic to plastic", "one", 1.0, 50.0, (4.0, 20.0)),
+    ),
+    steps=_steps,
+    coupled=True,
+    family="bouc-wen",
+)
