@@ -24,7 +24,7 @@ from mrpipe.artifacts import load_parameter_set
 from mrpipe.case_studies.motion import spectrum_compatible_motion
 from mrpipe.case_studies.ten_storey.structure import ten_storey
 from mrpipe.control.assembly import ControllerFactory, calibrated_from
-from mrpipe.control.calibration import CalibrationOptions, calibrate
+from mrpipe.control.calibration import CalibrationOptions, balanced_weights, calibrate
 from mrpipe.control.laws import all_laws, law_named
 from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceNetwork, ReferenceOptions, train_reference
@@ -45,6 +45,9 @@ FACTORS = (0.5, 1.0, 2.0)
 AMPLITUDE_M_S2 = 0.768
 
 CURVES = CurveOptions(points=13, tolerance=1e-2, most_cycles=80, frequency_tolerance=4e-3, refined=("rms_x_top_m",))
+
+EXPECTED_M = 0.02
+"""Expected amplitude of the damper in the ten-storey frame."""
 
 RATE_HZ = 200.0
 """Sampling rate of the controllers."""
@@ -100,10 +103,13 @@ def ten_storey_rig(network: bool) -> Rig:
     frame = replace(plain, damping=2.0 * FRAME_DAMPING / first * plain.stiffness)
     damper = damper_from_parameter_set(load_parameter_set("dampers", "p4-1000kn"))
     calibration = calibrate(frame, model.devices[:, 0], CalibrationOptions())
+    # as the stage calibrate does: default weights of the regulator would be out of proportion for this frame
+    residual = float(damper.quasi_static_force(EXPECTED_M * first, 0.0))
+    weights = balanced_weights(calibration.modes, residual)
     trained = None
     if network:
-        trained = reference(frame, calibration.laws["nnc"].gains.alpha_n_m, 0.02).network
-    known = calibrated_from(calibration, Weights(), damper, amplitude_m=0.02, reference=trained)
+        trained = reference(frame, calibration.laws["nnc"].gains.alpha_n_m, EXPECTED_M).network
+    known = calibrated_from(calibration, weights, damper, amplitude_m=EXPECTED_M, reference=trained)
     noise = ControllerSettings(inverse="model", kalman_displacement_noise_m=1e-4, kalman_acceleration_noise_m_s2=0.05)
     return Rig(frame, damper, ControllerFactory(frame, damper, known, noise), LoopOptions())
 
@@ -161,7 +167,9 @@ STUDIES: dict[str, Callable[[str], dict[str, Any]]] = {"frame": of_thesis_frame,
 
 
 def as_markdown(rows: list[dict[str, Any]]) -> str:
-    """Return both tables."""
+    """Return both tables, with the laws in the order of `mrpipe simulate --help`."""
+    order = list(all_laws())
+    rows = sorted(rows, key=lambda row: order.index(row["law"]))
 
     def cells(found: list[Any] | None) -> list[str]:
         if found is None:

@@ -13,6 +13,8 @@ import pytest
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.case_studies.options import WindClimate
 from mrpipe.errors import UserError
+from mrpipe.simulation.resonance import runner
+from mrpipe.simulation.response_curve import response_curve
 from mrpipe.structures import frame_from_parameter_set
 from mrpipe.thesis import Ledger, build_ledger, page, table51, table51_page
 from mrpipe.thesis.bench import LAWS, Bench, bench_of_sets, excite
@@ -201,6 +203,19 @@ def test_table_5_1_is_explained_by_the_errors_of_the_cases() -> None:
     assert len(table51_page.damping_rows(cases)) == 4 * (2 + len(cases))
     assert len(table51_page.figure(cases).axes) == 8
     assert any("Table 5.1 explained" in line for line in table51_page.markdown(cases))
+
+
+@pytest.mark.property
+def test_resonances_of_the_ledger_do_not_depend_on_their_grid(bench: Bench) -> None:
+    """Accelerations at a resonance go with the square of its frequency: 1 % of frequency would be 2 % of a5."""
+    fine = replace(table51.CURVE, points=37, frequency_tolerance=5e-4, tolerance=2e-3)
+    for law in ("vd", "vdps"):
+        run = runner(bench.rig, bench.rig.controller(law), np.random.default_rng(0))
+        first, second = (
+            response_curve(run, 0.57, table51.band_of(bench.rig), options) for options in (table51.CURVE, fine)
+        )
+        assert first.resonance_rad_s == pytest.approx(second.resonance_rad_s, rel=5e-3)
+        assert first.peak("rms_x_top_m") == pytest.approx(second.peak("rms_x_top_m"), rel=5e-3)
 
 
 @pytest.mark.literature
