@@ -26,7 +26,7 @@ LEADERS = 3
 """Numerical technique: base forms, in addition to the declared one, under which effects are searched."""
 
 SCREENED = 8
-"""Numerical technique: base forms, the best ones alone, that are tried with the effects of another form."""
+"""Numerical technique: base forms that are followed with the effects of another form."""
 
 COMPARED = 60
 """Numerical technique: models, the best ones on the draft, that are compared on all training tests."""
@@ -223,7 +223,6 @@ def race(
         return _compared(fits, base, {}, noise, coupled, rules, jobs)
     ordered = sorted(singles, key=lambda name: _draft_cost(singles[name], noise, rules))
     names = list(dict.fromkeys((base.problem.base.name, *ordered[:LEADERS])))
-    screened = [singles[name] for name in dict.fromkeys((base.problem.base.name, *ordered[:SCREENED]))]
     searches: dict[str, Selection] = {}
 
     def searched(name: str) -> None:
@@ -237,6 +236,13 @@ def race(
     count = len(base.problem.terms)
     best = min(fits, key=lambda item: _draft_cost(item, noise, rules))
     if len(best.problem.terms) > count:
+        # a large effect decides which base form is best alone, so the forms are ranked again with the effects
+        ranked = sorted(
+            with_effects_of(best, list(singles.values()), iterations=2, jobs=jobs),
+            key=lambda item: _draft_cost(item, noise, rules),
+        )
+        closest = [item.problem.base.name for item in ranked[:SCREENED]]
+        screened = [singles[name] for name in dict.fromkeys((base.problem.base.name, *closest))]
         fits += with_effects_of(best, screened, jobs=jobs)
         rival = min(fits, key=lambda item: _draft_cost(item, noise, rules)).problem.base.name
         if rival not in searches:
@@ -293,12 +299,17 @@ def alone(small: Fit, forms: Mapping[str, BaseForm], *, jobs: int = 1) -> dict[s
         return {own: small, **dict(zip(names, fits, strict=True))}
 
 
-def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, jobs: int = 1) -> list[Fit]:
-    """Return base forms that were fitted alone, each with the effects of a fit, on the same tests."""
+def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, iterations: int = 8, jobs: int = 1) -> list[Fit]:
+    """Return base forms that were fitted alone, each with the effects of a fit, on the same tests.
+
+    The laws of the drive that the steps read are found again, because those of the base form alone contain the effect.
+    """
 
     def one(drafted: Fit) -> Fit:
         problem = replace(drafted.problem, terms=chosen.problem.terms)
-        return fit(problem, start_of(problem, drafted.base_values, chosen.term_values), iterations=8, tolerance=1e-3)
+        start = start_of(problem, drafted.base_values, chosen.term_values)
+        found = fit(problem, start, iterations=iterations, tolerance=1e-3)
+        return with_own_laws(found, iterations=iterations // 2)
 
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         return list(pool.map(one, singles))
