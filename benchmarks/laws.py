@@ -168,42 +168,46 @@ STUDIES: dict[str, Callable[[str], dict[str, Any]]] = {"frame": of_thesis_frame,
 
 def as_markdown(rows: list[dict[str, Any]]) -> str:
     """Return both tables, with the laws in the order of `mrpipe simulate --help`."""
-    order = list(all_laws())
-    rows = sorted(rows, key=lambda row: order.index(row["law"]))
+    known = {(row["structure"], row["law"]): row for row in rows}
+    both, amplitudes = [], []
+    for law in all_laws():
+        frame, tall = known.get(("frame", law)), known.get(("ten-storey", law))
+        nominal = frame["set C"][FACTORS.index(1.0)] if frame else None
+        row = [law, *_of_band(nominal, ".1f"), *_of_band(tall and tall["over frequency"], ".0f")]
+        both.append([*row, *_of_earthquake(tall and tall["earthquake"])])
+        if frame:
+            amplitudes.append([law, *_over_amplitudes(frame["set C"]), *_over_amplitudes(frame.get("ideal"))])
+    peaks = ("resonance [rad/s]", "x top [mm]", "a1 [m/s2]", "a top [m/s2]")
+    quake = ("x top [mm]", "drift [mm]", "acceleration [m/s2]", "force [kN]")
+    head = [*(f"frame: {name}" for name in peaks), *(f"ten storeys: {name}" for name in peaks)]
+    head += [f"earthquake: {name}" for name in quake]
+    kinds = [f"{kind} x{factor:g} [mm]" for kind in ("set C", "ideal") for factor in FACTORS]
+    return "\n".join([*_table(["law", *head], both), "", *_table(["law", *kinds], amplitudes)])
 
-    def cells(found: list[Any] | None) -> list[str]:
-        if found is None:
-            return ["-"] * len(FACTORS)
-        return ["grows" if item is None else f"{1e3 * item['peak_rms_x_top_m']:.1f}" for item in found]
 
-    lines = [
-        "| law | " + " | ".join(f"{kind} x{factor:g} [mm]" for kind in ("set C", "ideal") for factor in FACTORS)
-        + " | resonance, set C x1 [rad/s] | peak a1, set C x1 [m/s2] |",
-        "| --- |" + " --- |" * (2 * len(FACTORS) + 2),
-    ]  # fmt: skip
-    for row in (item for item in rows if item["structure"] == "frame"):
-        nominal = row["set C"][1]
-        more = ["grows", "-"]
-        if nominal is not None:
-            more = [f"{nominal['resonance_rad_s']:.2f}", f"{nominal['peak_rms_a1_m_s2']:.2f}"]
-        lines.append("| " + " | ".join([row["law"], *cells(row["set C"]), *cells(row.get("ideal")), *more]) + " |")
-    lines += [
-        "",
-        "| law | over frequency: resonance [rad/s] | largest RMS x top [mm] | earthquake: peak x top [mm] "
-        "| peak drift [mm] | peak acceleration [m/s2] | peak force [kN] |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    for row in (item for item in rows if item["structure"] == "ten-storey"):
-        band, quake = row["over frequency"], row["earthquake"]
-        first = ["grows", "grows"] if band is None else [
-            f"{band['resonance_rad_s']:.2f}", f"{1e3 * band['peak_rms_x_top_m']:.0f}"
-        ]  # fmt: skip
-        last = ["grows"] * 4 if quake is None else [
-            f"{1e3 * quake['peak_x_top_m']:.0f}", f"{1e3 * quake['peak_drift_m']:.0f}", f"{quake['peak_a_m_s2']:.2f}",
-            f"{1e-3 * quake['peak_force_n']:.0f}",
-        ]  # fmt: skip
-        lines.append("| " + " | ".join([row["law"], *first, *last]) + " |")
-    return "\n".join(lines)
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
+
+
+def _of_band(found: dict[str, float] | None, form: str) -> list[str]:
+    """Return resonance, top displacement and both accelerations; dashes where the law was not run or the loop grows."""
+    if found is None:
+        return ["-"] * 4
+    accelerations = [f"{found[f'peak_rms_{name}']:.2f}" for name in ("a1_m_s2", "a_top_m_s2")]
+    return [f"{found['resonance_rad_s']:.2f}", f"{1e3 * found['peak_rms_x_top_m']:{form}}", *accelerations]
+
+
+def _of_earthquake(found: dict[str, float] | None) -> list[str]:
+    if found is None:
+        return ["-"] * 4
+    millimetres = [f"{1e3 * found[name]:.0f}" for name in ("peak_x_top_m", "peak_drift_m")]
+    return [*millimetres, f"{found['peak_a_m_s2']:.2f}", f"{1e-3 * found['peak_force_n']:.0f}"]
+
+
+def _over_amplitudes(found: list[dict[str, float] | None] | None) -> list[str]:
+    if found is None:
+        return ["-"] * len(FACTORS)
+    return ["grows" if item is None else f"{1e3 * item['peak_rms_x_top_m']:.1f}" for item in found]
 
 
 def main() -> None:
