@@ -52,6 +52,14 @@ def shown(value: Any) -> str:
     return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 4]} ..."
 
 
+def dotted(place: Place) -> str:
+    """Return `tests[3].role` for a place such as `("tests", 3, "role")`."""
+    text = ""
+    for part in place:
+        text += f"[{part}]" if isinstance(part, int) else f"{'.' if text else ''}{part}"
+    return text
+
+
 @dataclass(frozen=True)
 class YamlSource:
     """A YAML file: its content, and on which line each key stands."""
@@ -62,9 +70,7 @@ class YamlSource:
 
     def where(self, place: Place) -> str:
         """Return `line 12, tests[3].role` for a place such as `("tests", 3, "role")`."""
-        text = ""
-        for part in place:
-            text += f"[{part}]" if isinstance(part, int) else f"{'.' if text else ''}{part}"
+        text = dotted(place)
         for length in range(len(place), 0, -1):
             if place[:length] in self.lines:
                 return f"line {self.lines[place[:length]]}, {text}"
@@ -104,6 +110,9 @@ def expected(fault: Mapping[str, Any]) -> str:
         close = difflib.get_close_matches(str(fault["input"]), words, n=1, cutoff=0.5)
         hint = f"did you mean {close[0]}? " if close else ""
         return f"{hint}{context['expected']} expected"
+    if kind == "too_short":
+        least = int(context.get("min_length", 1))
+        return f"a list of at least {least} {'value' if least == 1 else 'values'} expected"
     plain = {
         "finite_number": "a finite number expected",
         "float_parsing": "a number expected",
@@ -119,7 +128,11 @@ def expected(fault: Mapping[str, Any]) -> str:
         "list_type": "a list expected, as in [a, b]",
         "tuple_type": "a list expected, as in [a, b]",
     }
-    return plain.get(kind, str(fault["msg"]).removeprefix("Value error, "))
+    said = str(fault["msg"]).removeprefix("Value error, ")
+    limit = said.removeprefix("Input should be ")
+    if limit.startswith(("greater", "less")):
+        return f"a value {limit} expected"
+    return plain.get(kind, said[:1].lower() + said[1:] if said.startswith("Input") else said)
 
 
 class _Loader(yaml.SafeLoader):

@@ -24,6 +24,7 @@ _REMEDIES = {
     errno.EPERM: "give permission, or choose another directory with --run",
     errno.EROFS: "choose a directory that can be written with --run",
     errno.ENOENT: "name a file or directory that is there",
+    errno.EEXIST: "choose another name: this is a file, or a link to a place that is not there",
     errno.ENAMETOOLONG: "choose a shorter name",
     errno.EMFILE: "raise the limit of open files (ulimit -n)",
 }

@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from mrpipe.artifacts.yaml_source import nearest
+from mrpipe.artifacts.yaml_source import dotted, expected, nearest, shown
 from mrpipe.errors import UserError
 
 
@@ -67,12 +67,11 @@ def explain(
     while known_path and known_path not in lines:
         known_path = known_path[:-1]
     line = lines.get(known_path)
-    dotted = ".".join(str(part) for part in path)
-    where = f"line {line}, {dotted}" if line else dotted
+    where = f"line {line}, {dotted(path)}" if line else dotted(path)
     if first["type"] == "extra_forbidden":
         section = section_of(model, path[:-1])
         known = list(section.model_fields) if section is not None else []
         return UserError(source, where, "unknown key", nearest(str(path[-1]), known))
     given = first.get("input")
-    shown = f"is {given!r}" if not isinstance(given, Mapping) else "is a section with settings"
-    return UserError(source, where, shown, first["msg"][0].lower() + first["msg"][1:])
+    problem = f"is {shown(given)}" if not isinstance(given, Mapping) else "is a section with settings"
+    return UserError(source, where, problem, expected(first))

@@ -379,7 +379,7 @@ def amplitude_finding(result: AmplitudeDependence) -> str:
     before, after = (100.0 * np.sqrt(np.mean(values)) for values in (result.constant_error, result.error))
     return (
         f"modes depend on the amplitude: mode {mode + 1} from {low[0][mode] / (2 * np.pi):.4g} Hz and "
-        f"{100 * low[1][mode]:.2g} % damping at small motion to {high[0][mode] / (2 * np.pi):.4g} Hz and "
+        f"{100 * low[1][mode]:.2g} % damping (extrapolated to no motion) to {high[0][mode] / (2 * np.pi):.4g} Hz and "
         f"{100 * high[1][mode]:.2g} % at {reached:.3g} mm; on data left out of the fit the RMS "
         f"error falls from {before:.0f} to {after:.0f} % of the response"
     )

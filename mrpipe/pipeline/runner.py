@@ -331,6 +331,7 @@ class Pipeline:
             return found[name]
         stage = self.stages[name]
         reasons: list[str] = []
+        stale: list[str] = []
         for item in (*stage.inputs, *stage.optional_inputs):
             provider = self.sources.provider(item)
             if provider is None:
@@ -344,8 +345,11 @@ class Pipeline:
                         return before
                 else:
                     reasons.append(f"{provider}, which it reads, is stale")
+                    stale.append(f"input {item} ")
         manifest = Manifest.load(self._manifests, name)
         own = reasons_stale(manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self._hashes)
+        # the artifact of a stale stage is there, but does not count: "missing" would send people to look for the file
+        own = [reason for reason in own if not reason.startswith(tuple(stale))]
         found[name] = own if own[:1] == ["never built"] else reasons + own
         return found[name]
 

@@ -31,7 +31,8 @@ def in_points(found: Mapping[str, Any]) -> list[str]:
     if "rms_x_top_error" in found:
         parts.append(errors_in_words(found))
     parts.append(ranking_in_words(found))
-    parts += [f"The effect {name} is not in the plant: {why}." for name, why in found["plant"]["left_out"].items()]
+    left_out = found["plant"]["left_out"].items()
+    parts += [f"The effect {name} is not put into the damper of the closed loop ({why})." for name, why in left_out]
     if effects and "controller" in found:
         parts.append(controller_in_words(found))
     return parts + _doubts([*found["laws"], *found["over_band"]["laws"]])
@@ -136,8 +137,8 @@ def _inverse_in_words(inverse: str) -> str:
     if words != "kept":
         return f"an inverse {inverse}"
     if why == "the better of both":
-        return "the present inverse, because a retrained one was no better"
-    return f"the present inverse, because {why} only"
+        return "a retrained inverse, which is no better than the present one and is not used"
+    return f"no new inverse, because {why} only"
 
 
 def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:

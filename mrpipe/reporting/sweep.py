@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import exp
 
 import pandas as pd
 
@@ -47,7 +48,11 @@ def describe(sink: Sink, result: SweepResult) -> None:
         "network that is worse than the best by less than the standard error of their ratio and by less than "
         f"{100.0 * WORTHWHILE:.0f} %: {chosen.candidate.label}."
     )
-    sink.table("findings", _verdicts(result.verdicts), "General statements on architectures, checked on this campaign.")
+    sink.table(
+        "findings",
+        _verdicts(result.verdicts),
+        "General statements on architectures, checked on this campaign; change of the error with its 95 % interval.",
+    )
     sink.table("candidates", _candidates(outcomes), "All candidates; errors over the starts on held-out records.")
     sink.figure(
         "axes",
@@ -87,8 +92,10 @@ def _verdicts(verdicts: Sequence[Finding]) -> pd.DataFrame:
                 "with": item.reference,
                 "NRMSE": item.alternative_nrmse,
                 "NRMSE of the reference": item.reference_nrmse,
-                "change": item.change,
-                "two standard errors": item.uncertainty,
+                "change [%]": 100.0 * item.change,
+                # the standard error is that of the logarithm of the ratio
+                "from [%]": 100.0 * ((1.0 + item.change) * exp(-item.uncertainty) - 1.0),
+                "to [%]": 100.0 * ((1.0 + item.change) * exp(item.uncertainty) - 1.0),
                 "fit": item.level,
                 "verdict": item.verdict,
             }

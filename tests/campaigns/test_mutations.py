@@ -1,4 +1,4 @@
-"""200 mutated campaign files and configurations: `check` judges each, or refuses it in one line, and soon."""
+"""260 mutated campaign files and configurations: `check` judges each, or refuses it in one line, and soon."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from mrpipe.cli import run
+from mrpipe.config.loader import load_config
 from tests.campaigns.builders import campaign, content
 
 NASTY: list[Any] = [
@@ -123,4 +124,21 @@ def test_mutated_configurations(tmp_path: Path, capsys: pytest.CaptureFixture[st
     path = tmp_path / "x.yaml"
     for seed in range(20 * block, 20 * block + 20):
         path.write_text(yaml.safe_dump(_mutated(CONFIG, seed), sort_keys=False), encoding="utf-8")
+        _checked(path, capsys)
+
+
+def _every_setting() -> dict[str, Any]:
+    """Return a configuration that writes every setting of every section, on the small campaign."""
+    whole: dict[str, Any] = yaml.safe_load(load_config(Path("thesis")).as_yaml())
+    stages = ["prepare", "assemble", "sweep", "train-forward", "identify-damper", "close-loop", "report"]
+    return whole | {"campaigns": {"bench": "data", "frame": None, "closed_loop": None}, "stages": stages}
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("block", range(3))
+def test_mutated_settings_of_every_section(tmp_path: Path, capsys: pytest.CaptureFixture[str], block: int) -> None:
+    campaign(tmp_path / "data")
+    path, whole = tmp_path / "x.yaml", _every_setting()
+    for seed in range(20 * block, 20 * block + 20):
+        path.write_text(yaml.safe_dump(_mutated(whole, seed), sort_keys=False), encoding="utf-8")
         _checked(path, capsys)

@@ -32,6 +32,10 @@ SYSTEM = {
     ),
     "forbidden": (PermissionError(errno.EACCES, "x", "/sys/x"), "/sys/x: permission denied; give permission"),
     "read-only": (OSError(errno.EROFS, "x", "/r"), "/r: read-only file system; choose a directory"),
+    "link": (
+        FileExistsError(errno.EEXIST, "x", "runs/a"),
+        "runs/a: file exists; choose another name: this is a file, or a link",
+    ),
     "long": (OSError(errno.ENAMETOOLONG, "x", "aaa"), "aaa: file name too long; choose a shorter name"),
     "hdf5": (OSError("Unable to synchronously open file (truncated file)"), "truncated file"),
     "hdf5 read": (RuntimeError("Can't decode chunk"), "HDF5 file: is damaged"),

@@ -46,13 +46,13 @@ def test_a_wrong_value_is_shown_with_what_would_be_right() -> None:
 
 
 def test_a_key_within_a_list_takes_the_line_of_the_list() -> None:
-    assert "line 5, rows.0.order" in _explained({"rows": [{"order": "x"}]})
+    assert "line 5, rows[0].order" in _explained({"rows": [{"order": "x"}]})
 
 
 def test_names_of_types_are_no_keys() -> None:
     # pydantic tries every kind of `band` and puts its name among the keys
     text = _explained({"band": ["x", 2.0]})
-    assert "band.0" in text and "tuple" not in text.partition("is 'x'")[0]
+    assert "band[0]" in text and "tuple" not in text.partition("is 'x'")[0]
 
 
 def test_a_section_in_place_of_a_value_is_not_printed_in_full() -> None:

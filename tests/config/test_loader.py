@@ -17,15 +17,15 @@ FAULTS = {
         "line 3, prepare.cutof_hz: unknown key; did you mean cutoff_hz?",
     ),
     "key with no near one": ("zzzqqq: 1\n", "line 1, zzzqqq: unknown key; known: "),
-    "wrong type": ("seed: many\n", "line 1, seed: is 'many'; input should be a valid integer"),
+    "wrong type": ("seed: many\n", "line 1, seed: is 'many'; a whole number expected"),
     "out of range": (
         "execution:\n  jobs: -2\n",
-        "line 2, execution.jobs: is -2; input should be greater than or equal to 0",
+        "line 2, execution.jobs: is -2; a value greater than or equal to 0 expected",
     ),
     "key twice": ("seed: 1\nname: x\nseed: 2\n", "line 3, seed: appears already in line 1; keep one of the two"),
     "no YAML": ("seed: [1\n", "not valid YAML"),
     "no mapping": ("- a\n- b\n", "line 1: is not a mapping; write `key: value` lines"),
-    "section is a number": ("prepare: 3\n", "line 1, prepare: is 3; input should be a valid dictionary"),
+    "section is a number": ("prepare: 3\n", "line 1, prepare: is 3; a mapping of keys to values expected"),
     "code in YAML": (
         "name: !!python/object/apply:os.system ['true']\n",
         "not valid YAML (could not determine a constructor",
@@ -49,14 +49,14 @@ def test_fault_is_one_line_with_place(fault: str, tmp_path: Path) -> None:
 OVERRIDES = {
     "prepare.cutof_hz=80": "--set: prepare.cutof_hz: unknown key; did you mean cutoff_hz?",
     "prepare": "--set: prepare: is not an assignment; write section.key=value",
-    "seed=many": "--set: seed: is 'many'; input should be a valid integer",
-    "train_inverse.architecture=[12, six]": "train_inverse.architecture.1: is 'six'; input should be a valid int",
-    "train_inverse.architecture=[0]": "--set: train_inverse.architecture.0: is 0; input should be greater than 0",
-    "train_inverse.architecture=best": "train_inverse.architecture: is 'best'; input should be 'thesis' or 'sweep'",
+    "seed=many": "--set: seed: is 'many'; a whole number expected",
+    "train_inverse.architecture=[12, six]": "train_inverse.architecture[1]: is 'six'; a whole number expected",
+    "train_inverse.architecture=[0]": "--set: train_inverse.architecture[0]: is 0; a value greater than 0 expected",
+    "train_inverse.architecture=best": "train_inverse.architecture: is 'best'; 'thesis' or 'sweep' expected",
     "identify_damper.form=bouc-wenn": "no base form 'bouc-wenn'; did you mean bouc-wen",
     "sweep.strats=3": "--set: sweep.strats: unknown key; did you mean starts?",
-    "sweep.neurons=[0]": "--set: sweep.neurons.0: is 0; input should be greater than 0",
-    "sweep.layers=[]": "--set: sweep.layers: is []; tuple should have at least 1 item",
+    "sweep.neurons=[0]": "--set: sweep.neurons[0]: is 0; a value greater than 0 expected",
+    "sweep.layers=[]": "--set: sweep.layers: is []; a list of at least 1 value expected",
     "seed=[1": "--set: seed=[1: value: not valid YAML",
 }
 
@@ -116,6 +116,6 @@ def test_fault_of_settings_laid_over_names_their_file(tmp_path: Path) -> None:
     over.write_text("laboratory:\n  bench:\n    tests:\n    - {name: a, motion: sinus}\n", encoding="utf-8")
     with pytest.raises(UserError) as caught:
         load_config(path, [], [over])
-    assert str(caught.value).startswith(f"{over}: line 4, laboratory.bench.tests.0.motion: is 'sinus'")
+    assert str(caught.value).startswith(f"{over}: line 4, laboratory.bench.tests[0].motion: is 'sinus'")
     with pytest.raises(UserError, match=r"--settings: nowhere\.yaml: no such file"):
         load_config(path, [], [Path("nowhere.yaml")])

@@ -88,6 +88,15 @@ def test_output_harmed_by_other_hands_is_built_again(harm: str, make_pipeline: M
     assert again.build("first").reasons == [expected]
 
 
+def test_the_artifact_of_a_stale_stage_is_not_called_missing(make_pipeline: MakePipeline) -> None:
+    """`input first is missing` sends people to look for a file that is there."""
+    make_pipeline().build("second")
+    path = make_pipeline().run_directory / "first.h5"
+    with h5py.File(path, "a") as handle:
+        handle["values"][0] = 9.0
+    assert make_pipeline().status(["second"])["second"] == ["first, which it reads, is stale"]
+
+
 def test_code_change_is_named(make_pipeline: MakePipeline) -> None:
     pipeline = make_pipeline()
     pipeline.build("first")

@@ -62,7 +62,7 @@ def test_changes_that_no_law_takes_are_called_tried() -> None:
 @pytest.mark.property
 def test_changes_that_some_laws_take_are_said_with_the_laws() -> None:
     text = controller_in_words(_controller({"vd": "inverse, switch", "fdns": "nothing"}, "kept: the better of both"))
-    assert "the present inverse, because a retrained one was no better" in text
+    assert "a retrained inverse, which is no better than the present one and is not used;" in text
     assert "gains vd x 0.90" in text
     assert "only if its simulated response falls: inverse, switch for vd. fdns keeps its controller." in text
     assert "largest RMS top displacement: vd -10 %" in text

@@ -263,7 +263,7 @@ def doubts(facts: RunFacts) -> list[str]:
     limited = [line.partition(":")[0] for line in facts.warnings("calibrate") if "residual force" in line]
     if limited:
         found.append(
-            f"The unpowered damper limits {listed(limited)}: in part of each cycle they ask for less force than it "
+            f"The unpowered damper limits {listed(limited)}: in part of each cycle they request less force than it "
             "gives without drive."
         )
     return found
