@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +10,11 @@ import numpy as np
 import pytest
 
 from mrpipe.dampers.library import base_form
-from mrpipe.tracing.bench.race import Model, Race
+from mrpipe.effects.library import damper_effects
+from mrpipe.fitting.engine import fit, start_of
+from mrpipe.fitting.problem import Term
+from mrpipe.tracing.bench.race import Model, Race, _held, alone, with_effects_of
+from tests.tracing.bench.fits import plain_fit
 
 LEAD = 0.3
 TESTS = 8
@@ -95,3 +100,18 @@ def test_springs_of_a_base_form_are_left_to_the_accumulator() -> None:
         assert {item.name for item in form.parameters} - {item.name for item in bare.parameters} == set(form.springs)
         values = {item.name: 1.0 for item in bare.parameters}
         assert len(bare.steps(values)) == len(form.steps({**values, **dict.fromkeys(form.springs, 0.0)}))
+
+
+@pytest.mark.planted
+def test_a_form_that_reads_its_yield_force_finds_it_again_with_the_effects() -> None:
+    """The yield force of the form alone contains the force of the spring in parallel, which the effect then takes."""
+    plain = plain_fit("accumulator")
+    effect = damper_effects()["accumulator"]
+    problem = replace(plain.problem, terms=(Term(effect, effect.form("linear")),))
+    chosen = fit(problem, start_of(problem, plain.base_values, [{}]), iterations=6)
+    single = _held(alone(plain, {"bouc-wen-stiffness": base_form("bouc-wen-stiffness")})["bouc-wen-stiffness"])
+    (found,) = with_effects_of(chosen, [single])
+    drive = np.linspace(0.0, found.problem.scales.drive, 9)
+    largest = np.max(np.abs(found.laws[0](drive)))
+    assert np.max(np.abs(found.laws[0](drive) - found.problem.reference[0](drive))) < 0.02 * largest
+    assert np.max(np.abs(found.laws[0](drive) - single.problem.reference[0](drive))) > 0.02 * largest
