@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage, optimize
+from scipy import ndimage, optimize, stats
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.plant import build_chain
@@ -29,6 +29,15 @@ TOP = 0.9
 
 LEAST_EXPECTED = 0.05
 """Numerical technique: least expected variance in the regression of the factors, as a share of the first guess."""
+
+MOST_DEVIATIONS = 2.0
+"""Numerical technique: deviations beyond this multiple of the expected one are limited to it."""
+
+UNLIMITED = 0.9205
+"""Numerical technique: mean square of a normal variable limited to +-2, by which limited squares are corrected."""
+
+NOISE_PASSES = 8
+"""Numerical technique: passes of the regression with new weights and limits; each may raise a part fourfold."""
 
 
 @dataclass(frozen=True)
@@ -125,13 +134,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         limit = _limit(residual[used], force[used] + motion[used])
         return NoiseScale(limit, limit)
     columns, target = np.concatenate(rows), np.concatenate(targets)
-    # the scatter of squared differences is proportional to their mean: weight by the mean, and repeat
-    expected = columns.sum(axis=1)
-    factors = np.ones(2)
-    for _ in range(3):
-        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
-        factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
-        expected = np.maximum(columns @ factors, LEAST_EXPECTED * columns.sum(axis=1))
+    factors, target = _factors(columns, target)
     # no part exceeds the difference: the force overall, the motion where its own part is largest
     most = columns[:, 1] >= np.quantile(columns[:, 1], TOP)
     parts = ((target, columns[:, 0]), (target[most], columns[most, 1]))
@@ -144,6 +147,28 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     force_factor = max(force_factor, float(np.sum(rounding)) / max(float(np.sum(force)), 1e-300))
     limit = _limit(residual[used], (force_factor * force + motion_factor * motion)[used])
     return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles))
+
+
+def _factors(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the factors of the columns that explain squared differences, and the differences without single events.
+
+    The scatter of squared differences is proportional to their mean, so they are weighted by their mean. Noise is
+    spread over all samples. What exceeds its expected deviation several times in a few samples only is an event that
+    does not repeat, such as sticking, and no noise: it is limited to that multiple (proposal 2 of Huber 1964, Ann.
+    Math. Statist. 35, 73-101).
+    """
+    together = columns.sum(axis=1)
+    least = 1e-12 * float(np.max(together))
+    # half of all samples decide where the search starts, so that rare events cannot
+    expected = together * float(np.median(target / np.maximum(together, least))) / float(stats.chi2.median(1))
+    factors, limited = np.ones(2), target
+    for _ in range(NOISE_PASSES):
+        expected = np.maximum(expected, LEAST_EXPECTED * together)
+        limited = np.minimum(target, MOST_DEVIATIONS**2 * expected) / UNLIMITED
+        weights = 1.0 / np.maximum(expected, least)
+        factors = optimize.nnls(columns * weights[:, None], limited * weights)[0]
+        expected = columns @ factors
+    return factors, limited
 
 
 def _limit(residual: FloatArray, variance: FloatArray) -> float:

@@ -11,7 +11,7 @@ from scipy import signal
 from mrpipe.fitting.recordings import record_tests, resolution
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.weights import sensor_deviation
+from mrpipe.tracing.bench.weights import _factors, sensor_deviation
 from tests.tracing.bench.rig import RATE, campaign
 
 
@@ -57,3 +57,16 @@ def test_the_step_of_a_quantised_channel() -> None:
     smooth = np.sin(np.linspace(0.0, 30.0, 4000))
     assert resolution(smooth) == 0.0
     assert resolution(np.round(smooth / 0.02) * 0.02) == pytest.approx(0.02)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("events", [0.0, 0.1])
+def test_events_that_do_not_repeat_are_no_noise(events: float) -> None:
+    """A tenth of all differences is 30 times as large as the noise, so the mean square is 90 times too large."""
+    rng = np.random.default_rng(5)
+    columns = np.stack([np.ones(8000), np.where(np.arange(8000) % 10 == 0, 4.0, 0.01)], axis=1)
+    difference = np.sqrt(columns @ [3.0, 5.0]) * rng.standard_normal(8000)
+    difference[rng.random(8000) < events] *= 30.0
+    factors, _ = _factors(columns, difference**2)
+    # with a tenth of events the limited mean settles 1.65 times above that of the noise
+    assert factors == pytest.approx(np.array([3.0, 5.0]) * (1.0 if events == 0.0 else 1.65), rel=0.15)
