@@ -55,6 +55,8 @@ class Evidence:
         Whether effects are named.
     base_changed
         Whether another base form than the declared one is taken.
+    events
+        Of single events that do not repeat when motion and drive repeat.
     """
 
     before: float
@@ -65,6 +67,15 @@ class Evidence:
     structured: bool
     effects: bool
     base_changed: bool = False
+    events: float = 0.0
+
+    def eventful(self, rules: ValidationRules) -> bool:
+        """Return whether most of the error beyond noise is due to events that do not repeat.
+
+        No model of motion and drive can learn such events, so its ceiling does not show that nothing is missing.
+        """
+        excess = self.after**2 - self.floor**2
+        return self.after > rules.noise_floors * self.floor and self.events**2 >= rules.accounts * excess
 
     @property
     def share(self) -> float:
@@ -90,7 +101,8 @@ def classify(evidence: Evidence, rules: ValidationRules) -> VerdictClass:
         return "unknown"
     explained = reached(evidence, rules)
     if evidence.base_changed and not evidence.effects:
-        return "base form" if explained or evidence.share >= rules.accounts else "unknown"
+        accounts = evidence.share >= rules.accounts and not evidence.eventful(rules)
+        return "base form" if explained or accounts else "unknown"
     return "explained" if explained else "partly explained"
 
 
@@ -98,6 +110,8 @@ def reached(evidence: Evidence, rules: ValidationRules) -> bool:
     """Return whether the error is at the noise floor, or at the ceiling on every validation test."""
     if evidence.after <= rules.within_floors * evidence.floor:
         return True
+    if evidence.eventful(rules):
+        return False
     return bool(evidence.conditions) and all(item.explained(rules) for item in evidence.conditions)
 
 

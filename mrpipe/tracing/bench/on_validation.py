@@ -46,6 +46,8 @@ class OnValidation:
         Whether every test has its own offset.
     gains
         Gain of each test by the final model.
+    events
+        Root mean square of the force of events that do not repeat in repeated training motion [N].
     """
 
     recordings: Recordings
@@ -57,6 +59,7 @@ class OnValidation:
     noise_components: dict[str, float]
     own_offsets: bool
     gains: dict[str, RecordGain]
+    events: float = 0.0
 
     @property
     def score_before(self) -> Score:
@@ -150,7 +153,7 @@ def on_validation(
     }
     components = {name: float(np.sqrt(np.mean(values[used]))) / power for name, values in parts.items()}
     return OnValidation(
-        recordings, validation, judged.measured, before, after, floor, components, shared is None, gains
+        recordings, validation, judged.measured, before, after, floor, components, shared is None, gains, scale.events
     )
 
 
@@ -227,12 +230,12 @@ def judge(
     total = min((item.nrmse(found.recordings.used) for item in ceilings), key=lambda item: item[0])
     if kind in ("noise", "explained"):
         return Judgement(
-            Verdict(kind, _sentence(kind, whole, names, base_taken, reason), whole.share), whole, *total, None
+            Verdict(kind, _sentence(kind, whole, names, base_taken, reason, rules), whole.share), whole, *total, None
         )
     trained = training_agreements(chosen, folds, rules, jobs=jobs)
     comparison = compare(found.recordings, found.measured, found.after, found.floor, training, trained, faults, rules)
     if not comparison.differences or comparison.accounted < rules.accounts:
-        verdict = Verdict(kind, _sentence(kind, whole, names, base_taken, reason), whole.share)
+        verdict = Verdict(kind, _sentence(kind, whole, names, base_taken, reason, rules), whole.share)
         return Judgement(verdict, whole, *total, comparison)
     part = comparison.comparable
     evidence, inner = whole, ""
@@ -240,7 +243,7 @@ def judge(
     if np.count_nonzero(part) > 0:
         evidence = _evidence(found, ceilings, part, structured, bool(names), bool(base_taken))
         tests = tuple(item.name for item in evidence.conditions)
-        inner = _sentence(classify(evidence, rules), evidence, names, base_taken, reason)
+        inner = _sentence(classify(evidence, rules), evidence, names, base_taken, reason, rules)
     comparable = Comparable(
         tests,
         float(np.mean(part[found.recordings.used])),
@@ -296,10 +299,13 @@ def _evidence(
         structured,
         effects,
         changed,
+        found.events / max(_rms(found.measured[part & found.recordings.used]), 1e-12),
     )
 
 
-def _sentence(kind: str, evidence: Evidence, names: Sequence[str], base_taken: str, reason: str) -> str:
+def _sentence(
+    kind: str, evidence: Evidence, names: Sequence[str], base_taken: str, reason: str, rules: ValidationRules
+) -> str:
     listed = " and ".join(names) + (f" with the base form {base_taken}" if base_taken else "")
     verb = "explains" if len(names) == 1 else "explain"
     if kind == "noise":
@@ -313,6 +319,11 @@ def _sentence(kind: str, evidence: Evidence, names: Sequence[str], base_taken: s
         )
     if kind == "base form":
         return f"the base form: {base_taken} explains what is missing, and no effect is named"
+    if evidence.eventful(rules):
+        return (
+            "unknown: most of what remains on the validation tests are single events, which do not repeat when motion "
+            "and drive repeat, and no effect explains them"
+        )
     if reason and evidence.structured:
         return reason
     ratio = evidence.after / max(evidence.floor, 1e-12)

@@ -53,12 +53,15 @@ class NoiseScale:
         Factors on the variance of the force channel's noise, and on that of the force that displacement noise causes.
     repeats, cycles
         Number of pairs of repeated tests and of repeated cycles that the factors are estimated from.
+    events
+        Root mean square, over all samples of these pairs, of the force of single events that do not repeat [N].
     """
 
     force: float = 1.0
     motion: float = 1.0
     repeats: int = 0
     cycles: int = 0
+    events: float = 0.0
 
     @property
     def source(self) -> str:
@@ -134,7 +137,10 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         limit = _limit(residual[used], force[used] + motion[used])
         return NoiseScale(limit, limit)
     columns, target = np.concatenate(rows), np.concatenate(targets)
-    factors, target = _factors(columns, target)
+    factors, limited = _factors(columns, target)
+    # a difference holds the events of both repeats
+    events = float(np.sqrt(0.5 * max(float(np.mean(target - limited)), 0.0)))
+    target = limited
     # no part exceeds the difference: the force overall, the motion where its own part is largest
     most = columns[:, 1] >= np.quantile(columns[:, 1], TOP)
     parts = ((target, columns[:, 0]), (target[most], columns[most, 1]))
@@ -146,7 +152,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     rounding = recordings.force_rounding[recordings.test] ** 2
     force_factor = max(force_factor, float(np.sum(rounding)) / max(float(np.sum(force)), 1e-300))
     limit = _limit(residual[used], (force_factor * force + motion_factor * motion)[used])
-    return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles))
+    return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events)
 
 
 def _factors(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:

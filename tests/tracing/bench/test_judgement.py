@@ -17,13 +17,13 @@ RULES = ValidationRules()
 
 def evidence(
     before: float, after: float, *, structured: bool = True, effects: bool = True, changed: bool = False,
-    floor: float = 0.01, ceiling: float = 0.01, worse: float = 0.0,
+    floor: float = 0.01, ceiling: float = 0.01, worse: float = 0.0, events: float = 0.0,
 ) -> Evidence:  # fmt: skip
     conditions = tuple(
         Condition(name, before, after + extra, floor, ceiling, 1.02 * ceiling)
         for name, extra in (("a", 0.0), ("b", worse))
     )
-    return Evidence(before, after, floor, ceiling, conditions, structured, effects, changed)
+    return Evidence(before, after, floor, ceiling, conditions, structured, effects, changed, events)
 
 
 @pytest.mark.property
@@ -48,6 +48,11 @@ def evidence(
         (evidence(0.05, 0.05, effects=False), "unknown"),
         (evidence(0.1, 0.012, effects=False, changed=True), "base form"),
         (evidence(0.1, 0.095, effects=False, changed=True), "unknown"),
+        # no model learns events that do not repeat, so a high ceiling does not show that they are explained
+        (evidence(0.1, 0.051, effects=False, changed=True, ceiling=0.05), "base form"),
+        (evidence(0.1, 0.051, effects=False, changed=True, ceiling=0.05, events=0.045), "unknown"),
+        (evidence(0.1, 0.051, ceiling=0.05, events=0.045), "partly explained"),
+        (evidence(0.1, 0.012, events=0.045), "explained"),
     ],
 )
 def test_the_class_follows_from_the_errors(found: Evidence, kind: str) -> None:
