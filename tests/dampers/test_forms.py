@@ -41,7 +41,7 @@ NUMBERS: dict[str, dict[str, float]] = {
     },
     "hyperbolic-tangent": {"velocity_scale": 0.015, "shift": 0.6, "displacement_scale": 1e-3, "stiffness": 900.0},
     "hysteretic-sigmoid": {"velocity_scale": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.02},
-    "algebraic": {"velocity_scale": 0.015, "frequency": 1.5},
+    "algebraic": {"velocity_scale": 0.015, "frequency": 1.5, "sharpness": 3.0},
     "lugre": {"yield_displacement": 8e-4, "sigma_1": 200.0},
     "gamota-filisko": {"solid_stiffness": 8e4, "solid_viscosity": 600.0, "spring_stiffness": 6e4},
     "modified-bouc-wen": {
@@ -172,7 +172,9 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
             v / p["velocity_scale"] + p["shift"] * np.tanh(x / p["displacement_scale"])
         ),
         "hysteretic-sigmoid": lambda: 2.0 / (1.0 + np.exp(-2.0 * (v - late) / p["velocity_scale"])) - 1.0,
-        "algebraic": lambda: (v + p["frequency"] * x) / np.hypot(p["velocity_scale"], v + p["frequency"] * x),
+        "algebraic": lambda: (
+            (v + p["frequency"] * x) / np.cbrt(p["velocity_scale"] ** 3 + np.abs(v + p["frequency"] * x) ** 3)
+        ),
     }
     if name in static:
         return YIELD * static[name]() + viscous + p.get("stiffness", 0.0) * x
