@@ -179,7 +179,11 @@ def simulate(
     ] = False,
     damper: Annotated[
         str | None,
-        typer.Option(metavar="DAMPER", help="identified, traced (by close-loop), a set of configs/dampers, or a file."),
+        typer.Option(
+            metavar="DAMPER",
+            help="Damper in the structure: identified, traced (by close-loop), a set of configs/dampers, or a file. "
+            "With traced, the controller stays that of the identified damper.",
+        ),
     ] = None,
     gains: Annotated[
         str | None, typer.Option(metavar="GAINS", help="calibrated, or design: the best ones that design found.")
@@ -223,7 +227,11 @@ def export(
     ] = None,
     damper: Annotated[
         str | None,
-        typer.Option(metavar="DAMPER", help="identified, traced (by close-loop), a set of configs/dampers, or a file."),
+        typer.Option(
+            metavar="DAMPER",
+            help="identified, traced (by close-loop), a set of configs/dampers, or a file. A controller is adapted to "
+            "this damper, whereas simulate --damper traced keeps that of the identified one.",
+        ),
     ] = None,
     formats: Annotated[
         list[str] | None,

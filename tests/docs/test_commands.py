@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -124,6 +125,10 @@ RUNS = {
     "simulate --law LAW --resonance": "simulate --law vd --resonance",
     "simulate --law fdns --resonance --json": "simulate --law fdns --resonance --json",
     "design": "design --jobs 1",
+    "design --set design.weights={rms_drift_m: 1, max_base_shear_n: 0.5} --set design.stroke_limit_m=0.01": (
+        "design --jobs 1 --set 'design.weights={rms_drift_m: 1, max_base_shear_n: 0.5}' "
+        "--set design.stroke_limit_m=0.01"
+    ),
     "simulate --law fdns --gains design": "simulate --law fdns --gains design",
     "export controller --law fdns --gains design": "export controller --law fdns --gains design",
     "export controller --law fdns": "export controller --law fdns",
@@ -217,7 +222,7 @@ def here(project: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("line", RUNS)
 def test_command_runs(line: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     capsys.readouterr()
-    assert run(RUNS[line].split()) == 0, capsys.readouterr().err
+    assert run(shlex.split(RUNS[line])) == 0, capsys.readouterr().err
     captured = capsys.readouterr()
     assert captured.out.strip() or "--quiet" in line
     if "--json" in RUNS[line]:

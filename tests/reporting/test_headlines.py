@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mrpipe.reporting.headlines import in_brief, weak_network
+from mrpipe.reporting.headlines import headline, in_brief, weak_network
 from tests.reporting.front.run import tracing
 
 
@@ -27,3 +27,20 @@ def test_the_command_that_applies_corrections_is_complete() -> None:
     (line,) = [line for line in lines if "corrections" in line]
     assert "mrpipe prepare --settings RUN/corrections.yaml, and the same --config or --campaign" in line
     assert not any("corrections" in line for line in in_brief("close-loop", tracing()))
+
+
+@pytest.mark.property
+def test_a_relative_acceleration_is_called_relative() -> None:
+    """The table of the laws has absolute accelerations, so the two must not share a name."""
+    summary = {"rms_x_top_m": 0.0243, "rms_x1_m": 0.00617, "rms_a1_m_s2": 0.816, "damping_ratio": 0.127}
+    assert "a1 0.816 m/s2 relative to the ground" in headline("simulate-vd", summary)
+
+
+@pytest.mark.property
+def test_stages_that_read_data_say_so_in_words() -> None:
+    recorded = {"campaign": "x", "tests": 190, "samples": 2415546, "duration_s": 2415.5}
+    prepared = {"campaign": "rig", "test_count": 14, "sampling_rate_hz": 1000.0, "drive_unit": "A"}
+    swept = {"candidates": 31, "choice": "v,i | 4 past | 10-12-1"}
+    assert headline("record-bench", recorded) == "190 tests, 40 min"
+    assert headline("prepare", prepared) == "campaign rig: 14 tests at 1000 Hz, drive in A"
+    assert headline("sweep", swept) == "of 31 networks, v,i | 4 past | 10-12-1 is chosen"

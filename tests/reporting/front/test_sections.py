@@ -13,7 +13,7 @@ import pytest
 from mrpipe.artifacts import ArtifactWriter, Provenance
 from mrpipe.reporting.front.sections import sections
 from mrpipe.reporting.page import first_screen, write_report
-from tests.reporting.front.run import run_in, tracing
+from tests.reporting.front.run import EFFECT, run_in, tracing
 
 pytestmark = pytest.mark.property
 
@@ -105,3 +105,11 @@ def test_report_of_a_structure_alone_lists_its_effects_with_the_structure(tmp_pa
     found = {section.anchor: section for section in sections(type(facts)(tmp_path, "tower", "", frame))}
     assert "damper" not in found
     assert {item["name"] for item in found["structure"].items if item["kind"] == "table"} >= {"modes", "effects"}
+
+
+def test_a_form_that_no_table_of_candidates_has_is_explained(tmp_path: Path) -> None:
+    facts = run_in(tmp_path, tracing(effects=[{**EFFECT, "form": "gas"}]))
+    (found,) = [section for section in sections(facts) if section.anchor == "damper"]
+    text = " ".join(str(item.get("text", "")) for item in found.items)
+    assert "**accumulator** (form gas)" in text
+    assert "best single form, linear. Once it was named, all its forms were fitted again, and gas did better." in text
