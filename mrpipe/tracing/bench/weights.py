@@ -30,6 +30,9 @@ TOP = 0.9
 LEAST_EXPECTED = 0.05
 """Numerical technique: least expected variance in the regression of the factors, as a share of the first guess."""
 
+WEIGHTED = 3
+"""Numerical technique: passes of the regression with weights from the pass before."""
+
 MOST_DEVIATIONS = 2.0
 """Numerical technique: deviations beyond this multiple of the expected one are limited to it."""
 
@@ -37,7 +40,7 @@ UNLIMITED = 0.9205
 """Numerical technique: mean square of a normal variable limited to +-2, by which limited squares are corrected."""
 
 NOISE_PASSES = 8
-"""Numerical technique: passes of the regression with new weights and limits; each may raise a part fourfold."""
+"""Numerical technique: passes of the robust regression; each may raise a part fourfold."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     repeats, cycles = _repeats(recordings, rules), _cycles(recordings, rules)
     residual = np.divide(found.residual, root, out=np.zeros_like(root), where=root > 0.0)
     force, motion = noise_variances(found, recordings)
-    rows, targets = [], []
+    rows, targets, steps = [], [], []
     for first, second in (*repeats, *cycles):
         begin, part = _aligned(recordings, first, second)
         end = np.minimum(begin + 1, len(root) - 1)
@@ -131,16 +134,20 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         a, b, c = first[both], begin[both], end[both]
         left, right = (1.0 - part) ** 2, part**2
         rows.append(np.stack([values[a] + left * values[b] + right * values[c] for values in (force, motion)], axis=1))
+        steps.append(12.0 * recordings.force_rounding[recordings.test[a]] ** 2)
         targets.append(np.square(residual[a] - (1.0 - part) * residual[b] - part * residual[c]))
     used = root > 0.0
     if not rows or sum(map(len, targets)) < rules.least_samples:
         limit = _limit(residual[used], force[used] + motion[used])
         return NoiseScale(limit, limit)
     columns, target = np.concatenate(rows), np.concatenate(targets)
-    factors, limited = _factors(columns, target)
+    factors, without = _factors(columns, target, 1.0), target
+    robust, limited = _robust_factors(columns, target, np.concatenate(steps))
+    if float(np.sum(target - limited)) > rules.events * float(np.sum(target)):
+        factors, without = robust, limited
     # a difference holds the events of both repeats
-    events = float(np.sqrt(0.5 * max(float(np.mean(target - limited)), 0.0)))
-    target = limited
+    events = float(np.sqrt(0.5 * np.mean(target - without)))
+    target = without
     # no part exceeds the difference: the force overall, the motion where its own part is largest
     most = columns[:, 1] >= np.quantile(columns[:, 1], TOP)
     parts = ((target, columns[:, 0]), (target[most], columns[most, 1]))
@@ -155,25 +162,37 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events)
 
 
-def _factors(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the factors of the columns that explain squared differences, and the differences without single events.
+def _factors(columns: FloatArray, target: FloatArray, start: float) -> FloatArray:
+    """Return the factors of the columns that explain squared differences; the search starts at one factor for all.
 
-    The scatter of squared differences is proportional to their mean, so they are weighted by their mean. Noise is
-    spread over all samples. What exceeds its expected deviation several times in a few samples only is an event that
-    does not repeat, such as sticking, and no noise: it is limited to that multiple (proposal 2 of Huber 1964, Ann.
-    Math. Statist. 35, 73-101).
+    The scatter of squared differences is proportional to their mean, so they are weighted by their mean.
     """
     together = columns.sum(axis=1)
-    least = 1e-12 * float(np.max(together))
+    expected, factors = start * together, np.ones(2)
+    for _ in range(WEIGHTED):
+        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
+        factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
+        expected = np.maximum(columns @ factors, LEAST_EXPECTED * together)
+    return np.asarray(factors)
+
+
+def _robust_factors(columns: FloatArray, target: FloatArray, step_squared: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the factors without single events, and the squared differences without them.
+
+    Noise is spread over all samples. What exceeds its expected deviation several times in a few samples only is an
+    event that does not repeat, such as sticking, and no noise: it is limited to that multiple (proposal 2 of Huber
+    1964, Ann. Math. Statist. 35, 73-101). Rounding makes few differences too, of one step each; a step is no event.
+    """
+    together = columns.sum(axis=1)
     # half of all samples decide where the search starts, so that rare events cannot
-    expected = together * float(np.median(target / np.maximum(together, least))) / float(stats.chi2.median(1))
-    factors, limited = np.ones(2), target
+    middle = float(np.median(target / np.maximum(together, 1e-12 * float(np.max(together)))))
+    start = max(middle / float(stats.chi2.median(1)), 1e-300)
+    factors, limited, expected = np.full(2, start), target, start * together
     for _ in range(NOISE_PASSES):
-        expected = np.maximum(expected, LEAST_EXPECTED * together)
-        limited = np.minimum(target, MOST_DEVIATIONS**2 * expected) / UNLIMITED
-        weights = 1.0 / np.maximum(expected, least)
-        factors = optimize.nnls(columns * weights[:, None], limited * weights)[0]
-        expected = columns @ factors
+        limited = np.minimum(target, MOST_DEVIATIONS**2 * np.maximum(expected, step_squared))
+        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
+        factors = optimize.nnls(columns * weights[:, None], limited * weights / UNLIMITED)[0]
+        expected = np.maximum(columns @ factors, LEAST_EXPECTED * start * together)
     return factors, limited
 
 

@@ -34,6 +34,13 @@ class NoiseRules(Section):
         description="Repeated motion shows noise only if it has this many samples, which fixes a variance to about "
         "7 percent.",
     )
+    events: float = Field(
+        0.5,
+        gt=0.0,
+        lt=1.0,
+        description="Differences of repeated motion are events and no noise if deviations beyond twice the expected "
+        "one hold this share of their squared sum; of normal noise they hold 8 percent.",
+    )
     least_factor: float = Field(
         0.25,
         gt=0.0,

@@ -11,7 +11,7 @@ from scipy import signal
 from mrpipe.fitting.recordings import record_tests, resolution
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.weights import _factors, sensor_deviation
+from mrpipe.tracing.bench.weights import _factors, _robust_factors, sensor_deviation
 from tests.tracing.bench.rig import RATE, campaign
 
 
@@ -67,6 +67,9 @@ def test_events_that_do_not_repeat_are_no_noise(events: float) -> None:
     columns = np.stack([np.ones(8000), np.where(np.arange(8000) % 10 == 0, 4.0, 0.01)], axis=1)
     difference = np.sqrt(columns @ [3.0, 5.0]) * rng.standard_normal(8000)
     difference[rng.random(8000) < events] *= 30.0
-    factors, _ = _factors(columns, difference**2)
+    factors, limited = _robust_factors(columns, difference**2, np.zeros(8000))
+    assert (np.sum(limited) < 0.5 * np.sum(difference**2)) == (events > 0.0)
     # with a tenth of events the limited mean settles 1.65 times above that of the noise
     assert factors == pytest.approx(np.array([3.0, 5.0]) * (1.0 if events == 0.0 else 1.65), rel=0.15)
+    if events == 0.0:
+        assert _factors(columns, difference**2, 1.0) == pytest.approx([3.0, 5.0], rel=0.1)
