@@ -44,7 +44,7 @@ FACTORS = (0.5, 1.0, 2.0)
 
 AMPLITUDE_M_S2 = 0.768
 
-CURVES = CurveOptions(points=13, tolerance=1e-2, most_cycles=80, frequency_tolerance=4e-3, refined=("rms_x_top_m",))
+CURVES = CurveOptions(points=13, tolerance=1e-2, most_cycles=160, frequency_tolerance=4e-3, refined=("rms_x_top_m",))
 
 EXPECTED_M = 0.02
 """Expected amplitude of the damper in the ten-storey frame."""
