@@ -12,7 +12,10 @@ from typing import Any
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.headlines import weak_network
-from mrpipe.reporting.words import duration, listed, number, percent, plain, with_interval
+from mrpipe.reporting.words import duration, listed, number, percent, plain, quantity, with_interval
+
+NARROW = 0.001
+"""Half width of an interval, over the value, below which its digits are not written out: it holds the noise alone."""
 
 FITTED_ALIKE = 0.1
 """Two fits of one form whose errors differ by less than this share are reported as one."""
@@ -146,8 +149,11 @@ def _value_of(effect: Mapping[str, Any]) -> str:
         if entry.get("value") is None:
             continue
         low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
-        value, _, interval = with_interval(entry["value"], low, high, entry["unit"]).partition(" (")
         level = f"{100.0 * entry.get('interval_level', 0.95):.0f} % interval"
+        if 0.0 < abs(high - low) < 2.0 * NARROW * abs(entry["value"]):
+            value = quantity(entry["value"], entry["unit"], 4)
+            return f"{place} ({plain(name)} {value}, {level} within {percent(NARROW)})"
+        value, _, interval = with_interval(entry["value"], low, high, entry["unit"]).partition(" (")
         return f"{place} ({plain(name)} {value}, {level} {interval.rstrip(')')})"
     return place
 

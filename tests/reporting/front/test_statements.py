@@ -29,6 +29,12 @@ def test_finding_has_value_interval_confidence_and_errors(tmp_path: Path) -> Non
     assert "best any model reached is 1.3 %" in text
 
 
+def test_digits_below_the_noise_are_not_written(tmp_path: Path) -> None:
+    stiffness = {"value": 2469.388, "unit": "N/m", "interval": [2469.353, 2469.423]}
+    text = answers(tmp_path, effects=[{**EFFECT, "parameters": {"stiffness": stiffness}}])["Missing"]
+    assert "(stiffness 2.469 kN/m, 95 % interval within 0.10 %)" in text
+
+
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
