@@ -180,8 +180,9 @@ def _robust_factors(columns: FloatArray, target: FloatArray, step_squared: Float
     """Return the factors without single events, and the squared differences without them.
 
     Noise is spread over all samples. What exceeds its expected deviation several times in a few samples only is an
-    event that does not repeat, such as sticking, and no noise: it is limited to that multiple (proposal 2 of Huber
-    1964, Ann. Math. Statist. 35, 73-101). Rounding makes few differences too, of one step each; a step is no event.
+    event that does not repeat, such as sticking, and not noise: it is limited to that multiple (proposal 2 of Huber
+    1964, Ann. Math. Statist. 35, 73-101). Rounding, too, makes few differences, of one step each. One step is not an
+    event.
     """
     together = columns.sum(axis=1)
     # half of all samples decide where the search starts, so that rare events cannot

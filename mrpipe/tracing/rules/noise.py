@@ -38,7 +38,7 @@ class NoiseRules(Section):
         0.5,
         gt=0.0,
         lt=1.0,
-        description="Differences of repeated motion are events and no noise if deviations beyond twice the expected "
+        description="Differences of repeated motion are events, not noise, if deviations beyond twice the expected "
         "one hold this share of their squared sum; of normal noise they hold 8 percent.",
     )
     least_factor: float = Field(
