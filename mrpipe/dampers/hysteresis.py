@@ -135,6 +135,18 @@ def advance_hysteresis(
     return sign * min(max(y, -1.0), 1.0)
 
 
+@njit(float64(float64, float64, float64), cache=True)
+def _square_part(mean: float, speed_before: float, speed_after: float) -> float:
+    """Return b of the velocity between two samples, speed_before + a s + b s^2 with s from 0 to 1, of given mean."""
+    return 3.0 * (speed_before + speed_after - 2.0 * mean)
+
+
+@njit(float64(float64, float64, float64), cache=True)
+def _linear_part(mean: float, speed_before: float, speed_after: float) -> float:
+    """Return a of the velocity of :func:`_square_part`."""
+    return 6.0 * mean - 4.0 * speed_before - 2.0 * speed_after
+
+
 @njit(float64(float64, float64, float64, float64, float64), cache=True)
 def turning_share(before: float, speed_before: float, after: float, speed_after: float, dt: float) -> float:
     """Return when the motion turns between two samples, as a share of the interval; 1 where it does not turn.
@@ -155,9 +167,9 @@ def turning_share(before: float, speed_before: float, after: float, speed_after:
     if speed_before * speed_after >= 0.0:
         return 1.0
     mean = (after - before) / dt
-    # the velocity is speed_before + linear s + square s^2, s from 0 to 1; it changes its sign once
-    square = 3.0 * (speed_before + speed_after - 2.0 * mean)
-    linear = 6.0 * mean - 4.0 * speed_before - 2.0 * speed_after
+    # the velocity changes its sign once
+    square = _square_part(mean, speed_before, speed_after)
+    linear = _linear_part(mean, speed_before, speed_after)
     root = math.sqrt(max(linear * linear - 4.0 * square * speed_before, 0.0))
     # the form of the roots without cancellation (Press et al. 2007, Numerical Recipes, section 5.6)
     half = -0.5 * (linear + math.copysign(root, linear))
@@ -175,8 +187,8 @@ def displacement_between(
     if share >= 1.0:
         return after
     mean = (after - before) / dt
-    square = 3.0 * (speed_before + speed_after - 2.0 * mean)
-    linear = 6.0 * mean - 4.0 * speed_before - 2.0 * speed_after
+    square = _square_part(mean, speed_before, speed_after)
+    linear = _linear_part(mean, speed_before, speed_after)
     return before + dt * share * (speed_before + share * (0.5 * linear + share * square / 3.0))
 
 

@@ -19,13 +19,10 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numba import NumbaExperimentalFeatureWarning, float64, int64, njit, types, void
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.dampers.timing import look_ahead
@@ -161,15 +158,6 @@ class Chain:
         return int(self.state_offsets[-1])
 
     @property
-    def addresses(self) -> IntArray:
-        """Return the addresses of the functions, for kernels that call them through :func:`step_at`.
-
-        numba examines every function of a tuple at every call of a kernel, which takes 2 ms and holds the interpreter
-        lock. A fit calls its kernel thousands of times, so it passes addresses instead.
-        """
-        return np.array([_address(function) for function in self.functions], dtype=np.int64)
-
-    @property
     def arguments(self) -> tuple[Any, ...]:
         """Return (functions, parameters, parameter_offsets, state_offsets), the first arguments of :func:`advance`."""
         return self.functions, self.parameters, self.parameter_offsets, self.state_offsets
@@ -225,28 +213,6 @@ def build_chain(steps: Sequence[Step]) -> Chain:
 
 CHAIN_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
 """The compiled type of a chain's functions, for the signatures of kernels that run it."""
-
-
-@cache
-def _address(function: Any) -> int:
-    """Return the address of a step's machine code; the cache keeps the function, and so its code, alive."""
-    compiled = function.get_compile_result(STEP_SIGNATURE)
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
-
-
-@intrinsic
-def step_at(typing_context: Any, address: Any) -> Any:
-    """Return, inside compiled code, the step function at an address of :attr:`Chain.addresses`."""
-    del typing_context, address
-    function = types.FunctionType(STEP_SIGNATURE)
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        del signature
-        pointer = cgutils.create_struct_proxy(function)(context, builder)
-        pointer.jit_addr = builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
-        return pointer._getvalue()
-
-    return function(types.int64), code
 
 
 @njit(void(float64[::1], int64, float64[::1], float64), cache=True)

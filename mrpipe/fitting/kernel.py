@@ -32,9 +32,9 @@ from mrpipe.dampers.plant import (
     Chain,
     begin_step,
     end_step,
-    step_at,
 )
 from mrpipe.dampers.timing import look_ahead
+from mrpipe.fitting.pointers import addresses_of, step_at
 from mrpipe.fitting.recordings import Recordings
 
 COLUMNS = 11
@@ -147,7 +147,7 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
     if chain.ahead_s:
         motion = look_ahead(*motion, recordings.starts, recordings.dt, chain.ahead_s)
     _run(
-        chain.addresses,
+        addresses_of(chain),
         *chain.arguments[1:],
         *motion,
         recordings.drive,
