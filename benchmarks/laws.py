@@ -33,9 +33,10 @@ from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import DivergedError
 from mrpipe.simulation.excitation import Excitation, recorded
 from mrpipe.simulation.loop import LoopOptions, Response
-from mrpipe.simulation.response_curve import CurveOptions, response_curve
+from mrpipe.simulation.response_curve import response_curve
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.sensors import SensorNoise
+from mrpipe.simulation.steady_state import CurveOptions
 from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
 from mrpipe.thesis.gains import THESIS_GAINS
 

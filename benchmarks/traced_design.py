@@ -55,9 +55,10 @@ from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions, Response
 from mrpipe.simulation.resonance import BAND
-from mrpipe.simulation.response_curve import CurveOptions, response_curve
+from mrpipe.simulation.response_curve import response_curve
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.sensors import SensorNoise
+from mrpipe.simulation.steady_state import CurveOptions
 from mrpipe.structures import Frame, frame_from_parameter_set
 from mrpipe.thesis.gains import THESIS_GAINS
 from mrpipe.tracing.bench.summary import Tracing

@@ -16,7 +16,8 @@ from mrpipe.artifacts import atomic_write_text
 from mrpipe.control.gains import Gains
 from mrpipe.law_design.objective import Evaluation
 from mrpipe.law_design.search import FreeGain
-from mrpipe.simulation.response_curve import QUANTITIES, ResponseCurve
+from mrpipe.simulation.response_curve import ResponseCurve
+from mrpipe.simulation.windows import QUANTITIES
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,7 @@ def _as_plain(item: Evaluation) -> dict[str, Any]:
                 "base_amplitude_m_s2": curve.base_amplitude_m_s2,
                 "frequency_rad_s": curve.frequency_rad_s.tolist(),
                 "values": curve.values.tolist(),
+                "errors": curve.errors.tolist(),
                 "steady": curve.steady.tolist(),
             }
             for curve in item.curves
@@ -140,6 +142,7 @@ def _evaluation(content: Mapping[str, Any]) -> Evaluation:
             float(curve["base_amplitude_m_s2"]),
             np.array(curve["frequency_rad_s"], dtype=np.float64),
             np.array(curve["values"], dtype=np.float64),
+            np.array(curve["errors"], dtype=np.float64),
             np.array(curve["steady"], dtype=np.bool_),
         )
         for curve in content["curves"]

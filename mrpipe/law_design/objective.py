@@ -12,14 +12,9 @@ from mrpipe.control.gains import Gains
 from mrpipe.law_design.options import DesignSettings
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import (
-    QUANTITIES,
-    CurveOptions,
-    ResponseCurve,
-    Run,
-    response_curve,
-    values_between,
-)
+from mrpipe.simulation.response_curve import ResponseCurve, response_curve
+from mrpipe.simulation.steady_state import CurveOptions, Run
+from mrpipe.simulation.windows import QUANTITIES, values_between
 
 RunOf = Callable[[str, Gains], Run]
 """From a law and its gains to the function that runs the loop under an excitation."""

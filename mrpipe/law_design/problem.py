@@ -19,8 +19,8 @@ from mrpipe.law_design.search import FreeGain
 from mrpipe.law_design.uncertainty import Draw
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import Run
 from mrpipe.simulation.rig import Rig
+from mrpipe.simulation.steady_state import Run
 
 SMALLEST_SHARE = 0.02
 """Where a gain may be zero, the search on logarithms ends at this share of its largest value."""

@@ -21,8 +21,10 @@ from mrpipe.law_design.study import COARSE, Loops, design_all, pareto_front, ref
 from mrpipe.law_design.uncertainty import DamperUncertainty, Draw, FrameUncertainty, Ranking, draw, rank
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.ground_record import read_ground_record
-from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, ResponseCurve, steady_values
+from mrpipe.simulation.response_curve import ResponseCurve
 from mrpipe.simulation.rig import Rig
+from mrpipe.simulation.steady_state import CurveOptions, steady_values
+from mrpipe.simulation.windows import QUANTITIES
 
 AROUND = (0.97, 1.0, 1.03)
 """Frequencies over the resonance at which a drawn loop is run: a draw moves the resonance by a few percent."""

@@ -19,8 +19,8 @@ from mrpipe.law_design.search import FreeGain, simplex_search
 from mrpipe.law_design.study import COARSE, reference_evaluation
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import Run
 from mrpipe.simulation.several_rig import DampersRig
+from mrpipe.simulation.steady_state import Run
 
 TOGETHER = "dampers"
 """Name of the set of all dampers where functions for a single law need the name of a law."""

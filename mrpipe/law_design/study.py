@@ -13,7 +13,7 @@ from mrpipe.errors import DivergedError
 from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Load, Objective, RunOf, evaluate
 from mrpipe.law_design.search import SearchOptions, refine, search
-from mrpipe.simulation.response_curve import CurveOptions
+from mrpipe.simulation.steady_state import CurveOptions
 
 COARSE = CurveOptions(
     points=9,

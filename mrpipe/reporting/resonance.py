@@ -9,6 +9,9 @@ from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, figure_with_axes, label
 from mrpipe.simulation.resonance import Curves
 
+STATED = ("rms_x_top_m", "rms_a1_m_s2")
+"""Largest values that the text states."""
+
 
 def describe(sink: Sink, law: str, curves: Curves) -> None:
     """Write the section of a stage `resonance-LAW`.
@@ -25,11 +28,12 @@ def describe(sink: Sink, law: str, curves: Curves) -> None:
         f"Law {law}: the loop resonates at {nominal.resonance_rad_s:.2f} rad/s, where the RMS displacement of the top "
         f"floor is {1e3 * nominal.peak('rms_x_top_m'):.1f} mm under a harmonic base acceleration of "
         f"{nominal.base_amplitude_m_s2:.3g} m/s^2. The largest RMS acceleration of floor 1 over the band is "
-        f"{nominal.peak('rms_a1_m_s2'):.2f} m/s^2."
+        f"{nominal.peak('rms_a1_m_s2'):.2f} m/s^2. The standard error of these values is "
+        f"{100.0 * max(nominal.peak_error(name) / nominal.peak(name) for name in STATED):.2f} % or less."
     )
-    sink.table(
-        "peaks", pd.DataFrame(curves.as_json()["amplitudes"]), "Resonance and largest responses over the band (SI)."
-    )
+    rows = pd.DataFrame(curves.as_json()["amplitudes"])
+    stated = [name for name in rows if not str(name).startswith("standard_error")]
+    sink.table("peaks", rows[stated], "Resonance and largest responses over the band (SI).")
     sink.figure("curve", curve_figure(curves), "Steady RMS response over frequency; the dots are the resonances.")
 
 

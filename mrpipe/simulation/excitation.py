@@ -54,8 +54,9 @@ def harmonic(
     settling_cycles: int = _SETTINGS.settling_cycles,
     ramp_cycles: float = _SETTINGS.ramp_cycles,
     decay_s: float = 0.0,
+    phase_rad: float = 0.0,
 ) -> Excitation:
-    """Return a_g = -A sin(omega t), eased in over `ramp_cycles`, stopped after whole cycles for a free decay.
+    """Return a_g = -A sin(omega t + phase), eased in over `ramp_cycles`, stopped after whole cycles for a free decay.
 
     Parameters
     ----------
@@ -67,6 +68,8 @@ def harmonic(
         Length of the raised-cosine start.
     decay_s
         How long the run goes on at rest of the base.
+    phase_rad
+        Phase at the start [rad].
     """
     period = 2.0 * math.pi / omega
     stop = cycles * period
@@ -74,7 +77,7 @@ def harmonic(
 
     def at(t: FloatArray) -> FloatArray:
         rise = 0.5 - 0.5 * np.cos(np.pi * np.clip(t / ramp, 0.0, 1.0))
-        return np.where(t < stop, -amplitude_m_s2 * rise * np.sin(omega * t), 0.0)
+        return np.where(t < stop, -amplitude_m_s2 * rise * np.sin(omega * t + phase_rad), 0.0)
 
     return Excitation(
         stop + decay_s,

@@ -14,13 +14,20 @@ from mrpipe.control.controller import Controller
 from mrpipe.errors import UserError
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import CurveOptions, ResponseCurve, Run, response_curve
+from mrpipe.simulation.response_curve import ResponseCurve, response_curve
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.settings import ResonanceSettings
+from mrpipe.simulation.steady_state import CurveOptions, Run
 
 BAND = (0.75, 1.2)
 """Default band: lowest frequency over the free one of the target mode, highest over that with a locked damper. The
 resonance of any loop with a passive damper force lies between these two frequencies."""
+
+WARNED = 1.1
+"""A standard error is reported if it exceeds the demanded one by this factor."""
+
+REFINEMENTS, FLATNESS = 12, 0.01
+"""Most frequencies that refine one maximum, and by how much its neighbours may be lower in the end [1]."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +78,10 @@ def curve_options(settings: ResonanceSettings, *, absolute: bool) -> CurveOption
         tolerance=settings.tolerance,
         window_cycles=settings.window_cycles,
         most_cycles=settings.most_cycles,
+        refinements=REFINEMENTS,
+        flatness=FLATNESS,
+        standard_error=settings.standard_error,
+        most_averaged_cycles=settings.most_averaged_cycles,
         absolute=absolute,
     )
 
@@ -138,10 +149,11 @@ def measure_resonance(
     for number, factor in enumerate(settings.amplitude_factors):
         progress(number / len(settings.amplitude_factors), f"response over frequency at {factor:g} times the amplitude")
         curves.append(response_curve(run, factor * float(amplitude), band_rad_s, options))
-    return Curves(settings.amplitude_factors, tuple(curves), tuple(_warnings(curves, band_rad_s)))
+    warnings = _warnings(curves, band_rad_s, settings.standard_error)
+    return Curves(settings.amplitude_factors, tuple(curves), tuple(warnings))
 
 
-def _warnings(curves: Sequence[ResponseCurve], band: tuple[float, float]) -> list[str]:
+def _warnings(curves: Sequence[ResponseCurve], band: tuple[float, float], standard_error: float) -> list[str]:
     found = []
     for curve in curves:
         level = f"at {curve.base_amplitude_m_s2:.3g} m/s^2"
@@ -152,5 +164,11 @@ def _warnings(curves: Sequence[ResponseCurve], band: tuple[float, float]) -> lis
             found.append(
                 f"{level} the largest response is at the edge of the band, {curve.resonance_rad_s:.3g} rad/s; "
                 f"widen resonance.band_rad_s ({band[0]:.3g} to {band[1]:.3g})"
+            )
+        error = max(curve.peak_error(name) / curve.peak(name) for name in CurveOptions().refined if curve.peak(name))
+        if error > WARNED * standard_error:
+            found.append(
+                f"{level} the response does not become periodic, and the standard error of a largest value is "
+                f"{100.0 * error:.1f} %; raise resonance.most_averaged_cycles for more accurate ones"
             )
     return found

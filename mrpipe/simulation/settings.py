@@ -158,4 +158,15 @@ class ResonanceSettings(Section):
         2e-3, gt=0.0, description="Relative change of the RMS values from window to window that counts as steady."
     )
     window_cycles: int = Field(6, ge=2, description="Cycles over which an RMS value is taken.")
-    most_cycles: int = Field(160, ge=20, description="Longest run at one frequency.")
+    most_cycles: int = Field(
+        160, ge=20, description="Longest run at one frequency; only the largest values are averaged over more."
+    )
+    standard_error: float = Field(
+        1.5e-3,
+        gt=0.0,
+        description="Relative standard error of the largest values. A response that does not become periodic is "
+        "averaged over further runs until the largest values are known so accurately.",
+    )
+    most_averaged_cycles: int = Field(
+        20000, ge=0, description="Most cycles over which one of the largest values is averaged; 0: no further runs."
+    )

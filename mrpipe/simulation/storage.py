@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 from mrpipe.simulation.loop import Response
-from mrpipe.simulation.response_curve import DISPLAYED, ResponseCurve
+from mrpipe.simulation.response_curve import ResponseCurve
+from mrpipe.simulation.windows import DISPLAYED, QUANTITIES
 
 _FLOORS = {
     "displacement": "m",
@@ -86,3 +87,5 @@ def write_curves(artifact: ArtifactWriter, curves: Sequence[ResponseCurve], with
             unit = "m/s^2" if name.endswith("_m_s2") else "m"
             plain = name.removesuffix("_m_s2").removesuffix("_m")
             artifact.put(f"{group}/{plain}", curve.column(name), unit=unit, dims=("frequency",))
+            errors = curve.errors[:, QUANTITIES.index(name)]
+            artifact.put(f"{group}/standard_error_{plain}", errors, unit=unit, dims=("frequency",))

@@ -18,8 +18,10 @@ from mrpipe.artifacts import FloatArray, Progress, load_parameter_set
 from mrpipe.control.limits import limiting_modes
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.simulation.resonance import runner
-from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, response_curve, steady_values
+from mrpipe.simulation.response_curve import response_curve
 from mrpipe.simulation.rig import Rig
+from mrpipe.simulation.steady_state import CurveOptions, steady_values
+from mrpipe.simulation.windows import QUANTITIES
 from mrpipe.thesis.bench import (
     LAWS,
     OMEGA,

@@ -12,13 +12,15 @@ from mrpipe.control.gains import Gains
 from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation
 from mrpipe.law_design.search import FreeGain
-from mrpipe.simulation.response_curve import QUANTITIES, ResponseCurve
+from mrpipe.simulation.response_curve import ResponseCurve
+from mrpipe.simulation.windows import QUANTITIES
 
 ENTRY = LawUnderDesign("vd", Gains(650.0), (FreeGain("c_n_s_m", 10.0, 2000.0),), "vd")
 
 
 def evaluation(c: float, peak: float) -> Evaluation:
-    curve = ResponseCurve(0.79, np.array([8.0, 9.0]), np.full((2, len(QUANTITIES)), peak), np.array([True, False]))
+    values = np.full((2, len(QUANTITIES)), peak)
+    curve = ResponseCurve(0.79, np.array([8.0, 9.0]), values, 0.01 * np.ones_like(values), np.array([True, False]))
     return Evaluation("vd", Gains(c), (curve,), {"quake": dict.fromkeys(QUANTITIES, 0.02)}, 0.9)
 
 
@@ -36,6 +38,7 @@ def test_what_was_written_is_read(tmp_path: Path) -> None:
     assert again.best.peaks["rms_x_top_m"] == 0.03
     assert math.isinf(again.tried[0].peaks["rms_x_top_m"])
     np.testing.assert_array_equal(again.best.curves[0].steady, [True, False])
+    assert again.best.curves[0].peak_error("rms_x_top_m") == 0.01
     kept.clear()
     assert not (tmp_path / "kept").exists()
 

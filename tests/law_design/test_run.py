@@ -25,8 +25,9 @@ from mrpipe.law_design.run import Result, load_of, run_design
 from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty, draw
 from mrpipe.reporting.design import in_plain_words
 from mrpipe.simulation.loop import LoopOptions
-from mrpipe.simulation.response_curve import CurveOptions, response_curve
+from mrpipe.simulation.response_curve import response_curve
 from mrpipe.simulation.rig import Rig
+from mrpipe.simulation.steady_state import CurveOptions
 from mrpipe.structures import frame_from_parameter_set, natural_modes
 
 LAWS = tuple(law_named(name) for name in ("vd", "vdns", "fdns"))

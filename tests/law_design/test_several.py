@@ -14,7 +14,9 @@ from mrpipe.law_design import several
 from mrpipe.law_design.objective import Evaluation, Load, Objective
 from mrpipe.law_design.options import DesignSettings
 from mrpipe.law_design.several import design_as_json, design_dampers
-from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, ResponseCurve
+from mrpipe.simulation.response_curve import ResponseCurve
+from mrpipe.simulation.steady_state import CurveOptions
+from mrpipe.simulation.windows import QUANTITIES
 
 pytestmark = pytest.mark.property
 
@@ -44,7 +46,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> list[Gains]:
         tried.append(gains)
         top = 1.0 + np.log(gains["below"] / 0.5) ** 2 + 2.0 * np.log(gains["above"] / 1.5) ** 2
         values = np.tile([top if name == "rms_x_top_m" else 0.01 for name in QUANTITIES], (2, 1))
-        curve = ResponseCurve(0.8, np.array([6.0, 7.0]), values, np.array([True, True]))
+        curve = ResponseCurve(0.8, np.array([6.0, 7.0]), values, np.zeros_like(values), np.array([True, True]))
         found = Evaluation(law, gains, (curve,), {})
         return replace(found, value=objective.value(found.peaks))
 
@@ -81,7 +83,7 @@ def test_the_json_gives_factors_and_gains(seen: list[Gains]) -> None:
 def test_without_gains_the_calibration_stays(seen: list[Gains], monkeypatch: pytest.MonkeyPatch) -> None:
     rig = _rig(("below", "passive-off", Gains()))
     monkeypatch.setattr(several, "reference_evaluation", lambda *_: Evaluation("x", Gains(), (
-        ResponseCurve(0.8, np.array([6.0]), np.ones((1, len(QUANTITIES))), np.array([True])),
+        ResponseCurve(0.8, np.array([6.0]), *np.ones((2, 1, len(QUANTITIES))), np.array([True])),
     ), {}))  # fmt: skip
     found = design_dampers(rig, SETTINGS, LOAD, absolute=False, seed=1)  # type: ignore[arg-type]
     assert found.designed.best is found.designed.calibrated and seen == []

@@ -16,7 +16,9 @@ from mrpipe.law_design.kept import Kept, LawUnderDesign
 from mrpipe.law_design.objective import Evaluation, Load, Objective
 from mrpipe.law_design.search import FreeGain, SearchOptions
 from mrpipe.law_design.study import COARSE, Loops, design_all, design_law, pareto_front, reference_evaluation
-from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, ResponseCurve
+from mrpipe.simulation.response_curve import ResponseCurve
+from mrpipe.simulation.steady_state import CurveOptions
+from mrpipe.simulation.windows import QUANTITIES
 
 pytestmark = pytest.mark.property
 
@@ -28,7 +30,7 @@ VISCOSITY = FreeGain("c_n_s_m", 10.0, 10000.0)
 
 def _evaluation(law: str, gains: Gains, peaks: dict[str, float]) -> Evaluation:
     values = np.tile([peaks.get(name, 1.0) for name in QUANTITIES], (2, 1))
-    curve = ResponseCurve(0.8, np.array([6.0, 7.0]), values, np.array([True, True]))
+    curve = ResponseCurve(0.8, np.array([6.0, 7.0]), values, np.zeros_like(values), np.array([True, True]))
     return Evaluation(law, gains, (curve,), {}, OBJECTIVE.value({"rms_stroke_m": 0.0, **peaks}))
 
 

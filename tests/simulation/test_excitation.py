@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrpipe.simulation.excitation import Excitation, narrow_band
+from mrpipe.simulation.excitation import Excitation, harmonic, narrow_band
 
 OMEGA, WIDTH, RMS = 8.0, 0.1, 0.5
 
@@ -38,3 +38,10 @@ def test_random_motion_is_that_of_its_seed_and_starts_softly() -> None:
     assert eased.at(np.zeros(1))[0] == 0.0
     assert eased.details["base_amplitude_m_s2"] == pytest.approx(np.sqrt(2.0) * RMS)
     assert motion(1, 60.0).steady_s == (10.0, 60.0)
+
+
+@pytest.mark.property
+def test_harmonic_motion_starts_at_its_phase() -> None:
+    t = np.linspace(10.0, 12.0, 50)
+    motion = harmonic(RMS, OMEGA, cycles=20, settling_cycles=10, phase_rad=0.7)
+    np.testing.assert_allclose(motion.at(t), -RMS * np.sin(OMEGA * t + 0.7), atol=1e-12)

@@ -11,8 +11,10 @@ from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, no_progress
 from mrpipe.errors import UserError
 from mrpipe.simulation import at_rest, harmonic, resonance
 from mrpipe.simulation.resonance import curve_options, default_band, measure_resonance
-from mrpipe.simulation.response_curve import QUANTITIES, CurveOptions, ResponseCurve
+from mrpipe.simulation.response_curve import ResponseCurve
 from mrpipe.simulation.settings import ResonanceSettings
+from mrpipe.simulation.steady_state import CurveOptions
+from mrpipe.simulation.windows import QUANTITIES
 
 pytestmark = pytest.mark.property
 
@@ -21,13 +23,13 @@ BAND = (6.0, 10.0)
 
 
 def _measured(
-    monkeypatch: pytest.MonkeyPatch, top: dict[float, list[float]], settings: ResonanceSettings
+    monkeypatch: pytest.MonkeyPatch, top: dict[float, list[float]], settings: ResonanceSettings, error: float = 1e-4
 ) -> resonance.Curves:
     """Replace the loop by curves of three frequencies: amplitude -> top displacement."""
 
     def curve(_: object, amplitude: float, band: tuple[float, float], options: CurveOptions) -> ResponseCurve:
         values = np.tile(np.array(top[round(amplitude, 9)])[:, None], (1, len(QUANTITIES)))
-        return ResponseCurve(amplitude, np.array([band[0], 8.0, band[1]]), values, np.full(3, True))
+        return ResponseCurve(amplitude, np.array([band[0], 8.0, band[1]]), values, error * values, np.full(3, True))
 
     monkeypatch.setattr(resonance, "response_curve", curve)
     monkeypatch.setattr(resonance, "runner", lambda *_: None)
@@ -55,6 +57,13 @@ def test_a_peak_at_the_edge_and_growth_without_bound_are_warned_of(monkeypatch: 
     assert "at 1.6 m/s^2 the response grows without bound" in growth
 
 
+def test_a_largest_value_that_is_not_known_accurately_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = _measured(monkeypatch, {0.8: [0.1, 0.3, 0.2]}, ResonanceSettings(), error=0.008)
+    (warning,) = found.warnings
+    assert "does not become periodic" in warning and "0.8 %" in warning and "resonance.most_averaged_cycles" in warning
+    assert found.as_json()["standard_error_rms_x_top_m"] == pytest.approx(0.0024)
+
+
 @pytest.mark.parametrize("band", [(0.0, 5.0), (9.0, 6.0)])
 def test_an_empty_band_is_refused(band: tuple[float, float]) -> None:
     with pytest.raises(UserError, match="give a positive rising band"):
@@ -76,6 +85,7 @@ def test_the_band_spans_the_free_and_the_locked_frequency(tmp_path) -> None:
 
 def test_every_setting_of_the_curve_reaches_its_options() -> None:
     settings = ResonanceSettings(points=7, tolerance=0.01, window_cycles=3, most_cycles=30)
-    options = curve_options(settings, absolute=True)
+    options = curve_options(settings.changed(standard_error=0.02, most_averaged_cycles=50), absolute=True)
+    assert (options.standard_error, options.most_averaged_cycles) == (0.02, 50)
     assert (options.points, options.tolerance, options.window_cycles, options.most_cycles) == (7, 0.01, 3, 30)
     assert options.absolute

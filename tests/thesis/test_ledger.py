@@ -221,7 +221,7 @@ def test_resonances_of_the_ledger_do_not_depend_on_their_grid(bench: Bench) -> N
 @pytest.mark.literature
 def test_closed_loop_of_the_sets(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """Chapter 5 on a coarse grid: errata section B holds, and the tables have their values."""
-    from mrpipe.simulation.response_curve import CurveOptions
+    from mrpipe.simulation.steady_state import CurveOptions
     from mrpipe.thesis import chapter5
 
     coarse = CurveOptions(

@@ -18,7 +18,8 @@ from mrpipe.artifacts import Progress, no_progress
 from mrpipe.errors import DivergedError
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response, simulate_law
-from mrpipe.simulation.response_curve import CurveOptions, ResponseCurve, response_curve
+from mrpipe.simulation.response_curve import ResponseCurve, response_curve
+from mrpipe.simulation.steady_state import CurveOptions
 from mrpipe.tracing.loop.comparison import (
     Arrangement,
     Bench,

@@ -43,7 +43,7 @@ def test_a_locked_damper_ranks_last_over_the_band_though_it_is_best_at_the_free_
 
 
 def curve(peak: float) -> ResponseCurve:
-    return ResponseCurve(1.0, np.array([8.0]), np.full((1, 5), peak), np.array([True]))
+    return ResponseCurve(1.0, np.array([8.0]), np.full((1, 5), peak), np.zeros((1, 5)), np.array([True]))
 
 
 @pytest.mark.property

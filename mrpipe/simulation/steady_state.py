@@ -1,0 +1,265 @@
+"""The steady response of the closed loop at one frequency of harmonic base motion.
+
+Most loops become periodic, and a few windows of whole cycles give their values. A loop that switches its damper can
+move irregularly for ever. Its values are means over a run, and are only as accurate as the run is long. Where a value
+must be known to a demanded accuracy, :class:`SteadyResponses` averages over further runs until its standard error
+is small enough.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import DivergedError
+from mrpipe.simulation.excitation import Excitation, harmonic
+from mrpipe.simulation.loop import Response
+from mrpipe.simulation.settings import ResonanceSettings
+from mrpipe.simulation.windows import QUANTITIES, mean_values, settled, standard_errors, values_between
+
+Run = Callable[[Excitation], Response]
+
+_SETTINGS = ResonanceSettings()
+"""The defaults that the options share with the settings."""
+
+FURTHER_RUN = (4, 54)
+"""Fewest and most windows of a further run; the histories of a longer one would need too much memory."""
+
+PHASE_STEP = 2.0 * math.pi * (0.5 * math.sqrt(5.0) - 0.5)
+"""Each further run begins at another phase of the base motion, this angle later than the run before, so that irregular
+motions are independent. The golden section spreads any number of phases evenly."""
+
+
+@dataclass(frozen=True)
+class CurveOptions:
+    """How a response curve is measured.
+
+    Attributes
+    ----------
+    points
+        Frequencies of the grid, spaced in equal ratios.
+    settling_cycles
+        Cycles before the first comparison of windows.
+    window_cycles
+        Cycles over which an RMS value is taken.
+    tolerance
+        Relative change of the RMS values from one window to the next that counts as steady.
+    most_cycles
+        Longest run. A response that is not steady by then has the mean over the second half of its windows.
+    frequency_tolerance
+        Relative accuracy of the refined resonance frequencies.
+    refinements
+        Most frequencies that refine one maximum.
+    flatness
+        A maximum is refined until its neighbours are lower by no more than this share, because a maximum can be a kink.
+    refined
+        Quantities whose maxima are refined.
+    refined_share
+        Local maxima of the grid above this share of the largest value are refined.
+    absolute
+        Whether accelerations are absolute; else relative to the ground.
+    standard_error
+        Relative standard error to which the largest values are measured; infinite: every value comes from one run.
+    most_averaged_cycles
+        Most cycles over which one value is averaged for it.
+    """
+
+    points: int = _SETTINGS.points
+    settling_cycles: int = 10
+    window_cycles: int = _SETTINGS.window_cycles
+    tolerance: float = _SETTINGS.tolerance
+    most_cycles: int = _SETTINGS.most_cycles
+    frequency_tolerance: float = 2e-3
+    refinements: int = 8
+    flatness: float = math.inf
+    refined: tuple[str, ...] = ("rms_x_top_m", "rms_a_top_m_s2", "rms_a1_m_s2")
+    refined_share: float = 0.9
+    absolute: bool = False
+    standard_error: float = math.inf
+    most_averaged_cycles: int = _SETTINGS.most_averaged_cycles
+
+
+@dataclass(frozen=True)
+class Steady:
+    """The steady response at one frequency.
+
+    Attributes
+    ----------
+    values
+        In the order of QUANTITIES.
+    errors
+        Their standard errors. Two windows that agree give half their difference.
+    steady
+        Whether the values became steady within the longest run.
+    cycles
+        Cycles of the shortest run that would have given steady values.
+    scatter
+        Relative standard deviation from window to window, shape (q,); None where two windows agreed.
+    """
+
+    values: FloatArray
+    errors: FloatArray
+    steady: bool
+    cycles: int
+    scatter: FloatArray | None = None
+
+
+def steady_values(
+    run: Run, amplitude_m_s2: float, omega: float, options: CurveOptions, first_cycles: int = 0
+) -> Steady:
+    """Return the steady RMS values at one frequency.
+
+    The run is repeated with twice the length until the RMS values are steady
+    (:func:`~mrpipe.simulation.windows.settled`). A response that grows without bound has infinite values, because an
+    optimiser must be able to compare it.
+
+    Parameters
+    ----------
+    run
+        Runs the loop under an excitation, from rest.
+    amplitude_m_s2, omega
+        Of the base acceleration [m/s^2], [rad/s].
+    options
+        Lengths and tolerance.
+    first_cycles
+        Length of the first run in cycles; the shortest possible where it is less than that.
+    """
+    window, settling = options.window_cycles, options.settling_cycles
+    shortest = settling + 2 * window
+    cycles = min(max(first_cycles, shortest), max(options.most_cycles, shortest))
+    period = 2.0 * math.pi / omega
+    while True:
+        excitation = harmonic(amplitude_m_s2, omega, cycles=cycles, settling_cycles=cycles - window)
+        try:
+            response = run(excitation)
+        except DivergedError:
+            return _unbounded(shortest)
+        count = (cycles - settling) // window
+        edges = period * (cycles - window * np.arange(count, -1, -1, dtype=np.float64))
+        windows = values_between(response, edges, options.absolute)
+        length = settled(windows, options.tolerance)
+        if length:
+            # the shortest run whose windows would have been enough
+            enough = next(k for k in range(2, count + 1) if settled(windows[:k], options.tolerance))
+            return _steady(windows, length, True, cycles - window * (count - enough))
+        if cycles >= options.most_cycles:
+            return _steady(windows, max(2, count // 2), False, cycles)
+        cycles = min(2 * cycles, options.most_cycles)
+
+
+def _unbounded(cycles: int) -> Steady:
+    values = np.full(len(QUANTITIES), math.inf)
+    return Steady(values, np.zeros(len(QUANTITIES)), False, cycles)
+
+
+def _steady(windows: FloatArray, length: int, steady: bool, cycles: int) -> Steady:
+    """Return the values of the last windows."""
+    counted = windows[-length:]
+    values = mean_values(counted)
+    errors = standard_errors(windows[-max(length, 2) :])
+    return Steady(values, errors, steady, cycles, None if length == 1 else _scatter(counted, values))
+
+
+def _scatter(windows: FloatArray, values: FloatArray) -> FloatArray:
+    spread = np.std(windows, axis=0, ddof=1)
+    return np.divide(spread, values, out=np.zeros_like(spread), where=values > 0.0)
+
+
+@dataclass
+class SteadyResponses:
+    """Steady responses by frequency, so that no frequency is run twice.
+
+    A run starts with the length that the frequency before needed, because neighbouring frequencies need about the same.
+
+    Attributes
+    ----------
+    run
+        Runs the loop under an excitation, from rest.
+    amplitude_m_s2
+        Of the base acceleration [m/s^2].
+    options
+        Lengths and accuracy.
+    known
+        Frequency [rad/s] -> its response.
+    """
+
+    run: Run
+    amplitude_m_s2: float
+    options: CurveOptions
+    known: dict[float, Steady] = field(default_factory=dict)
+    _further: dict[float, list[FloatArray]] = field(default_factory=dict)
+    _cycles: int = 0
+
+    def __call__(self, omega: float) -> FloatArray:
+        """Return the values at a frequency, shape (q,)."""
+        if omega not in self.known:
+            self.known[omega] = steady_values(self.run, self.amplitude_m_s2, omega, self.options, self._cycles)
+            self._cycles = self.known[omega].cycles
+        return self.known[omega].values
+
+    def errors(self, omega: float) -> FloatArray:
+        """Return the standard errors of the values at a known frequency, shape (q,).
+
+        Two windows of an irregular response can agree by chance. Where windows scatter at other frequencies, a value
+        that rests on the agreement of two windows has at least the error of a single window of that scatter.
+        """
+        found = self.known[omega]
+        others = [item.scatter for item in self.known.values() if item.scatter is not None]
+        if found.scatter is not None or not others:
+            return found.errors
+        return np.maximum(found.errors, np.median(others, axis=0) * found.values)
+
+    def accurate(self, omega: float, column: int, error: float, most_cycles: int) -> float:
+        """Return the value of one quantity, averaged over further runs until its standard error is small enough.
+
+        The first run does not enter the mean of the further ones. It decided that the value is worth the effort, and a
+        value that was selected because it is large is on average too large.
+
+        Parameters
+        ----------
+        omega
+            Frequency [rad/s].
+        column
+            Of the quantity.
+        error
+            Largest relative standard error.
+        most_cycles
+            Most cycles of further runs.
+        """
+        value = float(self(omega)[column])
+        most = most_cycles // self.options.window_cycles
+        while math.isfinite(value):
+            share = float(self.errors(omega)[column]) / (error * value) if value > 0.0 else 0.0
+            done = sum(map(len, self._further.get(omega, ())))
+            if share <= 1.0 or done >= most:
+                break
+            wanted = max(done, FURTHER_RUN[0]) * min(share**2, 2.0)
+            self._average(omega, min(math.ceil(wanted), most))
+            value = float(self.known[omega].values[column])
+        return value
+
+    def _average(self, omega: float, wanted: int) -> None:
+        """Run until there are that many windows of further runs, and put their mean in the place of the value."""
+        options, first = self.options, self.known[omega]
+        parts = self._further.setdefault(omega, [])
+        settling = first.cycles if first.steady else max(options.settling_cycles, options.most_cycles // 2)
+        while (missing := wanted - sum(map(len, parts))) > 0:
+            count = min(max(missing, FURTHER_RUN[0]), FURTHER_RUN[1])
+            cycles = settling + count * options.window_cycles
+            phase = PHASE_STEP * (1 + len(parts)) % (2.0 * math.pi)
+            excitation = harmonic(self.amplitude_m_s2, omega, cycles=cycles, settling_cycles=settling, phase_rad=phase)
+            try:
+                response = self.run(excitation)
+            except DivergedError:
+                self.known[omega] = _unbounded(first.cycles)
+                return
+            edges = 2.0 * math.pi / omega * (settling + options.window_cycles * np.arange(count + 1, dtype=np.float64))
+            parts.append(values_between(response, edges, options.absolute))
+        windows = np.vstack(parts)
+        values = mean_values(windows)
+        scatter = _scatter(windows, values)
+        self.known[omega] = Steady(values, standard_errors(windows), first.steady, first.cycles, scatter)
