@@ -133,6 +133,20 @@ class Response:
         return float(self.time_s[-1]) / max(self.seconds, 1e-9)
 
 
+def base_shear(frame: Frame, absolute_acceleration: FloatArray) -> FloatArray:
+    """Return the force of structure and dampers on the ground [N], shape (m,).
+
+    Parameters
+    ----------
+    frame
+        Gives the masses.
+    absolute_acceleration
+        Of the degrees of freedom [m/s^2], shape (m, n).
+    """
+    # not by BLAS, whose second thread continues to run after a product of this length
+    return np.einsum("tf,f->t", absolute_acceleration, frame.ground_masses)
+
+
 def no_damper() -> Chain:
     """Return a chain whose force is zero."""
     return build_chain([])
@@ -235,7 +249,7 @@ def _plant(frame: Frame, w: FloatArray, dt: float) -> tuple[FloatArray, FloatArr
     outputs[2 * n, :n] = w
     outputs[2 * n + 1, n:] = w
     outputs[2 * n + 2] = relative
-    outputs[2 * n + 3, :n] = frame.mass.T @ frame.ground_influence
+    outputs[2 * n + 3, :n] = frame.ground_masses
     step_matrix = outputs @ np.column_stack([Ad, B0[:, 0], B1[:, 0], B0[:, 1]])
     step_matrix[2 * n + 2, 2 * n + 1] += w @ space.B[n:, 0]
     at_end = outputs @ B1[:, 1]
@@ -317,7 +331,7 @@ def _response(
         drive=tail[:, parts.T_DRIVE],
         desired_force=tail[:, parts.T_DESIRED],
         ground_acceleration=ground,
-        base_shear=np.einsum("tf,f->t", absolute, frame.mass.T @ frame.ground_influence),
+        base_shear=base_shear(frame, absolute),
         work_in=tail[:, parts.T_WORK_IN],
         work_damper=tail[:, parts.T_WORK_DAMPER],
         work_frame=tail[:, parts.T_WORK_FRAME],

@@ -33,7 +33,7 @@ from mrpipe.simulation import several_kernel as kernel
 from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import clock_of
 from mrpipe.simulation.excitation import Excitation
-from mrpipe.simulation.loop import LoopOptions, Response
+from mrpipe.simulation.loop import LoopOptions, Response, base_shear
 from mrpipe.simulation.sensors import add_fault, sensor_noise
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
@@ -204,7 +204,7 @@ def _plant(frame: Frame, positions: FloatArray, dt: float) -> tuple[FloatArray, 
     space = state_space(frame, -positions.T)
     Ad, B0, B1 = discretise_first_order(space.A, space.B, dt)
     step_matrix = np.column_stack([Ad, B0[:, 0], B1[:, 0], B0[:, 1:]])
-    columns = np.vstack([frame.ground_influence, frame.mass.T @ frame.ground_influence])
+    columns = np.vstack([frame.ground_influence, frame.ground_masses])
     arrays = (step_matrix.T, B1[:, 1:].T, space.A[n:].T, space.B[n:, 1:].T,
               frame.mass, frame.damping, frame.stiffness, columns)  # fmt: skip
     return tuple(np.ascontiguousarray(item, dtype=np.float64) for item in arrays)
@@ -301,7 +301,7 @@ def _response(
     tail = record[:, 3 * n + k * kernel.T_DEVICE :]
     ground = tail[:, kernel.T_GROUND]
     absolute = record[:, 2 * n : 3 * n]
-    shear = np.einsum("tf,f->t", absolute, frame.mass.T @ frame.ground_influence)
+    shear = base_shear(frame, absolute)
     found: dict[str, Response] = {}
     for place, item in enumerate(dampers):
         own = record[:, 3 * n + place * kernel.T_DEVICE :]

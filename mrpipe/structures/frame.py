@@ -46,6 +46,11 @@ class Frame:
         return np.ones(self.floors) if self.influence is None else self.influence
 
     @property
+    def ground_masses(self) -> FloatArray:
+        """Force on the ground per unit absolute acceleration of each degree of freedom, r' M, shape (n,) [kg]."""
+        return np.asarray(self.mass.T @ self.ground_influence)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the degrees of freedom."""
         return self.degrees_of_freedom or tuple(f"floor {k + 1}" for k in range(self.floors))
