@@ -60,7 +60,7 @@ def table_of(name: str, summary: Mapping[str, Any]) -> list[str]:
         "",
     ]
     laws, thesis = summary["laws"], summary["thesis"]
-    lines.append("[number]: value that the thesis prints; docs/benchmarks.md and docs/glossary.md explain the indices")
+    lines.append("[number]: value that the thesis prints; docs/benchmarks.md explains the indices")
     lines.append(f"{'':6}" + "".join(f"{law:>19}" for law in laws) + f"    {summary['model']} model")
     for index in next(iter(laws.values())):
         cells = []

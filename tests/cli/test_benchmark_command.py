@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from mrpipe.artifacts import Artifact
 from mrpipe.cli import run
 from mrpipe.cli.benchmark_command import overrides_of, table_of
 from mrpipe.errors import UserError
+from mrpipe.thesis.entries import printed_columns
 
 
 @pytest.mark.golden
@@ -112,8 +114,24 @@ def test_table_puts_the_thesis_beside_ours() -> None:
     }  # fmt: skip
     text = "\n".join(table_of("wind", summary))
     assert "surrogate model" in text
-    assert "[number]: value that the thesis prints; docs/benchmarks.md and docs/glossary.md explain the indices" in text
+    assert "[number]: value that the thesis prints; docs/benchmarks.md explains the indices" in text
     row = next(line for line in text.splitlines() if line.startswith("J1"))
     assert row.split() == ["J1", "0.5", "[0.63]", "0.7"]
     assert "kobe (surrogate model)" in text
     assert "why ours differ: reasons" in text
+
+
+@pytest.mark.property
+def test_the_documentation_explains_every_index() -> None:
+    """The line below the table of indices names a page: each index of each structure has its words there."""
+    page = (Path(__file__).parents[2] / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    cells = [[cell.strip() for cell in row.split("|")[1:-1]] for row in re.findall(r"(?m)^\| J\d+ .*$", page)]
+    explained = {
+        name: {row[0] for row in cells if row[column]}
+        for column, name in enumerate(("ten-storey", "base-isolated", "wind"), start=1)
+    }
+    assert explained == {
+        "ten-storey": set(printed_columns("P4 Table 2", "P4-T2")["vd"]),
+        "base-isolated": set(printed_columns("Table 6.2", "T6.2")["vd"]),
+        "wind": set(printed_columns("Table 6.3", "T6.3")["vd"]),
+    }
