@@ -114,7 +114,8 @@ class Pipeline:
     def _build(self, stage: Stage) -> Outcome:
         self.check(stage.name)
         missing = ""
-        for item in stage.inputs:
+        # inputs that no campaign can give come first, so that nothing is built for a stage that is then skipped
+        for item in sorted(stage.inputs, key=self.sources.configured):
             missing = missing or self._provide(item, stage.inputs)
         together = all(self._is_to_be_had(item) for item in stage.optional_inputs)
         for item in stage.optional_inputs:

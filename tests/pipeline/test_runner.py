@@ -120,6 +120,15 @@ def test_stage_without_campaign_is_skipped_with_all_after_it(make_pipeline: Make
     assert CALLS == []
 
 
+@pytest.mark.property
+def test_nothing_is_built_for_a_stage_that_lacks_a_campaign(make_pipeline: MakePipeline) -> None:
+    whole = replace(STAGES["after"], name="whole", inputs=("second", "after"), outputs=("whole.h5",))
+    outcome = make_pipeline({**STAGES, "whole": whole}).build("whole")
+    assert outcome.what == "skipped"
+    assert "there is no frame campaign" in outcome.manifest.skipped
+    assert CALLS == []
+
+
 def test_optional_input_is_used_where_it_is_there(make_pipeline: MakePipeline) -> None:
     assert make_pipeline().build("third").what == "built"
     assert CALLS == ["first", "second", "third"]
