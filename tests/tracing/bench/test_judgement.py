@@ -60,6 +60,21 @@ def test_the_class_follows_from_the_errors(found: Evidence, kind: str) -> None:
 
 
 @pytest.mark.property
+@given(
+    before=st.floats(0.01, 5.0), ratio=st.floats(1.0, 3.0), floor=st.floats(1e-4, 0.5), ceiling=st.floats(1e-4, 5.0),
+    structured=st.booleans(), changed=st.booleans(), events=st.floats(0.0, 1.0),
+)  # fmt: skip
+def test_an_effect_that_does_not_lower_the_error_explains_nothing(
+    before: float, ratio: float, floor: float, ceiling: float, structured: bool, changed: bool, events: float
+) -> None:
+    found = evidence(
+        before, ratio * before, structured=structured, changed=changed, floor=floor, ceiling=ceiling, events=events
+    )
+    assert classify(found, RULES) == "unknown"
+    assert found.share == 0.0
+
+
+@pytest.mark.property
 def test_the_share_is_that_of_the_squared_error_beyond_the_ceiling() -> None:
     assert recovered(0.1, 0.1, 0.01) == 0.0
     assert recovered(0.1, 0.01, 0.01) == 1.0

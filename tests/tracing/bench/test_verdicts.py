@@ -175,6 +175,27 @@ def test_drives_between_those_of_the_training_are_named_where_the_drive_law_fail
 
 
 @pytest.mark.planted
+def test_no_effect_is_named_where_the_model_is_worse_than_the_mean() -> None:
+    """A damper with play whose yield force between the drives of the training is far from what these suggest.
+
+    The play lowers the error of the training tests, but not that of validation tests with an NRMSE above 1.
+    """
+    t = np.arange(int(3.0 * RATE)) / RATE
+    plan = [("training", 1.0 + 0.3 * (k % 3), current) for k, current in enumerate((0.0, 1.0, 2.0, 3.0) * 2)]
+    plan += [("validation", 1.2 + 0.2 * k, current) for k, current in enumerate((0.5, 2.5))]
+    tests = [
+        recorded(f"{k}-{role}", role, 8e-3 * np.sin(2 * np.pi * frequency * t), current, k, "wide-backlash")
+        for k, (role, frequency, current) in enumerate(plan)
+    ]
+    found = traced([scaled(test, 0.3) if test.role == "validation" else test for test in tests], ("backlash",))
+    assert found["before"]["nrmse"] > 1.0
+    assert found["effects"] == []
+    assert found["verdict_class"] not in ("noise", "explained", "partly explained", "base form")
+    assert "explain" not in found["verdict"]
+    assert found["share_explained"] == 0.0
+
+
+@pytest.mark.planted
 def test_a_damper_that_never_yields_within_its_stroke_has_no_effect() -> None:
     t = np.arange(int(3.0 * RATE)) / RATE
     # the yield displacement of the rig is 0.37 mm
