@@ -97,6 +97,9 @@ class AmplitudeModel:
     largest_m
         Shape (r,): largest amplitude that counts for each mode in the records of the fit [m]; beyond it the laws are
         extrapolated.
+    smallest_m
+        Shape (r,): amplitude below which the records hold 5 % of the energy of each mode [m]; below it the laws are
+        extrapolated.
     """
 
     laws: AmplitudeLaws
@@ -106,6 +109,7 @@ class AmplitudeModel:
     shapes: FloatArray
     direct: FloatArray
     largest_m: FloatArray
+    smallest_m: FloatArray
 
     def response(self, test: FrameTest) -> FloatArray:
         """Return the simulated response of each sensor of a test, shape (m, s) [m/s2] or [m].

@@ -31,6 +31,8 @@ _LEAST_GAIN = 0.05
 _SUFFICIENT = 0.03
 """RMS error over RMS response below which constant modes serve. A natural frequency
 that is wrong by a fiftieth of the half-power bandwidth leaves about as much."""
+_LEAST_ENERGY = 0.05
+"""Share of the energy of a mode below the smallest amplitude at which its law is reported."""
 _EVALUATIONS = 25
 _STEP = 1e-5
 _START_SOFTENING = 0.005
@@ -354,16 +356,27 @@ def _model(problem: _Problem, theta: FloatArray) -> AmplitudeModel:
     common, laws = problem.common, problem.laws(theta)
     coefficients = problem.solve(theta)[0]
     shapes, direct = coefficients[:, : common.modes], coefficients[:, common.modes :]
-    largest = _largest(problem, laws)
-    return AmplitudeModel(laws, common.sensors, common.inputs, common.gains, shapes, direct, largest)
+    smallest, largest = _seen(problem, laws)
+    return AmplitudeModel(laws, common.sensors, common.inputs, common.gains, shapes, direct, largest, smallest)
 
 
-def _largest(problem: _Problem, laws: AmplitudeLaws) -> FloatArray:
-    """Return the largest amplitude that counts for each mode over all records, shape (r,) [m]."""
+def _seen(problem: _Problem, laws: AmplitudeLaws) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest and the largest amplitude that counts for each mode over all records, shape (r,) each [m].
+
+    The smallest is the amplitude below which the records hold 5 % of the energy of the mode: what is seen below it is
+    mostly noise.
+    """
     motions = [_simulated_record(laws, record) for record in problem.records]
+    own = np.abs(np.concatenate([item.displacement for item in motions]))
     if laws.measure == "motion":
-        return np.full(problem.common.modes, max(float(item.amplitude.max()) for item in motions))
-    return np.asarray(np.max([np.abs(item.displacement).max(axis=0) for item in motions], axis=0))
+        amplitude = np.concatenate([item.amplitude for item in motions])[:, None] * np.ones(own.shape[1])
+    else:
+        amplitude = own
+    order = np.argsort(amplitude, axis=0)
+    energy = np.cumsum(np.take_along_axis(own**2, order, axis=0), axis=0)
+    first = np.argmax(energy >= _LEAST_ENERGY * energy[-1], axis=0)
+    place = np.take_along_axis(order, first[None], axis=0)
+    return np.take_along_axis(amplitude, place, axis=0)[0], np.asarray(amplitude.max(axis=0))
 
 
 def _simulated_record(laws: AmplitudeLaws, record: _Record) -> Motion:
@@ -371,15 +384,16 @@ def _simulated_record(laws: AmplitudeLaws, record: _Record) -> Motion:
 
 
 def amplitude_finding(result: AmplitudeDependence) -> str:
-    """Return one line for the user: how far the modes change with amplitude, and what the laws gain."""
-    laws = result.model.laws
-    low, high = laws.at(0.0), laws.at(result.model.largest_m)
+    """Return one line for the user: how far the modes change over the amplitudes seen, and what the laws gain."""
+    model = result.model
+    low, high = model.laws.at(model.smallest_m), model.laws.at(model.largest_m)
     mode = int(np.argmax(np.abs(high[0] / low[0] - 1.0)))
-    reached = 1e3 * result.model.largest_m[mode]
+    seen = (
+        f"{omega[mode] / (2 * np.pi):.4g} Hz and {100 * zeta[mode]:.2g} % damping at {1e3 * reached[mode]:.2g} mm"
+        for (omega, zeta), reached in ((low, model.smallest_m), (high, model.largest_m))
+    )
     before, after = (100.0 * np.sqrt(np.mean(values)) for values in (result.constant_error, result.error))
     return (
-        f"modes depend on the amplitude: mode {mode + 1} from {low[0][mode] / (2 * np.pi):.4g} Hz and "
-        f"{100 * low[1][mode]:.2g} % damping (extrapolated to no motion) to {high[0][mode] / (2 * np.pi):.4g} Hz and "
-        f"{100 * high[1][mode]:.2g} % at {reached:.3g} mm; on data left out of the fit the RMS "
+        f"modes depend on the amplitude: mode {mode + 1} from {' to '.join(seen)}; on data left out of the fit the RMS "
         f"error falls from {before:.0f} to {after:.0f} % of the response"
     )

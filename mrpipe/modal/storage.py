@@ -90,12 +90,12 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
 
 
 def _over_amplitude(result: FrameIdentification) -> dict[str, Any] | None:
-    """Return the laws of the modes over amplitude, values up to the largest amplitude, and errors on data left out."""
+    """Return the laws of the modes over amplitude, values at the amplitudes seen, and errors on data left out."""
     found = result.amplitude
     if found is None:
         return None
-    laws, largest = found.model.laws, found.model.largest_m
-    shares = (0.0, 0.03, 0.1, 0.3, 1.0)
+    laws, smallest, largest = found.model.laws, found.model.smallest_m, found.model.largest_m
+    amplitudes = np.geomspace(smallest, largest, 5)
     return {
         "measure": laws.measure,
         "frequencies_hz": (laws.angular_frequencies / _TWO_PI).tolist(),
@@ -103,13 +103,14 @@ def _over_amplitude(result: FrameIdentification) -> dict[str, Any] | None:
         "softening_exponents": laws.softening.tolist(),
         "damping_exponents": laws.damping_growth.tolist(),
         "reference_amplitudes_m": laws.references_m.tolist(),
+        "seen_amplitudes_m": np.column_stack([smallest, largest]).tolist(),
         "at_amplitudes": [
             {
-                "amplitudes_m": (share * largest).tolist(),
-                "frequencies_hz": (laws.at(share * largest)[0] / _TWO_PI).tolist(),
-                "damping_ratios": laws.at(share * largest)[1].tolist(),
+                "amplitudes_m": each.tolist(),
+                "frequencies_hz": (laws.at(each)[0] / _TWO_PI).tolist(),
+                "damping_ratios": laws.at(each)[1].tolist(),
             }
-            for share in shares
+            for each in amplitudes
         ],
         "left_out": [
             {"name": name, "constant_modes_error": before, "error": after}

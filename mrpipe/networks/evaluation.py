@@ -103,6 +103,15 @@ def yield_travel(history: History) -> float:
     return float(edges[reached[0] + 1]) if len(reached) else longest
 
 
+def yield_time(history: History, yield_travel_m: float) -> float:
+    """Return the time [s] that the mean speed of some tests needs for the travel from a reversal to yield.
+
+    The force of a hysteresis depends on this part of the past. A network sees `past_values` samples of it.
+    """
+    speed = float(np.mean(np.abs(history.channels["velocity"]))) if history.samples else 0.0
+    return yield_travel_m / speed if speed > 0.0 else 0.0
+
+
 def regimes_of(history: History, yield_travel_m: float) -> IntArray:
     """Return the regime of each sample, a number into :data:`REGIMES`.
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from mrpipe.artifacts import Artifact
 from mrpipe.networks.assembly import History, read_history
 from mrpipe.networks.candidates import Candidate, Grid
-from mrpipe.networks.evaluation import Judgement
+from mrpipe.networks.evaluation import Judgement, yield_time
 from mrpipe.networks.network import FeatureSpec, spec_from_json
 from mrpipe.networks.options import THESIS_HIDDEN, SweepOptions, TrainingOptions
 from mrpipe.networks.scaling import Normalisation
@@ -83,7 +83,7 @@ def sweep_grid(options: SweepOptions, past_values: int) -> Grid:
     )
 
 
-def training_summary(trained: Trained, judged: Judgement) -> dict[str, Any]:
+def training_summary(trained: Trained, judged: Judgement, plan: TrainingPlan) -> dict[str, Any]:
     """Return what `train-forward` and `train-inverse` print: architecture, errors, baseline, spread over starts."""
     network = trained.network
     return {
@@ -100,6 +100,9 @@ def training_summary(trained: Trained, judged: Judgement) -> dict[str, Any]:
         "linear_baseline_r2": judged.linear.r2,
         "regime_nrmse": {name: figures.nrmse for name, figures in judged.regimes.items()},
         "yield_travel_m": judged.yield_travel_m,
+        "yield_time_s": yield_time(plan.validation, judged.yield_travel_m),
+        "training_tests": len(plan.training.names),
+        "training_tests_with_varying_drive": sum(plan.training.drive_varies),
         "constant_drive_nrmse": judged.constant.nrmse,
         "varying_drive_nrmse": judged.varying.nrmse,
         "held_out_nrmse_of_starts": [start.held_out_nrmse for start in trained.starts],

@@ -119,8 +119,30 @@ def weak_network(summaries: Mapping[str, Mapping[str, Any]]) -> str:
     return (
         f"The forward network misses the validation tests by {100.0 * error:.2g} % of the RMS force, "
         f"{error / reference:.2g} times the error of the damper model {damper.get('form', '')} "
-        f"({100.0 * reference:.2g} %). Use the damper model for predictions; a network needs tests with more motions."
+        f"({100.0 * reference:.2g} %). {_why_weak(network)}Use the damper model for predictions."
     )
+
+
+def _why_weak(network: Mapping[str, Any]) -> str:
+    """Return sentences on what limits a weak network: tests with a changing drive, and the part of the past it sees."""
+    found = []
+    steady, varying = network.get("constant_drive_nrmse"), network.get("varying_drive_nrmse")
+    tests, changing = network.get("training_tests", 0), network.get("training_tests_with_varying_drive", 0)
+    if steady and varying and varying > FAR_WORSE * steady:
+        found.append(
+            f"The error is {100.0 * varying:.2g} % in tests whose drive changes and {100.0 * steady:.2g} % in the "
+            f"others. The drive changes in only {changing} of {tests} training tests, so record more such tests."
+        )
+    rate = float(network.get("sampling_rate_hz") or 0.0)
+    window = network.get("past_values", 0) / rate if rate > 0.0 else 0.0
+    needed = float(network.get("yield_time_s") or 0.0)
+    if needed > FAR_WORSE * window > 0.0:
+        found.append(
+            f"The network sees {1e3 * window:.3g} ms of the past, but from a reversal of the motion until it yields the "
+            f"damper takes about {1e3 * needed:.0f} ms; a longer window (sweep.past_values) needs more tests with "
+            "irregular motion."
+        )
+    return "".join(f"{text} " for text in found)
 
 
 def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:

@@ -35,7 +35,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     if judged.finding:
         context.warn(judged.finding)
     section.describe(context.report, section.TrainedForward(trained, judged, plan.validation, free))
-    summary = training_summary(trained, judged)
+    summary = training_summary(trained, judged, plan)
     if free is not None:
         summary |= {"one_step_nrmse": judged.pooled.nrmse, "free_run_nrmse": free.nrmse, "free_run_r2": free.r2}
     return summary

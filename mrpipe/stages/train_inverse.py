@@ -62,7 +62,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     section.describe(context.report, section.TrainedInverse(trained, judged, validation, span, compared, tracking))
     varying = judged.varying_regimes
     return {
-        **training_summary(trained, judged),
+        **training_summary(trained, judged, plan),
         "drive_unit": unit,
         f"drive_range_{unit.lower()}": span,
         "varying_drive_error_over_range": {name: item.rms / span for name, item in varying.items()},

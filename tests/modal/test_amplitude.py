@@ -71,7 +71,15 @@ def test_planted_softening_is_found_and_predicts_what_was_left_out(softened):
         omega, zeta = found.model.laws.at(amplitude)
         assert omega[0] == pytest.approx(OMEGA[0] * (1 - 0.04 * level), rel=0.004)
         assert zeta[0] == pytest.approx(ZETA[0] * (1 + 2.0 * level), rel=0.2)
-    assert "modes depend on the amplitude: mode " in amplitude_finding(found)
+    smallest, largest = found.model.smallest_m, found.model.largest_m
+    assert np.all(smallest > 0.01 * largest) and np.all(smallest < 0.5 * largest)
+    text = amplitude_finding(found)
+    assert "modes depend on the amplitude: mode " in text
+    # values at the amplitudes that were seen, and none that is extrapolated to no motion
+    omega, zeta = found.model.laws.at(smallest)
+    assert (
+        f"from {omega[1] / (2 * np.pi):.4g} Hz and {100 * zeta[1]:.2g} % damping at {1e3 * smallest[1]:.2g} mm" in text
+    )
 
 
 @pytest.mark.planted

@@ -70,7 +70,9 @@ def test_the_third_run_is_predicted_from_the_first_two(northridge):
     runs = []
     for number, times in enumerate(RUNS_S, start=1):
         inside = slice(*(round(time * whole.sampling_rate_hz) for time in times))
-        part = replace(whole, name=f"run {number}", excitation=whole.excitation[inside], responses=whole.responses[inside])
+        part = replace(
+            whole, name=f"run {number}", excitation=whole.excitation[inside], responses=whole.responses[inside]
+        )
         runs.append(part)
     found = identify_frame(replace(northridge, forced=tuple(runs[:2])))
     unseen = corrected(runs[2], expected_clocks(found.clocks, found.tests, runs[2:]))

@@ -22,6 +22,23 @@ def test_a_network_far_worse_than_the_damper_model_is_named_with_both_errors() -
 
 
 @pytest.mark.property
+def test_a_weak_network_is_explained_by_its_tests_and_by_the_past_it_sees() -> None:
+    network = {
+        "validation_nrmse": 0.37, "constant_drive_nrmse": 0.1, "varying_drive_nrmse": 0.59, "training_tests": 11,
+        "training_tests_with_varying_drive": 1, "past_values": 3, "sampling_rate_hz": 200.0, "yield_time_s": 0.13,
+    }  # fmt: skip
+    damper = {"validation_nrmse": 0.127, "form": "dahl"}
+    text = weak_network({"train-forward": network, "identify-damper": damper})
+    assert (
+        "59 % in tests whose drive changes and 10 % in the others. The drive changes in only 1 of 11 training" in text
+    )
+    assert "sees 15 ms of the past" in text and "takes about 130 ms" in text
+    enough = {**network, "past_values": 20, "varying_drive_nrmse": 0.12}
+    text = weak_network({"train-forward": enough, "identify-damper": damper})
+    assert text.endswith("dahl (13 %). Use the damper model for predictions.")
+
+
+@pytest.mark.property
 def test_the_command_that_applies_corrections_is_complete() -> None:
     lines = in_brief("close-loop", tracing(corrections={"found": True, "file": "corrections.yaml"}))
     (line,) = [line for line in lines if "corrections" in line]
