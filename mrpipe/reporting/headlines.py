@@ -138,8 +138,8 @@ def _why_weak(network: Mapping[str, Any]) -> str:
     needed = float(network.get("yield_time_s") or 0.0)
     if needed > FAR_WORSE * window > 0.0:
         found.append(
-            f"The network sees {1e3 * window:.3g} ms of the past, but from a reversal of the motion until it yields the "
-            f"damper takes about {1e3 * needed:.0f} ms; a longer window (sweep.past_values) needs more tests with "
+            f"The network sees {1e3 * window:.3g} ms of the past, but from a reversal of the motion until it yields "
+            f"the damper takes about {1e3 * needed:.0f} ms; a longer window (sweep.past_values) needs more tests with "
             "irregular motion."
         )
     return "".join(f"{text} " for text in found)
