@@ -53,7 +53,12 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
         outcomes = [pipeline.build(name) for name in names]
     for outcome in outcomes:
         if outcome.what == "skipped":
-            raise UserError(outcome.stage, "", f"cannot run: {outcome.manifest.skipped}", "name the data that it needs")
+            raise UserError(
+                outcome.stage,
+                "",
+                f"cannot run: {outcome.manifest.skipped}",
+                "change the data or the setting that the reason names",
+            )
     if options.json:
         # a caller that reads standard output alone sees them too
         summaries = {

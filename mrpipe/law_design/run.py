@@ -141,11 +141,17 @@ def load_of(settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[f
             raise UserError("design.weights", name, "is not a quantity", f"one of {', '.join(QUANTITIES)}")
     if not 0.0 < band_rad_s[0] < band_rad_s[1]:
         raise UserError(
-            "design", "band_rad_s", f"{band_rad_s[0]:g} to {band_rad_s[1]:g}", "give a positive rising band"
+            "design.band_rad_s",
+            "",
+            f"is {band_rad_s[0]:g} to {band_rad_s[1]:g}",
+            "give a positive rising band, the lowest frequency first",
         )
     motions = []
-    for item in settings.motions:
-        time_s, acceleration = read_ground_record(Path(item.file), item.unit)
+    for number, item in enumerate(settings.motions):
+        setting = f"design.motions[{number}]"
+        time_s, acceleration = read_ground_record(
+            Path(item.file), item.unit, file_setting=f"{setting}.file", unit_setting=f"{setting}.unit"
+        )
         motions.append(Motion(Path(item.file).stem, recorded(time_s, acceleration, scale=item.scale)))
     amplitudes = tuple(factor * amplitude_m_s2 for factor in sorted(settings.amplitude_factors))
     return Load(band_rad_s, amplitudes, tuple(motions))

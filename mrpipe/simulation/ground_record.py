@@ -11,7 +11,13 @@ from mrpipe.errors import UserError
 from mrpipe.units import to_si
 
 
-def read_ground_record(path: Path, unit: str) -> tuple[FloatArray, FloatArray]:
+def read_ground_record(
+    path: Path,
+    unit: str,
+    *,
+    file_setting: str = "simulate.excitation.file",
+    unit_setting: str = "simulate.excitation.file_unit",
+) -> tuple[FloatArray, FloatArray]:
     """Return time [s] and acceleration [m/s^2], shape (m,) each.
 
     Parameters
@@ -21,16 +27,18 @@ def read_ground_record(path: Path, unit: str) -> tuple[FloatArray, FloatArray]:
         that do not begin with a number are headers.
     unit
         Of the acceleration.
+    file_setting, unit_setting
+        Settings that name file and unit, for messages.
 
     Raises
     ------
     UserError
         If the file is missing, a row has fewer than two numbers, or the clock does not rise.
     """
+    if not path.name:
+        raise UserError(file_setting, "", "is empty", "name a text file of two columns, time [s] and acceleration")
     if not path.is_file():
-        raise UserError(
-            "simulate.excitation.file", str(path), "there is no such file", "name a text file of two columns"
-        )
+        raise UserError(file_setting, str(path), "there is no such file", "name a text file of two columns")
     rows = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
         words = line.replace(",", " ").replace(";", " ").split()
@@ -48,4 +56,4 @@ def read_ground_record(path: Path, unit: str) -> tuple[FloatArray, FloatArray]:
         raise UserError(path, f"row {wrong[0] + 2}", "time does not rise", "give a strictly rising clock in seconds")
     if not np.all(np.isfinite(table)):
         raise UserError(path, "", "holds a number that is not finite", "give finite accelerations")
-    return table[:, 0], to_si(table[:, 1], unit, where="simulate.excitation.file_unit", quantity="acceleration")
+    return table[:, 0], to_si(table[:, 1], unit, where=unit_setting, quantity="acceleration")

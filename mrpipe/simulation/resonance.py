@@ -133,7 +133,10 @@ def measure_resonance(
     """
     if not 0.0 < band_rad_s[0] < band_rad_s[1]:
         raise UserError(
-            "resonance", "band_rad_s", f"{band_rad_s[0]:g} to {band_rad_s[1]:g}", "give a positive rising band"
+            "resonance.band_rad_s",
+            "",
+            f"is {band_rad_s[0]:g} to {band_rad_s[1]:g}",
+            "give a positive rising band, the lowest frequency first",
         )
     amplitude = excitation.details.get("base_amplitude_m_s2")
     if amplitude is None:

@@ -86,7 +86,7 @@ class ResponseCurve:
         result: dict[str, object] = {"base_amplitude_m_s2": self.base_amplitude_m_s2}
         result["resonance_rad_s"] = self.resonance_rad_s
         result.update({f"peak_{name}": self.peak(name) for name in DISPLAYED})
-        result.update({f"standard_error_{name}": self.peak_error(name) for name in DISPLAYED})
+        result.update({f"standard_error_{name}": self.peak_error(name) for name in CurveOptions().refined})
         return result
 
 

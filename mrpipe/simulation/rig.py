@@ -15,6 +15,7 @@ from mrpipe.control.assembly import ControllerFactory, inverse_network
 from mrpipe.control.controller import Controller
 from mrpipe.control.gains import Gains, GainsSource
 from mrpipe.control.law import Law
+from mrpipe.control.laws import law_named
 from mrpipe.control.storage import read_calibrated_with
 from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import Chain
@@ -73,6 +74,15 @@ class Rig:
     def perfect(self) -> bool:
         """Whether the damper gives any force that is desired, and the sensors are perfect."""
         return self.options.tracking == "ideal"
+
+    def reason_to_skip(self, law: str) -> str:
+        """Return why the loop cannot run under a law; empty if it can."""
+        skipped = self.controllers.calibrated.skipped
+        if law in skipped:
+            return f"law {law} could not be calibrated: {skipped[law]}"
+        if self.options.tracking != "damper" and law_named(law).output == "drive":
+            return f"law {law} commands the drive, so that a perfect damper (simulate.tracking) has no force"
+        return ""
 
     def controller(self, law: str | Law, gains: Gains | None = None) -> Controller:
         """Return the controller of a law, with its calibrated gains or others."""

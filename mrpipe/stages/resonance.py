@@ -26,12 +26,15 @@ def resonance_stage(law: str) -> Stage:
 
 
 def _run(context: StageContext, law: str) -> Mapping[str, Any]:
+    from mrpipe.errors import StageSkipped
     from mrpipe.reporting import resonance as report
     from mrpipe.simulation.resonance import default_band, measure_resonance
     from mrpipe.simulation.rig import excitation_of, read_rig
     from mrpipe.simulation.storage import write_curves
 
     rig = read_rig(context.settings.simulate, context.artifact, context.settings.gains.source)
+    if reason := rig.reason_to_skip(law):
+        raise StageSkipped(reason)
     settings = context.settings.resonance
     excitation, _ = excitation_of(rig, context.settings.simulate.excitation)
     band = settings.band_rad_s or default_band(context.artifact("calibrate"))

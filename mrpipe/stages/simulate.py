@@ -26,7 +26,6 @@ def simulate_stage(law: str) -> Stage:
 
 
 def _run(context: StageContext, law: str) -> Mapping[str, Any]:
-    from mrpipe.control.laws import law_named
     from mrpipe.dampers.model import read_tested
     from mrpipe.errors import StageSkipped
     from mrpipe.reporting import simulate as report
@@ -37,10 +36,8 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
 
     settings = context.settings.simulate
     rig = read_rig(settings, context.artifact, context.settings.gains.source)
-    if law in rig.controllers.calibrated.skipped:
-        raise StageSkipped(f"law {law} could not be calibrated: {rig.controllers.calibrated.skipped[law]}")
-    if rig.options.tracking != "damper" and law_named(law).output == "drive":
-        raise StageSkipped(f"law {law} commands the drive, so that a perfect damper (simulate.tracking) has no force")
+    if reason := rig.reason_to_skip(law):
+        raise StageSkipped(reason)
     controller = rig.controller(law)
     excitation, viscous = excitation_of(rig, settings.excitation, context.warn)
     context.progress(0.4, f"loop under {law}")

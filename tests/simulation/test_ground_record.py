@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,18 @@ def test_faults(tmp_path, text, unit, words):
 def test_missing_file(tmp_path):
     with pytest.raises(UserError, match="no such file"):
         read_ground_record(tmp_path / "none.txt", "g")
+
+
+@pytest.mark.golden
+def test_the_setting_at_fault_is_named(tmp_path):
+    with pytest.raises(UserError, match=r"^simulate.excitation.file: is empty; name a text file"):
+        read_ground_record(Path(""), "g")
+    with pytest.raises(UserError, match=r"^design.motions\[0\].file: .*none.txt: there is no such file"):
+        read_ground_record(tmp_path / "none.txt", "g", file_setting="design.motions[0].file")
+    path = tmp_path / "record.txt"
+    path.write_text("0 1\n1 2\n")
+    with pytest.raises(UserError, match=r"design.motions\[0\].unit"):
+        read_ground_record(path, "mm", unit_setting="design.motions[0].unit")
 
 
 @pytest.mark.real

@@ -29,12 +29,13 @@ from mrpipe.networks.network import write_network
 from mrpipe.pipeline.runner import plain
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import Stage, StageContext
-from mrpipe.stages import calibrate, export_controller, export_models, export_opensees
+from mrpipe.stages import calibrate, export_controller, export_models, export_opensees, resonance
 from mrpipe.stages.simulate import STAGES
 from mrpipe.structures import frame_from_parameter_set, natural_modes, shear_frame, write_frame
 from tests.control.conftest import random_network
 
 SIMULATE = {stage.name: stage for stage in STAGES}
+RESONANCE = {stage.name: stage for stage in resonance.STAGES}
 CONTRACT = (
     "law rms_x1_m rms_x5_m rms_x_top_m rms_a1_m_s2 rms_a5_m_s2 peak_x1_m peak_x5_m peak_a1_m_s2 peak_a5_m_s2 "
     "damping_ratio force_tracking_nrmse residual_force_n real_time_factor"
@@ -237,6 +238,8 @@ def test_a_law_without_calibration_is_told(run):
     try:
         with pytest.raises(UserError, match="laws/vdps: this law is not calibrated; calibrated: vd, vdns"):
             run(SIMULATE["simulate-vdps"])
+        with pytest.raises(StageSkipped, match="law vdps could not be calibrated"):
+            run(RESONANCE["resonance-vdps"])
     finally:
         run(calibrate.STAGE, {"calibrate": SMALL})
 
@@ -376,6 +379,15 @@ def test_a_law_that_cannot_be_calibrated_is_skipped_with_its_reason(run, monkeyp
         assert any("law vdps was skipped" in line for line in summary["warnings"])
         with pytest.raises(StageSkipped, match=r"law vdps could not be calibrated: .*has no optimum here"):
             run(SIMULATE["simulate-vdps"])
+        with pytest.raises(StageSkipped, match="law vdps could not be calibrated"):
+            run(RESONANCE["resonance-vdps"])
     finally:
         monkeypatch.undo()
         run(calibrate.STAGE, {"calibrate": SMALL})
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("stage", [SIMULATE["simulate-passive-on"], RESONANCE["resonance-passive-on"]])
+def test_a_law_without_a_force_is_skipped_with_a_perfect_damper(run, stage):
+    with pytest.raises(StageSkipped, match=r"law passive-on commands the drive, so that a perfect damper"):
+        run(stage, {"simulate": {"tracking": "ideal"}})
