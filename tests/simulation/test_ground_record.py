@@ -48,7 +48,7 @@ def test_missing_file(tmp_path):
 @pytest.mark.golden
 def test_the_setting_at_fault_is_named(tmp_path):
     with pytest.raises(UserError, match=r"^simulate.excitation.file: is empty; name a text file"):
-        read_ground_record(Path(""), "g")
+        read_ground_record(Path(), "g")
     with pytest.raises(UserError, match=r"^design.motions\[0\].file: .*none.txt: there is no such file"):
         read_ground_record(tmp_path / "none.txt", "g", file_setting="design.motions[0].file")
     path = tmp_path / "record.txt"
