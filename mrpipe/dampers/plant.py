@@ -104,6 +104,8 @@ class Step:
         recordings can give that; a closed loop runs without such steps.
     back_s, kept
         Time that it looks back [s], and how many samples its memory keeps for this.
+    filters_force
+        It replaces the force by a linear filter of the force. A fit then filters each part of the force separately.
     """
 
     name: str
@@ -114,6 +116,7 @@ class Step:
     ahead_s: float = 0.0
     back_s: float = 0.0
     kept: int = 0
+    filters_force: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,8 @@ class Chain:
         Of the steps.
     ahead_s, memories
         See :class:`Step`.
+    filters
+        Places of the steps that filter the force.
     """
 
     functions: tuple[Any, ...]
@@ -139,6 +144,7 @@ class Chain:
     names: tuple[str, ...]
     ahead_s: float = 0.0
     memories: tuple[tuple[str, float, int], ...] = ()
+    filters: tuple[int, ...] = ()
 
     def check_interval(self, dt: float) -> None:
         """Raise UserError where a step looks back further than its memory reaches at this interval [s]."""
@@ -208,6 +214,7 @@ def build_chain(steps: Sequence[Step]) -> Chain:
         names=tuple(step.name for step in ordered),
         ahead_s=sum(step.ahead_s for step in ordered),
         memories=tuple((step.name, step.back_s, step.kept) for step in ordered if step.back_s > 0.0),
+        filters=tuple(place for place, step in enumerate(ordered) if step.filters_force),
     )
 
 

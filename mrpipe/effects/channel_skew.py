@@ -12,14 +12,16 @@ from mrpipe.dampers.plant import (
     DISPLACEMENT,
     DRIVE,
     FIRST,
+    FORCE,
     STEP_SIGNATURE,
     VELOCITY,
     Phase,
     Step,
     idle_step,
 )
+from mrpipe.dampers.second_order import second_order_filter
 from mrpipe.dampers.timing import between
-from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, strength
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
 
 INSTANTS = 1024
 """Instants that the late force can look back."""
@@ -59,10 +61,22 @@ def late_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray,
     state[-1] = (at + 1) % size
 
 
+@njit(STEP_SIGNATURE, cache=True)
+def filtered_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: delay [s], damping ratio. State: that of :func:`second_order_filter`."""
+    second_order_filter(state, wire[FORCE], parameters[0], parameters[1], dt, int(wire[FIRST]))
+    wire[FORCE] = state[0]
+
+
 def _late(values: Values) -> list[Step]:
     skew = values["skew"]
     size = _KEPT * INSTANTS + 1
     return [Step("late-force", Phase.MOTION, late_force_step, np.array([skew]), size, back_s=skew, kept=INSTANTS)]
+
+
+def _filtered(values: Values) -> list[Step]:
+    numbers = np.array([values["skew"], values["damping_ratio"]])
+    return [Step("filtered-force", Phase.SENSOR, filtered_force_step, numbers, 3, filters_force=True)]
 
 
 def _shift(values: Values) -> list[Step]:
@@ -76,7 +90,7 @@ EFFECT = Effect(
     remedy="Check time stamps with a common step on both inputs; give both channels the same filter.",
     residual="A loop over velocity that grows with frequency and vanishes where the force is constant; the "
     "measured loop is turned against the model's.",
-    source="multiplexed data loggers",
+    source="multiplexed data loggers; amplifiers with a low-pass filter",
     acts_on="time base",
     forms=(
         EffectForm(
@@ -90,6 +104,15 @@ EFFECT = Effect(
             "F(t - T)",
             (strength("skew", "s", "time that force lies behind displacement and drive", "one", 0.0, 0.03, 0.0005),),
             _late,
+        ),
+        EffectForm(
+            "filtered-force",
+            "F_m'' + 2 zeta omega F_m' + omega^2 (F_m - F) = 0, T = 2 zeta/omega",
+            (
+                strength("skew", "s", "time by which slow changes of the force are late", "one", 0.0, 0.03, 0.0005),
+                shape("damping_ratio", "1", "of the filter of the force channel", "one", 0.5, 2.0, (0.8,)),
+            ),
+            _filtered,
         ),
     ),
     sensor=True,

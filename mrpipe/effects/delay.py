@@ -10,6 +10,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, FIRST, STEP_SIGNATURE, Phase, Step
+from mrpipe.dampers.second_order import second_order_filter
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
 
 BUFFER = 2048
@@ -56,29 +57,8 @@ def second_lag_step(wire: FloatArray, state: FloatArray, parameters: FloatArray,
 
 @njit(STEP_SIGNATURE, cache=True)
 def second_order_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: delay 2 zeta/omega [s], damping ratio. State: output, its rate, last input. Trapezoidal steps."""
-    u = wire[CURRENT]
-    if wire[FIRST] > 0.5:
-        state[0] = u
-        state[1] = 0.0
-        state[2] = u
-    if parameters[0] > 1e-7:
-        omega = 2.0 * parameters[1] / parameters[0]
-        count = min(int(omega * dt / 0.3) + 1, 50)
-        h = dt / count
-        damping = 2.0 * parameters[1] * omega
-        for index in range(count):
-            middle = state[2] + (u - state[2]) * (index + 0.5) / count
-            force = omega * omega * (middle - state[0]) - damping * state[1]
-            change = h * force / (1.0 + 0.5 * h * damping + 0.25 * h * h * omega * omega)
-            # the mean rate over the step acts on the displacement within it
-            change -= 0.5 * h * h * omega * omega * state[1] / (1.0 + 0.5 * h * damping + 0.25 * h * h * omega * omega)
-            state[0] += h * (state[1] + 0.5 * change)
-            state[1] += change
-    else:
-        state[0] = u
-        state[1] = 0.0
-    state[2] = u
+    """Parameters: delay 2 zeta/omega [s], damping ratio. State: that of :func:`second_order_filter`."""
+    second_order_filter(state, wire[CURRENT], parameters[0], parameters[1], dt, int(wire[FIRST]))
     wire[CURRENT] = state[0]
 
 

@@ -20,6 +20,7 @@ from mrpipe.fitting.kernel import (
     SUM_VELOCITY_AT,
     VISCOSITY_AT,
     YIELD_AT,
+    filter_parts,
     run_recordings,
 )
 from mrpipe.fitting.problem import Problem
@@ -146,6 +147,8 @@ def regressors(problem: Problem, theta: FloatArray) -> FloatArray:
     for place in order:
         columns[row] = wires[COLUMNS + place]
         row += 1
+    if chain.filters:
+        columns = filter_parts(chain, columns, problem.recordings)
     if problem.window_share > 0.0:
         columns = moving_average(columns, problem.recordings, problem.window_share)
     return columns

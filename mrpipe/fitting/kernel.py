@@ -158,3 +158,47 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
         result,
     )
     return result
+
+
+@njit(
+    void(int64, float64[::1], int64, int64[::1], float64[::1], float64[:, ::1]),
+    cache=True,
+    nogil=True,
+)
+def _filter_rows(
+    address: int, parameters: FloatArray, state_size: int, starts: IntArray, dt: FloatArray, rows: FloatArray
+) -> None:
+    wire = np.zeros(WIRE_SIZE)
+    state = np.zeros(state_size)
+    for row in range(rows.shape[0]):
+        for test in range(starts.shape[0] - 1):
+            state[:] = 0.0
+            for index in range(starts[test], starts[test + 1]):
+                wire[FIRST] = 1.0 if index == starts[test] else 0.0
+                wire[FORCE] = rows[row, index]
+                step_at(address)(wire, state, parameters, dt[test])
+                rows[row, index] = wire[FORCE]
+
+
+def filter_parts(chain: Chain, parts: FloatArray, recordings: Recordings) -> FloatArray:
+    """Return parts of the force behind the filters of the force channel.
+
+    A filter is linear, so the measured force is the sum of the filtered parts.
+
+    Parameters
+    ----------
+    chain
+        Its steps that filter the force are applied, each with a state of its own for each part and test.
+    parts
+        Shape (c, n) [N].
+    recordings
+        The tests that the parts belong to.
+    """
+    parts = np.ascontiguousarray(parts)
+    for place in chain.filters:
+        begin, end = chain.parameter_offsets[place : place + 2]
+        size = int(chain.state_offsets[place + 1] - chain.state_offsets[place])
+        address = int(addresses_of(chain)[place])
+        parameters = np.ascontiguousarray(chain.parameters[begin:end])
+        _filter_rows(address, parameters, size, recordings.starts, recordings.dt, parts)
+    return parts

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mrpipe.dampers.forms import form_names
-from mrpipe.dampers.plant import FORCE, SLIP, run_chain
-from mrpipe.fitting.kernel import FORCE_AT, run_recordings
+from mrpipe.dampers.plant import FORCE, SLIP, build_chain, run_chain
+from mrpipe.effects.library import damper_effects
+from mrpipe.fitting.kernel import FORCE_AT, filter_parts, run_recordings
 from mrpipe.fitting.recordings import Recordings
 from tests.dampers.test_forms import NUMBERS, model
 
@@ -44,3 +45,15 @@ def test_both_loops_agree(form: str) -> None:
         wires = run_chain(chain, *(channel[piece] for channel in channels), dt)
         assert np.ptp(wires[:, SLIP]) > 0.0
         np.testing.assert_allclose(force[piece], wires[:, FORCE], rtol=1e-12, atol=1e-9)
+
+
+def test_filtered_parts_of_the_force_add_up_to_the_filtered_force() -> None:
+    tests = _recordings()
+    plain = model("bouc-wen").steps()
+    effect = damper_effects()["channel-skew"].form("filtered-force")
+    filtered = build_chain([*plain, *effect.steps({"skew": 0.012, "damping_ratio": 0.7})])
+    force = run_recordings(build_chain(plain), tests)[FORCE_AT]
+    wanted = run_recordings(filtered, tests)[FORCE_AT]
+    parts = filter_parts(filtered, np.stack([0.3 * force, 0.7 * force]), tests)
+    assert np.max(np.abs(wanted - force)) > 0.1 * np.max(np.abs(force))
+    np.testing.assert_allclose(parts.sum(axis=0), wanted, rtol=1e-12, atol=1e-9)

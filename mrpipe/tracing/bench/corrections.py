@@ -70,7 +70,7 @@ def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Correction
             continue
         if term.effect.name == "channel-skew":
             late = float(values["skew"])
-            if term.form.name == "late-force":
+            if term.form.name in ("late-force", "filtered-force"):
                 found = replace(found, force_late_s=late)
             else:
                 found = replace(found, displacement_late_s=late)
