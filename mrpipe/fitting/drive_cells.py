@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.dampers.laws import LawShape
 from mrpipe.fitting.engine import Fit, centred, regressors, weighting
 from mrpipe.fitting.kernel import CURRENT_AT, run_recordings
@@ -16,7 +16,7 @@ from mrpipe.fitting.start import LEVEL_SHARE, drive_varies, mean_levels
 BINS = 8
 """A drive that varies is sorted into so many levels."""
 
-CELLS = 32
+CELLS = 128
 """Within each of which the law is taken as constant over so many parts of the whole range."""
 
 
@@ -51,31 +51,47 @@ class Cells:
 
 
 def cells_of(found: Fit) -> Cells:
-    """Return the sums that laws are fitted to, from a fit of any form."""
+    """Return the sums that laws are fitted to, from a fit of any form.
+
+    The offset of a test is one number for all its cells. At constant drive a test has one cell, and its means are
+    subtracted. Where the drive varies the mean of a law times a signal is not the law times the mean of the signal,
+    so the offset that the fit found is subtracted from the force instead.
+    """
     problem = found.problem
     flat = LawShape("polynomial", 0)
     base = replace(problem.base, laws=(flat,) * len(problem.base.laws))
     plain = replace(problem, base=base, reference=found.laws)
     w = weighting(problem)
-    columns = centred(regressors(plain, found.theta)[:, w.at], w)[0]
-    force = centred(problem.recordings.force[w.at][None], w)[0][0]
+    signals = regressors(plain, found.theta)[:2, w.at]
     own = regressors(problem, found.theta)[:, w.at]
-    own = centred(own, w)[0]
     # what is neither yield force nor viscosity stays as the fit has it
     first = sum(law.count for law in problem.base.laws[:2])
-    force = force - found.linear[first:] @ own[first:]
-    current = run_recordings(found.chain(), problem.recordings)[CURRENT_AT][w.at]
-    limit = problem.scales.drive
     test = problem.recordings.test[w.at]
-    share = current / limit
+    force = problem.recordings.force[w.at] - found.test_offsets[test] - found.linear[first:] @ own[first:]
+    share = run_recordings(found.chain(), problem.recordings)[CURRENT_AT][w.at] / problem.scales.drive
     if drive_varies(problem.recordings):
         part = np.clip((share * CELLS).astype(np.int64), 0, CELLS - 1)
         level = part * BINS // CELLS
     else:
-        level = levels_of_tests(mean_levels(problem.recordings), limit)[test]
+        level = levels_of_tests(mean_levels(problem.recordings), problem.scales.drive)[test]
         part = level
     key = np.unique(test * (CELLS + 1) + part, return_inverse=True)[1]
-    signals = columns[:2]
+    rows = np.vstack([signals, force])
+    constant = _one_cell(test, key)
+    rows = np.where(constant, centred(rows, w)[0], rows * w.root)
+    return _sums(key, share, level, rows[:2], rows[2], problem.scales.drive)
+
+
+def _one_cell(test: IntArray, key: IntArray) -> BoolArray:
+    """Return whether each sample belongs to a test that has one cell."""
+    pairs = np.unique(np.stack([test, key]), axis=1)
+    return np.asarray(np.bincount(pairs[0])[test] == 1)
+
+
+def _sums(
+    key: IntArray, share: FloatArray, level: IntArray, signals: FloatArray, force: FloatArray, limit: float
+) -> Cells:
+    """Return the sums over the samples of each cell `key`; signals have shape (2, n)."""
     count = int(key.max()) + 1
     size = np.bincount(key)
     gram = np.empty((count, 2, 2))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mrpipe.fitting.drive_cells import BINS, Cells, cells_of, levels_of_tests
+from mrpipe.fitting.drive_laws import fit_laws
 from mrpipe.fitting.form_fit import FitMethod, fit_form
 from tests.dampers.planted import SET_C, bench_test
 from tests.fitting.test_form_fit import problem_of
@@ -42,3 +43,11 @@ def test_a_varying_drive_is_sorted_into_levels() -> None:
     # products are those of real signals
     assert np.all(np.linalg.eigvalsh(found.gram) > -1e-9 * np.abs(found.gram).max())
     assert np.all(found.power >= 0.0)
+
+
+def test_cells_of_a_varying_drive_leave_the_error_of_the_fit() -> None:
+    # the mean of a law times a signal over a test is not the law times the mean of the signal
+    tests = [bench_test(f"t{k}", "training", 8e-3, 1.5, ("half-sine", 4.0), seed=k) for k in range(2)]
+    found = fit_form(problem_of(tests, orders=(2, 1)), FitMethod(starts=1, iterations=15)).fit
+    errors = fit_laws(cells_of(found), found.problem.base.laws[:2])[0]
+    assert float(np.sum(errors)) == pytest.approx(found.cost, rel=0.1)
