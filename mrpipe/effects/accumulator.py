@@ -13,13 +13,13 @@ from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, ampl
 
 @njit(STEP_SIGNATURE, cache=True)
 def spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: stiffness [N/m], kind (1 linear, 2 square, 3 cube, 4 gas), gas length [m]."""
+    """Parameters: stiffness [N/m], kind (1 linear, 2 cube, 3 square, 4 gas), gas length [m]."""
     x = wire[DISPLACEMENT]
     kind = parameters[1]
     if kind == 1.0:
         force = x
     elif kind == 2.0:
-        force = x * abs(x)
+        force = x * x * x
     elif kind == 3.0:
         force = x * x
     else:
@@ -41,10 +41,15 @@ def _curved(values: Values) -> list[Step]:
     return [_spring("spring", values["stiffness"], 1.0), _spring("curvature", values["curvature"], 3.0)]
 
 
+def _hardening(values: Values) -> list[Step]:
+    return [*_curved(values), _spring("hardening", values["hardening"], 2.0)]
+
+
 def _gas(values: Values) -> list[Step]:
     return [_spring("gas", values["stiffness"], 4.0, values["gas_length"])]
 
 
+_CURVATURE = amplitude("curvature", "N/m^2", "second-order stiffness", "force/stroke^2", -5.0, 5.0)
 _STIFFNESS = amplitude("stiffness", "N/m", "stiffness about the middle", "force/stroke", 0.0, 5.0)
 
 EFFECT = Effect(
@@ -60,7 +65,7 @@ EFFECT = Effect(
         EffectForm(
             "curved",
             "F + k x + k2 x^2",
-            (_STIFFNESS, amplitude("curvature", "N/m^2", "second-order stiffness", "force/stroke^2", -5.0, 5.0)),
+            (_STIFFNESS, _CURVATURE),
             _curved,
             {"stiffness": 0, "curvature": 1},
         ),
@@ -77,4 +82,17 @@ EFFECT = Effect(
         "inertia": Separation("the same stroke at several frequencies", ("frequencies",)),
         "end-stop": Separation("the same motion at a smaller amplitude", ("amplitudes",)),
     },
+    refinements=(
+        EffectForm(
+            "hardening",
+            "F + k x + k2 x^2 + k3 x^3",
+            (
+                _STIFFNESS,
+                _CURVATURE,
+                amplitude("hardening", "N/m^3", "third-order stiffness", "force/stroke^3", -5.0, 5.0),
+            ),
+            _hardening,
+            {"stiffness": 0, "curvature": 1, "hardening": 2},
+        ),
+    ),
 )

@@ -44,6 +44,13 @@ def asymmetry_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
 
 
 @njit(STEP_SIGNATURE, cache=True)
+def rounded_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: amplitude, force [N] below which the difference between the directions fades."""
+    force = wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]
+    wire[FORCE] += parameters[0] * (math.sqrt(force * force + parameters[1] * parameters[1]) - parameters[1])
+
+
+@njit(STEP_SIGNATURE, cache=True)
 def direction_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: amplitude, transition velocity [m/s], kind (0 yield, 1 both).
 
@@ -81,6 +88,11 @@ def _both(values: Values) -> list[Step]:
 
 def _own(values: Values) -> list[Step]:
     return [_one(values["friction"], 3.0), _one(values["friction_rate"], 4.0), _one(values["drag"], 5.0)]
+
+
+def _rounded(values: Values) -> list[Step]:
+    numbers = np.array([values["share"], values["knee_force"]])
+    return [Step("asymmetry", Phase.FORCE_EFFECT, rounded_step, numbers)]
 
 
 _SHARE = amplitude("share", "1", "half the difference of the two directions over their mean", "one", -0.9, 0.9)
@@ -129,4 +141,13 @@ EFFECT = Effect(
     separated_by={
         "offset": Separation("constant drive at several speeds; rest at several drives", ("constants", "rest"))
     },
+    refinements=(
+        EffectForm(
+            "rounded",
+            "F + s (sqrt((alpha z + c v)^2 + f^2) - f)",
+            (_SHARE, shape("knee_force", "N", "force below which it fades", "force", 1e-3, 2.0, (0.03, 0.2))),
+            _rounded,
+            {"share": 0},
+        ),
+    ),
 )

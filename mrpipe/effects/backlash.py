@@ -8,7 +8,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -40,6 +40,36 @@ def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
     state[3] += moved
     wire[DISPLACEMENT] = state[3]
     # the damper's share of the rod's speed: without a gap the velocity is left as it is
+    if rod != 0.0:
+        wire[VELOCITY] *= min(max(moved / rod, 0.0), 1.0)
+
+
+_PLAYS = 8
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: mean gap [m], spread of the gaps (0..1). State: plays, damper, rod.
+
+    A Prandtl-Ishlinskii operator: the mean of plays whose gaps lie evenly from g (1 - s) to g (1 + s), as where soft or
+    uneven flanks take the damper along little by little.
+    """
+    x = wire[DISPLACEMENT]
+    gap, spread = parameters[0], parameters[1]
+    if wire[FIRST] > 0.5:
+        for index in range(_PLAYS + 2):
+            state[index] = x
+        return
+    moved = 0.0
+    for index in range(_PLAYS):
+        half = 0.5 * gap * (1.0 + spread * ((2.0 * index + 1.0) / _PLAYS - 1.0))
+        before = state[index]
+        state[index] = min(max(before, x - half), x + half)
+        moved += (state[index] - before) / _PLAYS
+    rod = x - state[_PLAYS + 1]
+    state[_PLAYS + 1] = x
+    state[_PLAYS] += moved
+    wire[DISPLACEMENT] = state[_PLAYS]
     if rod != 0.0:
         wire[VELOCITY] *= min(max(moved / rod, 0.0), 1.0)
 
@@ -129,6 +159,11 @@ def _lost(values: Values) -> list[Step]:
     return [Step("lost-motion", Phase.MOTION, lost_motion_step, numbers, 1)]
 
 
+def _graded(values: Values) -> list[Step]:
+    numbers = np.array([values["gap"], values["spread"]])
+    return [Step("graded-play", Phase.MOTION, graded_play_step, numbers, _PLAYS + 2)]
+
+
 _GAP = strength("gap", "m", "distance between the flanks", "stroke", 0.0, 0.5, 0.004)
 
 EFFECT = Effect(
@@ -161,4 +196,12 @@ EFFECT = Effect(
         ),
     ),
     separated_by={"migration": Separation("slow small triangles about reversal at two currents", ("reversal",))},
+    refinements=(
+        EffectForm(
+            "graded",
+            "mean of plays of gaps from g (1 - s) to g (1 + s)",
+            (_GAP, Parameter("spread", "1", "0: one gap, 1: gaps from 0 on", "one", 0.0, 1.0, (0.5,))),
+            _graded,
+        ),
+    ),
 )

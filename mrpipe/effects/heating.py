@@ -9,7 +9,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import FIRST, STEP_SIGNATURE, VISCOSITY, WORK, YIELD_FORCE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -29,6 +29,27 @@ def heating_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
         wire[YIELD_FORCE] *= factor
     if parameters[2] != 1.0:
         wire[VISCOSITY] *= factor
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def warming_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: loss for each joule, cooling rate [1/s], curvature p, exponent of the viscosity n.
+
+    State: heat [J], last work [J]. The yield force falls by (1 - p b Q)^(1/p), linearly at p = 1 and exponentially at
+    p = 0; the viscosity by the same factor to the power n.
+    """
+    if wire[FIRST] > 0.5:
+        state[0] = 0.0
+        state[1] = wire[WORK]
+    state[0] = state[0] * math.exp(-parameters[1] * dt) + wire[WORK] - state[1]
+    state[1] = wire[WORK]
+    loss = min(max(parameters[0] * state[0], -5.0), 20.0)
+    curvature = parameters[2]
+    flat = abs(curvature) < 1e-3
+    factor = math.exp(-loss) if flat else max(1.0 - curvature * loss, 0.02) ** (1.0 / curvature)
+    factor = min(max(factor, 1e-3), 1e3)
+    wire[YIELD_FORCE] *= factor
+    wire[VISCOSITY] *= factor ** parameters[3]
 
 
 def _step(loss: float, rate: float, kind: float, law: float = 0.0) -> list[Step]:
@@ -55,6 +76,13 @@ def _rational(values: Values) -> list[Step]:
     return _step(values["loss"], 0.0, 1.0, 1.0)
 
 
+def _warming(values: Values) -> list[Step]:
+    numbers = np.array(
+        [values["loss"], 1.0 / values["cooling_time"], values["curvature"], values["viscosity_exponent"]]
+    )
+    return [Step("heating", Phase.COEFFICIENT_EFFECT, warming_step, numbers, 2)]
+
+
 _LOSS = strength("loss", "1/J", "share of the force lost for each joule", "one/force/speed/time", 0.0, 8.0, 0.03)
 _TIME = shape("cooling_time", "s", "time constant of cooling", "time", 0.1, 30.0, (0.6, 4.0))
 
@@ -77,4 +105,17 @@ EFFECT = Effect(
         "offset": Separation("a long run, a cooling dwell, a repeat", ("long",)),
         "migration": Separation("a long run with a cooling dwell", ("long",)),
     },
+    refinements=(
+        EffectForm(
+            "curved",
+            "alpha g, c g^n, g = (1 - p b Q)^(1/p), Q' = P - Q/tau",
+            (
+                _LOSS,
+                shape("cooling_time", "s", "time constant of cooling", "time", 0.1, 100.0, (4.0,)),
+                Parameter("curvature", "1", "1: linear, 0: exponential", "one", -3.0, 2.0, (0.3,)),
+                Parameter("viscosity_exponent", "1", "1: viscosity falls as the yield force", "one", 0.0, 5.0, (1.5,)),
+            ),
+            _warming,
+        ),
+    ),
 )

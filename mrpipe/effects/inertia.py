@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import ACCELERATION, CURRENT, FORCE, STEP_SIGNATURE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude
+from mrpipe.dampers.plant import ACCELERATION, CURRENT, FIRST, FORCE, STEP_SIGNATURE, Phase, Step
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -15,6 +15,8 @@ def mass_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
     """Parameters: mass [kg], power of the drive, filter rate [1/s] (0 for none). State: filtered acceleration."""
     a = wire[ACCELERATION]
     if parameters[2] > 0.0:
+        if wire[FIRST] > 0.5:
+            state[0] = a
         share = 1.0 - np.exp(-parameters[2] * dt)
         state[0] += share * (a - state[0])
         a = state[0]
@@ -30,6 +32,10 @@ def _with_drive(values: Values) -> list[Step]:
         Step("mass", Phase.FORCE_EFFECT, mass_step, np.array([values["mass"], 0.0, 0.0]), 1),
         Step("mass-with-drive", Phase.FORCE_EFFECT, mass_step, np.array([values["mass_rate"], 1.0, 0.0]), 1),
     ]
+
+
+def _late(values: Values) -> list[Step]:
+    return [Step("mass", Phase.FORCE_EFFECT, mass_step, np.array([values["mass"], 0.0, 1.0 / values["lag"]]), 1)]
 
 
 _MASS = amplitude("mass", "kg", "moving mass", "force/acceleration", 0.0, 10.0)
@@ -58,4 +64,13 @@ EFFECT = Effect(
         "accumulator": Separation("the same stroke at several frequencies", ("frequencies",)),
         "channel-skew": Separation("time-stamp check, frequency sweep", ("frequencies",)),
     },
+    refinements=(
+        EffectForm(
+            "late-mass",
+            "F + m w, w' = (a - w)/tau",
+            (shape("lag", "s", "lag of the mass behind the rod", "one", 2e-4, 0.02, (0.002,)), _MASS),
+            _late,
+            {"mass": 0},
+        ),
+    ),
 )

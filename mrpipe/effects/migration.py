@@ -26,7 +26,7 @@ from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, ampl
 
 @njit(STEP_SIGNATURE, cache=True)
 def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: amplitude, length [m] or time [s], kind of rise (0..5), of amplitude (0 yield, 1, 2 with drive), p.
+    """Parameters: amplitude, length [m] or time [s], kind of rise (0..6), of amplitude (0 yield, 1, 2 with drive), p.
 
     State: a variable that follows the direction of motion with slip, its direction memory.
     """
@@ -37,10 +37,13 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
         rise = 1.0 - math.exp(-wire[SINCE_REVERSAL] / parameters[1])
     elif kind == 2.0:
         rise = wire[SLIP] / (wire[SLIP] + parameters[1])
-    elif kind >= 4.0:
+    elif kind == 4.0 or kind == 5.0:
         # stretched: many lengths or times at once
         way = wire[SLIP] if kind == 4.0 else wire[SINCE_REVERSAL]
         rise = 1.0 - math.exp(-((way / parameters[1]) ** parameters[4]))
+    elif kind == 6.0:
+        # from a rational rise at p = 1 to an exponential one at large p
+        rise = 1.0 - (1.0 + wire[SLIP] / (parameters[4] * parameters[1])) ** (-parameters[4])
     else:
         # a second, slow hysteretic variable: it follows the direction of motion along the path
         if wire[FIRST] > 0.5:
@@ -85,6 +88,10 @@ def _stretched(values: Values) -> list[Step]:
 
 def _stretched_time(values: Values) -> list[Step]:
     return [_step(values["share"], values["rise_time"], 5.0, 0.0, values["exponent"])]
+
+
+def _power_law(values: Values) -> list[Step]:
+    return [_step(values["share"], values["slip_length"], 6.0, 0.0, values["power"])]
 
 
 def _own(values: Values) -> list[Step]:
@@ -149,4 +156,13 @@ EFFECT = Effect(
         "backlash": Separation("slow small triangles about reversal at two currents", ("reversal",)),
         "heating": Separation("a long run with a cooling dwell", ("long",)),
     },
+    refinements=(
+        EffectForm(
+            "power-law",
+            "alpha (1 + s (1 - (1 + slip/(p L))^-p))",
+            (_LENGTH, shape("power", "1", "1: rational, large: exponential", "one", 0.2, 20.0, (1.0, 4.0)), _SHARE),
+            _power_law,
+            {"share": 0},
+        ),
+    ),
 )

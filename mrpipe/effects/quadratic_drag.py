@@ -20,6 +20,14 @@ def drag_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
     wire[FORCE] += parameters[0] * force * (wire[CURRENT] if parameters[3] > 0.5 else 1.0)
 
 
+@njit(STEP_SIGNATURE, cache=True)
+def transition_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: coefficient, speed [m/s] at which the flow becomes turbulent."""
+    speed = abs(wire[VELOCITY])
+    share = speed / (speed + parameters[1])
+    wire[FORCE] += parameters[0] * share * speed * wire[VELOCITY]
+
+
 def _step(value: float, exponent: float, with_drive: float = 0.0) -> Step:
     return Step("drag", Phase.FORCE_EFFECT, drag_step, np.array([value, exponent, 1.0, with_drive]))
 
@@ -34,6 +42,11 @@ def _with_drive(values: Values) -> list[Step]:
 
 def _power(values: Values) -> list[Step]:
     return [_step(values["drag"], values["exponent"])]
+
+
+def _transition(values: Values) -> list[Step]:
+    numbers = np.array([values["drag"], values["transition_speed"]])
+    return [Step("drag", Phase.FORCE_EFFECT, transition_step, numbers)]
 
 
 _DRAG = amplitude("drag", "N*s^2/m^2", "force at 1 m/s", "force/speed^2", 0.0, 20.0)
@@ -75,4 +88,14 @@ EFFECT = Effect(
     separated_by={
         "stribeck": Separation("triangular displacement at log-spaced speeds", ("speeds",)),
     },
+    refinements=(
+        EffectForm(
+            "transition",
+            "F + c v|v| |v|/(|v| + v_t)",
+            (shape("transition_speed", "m/s", "laminar below it", "speed", 0.01, 1.0, (0.1, 0.4)), _DRAG),
+            _transition,
+            {"drag": 0},
+            dissipative=True,
+        ),
+    ),
 )

@@ -151,6 +151,22 @@ def charging_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     wire[CURRENT] = larger * (1.0 + (min(u, kept) / larger) ** corner) ** (1.0 / corner)
 
 
+@njit(STEP_SIGNATURE, cache=True)
+def two_memories_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: gain, length [m], time [s], share of the memory that time breaks. State: the two memories.
+
+    Chains of particles are broken by slip, the magnetisation of the core fades with time.
+    """
+    u = wire[CURRENT]
+    if wire[FIRST] > 0.5:
+        state[0] = u
+        state[1] = u
+    state[0] = max(u, u + (state[0] - u) * math.exp(-abs(wire[VELOCITY]) * dt / parameters[1]))
+    state[1] = max(u, u + (state[1] - u) * math.exp(-dt / parameters[2]))
+    share = parameters[3]
+    wire[CURRENT] = u + parameters[0] * ((1.0 - share) * (state[0] - u) + share * (state[1] - u))
+
+
 def _step(gain: float, size: float, kind: float) -> list[Step]:
     return [Step("remanence", Phase.CURRENT_EFFECT, remanence_step, np.array([gain, size, kind]), 2)]
 
@@ -196,6 +212,11 @@ def _charging(values: Values) -> list[Step]:
     )  # fmt: skip
     numbers = np.array([values[name] for name in names])
     return [Step("remanence", Phase.CURRENT_EFFECT, charging_field_step, numbers, 1)]
+
+
+def _two_memories(values: Values) -> list[Step]:
+    numbers = np.array([values[name] for name in ("gain", "slip_length", "relaxation_time", "time_share")])
+    return [Step("remanence", Phase.CURRENT_EFFECT, two_memories_step, numbers, 2)]
 
 
 def _plays(values: Values) -> list[Step]:
@@ -306,6 +327,17 @@ EFFECT = Effect(
                 Parameter("exponent", "1", "which plays weigh most", "one", -2.0, 6.0, (0.0,)),
             ),
             _plays,
+        ),
+        EffectForm(
+            "two-memories",
+            "u + g ((1 - s)(m - u) + s (n - u)), m decays to u over the slip L, n over the time tau",
+            (
+                _GAIN,
+                shape("slip_length", "m", "path that breaks the chains", "stroke", 0.05, 100.0, (1.0, 4.0)),
+                shape("relaxation_time", "s", "time in which the core's part fades", "time", 0.008, 12.0, (0.1, 0.5)),
+                Parameter("time_share", "1", "share of the memory that time breaks", "one", 0.0, 1.0, (0.5,)),
+            ),
+            _two_memories,
         ),
         EffectForm(
             "charging",
