@@ -27,17 +27,32 @@ def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int
         Largest degrees of the polynomials that are tried.
     """
     chosen = selection.chosen
-    base = chosen.problem.base
-    richest = polynomial_laws(base.form, distinct_levels(chosen.problem.recordings), yield_order, viscosity_order)
-    if base.laws == richest or chosen is selection.base:
+    if chosen is selection.base:
         return selection
-    rich = _with_laws(chosen, replace(base, laws=richest))
-    found = _with_laws(rich, replace(base, laws=adequate_laws(rich)))
+    found = with_adequate_laws(chosen, yield_order, viscosity_order)
     if found.chi_square >= chosen.chi_square - selection.nothing_missing * selection.noise:
         return selection
     if chosen is selection.ground:
         return replace(selection, chosen=found, ground=found)
     return replace(selection, chosen=found)
+
+
+def with_adequate_laws(found: Fit, yield_order: int, viscosity_order: int) -> Fit:
+    """Return the fit with the simplest laws of the drive that cost nothing beside the richest ones.
+
+    Parameters
+    ----------
+    found
+        Fit with or without effects.
+    yield_order, viscosity_order
+        Largest degrees of the polynomials that are tried.
+    """
+    base = found.problem.base
+    richest = polynomial_laws(base.form, distinct_levels(found.problem.recordings), yield_order, viscosity_order)
+    if base.laws == richest:
+        return found
+    rich = _with_laws(found, replace(base, laws=richest))
+    return _with_laws(rich, replace(base, laws=adequate_laws(rich)))
 
 
 def _with_laws(found: Fit, base: Base) -> Fit:

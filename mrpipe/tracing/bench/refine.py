@@ -8,7 +8,7 @@ cause is not proven. Both are kept only if tests that were left out are predicte
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -124,6 +124,29 @@ def _confirmed(
     residual = left_out_residual(trial, folds, jobs=jobs)
     gain = gain_of(unseen, residual, trial.problem, draws=draws, rng=rng)
     return residual if gain.significant and gain.share > rules.least_gain else None
+
+
+def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2) -> Fit:
+    """Return the fit with the best forms of its terms at `places`, chosen on all tests one after another.
+
+    Parameters
+    ----------
+    found
+        The fit.
+    places
+        Which of its terms may take another form.
+    rounds
+        Numerical technique: how often all of them are visited, because a better form of one changes the others.
+    """
+    for _ in range(rounds):
+        before = found
+        for place in places:
+            richer = _richest(found, place)
+            if richer is not None and richer.chi_square < found.chi_square:
+                found = richer
+        if found is before:
+            break
+    return found
 
 
 def _richest(chosen: Fit, place: int) -> Fit | None:

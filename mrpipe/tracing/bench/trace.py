@@ -26,6 +26,7 @@ from mrpipe.tracing.bench.choose import Choice, choose_model, judged_by_trees
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
 from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
+from mrpipe.tracing.bench.needed import without_superfluous
 from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
 from mrpipe.tracing.bench.offsets import offset_between_tests
@@ -102,6 +103,13 @@ def trace_campaign(
     window = selection.base.problem.window_share
     if not baseline.model_error:
         window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
+    selection = without_superfluous(
+        selection,
+        len(declared),
+        lead=(options.rules.selection_by_force if baseline.model_error else options.rules.selection).lead,
+        yield_order=options.yield_order,
+        viscosity_order=options.viscosity_order,
+    )
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
     reason = unnamed_reason(selection, options)
     if reason:
@@ -186,7 +194,7 @@ def _recorded(
 
 
 def _first_baseline(training: Recordings, declared: Sequence[Effect], options: TracingOptions) -> Baseline:
-    base = declared_base(training, options.model, options.yield_order, options.viscosity_order)
+    base = declared_base(training, options.model, options.yield_order, options.viscosity_order, options.form_files)
     return fit_baseline(
         training, base, declared, model_error_share=options.model_error_share, rules=options.rules.noise
     )

@@ -1,0 +1,64 @@
+"""A second effect is kept only if no other form of the first one, and no richer law of the drive, replaces it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from mrpipe.effects.library import damper_effects
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.problem import Term
+from mrpipe.tracing.bench.needed import without_superfluous
+from mrpipe.tracing.bench.select import Selection
+from tests.tracing.bench.fits import plain_fit
+
+pytestmark = pytest.mark.planted
+
+
+def _with_terms(planted: str, *forms: tuple[str, str]) -> Fit:
+    plain = plain_fit(planted)
+    library = damper_effects()
+    terms = tuple(Term(library[effect], library[effect].form(form)) for effect, form in forms)
+    starts = []
+    for term in terms:
+        values = term.form.without_strength(plain.problem.scales)
+        for parameter in term.form.parameters:
+            if parameter.role == "strength":
+                values[parameter.name] = parameter.start_values(plain.problem.scales)[0]
+        starts.append(values)
+    problem = replace(plain.problem, terms=terms)
+    return fit(problem, start_of(problem, plain.base_values, starts), iterations=20)
+
+
+def _names(planted: str, *forms: tuple[str, str]) -> tuple[list[tuple[str, str]], int]:
+    chosen = _with_terms(planted, *forms)
+    selection = Selection(plain_fit(planted), 1.0, (), chosen, proven=len(forms))
+    kept = without_superfluous(selection, 0, lead=1.25, yield_order=3, viscosity_order=1)
+    return [(term.effect.name, term.form.name) for term in kept.chosen.problem.terms], kept.proven
+
+
+def test_a_second_name_that_corrects_the_form_of_the_first_is_dropped() -> None:
+    names, proven = _names("soft-stop", ("end-stop", "linear"), ("accumulator", "curved"))
+    assert names == [("end-stop", "contact")]
+    assert proven == 1
+
+
+def test_both_of_a_pair_are_kept() -> None:
+    names, proven = _names("soft-stop+accumulator", ("end-stop", "linear"), ("accumulator", "linear"))
+    assert [effect for effect, _ in names] == ["end-stop", "accumulator"]
+    assert proven == 2
+
+
+def test_one_effect_is_never_dropped() -> None:
+    names, proven = _names("accumulator", ("accumulator", "linear"))
+    assert names == [("accumulator", "linear")]
+    assert proven == 1
+
+
+def test_what_is_dropped_is_offered_as_a_further_term() -> None:
+    chosen = _with_terms("soft-stop", ("accumulator", "curved"), ("end-stop", "linear"))
+    selection = Selection(plain_fit("soft-stop"), 1.0, (), chosen, proven=2)
+    kept = without_superfluous(selection, 0, lead=1.25, yield_order=3, viscosity_order=1)
+    assert kept.extension is not None
+    assert [term.effect.name for term in kept.extension.problem.terms] == ["end-stop", "accumulator"]
