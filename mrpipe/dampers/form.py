@@ -82,6 +82,8 @@ class BaseForm:
         Over a closed cycle the form never feeds energy, whatever its parameters within their bounds.
     springs
         Names of the parameters that are springs across the damper. They are what the effect `accumulator` stands for.
+    file
+        The user's own file that defines the form, if any; set when the file is loaded.
     """
 
     name: str
@@ -98,6 +100,7 @@ class BaseForm:
     hysteresis: Callable[[Values], tuple[float, float, float]] | None = None
     dissipative: bool = True
     springs: tuple[str, ...] = ()
+    file: str = ""
 
     def without_springs(self) -> BaseForm:
         """Return the form without its springs, for comparisons in which the accumulator is a separate effect."""

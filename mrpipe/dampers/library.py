@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -45,7 +46,7 @@ def form_of_file(path: Path | str) -> BaseForm:
     form = getattr(module_of_file(path, "identify_damper.form_files", remedy), "FORM", None)
     if not isinstance(form, BaseForm):
         raise UserError(path, "FORM", "is missing", remedy)
-    return form
+    return replace(form, file=str(path))
 
 
 def forms_named(names: Sequence[str], files: Sequence[Path | str] = ()) -> dict[str, BaseForm]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mrpipe.artifacts import Progress, no_progress
-from mrpipe.dampers.library import form_of_file, forms_named
+from mrpipe.dampers.library import forms_named
 from mrpipe.fitting.comparison import Comparison, FitOptions, JudgedFit, best_by_folds, compare_forms
 from mrpipe.fitting.form_fit import FitMethod
 from mrpipe.fitting.settings import BEST, IdentifyDamperSettings
@@ -60,9 +60,8 @@ def compare_and_choose(
 
 def fit_options(settings: IdentifyDamperSettings) -> FitOptions:
     """Return how forms are fitted, from the settings."""
-    files = {form_of_file(path).name: str(path) for path in settings.form_files}
     return FitOptions(
-        method=FitMethod(settings.method, settings.starts, assumed_eta=settings.assumed_eta_per_s, form_files=files),
+        method=FitMethod(settings.method, settings.starts, assumed_eta=settings.assumed_eta_per_s),
         cycles=settings.cycles,
         maximum_samples=settings.maximum_samples,
         raw_force=settings.force == "raw",

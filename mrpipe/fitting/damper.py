@@ -18,7 +18,6 @@ def damper_model(
     *,
     effects: bool = False,
     assumed_eta: float = ASSUMED_ETA,
-    form_file: str = "",
     effect_files: Mapping[str, str] | None = None,
 ) -> DamperModel:
     """Return the damper of a fit.
@@ -31,8 +30,6 @@ def damper_model(
         Take the effects along; the base form alone where False.
     assumed_eta
         Rate of the lag [1/s] where the recordings do not determine it; infinite: no lag.
-    form_file
-        The user's own file that defines the base form, if any.
     effect_files
         Effect -> the user's own file that defines it.
     found
@@ -62,7 +59,7 @@ def damper_model(
         kinds,
         tuple(added) if effects else (),
         scales.stroke,
-        form_file,
+        base.form.file,
     )
 
 

@@ -110,15 +110,12 @@ class FitMethod:
         Most steps of the search from each start.
     assumed_eta
         Rate of the driver's lag [1/s] where the tests do not determine it.
-    form_files
-        Name of a form -> the user's own file that defines it.
     """
 
     method: str = _SETTINGS.method
     starts: int = _SETTINGS.starts
     iterations: int = 40
     assumed_eta: float = _SETTINGS.assumed_eta_per_s
-    form_files: Mapping[str, str] | None = None
 
 
 def form_problem(
@@ -195,10 +192,9 @@ def form_fit(found: Fit, method: FitMethod, drive_unit: str, start_nrmse: tuple[
         for (_, parameter), t, a, b, m in zip(problem.searched, found.theta, low, high, margin, strict=True)
         if not a + m < t < b - m
     )
-    file = (method.form_files or {}).get(problem.base.name, "")
     return FormFit(
         fit=found,
-        model=damper_model(found, drive_unit, assumed_eta=method.assumed_eta, form_file=file),
+        model=damper_model(found, drive_unit, assumed_eta=method.assumed_eta),
         training_nrmse=_nrmse(found),
         covariance=covariance,
         names=names,

@@ -40,7 +40,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for name in campaign.declared_effects:
         if name not in known:
             context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
-    options = tracing_options(settings, tests[0].drive_unit)
+    options = tracing_options(settings, tests[0].drive_unit, context.settings.identify_damper.form_files)
     library = effects_named(settings.candidates, settings.effect_files)
     traced = trace_campaign(
         tests, library, declared, options, rng=context.rng, jobs=context.jobs, progress=context.progress
@@ -215,11 +215,16 @@ def _write(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
 
 
 def _check(settings: Any) -> None:
-    """Look for effects that are not known and files of the user's own that do not work."""
+    """Look for effects and base forms that are not known, and for files of the user that do not work."""
+    from mrpipe.dampers.library import forms_named
     from mrpipe.effects.library import effects_named
+    from mrpipe.tracing.bench.baseline import form_name
 
-    if settings.close_loop.candidates or settings.close_loop.effect_files:
-        effects_named(settings.close_loop.candidates, settings.close_loop.effect_files)
+    section = settings.close_loop
+    if section.candidates or section.effect_files:
+        effects_named(section.candidates, section.effect_files)
+    if section.form_files:
+        forms_named([form_name(section.model), *section.base_forms], section.form_files)
 
 
 STAGE = Stage(
@@ -231,6 +236,7 @@ STAGE = Stage(
     settings=(
         "stages",
         "close_loop",
+        "identify_damper.form_files",
         "simulate",
         "resonance.band_rad_s",
         "prepare.displacement_late_s",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from pydantic import Field, field_validator
+from collections.abc import Sequence
+from pathlib import Path
+
+from pydantic import Field, ValidationInfo, field_validator
 
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.dampers.forms import form_names
@@ -65,6 +68,9 @@ class NamingRules(Section):
 class TracingSettings(NamingRules):
     """From the residual of a model to the effect that it lacks."""
 
+    form_files: tuple[Path, ...] = Field(
+        (), description="Your Python files, each of which defines one more base form as FORM."
+    )
     model: str = Field(
         "bouc-wen",
         description="Declared base form, any of mrpipe/dampers/forms; rate-dependent-yield stands for yielding-part, "
@@ -99,7 +105,10 @@ class TracingSettings(NamingRules):
 
     @field_validator("model")
     @classmethod
-    def _model_is_known(cls, value: str) -> str:
+    def _model_is_known(cls, value: str, info: ValidationInfo) -> str:
+        # a user's own file may define any name: it is looked at when the stage is checked
+        if info.data.get("form_files"):
+            return value
         known = (*form_names(), "rate-dependent-yield")
         if value not in known:
             raise ValueError(f"no base form {value!r}; {nearest(value, known)}")
@@ -112,7 +121,18 @@ class TracingOptions(TracingSettings):
     drive_unit: str = Field("A", description="Unit of the drive, A or V.")
 
 
-def tracing_options(settings: TracingSettings, drive_unit: str) -> TracingOptions:
-    """Return the options of a tracing, on a bench or of a structure."""
+def tracing_options(settings: TracingSettings, drive_unit: str, form_files: Sequence[Path] = ()) -> TracingOptions:
+    """Return the options of a tracing, on a bench or of a structure.
+
+    Parameters
+    ----------
+    settings
+        The section of the settings.
+    drive_unit
+        `A` or `V`; empty for A.
+    form_files
+        The user's own base forms that the damper was identified with; they compete in the tracing too.
+    """
     values = {name: getattr(settings, name) for name in TracingSettings.model_fields}
+    values["form_files"] = tuple(dict.fromkeys([*settings.form_files, *form_files]))
     return TracingOptions(**values, drive_unit=drive_unit or "A")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.library import base_form
+from mrpipe.dampers.library import base_form, forms_named
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.drive_laws import adequate_laws
 from mrpipe.fitting.engine import Fit, fit, start_of
@@ -51,16 +52,35 @@ class Baseline:
     model_error: bool = False
 
 
-def declared_base(recordings: Recordings, name: str, yield_order: int, viscosity_order: int) -> Base:
-    """Return the declared form with laws of the drive that its levels determine."""
-    form = base_form(DEFAULT_OF_FAMILY.get(name, name))
+def form_name(model: str) -> str:
+    """Return the name of the base form that the setting `model` stands for."""
+    return DEFAULT_OF_FAMILY.get(model, model)
+
+
+def declared_base(
+    recordings: Recordings, name: str, yield_order: int, viscosity_order: int, form_files: Sequence[Path] = ()
+) -> Base:
+    """Return the declared form with laws of the drive that its levels determine.
+
+    Parameters
+    ----------
+    recordings
+        Training tests.
+    name
+        Of the form, in the library or in one of `form_files`.
+    yield_order, viscosity_order
+        Degrees of the laws of the drive.
+    form_files
+        The user's own files that define further base forms.
+
+    Raises
+    ------
+    UserError
+        If no form has this name.
+    """
+    name = form_name(name)
+    form = forms_named([name], form_files)[name]
     return base_of(recordings, form, polynomial_laws(form, distinct_levels(recordings), yield_order, viscosity_order))
-
-
-def family_of(model: str) -> str:
-    """Return the family of a declared model: that of its base form, or the form's own name."""
-    form = base_form(DEFAULT_OF_FAMILY.get(model, model))
-    return form.family or form.name
 
 
 def fit_baseline(

@@ -120,7 +120,7 @@ def choose_model(
         used = chosen.problem.root_weight > 0.0
         left = chosen.residual[used] / chosen.problem.root_weight[used]
         floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
-        base = declared_base(training, options.model, options.yield_order, options.viscosity_order)
+        base = declared_base(training, options.model, options.yield_order, options.viscosity_order, options.form_files)
         declared_fit = fit_baseline(training, base, declared, model_error_share=floor, rules=options.rules.noise)
         baseline = _without_nuisances(_with_scale(declared_fit, choice, options.rules.noise), options)
 
@@ -166,7 +166,7 @@ def _raced(
     nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=least)
     if not nothing.structured:
         return Choice(baseline, nothing), lambda: None
-    forms = {name: form.without_springs() for name, form in forms_named(options.base_forms).items()}
+    forms = {name: form.without_springs() for name, form in forms_named(options.base_forms, options.form_files).items()}
     progress(0.1, "base forms")
     singles = alone(draft(baseline.fit), forms, jobs=jobs)
     if not model_error and not weighed:

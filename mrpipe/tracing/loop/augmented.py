@@ -54,9 +54,7 @@ def plant_chain(found: Fit) -> Chain:
     return traced_damper(found).chain()
 
 
-def traced_damper(
-    found: Fit, drive_unit: str = "A", *, effect_files: Mapping[str, str] | None = None, form_file: str = ""
-) -> DamperModel:
+def traced_damper(found: Fit, drive_unit: str = "A", *, effect_files: Mapping[str, str] | None = None) -> DamperModel:
     """Return the damper of a fit with its effects; a lag that no test determines is left out.
 
     Parameters
@@ -65,14 +63,10 @@ def traced_damper(
         `A` or `V`.
     effect_files
         Effect -> the user's own file that defines it.
-    form_file
-        The user's own file that defines the base form, if any.
     found
         The fit.
     """
-    return damper_model(
-        found, drive_unit, effects=True, assumed_eta=math.inf, form_file=form_file, effect_files=effect_files
-    )
+    return damper_model(found, drive_unit, effects=True, assumed_eta=math.inf, effect_files=effect_files)
 
 
 def tested_range(recordings: Recordings) -> dict[str, float]:

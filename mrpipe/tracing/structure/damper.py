@@ -162,7 +162,9 @@ def find_brace(
             rate_hz=options.fit_rate_hz,
             longest_s=SEARCHED_CYCLES * period,
         )
-        base = declared_base(recordings, options.model, options.yield_order, options.viscosity_order)
+        base = declared_base(
+            recordings, options.model, options.yield_order, options.viscosity_order, options.form_files
+        )
         baseline = fit_baseline(recordings, base, declared)
         noise.append(baseline.noise)
         tried[share] = baseline.fit

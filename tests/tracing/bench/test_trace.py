@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
+from mrpipe.dampers.forms import biviscous
 from mrpipe.effects.library import damper_effects
+from mrpipe.fitting.damper import damper_model
 from mrpipe.fitting.recordings import record_tests
+from mrpipe.fitting.start import best_fit, first_problem
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import declared_base, family_of
+from mrpipe.tracing.bench.baseline import declared_base
 from mrpipe.tracing.bench.summary import Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
 from mrpipe.tracing.options import TracingOptions
@@ -139,7 +144,18 @@ def test_a_declared_base_form_is_no_effect() -> None:
     training = record_tests(campaign("none")[:4], rate_hz=125.0)
     base = declared_base(training, "rate-dependent-yield", 3, 1)
     assert base.name == "yielding-part"
-    # the effect of this name is then no candidate, and a library without it is no fault
-    assert family_of("rate-dependent-yield") == "rate-dependent-yield"
-    assert family_of("rounded-yield") == "rate-dependent-yield"
-    assert family_of("bouc-wen") == "bouc-wen"
+
+
+@pytest.mark.property
+def test_a_form_of_the_users_own_file_is_declared_and_carried_into_the_damper(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    source = Path(biviscous.__file__).read_text(encoding="utf-8").replace('name="biviscous"', 'name="mine"')
+    path.write_text(source, encoding="utf-8")
+    options = TracingOptions(form_files=(path,), model="mine")
+    training = record_tests(campaign("none")[:4], rate_hz=125.0)
+    base = declared_base(training, options.model, 1, 0, options.form_files)
+    damper = damper_model(best_fit(first_problem(training, base), starts=1, iterations=2), "A")
+    assert (damper.form, damper.form_file) == ("mine", str(path))
+    assert damper.base.name == "mine"
+    with pytest.raises(ValidationError, match="no base form 'mine'"):
+        TracingOptions(model="mine")
