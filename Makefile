@@ -11,7 +11,8 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 RUN_STAMP := $(VENV)/.installed
 TEST_STAMP := $(VENV)/.installed-test
 DOCS_STAMP := $(VENV)/.installed-docs
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
+# modules are compiled to bytecode when they are first imported: a run imports a small part of what is installed
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile -c constraints.txt
 
 .DEFAULT_GOAL := help
 .PHONY: help run test lint docs bench bench-tracing reproduce train-inverse identify-frame simulate close-loop clean

@@ -13,8 +13,9 @@ from functools import partial
 
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.tracing.bench.drive_again import with_adequate_laws
+from mrpipe.tracing.bench.race import on_all_tests
 from mrpipe.tracing.bench.refine import with_best_forms
-from mrpipe.tracing.bench.select import Selection
+from mrpipe.tracing.bench.select import Selection, draft
 
 ITERATIONS = 15
 """Numerical technique: most steps of a fit without one of the effects."""
@@ -40,12 +41,15 @@ def without_superfluous(
     """
     without = partial(_without, yield_order=yield_order, viscosity_order=viscosity_order)
     kept = selection
-    full: Fit | None = None
     while kept.proven > 1 and len(kept.chosen.problem.terms) >= declared + 2:
         named = range(declared, min(declared + kept.proven, len(kept.chosen.problem.terms)))
-        full = full or with_best_forms(kept.chosen, named)
-        trials = [(place, without(kept.chosen, place, named)) for place in named]
-        place, best = min(trials, key=lambda item: item[1].chi_square)
+        small = draft(kept.chosen)
+        full = with_best_forms(small, named)
+        place, best = min(((k, without(small, k, named)) for k in named), key=lambda item: item[1].chi_square)
+        if best.chi_square > lead * full.chi_square:
+            break
+        # a share of the tests has ranked them, all tests decide
+        full, best = (on_all_tests(item, kept.chosen.problem) for item in (full, best))
         if best.chi_square > lead * full.chi_square:
             break
         count = len(kept.chosen.problem.terms)
@@ -59,7 +63,6 @@ def without_superfluous(
             rounds=rounds or kept.rounds[:1],
             extension=extension if kept is selection else kept.extension,
         )
-        full = None
     return kept
 
 
