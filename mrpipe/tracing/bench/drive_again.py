@@ -38,7 +38,7 @@ def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int
 
 
 def with_adequate_laws(found: Fit, yield_order: int, viscosity_order: int) -> Fit:
-    """Return the fit with the simplest laws of the drive that cost nothing beside the richest ones.
+    """Return the fit with the simplest laws of the drive that fit as well as the richest ones.
 
     Parameters
     ----------
