@@ -172,7 +172,7 @@ def answer(facts: RunFacts) -> str:
     motion = f"under harmonic base motion at {number(omega)} rad/s" if omega else "under this excitation"
     over_band = _over_band(facts)
     if over_band and omega:
-        motion = f"at {number(omega)} rad/s alone"
+        motion = f"at the single frequency {number(omega)} rad/s"
     text = (
         f"Of the laws that add damping, **{best.law}** is best {motion}"
         if len(damps) < len(laws)
@@ -218,12 +218,13 @@ def _over_band(facts: RunFacts) -> str:
     low, high = band["band_rad_s"]
     rest = ", ".join(f"{law} {number(1e3 * peaks[law])}" for law in others)
     text = (
-        f"Over harmonic base motion from {number(low)} to {number(high)} rad/s, **{best}** has the smallest peak of "
-        f"the RMS top displacement: {_millimetres(peaks[best])} ({rest} mm)."
+        f"Use **{best}**: over harmonic base motion from {number(low)} to {number(high)} rad/s it has the smallest "
+        f"peak of the RMS top displacement, {_millimetres(peaks[best])} ({rest} mm)."
     )
     absent = [law for law in facts.laws if law not in peaks]
     if absent:
-        text += f" This comparison leaves out {listed(absent)} (`mrpipe simulate --law {absent[0]} --resonance`)."
+        text += f" {listed(absent)} {'is' if len(absent) == 1 else 'are'} not part of this comparison"
+        text += f" (`mrpipe simulate --law {absent[0]} --resonance` computes its curve)."
     return text
 
 

@@ -85,10 +85,10 @@ def test_the_ranking_over_a_band_of_frequencies_comes_before_that_at_one(tmp_pat
     """passive-on is best at one frequency and worst over the band."""
     band = {"band_rad_s": [6.0, 12.5], "laws": [_peaks("passive-on", 0.131), _peaks("vd", 0.0348)]}
     text = answers(tmp_path, closed_loop={"status": "replayed", "over_band": band})["Control"]
-    assert text.startswith("Over harmonic base motion from 6.00 to 12.5 rad/s, **vd** has the smallest peak")
+    assert text.startswith("Use **vd**: over harmonic base motion from 6.00 to 12.5 rad/s it has the smallest peak")
     assert "34.8 mm (passive-on 131 mm)" in text
-    assert "leaves out passive-off (`mrpipe simulate --law passive-off --resonance`)" in text
-    assert "rad/s alone" in text
+    assert "passive-off is not part of this comparison (`mrpipe simulate --law passive-off --resonance`" in text
+    assert "at the single frequency" in text
 
 
 def test_the_worst_tests_are_named_with_what_was_done_in_them(tmp_path: Path) -> None:
