@@ -71,6 +71,8 @@ class DelayFinding:
         Error on validation tests over the RMS of the signal, without and with the dead time beyond what is granted.
     interval_s
         Interval of the lag [s].
+    granted_error_s
+        Uncertainty of `granted_s` [s]: all of it where the campaign does not declare the controller, else 0.
     least_s
         Dead time beyond the granted lag that is reported [s].
     better
@@ -85,6 +87,13 @@ class DelayFinding:
     interval_s: tuple[float, float]
     least_s: float
     better: float
+    granted_error_s: float = 0.0
+
+    @property
+    def delay_interval_s(self) -> tuple[float, float]:
+        """Interval of the dead time beyond what is granted [s]."""
+        half = 0.5 * (self.interval_s[1] - self.interval_s[0]) + self.granted_error_s
+        return max(0.0, self.delay_s - half), self.delay_s + half
 
     @property
     def delay_s(self) -> float:
@@ -120,7 +129,8 @@ def drive_lag(tests: Sequence[LoopSignals], rules: DelayRules | None = None) -> 
         table = _Table(training, shift, rules.acting)
         return np.array([_relative(table.drive(item, shift), item.drive) for item in validation])
 
-    return _least(errors, "drive-late", _filter_lag(varied, period, rules), period, rules)
+    declared = any(item.command_filter_hz > 0.0 for item in varied)
+    return _least(errors, "drive-late", _filter_lag(varied, period, rules), period, rules, declared=declared)
 
 
 def _varies(values: FloatArray, every: Sequence[FloatArray], share: float) -> bool:
@@ -203,7 +213,8 @@ def law_lag(
         return np.array(found)
 
     period = _period(linear)
-    return _least(errors, "law-late", _held(linear, period, rules), period, rules)
+    declared = any(item.controller_rate_hz > 0.0 for item in linear)
+    return _least(errors, "law-late", _held(linear, period, rules), period, rules, declared=declared)
 
 
 def _held(tests: Sequence[LoopSignals], period: float, rules: DelayRules) -> float:
@@ -233,7 +244,13 @@ def _vertex(shifts: FloatArray, errors: FloatArray, step: float) -> float:
 
 
 def _least(
-    errors: Callable[[float], FloatArray], part: str, granted: float, period: float, rules: DelayRules
+    errors: Callable[[float], FloatArray],
+    part: str,
+    granted: float,
+    period: float,
+    rules: DelayRules,
+    *,
+    declared: bool,
 ) -> DelayFinding:
     """Return the shift of least error: every fourth step first, then every step about the best of these."""
     step = STEP_PERIODS * period
@@ -259,4 +276,5 @@ def _least(
         (float(lag - half), float(lag + half)),
         rules.least_periods * period,
         rules.better,
+        0.0 if declared else granted,
     )

@@ -83,8 +83,7 @@ def _command_summary(
     share = 1.0 - (worst.after / max(worst.before, 1e-12)) ** 2
     named: list[NamedEffect] = []
     if worst.late:
-        half = 0.5 * (worst.interval_s[1] - worst.interval_s[0])
-        interval = Interval(max(0.0, worst.delay_s - half), worst.delay_s + half)
+        interval = Interval(*worst.delay_interval_s)
         named.append(
             NamedEffect(
                 effect.name,

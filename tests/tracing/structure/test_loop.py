@@ -71,6 +71,20 @@ def test_a_declared_filter_and_the_rules_decide_what_is_late() -> None:
     assert generous is not None and not generous.late
 
 
+@pytest.mark.planted
+@pytest.mark.parametrize("delay", [0.008, 0.012, 0.02])
+def test_the_interval_of_a_dead_time_contains_it_whatever_the_controller_is_granted(delay: float) -> None:
+    """Without a declared filter the lag that is granted may belong to the dead time: the interval is wider by it."""
+    unknown = drive_lag(loop(delay))
+    assert unknown is not None and unknown.late
+    low, high = unknown.delay_interval_s
+    assert low <= delay <= high
+    assert unknown.granted_error_s == unknown.granted_s > 0.0
+    declared = drive_lag([replace(item, command_filter_hz=200.0) for item in loop(delay)])
+    assert declared is not None and declared.granted_error_s == 0.0
+    assert np.ptp(declared.delay_interval_s) < np.ptp(unknown.delay_interval_s)
+
+
 @pytest.mark.property
 def test_lags_are_judged_by_the_period_of_the_motion() -> None:
     slow, fast = ([replace(item, rate_hz=item.rate_hz * factor) for item in loop(0.012)] for factor in (0.5, 1.0))
