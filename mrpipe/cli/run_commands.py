@@ -147,9 +147,10 @@ def report(
     from mrpipe.cli.session import load, pipeline_of, run_directory
 
     options = _config_of_run(_run_or_config(options, directory))
+    if options.run is not None:
+        _require_run(options.run)
     loaded = load(options)
-    if not run_directory(options, loaded).is_dir():
-        raise UserError(run_directory(options, loaded), "", "no such run directory", "run `mrpipe run` first")
+    _require_run(run_directory(options, loaded))
     pipeline = pipeline_of(options, loaded)
     paths = _write_report(pipeline)
     if options.json:
@@ -165,6 +166,15 @@ def report(
             print("\n".join(first_screen(run_facts(pipeline), columns)), end="\n\n")
         for path in paths:
             print(f"report: {path}")
+
+
+def _require_run(directory: Path) -> None:
+    """Refuse a directory that no run has written, so that no report is written into it."""
+    if not directory.is_dir():
+        raise UserError(directory, "", "no such run directory", "run `mrpipe run` first")
+    if not (directory / "manifests").is_dir():
+        problem = "is not a run directory, because it has no manifests of stages"
+        raise UserError(directory, "", problem, "name a directory that `mrpipe run` wrote, such as runs/my-rig")
 
 
 def _run_or_config(options: CommonOptions, given: Path | None) -> CommonOptions:

@@ -126,6 +126,8 @@ class Pipeline:
     def _failed(self, stage: Stage, error: Exception) -> Outcome:
         """Record a failure: outputs of an earlier run are kept and count as stale."""
         text = " ".join(str(error).split())
+        if isinstance(error, OSError) and error.filename and error.strerror:
+            text = f"{error.filename}: {error.strerror.lower()}"
         if not isinstance(error, MrpipeError | OSError | MemoryError):
             text = f"{type(error).__name__}: {text} (a fault of the program; {LOG} has the details)"
             self.logger.error("%s", stage.name, exc_info=error, extra={"file_only": True})

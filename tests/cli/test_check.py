@@ -127,10 +127,17 @@ def test_no_campaign_at_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 def test_a_missing_data_file_is_one_line_in_check_and_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = project(tmp_path)
     (tmp_path / "data" / "T2.h5").unlink()
-    for command in (["check", str(config)], ["run", str(config), "--run", str(tmp_path / "run"), "--quiet"]):
+    where = ["--run", str(tmp_path / "run")]
+    for command in (
+        ["check", str(config)],
+        ["run", str(config), *where, "--quiet"],
+        ["prepare", str(config), *where, "--quiet"],
+    ):
         assert run(command) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert "T2.h5: data file not found" in line
+    assert run(["status", "--config", str(config), str(tmp_path / "run")]) in (0, 2)
+    assert len(capsys.readouterr().err.splitlines()) <= 1
 
 
 @pytest.mark.golden

@@ -63,6 +63,7 @@ MISTAKES = {
     "no rig": (["record", "--rig", "table"], "--rig: table: is not a rig; one of bench, frame, closed-loop"),
     "nothing to export": (["export", "plant"], "export: plant: cannot be exported"),
     "no run to report": (["report", "nowhere"], "no such run directory"),
+    "no run in a directory": (["report", "tests"], "tests: is not a run directory, because it has no manifests"),
     "no run for status": (["status", "nowhere"], "no such run directory"),
     "negative jobs": (["prepare", "--jobs", "0"], "--jobs"),
 }

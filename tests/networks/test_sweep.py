@@ -12,7 +12,7 @@ from mrpipe.networks.candidates import Candidate, Grid
 from mrpipe.networks.findings import choose, findings, score
 from mrpipe.networks.held_out import extreme_motions, folds, motions, splits
 from mrpipe.networks.options import SweepOptions
-from mrpipe.networks.sweep import Outcome, predicted_costs, sweep
+from mrpipe.networks.sweep import Outcome, _kept, predicted_costs, sweep
 from tests.networks.rig import bench_history
 
 CENTRE = Candidate(("velocity",), 3, (6, 6), False)
@@ -80,6 +80,26 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
         assert one.refined.tobytes() == other.refined.tobytes()
     for name, changed in kept.items():
         assert (tmp_path / name).stat().st_mtime_ns == changed
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("content", ["half", "empty", "garbage"])
+def test_a_damaged_kept_fit_counts_as_none(tmp_path: Path, content: str) -> None:
+    candidate = GRID.centre
+    calls = []
+
+    def work() -> tuple[np.ndarray, np.ndarray]:
+        calls.append(1)
+        return np.array([0.1]), np.array([[1.0, 2.0]])
+
+    _kept(tmp_path, "screen-x", candidate, work)
+    (file,) = tmp_path.iterdir()
+    whole = file.read_bytes()
+    file.write_bytes({"half": whole[: len(whole) // 2], "empty": b"", "garbage": b"\x80\x04garbage"}[content])
+    for count in (2, 2):
+        errors, parameters = _kept(tmp_path, "screen-x", candidate, work)
+        assert errors.tolist() == [0.1] and parameters.tolist() == [[1.0, 2.0]]
+        assert len(calls) == count
 
 
 @pytest.mark.property

@@ -297,6 +297,17 @@ def test_a_damaged_artifact_is_built_again(make_pipeline: MakePipeline) -> None:
     assert digest_of_artifact(path) == before
 
 
+@pytest.mark.property
+def test_a_directory_in_place_of_an_artifact_is_named(make_pipeline: MakePipeline) -> None:
+    pipeline = make_pipeline()
+    (pipeline.run_directory / "first.h5").mkdir(parents=True)
+    pipeline.keep_going = True
+    outcome = pipeline.build("first")
+    assert outcome.what == "failed"
+    assert outcome.manifest.skipped == f"failed: {pipeline.run_directory / 'first.h5'}: is a directory"
+    assert not list(pipeline.run_directory.rglob("*.tmp"))
+
+
 def _fails(context: StageContext) -> Mapping[str, Any]:
     CALLS.append("failing")
     raise UserError("data.csv", "row 3", "is not a number", "write a number")
