@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.peak_picking import pick_peaks
 from mrpipe.modal.records import FrameTest, FrameTests
-from mrpipe.modal.rigid_floors import RigidShapes, assemble_rigid, rigid_shapes
+from mrpipe.modal.rigid_floors import RigidShapes, assemble_rigid, rigid_response, rigid_shapes
 from mrpipe.modal.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.search import ModeSearch, check_channels
 from mrpipe.modal.selection import (
@@ -36,6 +36,7 @@ from mrpipe.modal.selection import (
 )
 from mrpipe.modal.tridiagonal import fit_tridiagonal
 from mrpipe.modal.verification import (
+    TimeVerification,
     compare_in_time,
     verify_in_frequency,
     verify_in_time,
@@ -212,7 +213,10 @@ def _identify(
     band = chosen.search.band_hz
     inside = (band[0], min(band[1], 1.15 * float(fit.angular_frequencies[-1]) / (2.0 * np.pi)))
     frame = assembly.frame
-    # the simulation of tests knows one direction
+    in_time: tuple[TimeVerification, ...] = ()
+    if frame is not None and forced:
+        in_time = tuple(_verified(frame, test, inside, None if rigid is None else tests.positions) for test in shown)
+    # the synthesised frequency responses are those of one direction
     verified = frame if rigid is None and forced else None
     amplitude = None
     # errors of picked modes are those of the lines of the spectrum; a law over amplitude would only explain these
@@ -231,7 +235,7 @@ def _identify(
         decays=decays,
         fit=fit,
         tridiagonal=assembly.storeys,
-        in_time=() if verified is None else tuple(verify_in_time(verified, test, inside) for test in shown),
+        in_time=in_time,
         in_frequency=None if verified is None else verify_in_frequency(verified, fit, inside),
         phase_scatter=np.abs(fit.residues.imag).max(axis=0) / np.abs(fit.residues).max(axis=0),
         tests=shown,
@@ -248,6 +252,15 @@ def _identify(
         if amplitude is None
         else tuple(compare_in_time(amplitude.model.response(test), test, inside) for test in shown),
     )
+
+
+def _verified(
+    frame: Frame, test: FrameTest, band_hz: tuple[float, float], positions: Mapping[str, tuple[float, float]] | None
+) -> TimeVerification:
+    """Simulate a forced test with the identified frame; `positions` are those of the sensors on rigid floors."""
+    if positions is None:
+        return verify_in_time(frame, test, band_hz)
+    return compare_in_time(rigid_response(frame, test, positions), test, band_hz)
 
 
 def _shown(forced: Sequence[FrameTest], chosen: ChosenTests, clocks: Sequence[SensorClock]) -> tuple[FrameTest, ...]:

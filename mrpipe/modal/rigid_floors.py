@@ -6,8 +6,8 @@ three sensors of which two are apart, the three motions of the floor follow by l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,9 @@ from mrpipe.errors import UserError
 from mrpipe.modal.assembly import Assembly
 from mrpipe.modal.checks import orthogonal_shapes
 from mrpipe.modal.multimode import MultiModeFit
+from mrpipe.modal.records import FrameTest
 from mrpipe.structures import Frame, modal_damping_matrix, normalise_to_largest
+from mrpipe.structures.response import linear_response
 
 AXES = ("x", "y", "rotation")
 _LARGEST_MISFIT = 0.1
@@ -46,6 +48,58 @@ class RigidShapes:
 
 def _row(direction: str, place: tuple[float, float]) -> tuple[float, float, float]:
     return (1.0, 0.0, -place[1]) if direction.startswith("x") else (0.0, 1.0, place[0])
+
+
+def measured_rows(
+    places: Sequence[tuple[int, str]], positions: Mapping[str, tuple[float, float]], floors: int
+) -> FloatArray:
+    """Return what sensors measure of the motions of rigid floors, shape (places, 3 n).
+
+    The same row distributes the force of a shaker at this place over the degrees of freedom, because the power of the
+    force is that at its place.
+
+    Parameters
+    ----------
+    places
+        (floor from 1, direction) of each sensor.
+    positions
+        Direction -> place on the floor relative to the centre of mass [m].
+    floors
+        Number of floors n.
+    """
+    rows = np.zeros((len(places), 3 * floors))
+    for row, (floor, direction) in zip(rows, places, strict=True):
+        row[3 * floor - 3 : 3 * floor] = _row(direction, positions[direction])
+    return rows
+
+
+def rigid_response(frame: Frame, test: FrameTest, positions: Mapping[str, tuple[float, float]]) -> FloatArray:
+    """Return the simulated response of the sensors of a forced test, shape (m, s) [m/s2] or [m].
+
+    Parameters
+    ----------
+    frame
+        Three degrees of freedom a floor: x, y and rotation.
+    test
+        A test with a measured excitation of the ground or of shakers.
+    positions
+        See :func:`measured_rows`.
+    """
+    floors = frame.floors // 3
+    rows = measured_rows([(sensor.floor, sensor.direction) for sensor in test.sensors], positions, floors)
+    flags = np.asarray(test.is_displacement)
+    simulated = np.zeros(test.responses.shape)
+    for place, values in test.inputs.items():
+        force = None if place.floor == 0 else measured_rows([place], positions, floors)[0]
+        moved = replace(frame, influence=ground_influence(floors, place.direction)) if force is None else frame
+        found = linear_response(moved, values - values.mean(), 1.0 / test.sampling_rate_hz, force_position=force)
+        simulated += np.where(flags, found.displacement @ rows.T, found.absolute_acceleration @ rows.T)
+    return simulated
+
+
+def ground_influence(floors: int, axis: str) -> FloatArray:
+    """Return the displacement of each degree of freedom when the ground moves by 1 m along an axis, shape (3 n,)."""
+    return np.tile([0.0, 1.0, 0.0] if axis.startswith("y") else [1.0, 0.0, 0.0], floors)
 
 
 def rigid_shapes(fit: MultiModeFit, positions: Mapping[str, tuple[float, float]], source: Path) -> RigidShapes:
@@ -119,6 +173,6 @@ def assemble_rigid(
     weighted = mass @ unit
     stiffness = (weighted * fit.angular_frequencies**2) @ weighted.T
     damping = modal_damping_matrix(mass, stiffness, zeta)
-    influence = np.tile([1.0, 0.0, 0.0] if axis.startswith("x") else [0.0, 1.0, 0.0], masses.size)
+    influence = ground_influence(masses.size, axis)
     frame = Frame(mass, damping, stiffness, "identified, rigid floors", influence, rigid.names)
     return Assembly(frame, normalise_to_largest(shapes), numbers, None, masses, intervals, tuple(findings))

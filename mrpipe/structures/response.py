@@ -35,6 +35,7 @@ def linear_response(
     dt: float,
     *,
     shaker_floor: int = 0,
+    force_position: FloatArray | None = None,
     initial_state: FloatArray | None = None,
 ) -> LinearResponse:
     """Return the response to an excitation that is linear between samples (exact to rounding for such a one).
@@ -44,17 +45,22 @@ def linear_response(
     frame
         The structure.
     excitation
-        Ground acceleration [m/s2], or force [N] on `shaker_floor`; shape (m,).
+        Ground acceleration [m/s2], or force [N] on `shaker_floor` or at `force_position`; shape (m,).
     dt
         Sampling interval [s].
     shaker_floor
         0 for the ground.
+    force_position
+        Shape (n,): what a unit force gives to each degree of freedom, in place of `shaker_floor`.
     initial_state
         [x, v] at the first sample, shape (2n,); at rest if left out.
     """
     n = frame.floors
-    space = state_space(frame, floor_position(n, shaker_floor) if shaker_floor else None)
-    load = space.B[:, 1 if shaker_floor else 0]
+    if force_position is None and shaker_floor:
+        force_position = floor_position(n, shaker_floor)
+    column = 0 if force_position is None else 1
+    space = state_space(frame, force_position)
+    load = space.B[:, column]
     poles, vectors = np.linalg.eig(space.A)
     entry = np.linalg.solve(vectors, load.astype(np.complex128))
     z0 = np.zeros(2 * n) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
@@ -72,6 +78,6 @@ def linear_response(
         twice = 2.0 if pole.imag > 0.0 else 1.0
         state += twice * np.real(np.outer(coordinate, shape))
     C, D = space.absolute_acceleration()
-    direct = D[:, 1 if shaker_floor else 0]
+    direct = D[:, column]
     acceleration = state @ C.T + np.outer(excitation, direct)
     return LinearResponse(state[:, :n], state[:, n:], acceleration)

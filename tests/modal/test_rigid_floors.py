@@ -12,8 +12,10 @@ from mrpipe.campaigns import Campaign, Recording
 from mrpipe.errors import UserError
 from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.records import FrameTest, FrameTests, Place, frame_tests
+from mrpipe.modal.rigid_floors import ground_influence, measured_rows, rigid_response
 from mrpipe.modal.storage import summary, write_identification
-from mrpipe.structures import read_frame
+from mrpipe.modal.verification import compare_in_time
+from mrpipe.structures import Frame, modal_damping_matrix, read_frame
 from tests.modal.towers import Sensors as Instruments
 from tests.modal.towers import Tower, respond, sample
 
@@ -84,6 +86,35 @@ def test_close_modes_in_two_axes_with_torsion_give_modes_and_matrices(identified
         write_identification(artifact, result)
     frame = read_frame(Artifact(path))
     assert frame.ground_influence.tolist() == [1.0, 0.0, 0.0, 1.0, 0.0, 0.0]
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("direction", ["x", "y2"])
+def test_a_frame_with_torsion_is_simulated_under_a_shaker_and_a_moving_ground(direction):
+    """Against the independent integration of the towers: a shaker beside the centre of floor 2, and ground motion."""
+    tower, rate = building(), 40.0
+    dt = 1.0 / (4 * rate)
+    rng = np.random.default_rng(4)
+    force = 2000.0 * np.interp(np.arange(8000) * dt, np.arange(1000) * 8 * dt, rng.standard_normal(1000))
+    damping = modal_damping_matrix(np.diag(tower.mass), tower.stiffness, tower.damping_ratios)
+    frame = Frame(np.diag(tower.mass), damping, tower.stiffness, "truth", np.tile([1.0, 0.0, 0.0], 2))
+    places = tuple(Place(floor, name) for floor in (1, 2) for name in POSITIONS)
+    assert measured_rows(places, POSITIONS, 2) == pytest.approx(rows())
+    lever = measured_rows([(2, direction)], POSITIONS, 2)[0]
+    shaken = respond(tower, np.outer(force, lever), dt) @ rows().T
+    test = FrameTest(
+        "a", "random", 4 * rate, force - force.mean(), shaken, (False,) * 6, 2, direction=direction, places=places
+    )
+    # a ground acceleration is a force of mass times acceleration, and the ground's own acceleration is added
+    axis = ground_influence(2, direction)
+    ground = 1e-3 * force
+    moved = (respond(tower, -np.outer(ground, axis * tower.mass), dt) + np.outer(ground, axis)) @ rows().T
+    base = FrameTest(
+        "b", "random", 4 * rate, ground - ground.mean(), moved, (False,) * 6, 0, direction=direction, places=places
+    )
+    for each in (test, base):
+        found = compare_in_time(rigid_response(frame, each, POSITIONS), each, (0.3, 8.0))
+        assert found.fit_percent.min() > 98.0
 
 
 def campaign(declared):

@@ -84,3 +84,17 @@ def test_a_number_is_not_parted_from_its_unit(tmp_path: Path, stages: list[Repor
     (path,) = write_report(facts, ["html"])
     text = path.read_text(encoding="utf-8")
     assert "1.8\N{NO-BREAK SPACE}% of 34\N{NO-BREAK SPACE}N, 5 of 7\N{NO-BREAK SPACE}A." in text
+
+
+@pytest.mark.golden
+def test_a_warning_appears_once_and_one_matrix_has_one_notation(tmp_path: Path, stages: list[ReportStage]) -> None:
+    part = PartWriter("identify-frame", tmp_path)
+    part.table("stiffness", pd.DataFrame({"floor 1": [9569.37, -5127.3], "floor 2": [-5127.3, 10191.3]}), "K [N/m].")
+    part.save()
+    frame = ReportStage(
+        "identify-frame", "", read_part(tmp_path, "identify-frame"), {}, ["the laser is noisy"], "", 0.0
+    )
+    html, markdown = write_report(RunFacts(tmp_path, "T", "", [stages[0], frame]), ["html", "markdown"])
+    for text in (html.read_text(encoding="utf-8"), markdown.read_text(encoding="utf-8")):
+        assert text.count("the laser is noisy") == 1
+        assert "9569" in text and "10190" in text and "e+04" not in text
