@@ -115,7 +115,21 @@ def gain_of(before: FloatArray, after: FloatArray, problem: Problem, *, draws: i
 
 
 def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
-    """Return 95 % intervals of every parameter of the effects, from the Jacobian and blocks of the residual."""
+    """Return 95 % intervals of every parameter of the effects, by a jackknife over whole tests.
+
+    What a model does not describe persists within a test, so the samples of a test are no independent evidence. Each
+    test is left out in turn, with the Jacobian of the fit to all of them (one step of Gauss-Newton), and the spread of
+    the values is that of the jackknife: Cameron and Miller 2015, Journal of Human Resources 50, 317-372, CV3.
+
+    Parameters
+    ----------
+    found
+        A fit with effects.
+
+    Returns
+    -------
+    For each term: parameter -> lower and upper end, SI.
+    """
     problem = found.problem
     w = weighting(problem)
     low, high = problem.bounds()
@@ -124,12 +138,8 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
     searched = jacobian_of(problem, found.theta, residual, w, low, high)
     linear = centred(regressors(problem, found.theta)[:, w.at], w)[0]
     first = problem.base.columns
-    block = np.unique(problem.recordings.blocks(BLOCK)[w.at], return_inverse=True)[1]
-    rows = np.concatenate([-searched, linear])
-    inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
-    scores = np.stack([np.bincount(block, weights=row * residual) for row in rows])
-    deviation = np.sqrt(np.maximum(np.diag(inverse @ (scores @ scores.T) @ inverse), 0.0))
-    factor = float(stats.norm.ppf(0.975))
+    deviation, tests = _jackknife(np.concatenate([-searched, linear]), residual, problem.recordings.test[w.at])
+    factor = float(stats.t.ppf(0.975, max(tests - 1, 1)))
     result: list[dict[str, tuple[float, float]]] = [{} for _ in problem.terms]
     for k, (index, parameter) in enumerate(problem.searched):
         if index >= 0:
@@ -144,3 +154,29 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
         value = float(found.linear[first + k])
         result[index][parameter.name] = (value - half, value + half)
     return result
+
+
+def _jackknife(rows: FloatArray, residual: FloatArray, test: IntArray) -> tuple[FloatArray, int]:
+    """Return the standard error of each coefficient of a regression, shape (p,), and the number of tests.
+
+    Parameters
+    ----------
+    rows
+        Regressors, shape (p, n).
+    residual
+        Residual of the regression, shape (n,).
+    test
+        Test of each sample, shape (n,).
+    """
+    size = np.sqrt(np.maximum(np.sum(rows**2, axis=1), 1e-300))
+    scaled = rows / size[:, None]
+    gram = scaled @ scaled.T
+    present = np.unique(test)
+    changes = np.empty((len(present), len(rows)))
+    for place, number in enumerate(present):
+        own = scaled[:, test == number]
+        without = np.linalg.pinv(gram - own @ own.T, rcond=1e-10, hermitian=True)
+        changes[place] = -without @ (own @ residual[test == number])
+    count = len(present)
+    spread = np.sqrt((count - 1) / count * np.sum((changes - changes.mean(axis=0)) ** 2, axis=0))
+    return spread / size, count
