@@ -117,9 +117,9 @@ def gain_of(before: FloatArray, after: FloatArray, problem: Problem, *, draws: i
 def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
     """Return 95 % intervals of every parameter of the effects, by a jackknife over whole tests.
 
-    What a model does not describe persists within a test, so the samples of a test are no independent evidence. Each
-    test is left out in turn, with the Jacobian of the fit to all of them (one step of Gauss-Newton), and the spread of
-    the values is that of the jackknife: Cameron and Miller 2015, Journal of Human Resources 50, 317-372, CV3.
+    What a model does not describe persists within a test, so the samples of a test do not count as separate evidence.
+    Each test is left out in turn, with the Jacobian of the fit to all of them (one step of Gauss-Newton), and the
+    spread of the values is that of the jackknife: Cameron and Miller 2015, Journal of Human Resources 50, 317-372, CV3.
 
     Parameters
     ----------
