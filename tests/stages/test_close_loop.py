@@ -19,6 +19,7 @@ from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceOptions, train_reference
 from mrpipe.control.storage import write_calibration
 from mrpipe.effects.library import damper_effects
+from mrpipe.pipeline.fingerprint import FileHashes, plain_settings
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import StageContext
 from mrpipe.reporting import close_loop as section
@@ -106,6 +107,16 @@ def context(tmp_path: Path, inputs: dict[str, Path], **changes: Any) -> StageCon
         np.random.default_rng(0), 0, 1, lambda fraction, text="": None, Sink(), logging.getLogger("test"),
         Provenance("close-loop", "", {}, 0),
     )  # fmt: skip
+
+
+@pytest.mark.property
+def test_the_traced_damper_in_a_loop_is_no_reason_to_trace_again(tmp_path: Path) -> None:
+    def key(**simulate: Any) -> dict[str, Any]:
+        config = config_model().model_validate({"simulate": simulate})
+        return plain_settings(config, close_loop.STAGE.settings, FileHashes(tmp_path))
+
+    assert key(damper="traced") == key(damper="identified")
+    assert key(plant_rate_hz=4000.0) != key()
 
 
 @pytest.mark.planted
