@@ -26,7 +26,7 @@ NARROW, INTO = 10.0, 0.3
 """A maximum is found once its interval is narrower than so many frequency tolerances; share of the wider side of the
 interval that a search enters where the parabola repeats the maximum."""
 
-SEARCHING = 3.0
+SEARCHING = 2.0
 """Standard error with which a maximum is searched, over that with which it is measured."""
 
 SEARCHING_CYCLES = 0.25
