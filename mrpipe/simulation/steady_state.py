@@ -29,6 +29,10 @@ _SETTINGS = ResonanceSettings()
 FURTHER_RUN = (4, 54)
 """Fewest and most windows of a further run; the histories of a longer one would need too much memory."""
 
+FEWEST_RUNS = 8
+"""Fewest further runs of an irregular response. It can stay near one motion for hundreds of cycles before it changes to
+another, so that the scatter within a run can be small while the means of several runs differ."""
+
 PHASE_STEP = 2.0 * math.pi * (0.5 * math.sqrt(5.0) - 0.5)
 """Each further run begins at another phase of the base motion, this angle later than the run before, so that irregular
 motions are independent. The golden section spreads any number of phases evenly."""
@@ -232,13 +236,14 @@ class SteadyResponses:
         """
         value = float(self(omega)[column])
         most = most_cycles // self.options.window_cycles
-        while math.isfinite(value):
+        while math.isfinite(value) and math.isfinite(error):
+            steady, runs = self.known[omega].steady, self._further.get(omega, [])
             share = float(self.errors(omega)[column]) / (error * value) if value > 0.0 else 0.0
-            done = sum(map(len, self._further.get(omega, ())))
-            if share <= 1.0 or done >= most:
+            done = sum(map(len, runs))
+            if done >= most or (share <= 1.0 and (steady or len(runs) >= FEWEST_RUNS)):
                 break
-            wanted = max(done, FURTHER_RUN[0]) * min(share**2, 2.0)
-            self._average(omega, min(math.ceil(wanted), most))
+            fewest = FURTHER_RUN[0] * (1 if steady else FEWEST_RUNS)
+            self._average(omega, min(max(math.ceil(done * min(max(share**2, 1.0), 2.0)), done + 1, fewest), most))
             value = float(self.known[omega].values[column])
         return value
 
@@ -248,7 +253,8 @@ class SteadyResponses:
         parts = self._further.setdefault(omega, [])
         settling = first.cycles if first.steady else max(options.settling_cycles, options.most_cycles // 2)
         while (missing := wanted - sum(map(len, parts))) > 0:
-            count = min(max(missing, FURTHER_RUN[0]), FURTHER_RUN[1])
+            shared = 1 if first.steady else max(FEWEST_RUNS - len(parts), 1)
+            count = min(max(math.ceil(missing / shared), FURTHER_RUN[0]), FURTHER_RUN[1])
             cycles = settling + count * options.window_cycles
             phase = PHASE_STEP * (1 + len(parts)) % (2.0 * math.pi)
             excitation = harmonic(self.amplitude_m_s2, omega, cycles=cycles, settling_cycles=settling, phase_rad=phase)
@@ -261,5 +267,5 @@ class SteadyResponses:
             parts.append(values_between(response, edges, options.absolute))
         windows = np.vstack(parts)
         values = mean_values(windows)
-        scatter = _scatter(windows, values)
-        self.known[omega] = Steady(values, standard_errors(windows), first.steady, first.cycles, scatter)
+        errors = standard_errors(*parts)
+        self.known[omega] = Steady(values, errors, first.steady, first.cycles, _scatter(windows, values))

@@ -112,21 +112,26 @@ def mean_values(windows: FloatArray) -> FloatArray:
     return np.asarray(np.where(_IS_RMS, np.sqrt(np.mean(windows**2, axis=0)), np.mean(windows, axis=0)))
 
 
-def standard_errors(windows: FloatArray) -> FloatArray:
-    """Return the standard error of each of :func:`mean_values`, shape (q,).
+def standard_errors(*runs: FloatArray) -> FloatArray:
+    """Return the standard error of each of :func:`mean_values` over the windows of all runs, shape (q,).
 
     Successive windows of an irregular response are correlated. They are therefore joined to longer and longer blocks,
     and the largest of the errors counts that the blocks of each length give (Flyvbjerg and Petersen 1989, J. Chem.
-    Phys. 91, 461-466).
+    Phys. 91, 461-466), and that the means of independent runs give.
 
     Parameters
     ----------
-    windows
-        Values of each window, shape (k, q), k at least 2.
+    runs
+        Values of each window of a run, shape (k, q); at least two windows together.
     """
-    blocks = np.where(_IS_RMS, windows**2, windows)
+    powers = [np.where(_IS_RMS, run**2, run) for run in runs]
+    blocks = np.concatenate(powers)
     mean = np.mean(blocks, axis=0)
     found = np.std(blocks, axis=0, ddof=1) / math.sqrt(len(blocks))
+    if len(runs) > 1:
+        shares = np.array([len(run) / len(blocks) for run in runs])[:, None]
+        squares = np.sum((shares * (np.array([power.mean(axis=0) for power in powers]) - mean)) ** 2, axis=0)
+        found = np.maximum(found, np.sqrt(len(runs) / (len(runs) - 1.0) * squares))
     while len(blocks) >= 2 * FEWEST_BLOCKS:
         even = len(blocks) // 2 * 2
         blocks = 0.5 * (blocks[0:even:2] + blocks[1:even:2])

@@ -43,3 +43,11 @@ def test_the_standard_error_of_correlated_windows() -> None:
 def test_two_windows_give_half_their_difference_and_no_response_has_no_error() -> None:
     assert standard_errors(windows(np.array([1.0, 1.02])))[LARGEST] == pytest.approx(0.01)
     assert np.all(standard_errors(windows(np.zeros(20))) == 0.0)
+
+
+@pytest.mark.property
+def test_runs_that_differ_tell_more_than_their_windows() -> None:
+    low, high = windows(np.full(40, 1.0)), windows(np.full(40, 1.2))
+    assert standard_errors(low, high)[LARGEST] == pytest.approx(0.1)
+    # a run counts by its length
+    assert standard_errors(low, low, high[:4])[LARGEST] < 0.02
