@@ -11,8 +11,9 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 RUN_STAMP := $(VENV)/.installed
 TEST_STAMP := $(VENV)/.installed-test
 DOCS_STAMP := $(VENV)/.installed-docs
-# modules are compiled to bytecode when they are first imported: a run imports a small part of what is installed
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile -c constraints.txt
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
+# a run imports a small part of what is installed: its modules are compiled to bytecode when they are first imported
+KEEP_BYTECODE := PYTHONDONTWRITEBYTECODE=
 
 .DEFAULT_GOAL := help
 .PHONY: help run test lint docs bench bench-tracing reproduce train-inverse identify-frame simulate close-loop clean
@@ -24,7 +25,7 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(RUN_STAMP): pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) -e .
+	$(PIP) --no-compile -e .
 	@touch $@
 
 $(TEST_STAMP): pyproject.toml constraints.txt | $(BIN)/python
@@ -36,7 +37,7 @@ $(DOCS_STAMP): pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@ $(RUN_STAMP)
 
 run: $(RUN_STAMP)  ## the whole main job on the virtual laboratory; prints where the report is
-	$(ONE_THREAD) $(BIN)/mrpipe run $(CONFIG)
+	$(ONE_THREAD) $(KEEP_BYTECODE) $(BIN)/mrpipe run $(CONFIG)
 
 lint: $(TEST_STAMP)  ## style, types and import rules
 	$(BIN)/ruff check mrpipe tests benchmarks

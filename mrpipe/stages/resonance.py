@@ -35,6 +35,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     rig = read_rig(context.settings.simulate, context.artifact, context.settings.gains.source)
     if reason := rig.reason_to_skip(law):
         raise StageSkipped(reason)
+    rig.controller(law)  # a law that is not calibrated is refused before anything is simulated
     settings = context.settings.resonance
     excitation, _ = excitation_of(rig, context.settings.simulate.excitation)
     band = settings.band_rad_s or default_band(context.artifact("calibrate"))
