@@ -40,12 +40,13 @@ def second_order_filter(
         count = min(int(omega * dt / 0.3) + 1, 50)
         h = dt / count
         damping = 2.0 * damping_ratio * omega
+        implicit = 1.0 + 0.5 * h * damping + 0.25 * h * h * omega * omega
         for index in range(count):
             middle = state[2] + (value - state[2]) * (index + 0.5) / count
             force = omega * omega * (middle - state[0]) - damping * state[1]
-            change = h * force / (1.0 + 0.5 * h * damping + 0.25 * h * h * omega * omega)
+            change = h * force / implicit
             # the mean rate over the step acts on the displacement within it
-            change -= 0.5 * h * h * omega * omega * state[1] / (1.0 + 0.5 * h * damping + 0.25 * h * h * omega * omega)
+            change -= 0.5 * h * h * omega * omega * state[1] / implicit
             state[0] += h * (state[1] + 0.5 * change)
             state[1] += change
     else:

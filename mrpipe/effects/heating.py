@@ -5,11 +5,21 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import float64, njit, void
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import FIRST, STEP_SIGNATURE, VISCOSITY, WORK, YIELD_FORCE, Phase, Step
 from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
+
+
+@njit(void(float64[::1], float64[::1], float64, float64), cache=True)
+def _warm(wire: FloatArray, state: FloatArray, cooling_rate: float, dt: float) -> None:
+    """Advance the heat [J] in the state by the work of a step, less what cools at a rate [1/s]; then the last work."""
+    if wire[FIRST] > 0.5:
+        state[0] = 0.0
+        state[1] = wire[WORK]
+    state[0] = state[0] * math.exp(-cooling_rate * dt) + wire[WORK] - state[1]
+    state[1] = wire[WORK]
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -18,11 +28,7 @@ def heating_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
 
     State: heat [J], last work [J]. Heat is that of the simulated force, never of a measured one.
     """
-    if wire[FIRST] > 0.5:
-        state[0] = 0.0
-        state[1] = wire[WORK]
-    state[0] = state[0] * math.exp(-parameters[1] * dt) + wire[WORK] - state[1]
-    state[1] = wire[WORK]
+    _warm(wire, state, parameters[1], dt)
     loss = parameters[0] * state[0]
     factor = math.exp(-min(max(loss, -5.0), 20.0)) if parameters[3] == 0.0 else 1.0 / max(1.0 + loss, 0.05)
     if parameters[2] != 2.0:
@@ -38,11 +44,7 @@ def warming_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
     State: heat [J], last work [J]. The yield force falls by (1 - p b Q)^(1/p), linearly at p = 1 and exponentially at
     p = 0; the viscosity by the same factor to the power n.
     """
-    if wire[FIRST] > 0.5:
-        state[0] = 0.0
-        state[1] = wire[WORK]
-    state[0] = state[0] * math.exp(-parameters[1] * dt) + wire[WORK] - state[1]
-    state[1] = wire[WORK]
+    _warm(wire, state, parameters[1], dt)
     loss = min(max(parameters[0] * state[0], -5.0), 20.0)
     curvature = parameters[2]
     flat = abs(curvature) < 1e-3

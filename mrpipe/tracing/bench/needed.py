@@ -52,16 +52,17 @@ def without_superfluous(
         full, best = (on_all_tests(item, kept.chosen.problem) for item in (full, best))
         if best.chi_square > lead * full.chi_square:
             break
-        count = len(kept.chosen.problem.terms)
-        extension = _in_order(full, [*(k for k in range(count) if k != place), place])
-        rounds = kept.rounds[: place - declared] if place - declared < len(kept.rounds) else kept.rounds
+        extension = kept.extension
+        if kept is selection:
+            others = [k for k in range(len(full.problem.terms)) if k != place]
+            extension = _in_order(full, [*others, place])
         kept = replace(
             kept,
             chosen=best,
             proven=kept.proven - 1,
             # a round that compares what remains with its rivals, the first one even where its winner was dropped
-            rounds=rounds or kept.rounds[:1],
-            extension=extension if kept is selection else kept.extension,
+            rounds=kept.rounds[: place - declared] or kept.rounds[:1],
+            extension=extension,
         )
     return kept
 
