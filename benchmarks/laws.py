@@ -1,9 +1,11 @@
 """Every control law over frequency: the thesis' frame with set C and with a perfect damper, and the ten-storey frame.
 
-    python -m benchmarks.laws --results laws.jsonl [--laws vd fdns] [--structures frame ten-storey]
+    python -m benchmarks.laws --results laws.jsonl [--laws vd fdns] [--structures frame ten-storey half-step]
     python -m benchmarks.laws --results laws.jsonl --table
 
 One line of JSON per structure and law, so that an interrupted run goes on where it ended; `--table` prints Markdown.
+The structure `half-step` is the thesis' frame at the accuracy of `mrpipe simulate --resonance`, with the default
+frequency step and with half of it.
 Gains are those of the thesis where it prints some, else the exact optimum of the calibration.
 """
 
@@ -11,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -24,7 +27,7 @@ from mrpipe.artifacts import load_parameter_set
 from mrpipe.case_studies.motion import spectrum_compatible_motion
 from mrpipe.case_studies.ten_storey.structure import ten_storey
 from mrpipe.control.assembly import ControllerFactory, calibrated_from
-from mrpipe.control.calibration import CalibrationOptions, balanced_weights, calibrate
+from mrpipe.control.calibration import CalibrationOptions, balanced_weights, calibrate, plant_of
 from mrpipe.control.laws import all_laws, law_named
 from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceNetwork, ReferenceOptions, train_reference
@@ -33,10 +36,11 @@ from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import DivergedError
 from mrpipe.simulation.excitation import Excitation, recorded
 from mrpipe.simulation.loop import LoopOptions, Response
-from mrpipe.simulation.resonance import FLATNESS, REFINEMENTS
+from mrpipe.simulation.resonance import BAND, FLATNESS, REFINEMENTS, curve_options, runner
 from mrpipe.simulation.response_curve import response_curve
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.sensors import SensorNoise
+from mrpipe.simulation.settings import ResonanceSettings
 from mrpipe.simulation.steady_state import CurveOptions
 from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
 from mrpipe.thesis.gains import THESIS_GAINS
@@ -59,6 +63,12 @@ CURVES = CurveOptions(
 
 EXPECTED_M = 0.02
 """Expected amplitude of the damper in the ten-storey frame."""
+
+POINTS = ResonanceSettings().points
+"""Frequencies of the default grid."""
+
+PEAKS = ("rms_x_top_m", "rms_a1_m_s2", "rms_a_top_m_s2")
+"""Quantities of the tables."""
 
 RATE_HZ = 200.0
 """Sampling rate of the controllers."""
@@ -137,8 +147,7 @@ def largest(rig: Rig, law: str, amplitude: float) -> dict[str, float] | None:
     curve = response_curve(run, amplitude, (0.75 * known.omega_0, 1.6 * known.omega_0), CURVES)
     if not math.isfinite(curve.peak("rms_x_top_m")):
         return None
-    names = ("rms_x_top_m", "rms_a1_m_s2", "rms_a_top_m_s2")
-    return {"resonance_rad_s": curve.resonance_rad_s, **{f"peak_{name}": curve.peak(name) for name in names}}
+    return {"resonance_rad_s": curve.resonance_rad_s, **{f"peak_{name}": curve.peak(name) for name in PEAKS}}
 
 
 def of_thesis_frame(law: str) -> dict[str, Any]:
@@ -174,13 +183,33 @@ def of_ten_storeys(law: str) -> dict[str, Any]:
     }
 
 
-STUDIES: dict[str, Callable[[str], dict[str, Any]]] = {"frame": of_thesis_frame, "ten-storey": of_ten_storeys}
+def of_half_step(law: str) -> dict[str, Any]:
+    """Return the largest responses with the default frequency step and with half of it, and their standard errors."""
+    rig = thesis_rig("network" in law_named(law).needs)
+    modes = plant_of(rig.frame, rig.position, CalibrationOptions()).modes
+    band = (BAND[0] * modes.omega_0, BAND[1] * modes.omega_inf)
+    found = {}
+    for name, points in (("whole", POINTS), ("half", 2 * POINTS - 1)):
+        began = time.process_time()
+        options = curve_options(ResonanceSettings(points=points), absolute=False)
+        curve = response_curve(
+            runner(rig, rig.controller(law), np.random.default_rng(3)), AMPLITUDE_M_S2, band, options
+        )
+        found[name] = {**curve.peaks_as_json(), "cpu_s": time.process_time() - began}
+    return found
+
+
+STUDIES: dict[str, Callable[[str], dict[str, Any]]] = {
+    "frame": of_thesis_frame,
+    "ten-storey": of_ten_storeys,
+    "half-step": of_half_step,
+}
 
 
 def as_markdown(rows: list[dict[str, Any]]) -> str:
-    """Return both tables, with the laws in the order of `mrpipe simulate --help`."""
+    """Return the three tables, with the laws in the order of `mrpipe simulate --help`."""
     known = {(row["structure"], row["law"]): row for row in rows}
-    both, amplitudes = [], []
+    both, amplitudes, steps = [], [], []
     for law in all_laws():
         frame, tall = known.get(("frame", law)), known.get(("ten-storey", law))
         nominal = frame["set C"][FACTORS.index(1.0)] if frame else None
@@ -188,16 +217,29 @@ def as_markdown(rows: list[dict[str, Any]]) -> str:
         both.append([*row, *_of_earthquake(tall and tall["earthquake"])])
         if frame:
             amplitudes.append([law, *_over_amplitudes(frame["set C"]), *_over_amplitudes(frame.get("ideal"))])
+        if ("half-step", law) in known:
+            steps.append([law, *_changes(known["half-step", law])])
     peaks = ("resonance [rad/s]", "x top [mm]", "a1 [m/s2]", "a top [m/s2]")
     quake = ("x top [mm]", "drift [mm]", "acceleration [m/s2]", "force [kN]")
     head = [*(f"frame: {name}" for name in peaks), *(f"ten storeys: {name}" for name in peaks)]
     head += [f"earthquake: {name}" for name in quake]
     kinds = [f"{kind} x{factor:g} [mm]" for kind in ("set C", "ideal") for factor in FACTORS]
-    return "\n".join([*_table(["law", *head], both), "", *_table(["law", *kinds], amplitudes)])
+    changes = ["law", "top displacement", "acceleration of floor 1", "top acceleration", "largest standard error"]
+    tables = [(["law", *head], both), (["law", *kinds], amplitudes), ([*changes, "processor time [s]"], steps)]
+    return "\n\n".join("\n".join(_table(names, rows)) for names, rows in tables)
 
 
 def _table(head: list[str], rows: list[list[str]]) -> list[str]:
     return ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
+
+
+def _changes(found: dict[str, Any]) -> list[str]:
+    """Return how half the step changes each peak, the largest relative standard error, and the time of both curves."""
+    whole, half = found["whole"], found["half"]
+    changes = [abs(half[f"peak_{name}"] / whole[f"peak_{name}"] - 1.0) for name in PEAKS]
+    error = max(item[f"standard_error_{name}"] / item[f"peak_{name}"] for item in (whole, half) for name in PEAKS)
+    times = f"{whole['cpu_s']:.0f}, {half['cpu_s']:.0f}"
+    return [*(f"{100.0 * change:.1f} %" for change in changes), f"{100.0 * error:.2f} %", times]
 
 
 def _of_band(found: dict[str, float] | None, form: str) -> list[str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import Artifact, Progress
 from mrpipe.control.controller import Controller
@@ -106,6 +107,7 @@ def measure_resonance(
     absolute: bool,
     rng: np.random.Generator,
     progress: Progress,
+    jobs: int = 1,
 ) -> Curves:
     """Measure the response over frequency at each amplitude.
 
@@ -125,6 +127,8 @@ def measure_resonance(
         For sensor noise.
     progress
         Receives the share that is done.
+    jobs
+        Threads for irregular responses; the result does not depend on their number.
 
     Raises
     ------
@@ -151,7 +155,9 @@ def measure_resonance(
     curves = []
     for number, factor in enumerate(settings.amplitude_factors):
         progress(number / len(settings.amplitude_factors), f"response over frequency at {factor:g} times the amplitude")
-        curves.append(response_curve(run, factor * float(amplitude), band_rad_s, options))
+        # the linear algebra of a run is so small that a second thread only takes time from other programs
+        with threadpool_limits(1):
+            curves.append(response_curve(run, factor * float(amplitude), band_rad_s, options, jobs=jobs))
     warnings = _warnings(curves, band_rad_s, settings.standard_error)
     return Curves(settings.amplitude_factors, tuple(curves), tuple(warnings))
 

@@ -6,8 +6,8 @@ the steady RMS response at many frequencies, at constant amplitude of the base a
 of the largest response.
 
 The values of an irregular response have a standard error, and the largest of several such values is on average too
-large. With `CurveOptions.standard_error` the largest values are therefore measured again, over further runs, until the
-largest value of the curve is one that is accurate.
+large. With `CurveOptions.standard_error` all values that may be the largest are therefore measured again, over further
+runs, until they are accurate or are smaller than the largest by more than their errors.
 """
 
 from __future__ import annotations
@@ -19,15 +19,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.simulation.steady_state import CurveOptions, Run, SteadyResponses
+from mrpipe.simulation.steady_state import CurveOptions, Run, Steady, SteadyResponses
 from mrpipe.simulation.windows import DISPLAYED, QUANTITIES
 
 NARROW, INTO = 10.0, 0.3
 """A maximum is found once its interval is narrower than so many frequency tolerances; share of the wider side of the
 interval that a search enters where the parabola repeats the maximum."""
 
-SEARCHING = 2.0
-"""Standard error with which a maximum is searched, over that with which it is measured."""
+SEARCHING = (8.0, 4.0, 2.0)
+"""Errors with which two values are compared in a search, over the standard error with which the maximum is measured:
+one after the other until the difference is larger than its error."""
+
+RIVAL = 2.0
+"""A value may be the largest if it is smaller than the largest one by less than so many standard errors of their
+difference."""
 
 SEARCHING_CYCLES = 0.25
 """Most cycles over which a value of the search is averaged, over the most for a largest value."""
@@ -91,7 +96,12 @@ class ResponseCurve:
 
 
 def response_curve(
-    run: Run, amplitude_m_s2: float, band_rad_s: tuple[float, float], options: CurveOptions | None = None
+    run: Run,
+    amplitude_m_s2: float,
+    band_rad_s: tuple[float, float],
+    options: CurveOptions | None = None,
+    known: dict[float, Steady] | None = None,
+    jobs: int = 1,
 ) -> ResponseCurve:
     """Return the steady response over a frequency band, with refined resonances.
 
@@ -108,11 +118,15 @@ def response_curve(
         Lowest and highest frequency [rad/s].
     options
         How it is measured.
+    known
+        Frequency [rad/s] -> response that was measured under the same conditions; the new ones are put in.
+    jobs
+        Threads for the further runs of an irregular response; the result does not depend on their number.
     """
     options = options or CurveOptions()
     first, last = band_rad_s
     grid = [float(value) for value in np.geomspace(first, last, options.points)]
-    measured = SteadyResponses(run, amplitude_m_s2, options)
+    measured = SteadyResponses(run, amplitude_m_s2, options, {} if known is None else known, jobs)
     for omega in grid:
         measured(omega)
     for quantity in options.refined:
@@ -132,15 +146,27 @@ def response_curve(
     )
 
 
-def _accurate(measured: SteadyResponses, omega: float, column: int) -> float:
-    """Return a value with the accuracy of a search."""
+def _accurate(measured: SteadyResponses, omega: float, column: int, times: float = SEARCHING[0]) -> float:
+    """Return a value with an error of so many times the demanded one, as far as a search averages."""
     options = measured.options
     most = round(SEARCHING_CYCLES * options.most_averaged_cycles)
-    return measured.accurate(omega, column, SEARCHING * options.standard_error, most)
+    return measured.accurate(omega, column, times * options.standard_error, most)
+
+
+def _is_larger(measured: SteadyResponses, column: int, first: float, second: float) -> bool:
+    """Return whether the value at the first frequency is larger than that at the second.
+
+    Both are averaged only until they differ by more than their errors explain.
+    """
+    for times in SEARCHING:
+        difference = _accurate(measured, first, column, times) - _accurate(measured, second, column, times)
+        if not abs(difference) <= RIVAL * math.hypot(*(measured.errors(omega)[column] for omega in (first, second))):
+            break
+    return difference > 0.0
 
 
 def _searched(measured: SteadyResponses, column: int, grid: Sequence[float]) -> FloatArray:
-    """Return one quantity on the grid; values that may be maxima have the accuracy of a search."""
+    """Return one quantity on the grid; values that may be maxima have the accuracy of the beginning of a search."""
     values = np.array([measured(omega)[column] for omega in grid])
     if np.all(np.isfinite(values)):
         for place in np.flatnonzero(values >= measured.options.refined_share * np.max(values)).tolist():
@@ -149,15 +175,45 @@ def _searched(measured: SteadyResponses, column: int, grid: Sequence[float]) -> 
 
 
 def _measure_largest(measured: SteadyResponses, column: int) -> None:
-    """Measure the largest value of a quantity accurately, and so on until the largest value is one of these."""
+    """Measure the values of a quantity that may be the largest, until they are as accurate as demanded.
+
+    A value may be the largest while it is smaller than the largest one by no more than :data:`RIVAL` standard errors of
+    their difference. The least accurate of these values is averaged over further runs, in steps of half its error,
+    because most of them are dropped before they are accurate.
+    """
     options = measured.options
     done: set[float] = set()
     while True:
-        largest = max(measured.known, key=lambda omega: float(measured.known[omega].values[column]))
-        if largest in done:
+        rivals = [omega for omega in _rivals(measured, column) if omega not in done]
+        if not rivals:
             return
-        measured.accurate(largest, column, options.standard_error, options.most_averaged_cycles)
-        done.add(largest)
+        relative = {omega: _relative_error(measured, omega, column) for omega in rivals}
+        least = max(rivals, key=lambda omega: relative[omega])
+        known = measured.known[least]
+        error = max(options.standard_error, 0.5 * relative[least])
+        measured.accurate(least, column, error, options.most_averaged_cycles)
+        if measured.known[least] is known or error == options.standard_error:
+            done.add(least)
+
+
+def _rivals(measured: SteadyResponses, column: int) -> list[float]:
+    """Return the frequencies of the values that may be the largest, the largest first."""
+    values = {omega: float(item.values[column]) for omega, item in measured.known.items()}
+    errors = {omega: float(measured.errors(omega)[column]) for omega in values}
+    ordered = sorted(values, key=lambda omega: -values[omega])
+    largest = ordered[0]
+    if not math.isfinite(values[largest]):
+        return [largest]
+    return [
+        omega
+        for omega in ordered
+        if values[largest] - values[omega] <= RIVAL * math.hypot(errors[largest], errors[omega])
+    ]
+
+
+def _relative_error(measured: SteadyResponses, omega: float, column: int) -> float:
+    value = float(measured.known[omega].values[column])
+    return float(measured.errors(omega)[column]) / value if value > 0.0 else 0.0
 
 
 def _maxima(values: FloatArray, share: float) -> list[int]:
@@ -197,7 +253,8 @@ def _refine(measured: SteadyResponses, column: int, grid: Sequence[float], place
             if flat and high - low < NARROW * options.frequency_tolerance:
                 return
             new = top + INTO * (high - top) if high - top > top - low else top - INTO * (top - low)
-        if value(new) > value(top):
+        value(new)
+        if _is_larger(measured, column, frequencies[new], frequencies[top]):
             low, top, high = (top, new, high) if new > top else (low, new, top)
         else:
             low, high = (new, high) if new < top else (low, new)

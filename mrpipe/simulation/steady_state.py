@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import DivergedError
@@ -189,12 +190,15 @@ class SteadyResponses:
         Lengths and accuracy.
     known
         Frequency [rad/s] -> its response.
+    jobs
+        Threads for further runs.
     """
 
     run: Run
     amplitude_m_s2: float
     options: CurveOptions
     known: dict[float, Steady] = field(default_factory=dict)
+    jobs: int = 1
     _further: dict[float, list[FloatArray]] = field(default_factory=dict)
     _cycles: int = 0
 
@@ -252,20 +256,34 @@ class SteadyResponses:
         options, first = self.options, self.known[omega]
         parts = self._further.setdefault(omega, [])
         settling = first.cycles if first.steady else max(options.settling_cycles, options.most_cycles // 2)
-        while (missing := wanted - sum(map(len, parts))) > 0:
-            shared = 1 if first.steady else max(FEWEST_RUNS - len(parts), 1)
-            count = min(max(math.ceil(missing / shared), FURTHER_RUN[0]), FURTHER_RUN[1])
-            cycles = settling + count * options.window_cycles
-            phase = PHASE_STEP * (1 + len(parts)) % (2.0 * math.pi)
-            excitation = harmonic(self.amplitude_m_s2, omega, cycles=cycles, settling_cycles=settling, phase_rad=phase)
-            try:
-                response = self.run(excitation)
-            except DivergedError:
-                self.known[omega] = _unbounded(first.cycles)
-                return
-            edges = 2.0 * math.pi / omega * (settling + options.window_cycles * np.arange(count + 1, dtype=np.float64))
-            parts.append(values_between(response, edges, options.absolute))
+        counts: list[int] = []
+        while (missing := wanted - sum(map(len, parts)) - sum(counts)) > 0:
+            shared = 1 if first.steady else max(FEWEST_RUNS - len(parts) - len(counts), 1)
+            counts.append(min(max(math.ceil(missing / shared), FURTHER_RUN[0]), FURTHER_RUN[1]))
+        runs = (self._windows(omega, settling, count, len(parts) + place) for place, count in enumerate(counts))
+        runner = Parallel(n_jobs=self.jobs, backend="threading")
+        found = runner(delayed(run)() for run in runs) if self.jobs > 1 else [run() for run in runs]
+        parts += [windows for windows in found if windows is not None]
+        if any(windows is None for windows in found):
+            self.known[omega] = _unbounded(first.cycles)
+            return
         windows = np.vstack(parts)
         values = mean_values(windows)
         errors = standard_errors(*parts)
         self.known[omega] = Steady(values, errors, first.steady, first.cycles, _scatter(windows, values))
+
+    def _windows(self, omega: float, settling: int, count: int, number: int) -> Callable[[], FloatArray | None]:
+        """Return the further run of that number; it gives the values of its windows, None if it grows without bound."""
+        options, cycles = self.options, settling + count * self.options.window_cycles
+        phase = PHASE_STEP * (1 + number) % (2.0 * math.pi)
+
+        def run() -> FloatArray | None:
+            excitation = harmonic(self.amplitude_m_s2, omega, cycles=cycles, settling_cycles=settling, phase_rad=phase)
+            try:
+                response = self.run(excitation)
+            except DivergedError:
+                return None
+            edges = 2.0 * math.pi / omega * (settling + options.window_cycles * np.arange(count + 1, dtype=np.float64))
+            return values_between(response, edges, options.absolute)
+
+        return run

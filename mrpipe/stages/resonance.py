@@ -40,7 +40,9 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     excitation, _ = excitation_of(rig, context.settings.simulate.excitation)
     band = settings.band_rad_s or default_band(context.artifact("calibrate"))
     absolute = context.settings.simulate.accelerations == "absolute"
-    curves = measure_resonance(rig, law, excitation, band, settings, absolute, context.rng, context.progress)
+    curves = measure_resonance(
+        rig, law, excitation, band, settings, absolute, context.rng, context.progress, context.jobs
+    )
     for warning in curves.warnings:
         context.warn(warning)
     with context.write(f"resonance-{law}.h5") as artifact:

@@ -27,7 +27,9 @@ def _measured(
 ) -> resonance.Curves:
     """Replace the loop by curves of three frequencies: amplitude -> top displacement."""
 
-    def curve(_: object, amplitude: float, band: tuple[float, float], options: CurveOptions) -> ResponseCurve:
+    def curve(
+        _: object, amplitude: float, band: tuple[float, float], options: CurveOptions, jobs: int
+    ) -> ResponseCurve:
         values = np.tile(np.array(top[round(amplitude, 9)])[:, None], (1, len(QUANTITIES)))
         return ResponseCurve(amplitude, np.array([band[0], 8.0, band[1]]), values, error * values, np.full(3, True))
 

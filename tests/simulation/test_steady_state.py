@@ -80,6 +80,17 @@ def test_a_response_that_seldom_changes_its_motion_is_run_several_times() -> Non
     assert 0.01 < measured.errors(8.0)[X_TOP] <= 0.03 * found
 
 
+def test_the_number_of_threads_changes_nothing() -> None:
+    def phased(excitation: Excitation) -> Response:
+        loop = Loop(lambda _: 1.0, 0.3)
+        # runs differ in the phase of the base motion alone
+        loop.runs = int(1e6 * abs(float(excitation.at(np.array([3.0]))[0])))
+        return loop(excitation)
+
+    found = [SteadyResponses(phased, 1.0, options(), jobs=jobs).accurate(8.0, X_TOP, 3e-3, 20_000) for jobs in (1, 3)]
+    assert found[0] == found[1]
+
+
 def test_averaging_ends_at_its_most_cycles() -> None:
     measured = SteadyResponses(Loop(lambda _: 1.0, 1.0), 1.0, options())
     found = measured.accurate(8.0, X_TOP, 1e-6, 600)
@@ -110,6 +121,25 @@ def test_the_largest_of_irregular_values_is_not_too_large() -> None:
     assert np.mean(biased) > 1.03
     # the top of this curve is flat: what remains is the largest of a few values with that standard error
     assert np.mean(accurate) == pytest.approx(1.0, abs=9e-3)
+
+
+def test_all_values_that_may_be_the_largest_are_accurate() -> None:
+    """Of two maxima of nearly the same height, the search alone cannot say which one is larger."""
+
+    def twin(omega: float) -> float:
+        return max(np.exp(-20.0 * np.log(omega / 7.5) ** 2), 0.998 * np.exp(-20.0 * np.log(omega / 10.0) ** 2))
+
+    for shift in range(4):
+        loop = Loop(twin, 0.4)
+        loop.runs = 1000 * shift
+        curve = response_curve(loop, 1.0, BAND, options(standard_error=3e-3))
+        values, errors = curve.column("rms_x_top_m"), curve.errors[:, X_TOP]
+        largest = int(np.argmax(values))
+        rivals = values[largest] - values <= 2.0 * np.hypot(errors, errors[largest])
+        assert np.all(errors[rivals] <= 3e-3 * values[rivals])
+        # a value that is clearly smaller is not worth the effort
+        assert np.max(errors[values < 0.9 * values[largest]]) > 6e-3
+        assert values[largest] == pytest.approx(1.0, abs=9e-3)
 
 
 def test_two_windows_that_agree_by_chance_are_no_proof_of_accuracy() -> None:
