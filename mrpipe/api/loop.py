@@ -110,7 +110,7 @@ class Designed:
     result: Result
 
     def __str__(self) -> str:
-        from mrpipe.reporting.design import in_plain_words
+        from mrpipe.reporting.design_words import in_plain_words
 
         return in_plain_words(self.summary)
 

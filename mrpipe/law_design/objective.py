@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from mrpipe.law_design.options import DesignSettings
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import Response
 from mrpipe.simulation.response_curve import ResponseCurve, response_curve
-from mrpipe.simulation.steady_state import CurveOptions, Run
+from mrpipe.simulation.steady_state import CurveOptions, Run, Steady
 from mrpipe.simulation.windows import QUANTITIES, values_between
 
 RunOf = Callable[[str, Gains], Run]
@@ -166,8 +166,40 @@ def largest(curves: Sequence[ResponseCurve], motions: Mapping[str, Mapping[str, 
     }
 
 
+@dataclass
+class Known:
+    """Steady responses that were measured before, so that no loop runs twice under the same conditions.
+
+    It belongs to one loop: structure, damper, settings and sensor noise are the same for all of its responses.
+    """
+
+    _found: dict[Hashable, dict[float, Steady]] = field(default_factory=dict)
+
+    def curve(
+        self,
+        run: Run,
+        design: tuple[str, Gains],
+        amplitude_m_s2: float,
+        band: tuple[float, float],
+        options: CurveOptions,
+    ) -> ResponseCurve:
+        """Return the response curve of a law and its gains; it shares frequencies with curves of other quantities."""
+        key = (design, amplitude_m_s2, band, replace(options, refined=()))
+        # a copy, because other threads may read what is there
+        responses = dict(self._found.get(key, {}))
+        found = response_curve(run, amplitude_m_s2, band, options, responses)
+        self._found[key] = responses
+        return found
+
+
 def evaluate(
-    run_of: RunOf, law: str, gains: Gains, load: Load, objective: Objective, options: CurveOptions
+    run_of: RunOf,
+    law: str,
+    gains: Gains,
+    load: Load,
+    objective: Objective,
+    options: CurveOptions,
+    known: Known | None = None,
 ) -> Evaluation:
     """Run one law at one set of gains under the whole load.
 
@@ -181,10 +213,13 @@ def evaluate(
         What it is exposed to, and how responses become one number.
     options
         Of the response curves.
+    known
+        Responses of this loop that were measured before; the new ones are put in.
     """
     run = run_of(law, gains)
+    known = known or Known()
     amplitudes = sorted(load.amplitudes_m_s2)
-    curves = tuple(response_curve(run, amplitude, load.band_rad_s, options) for amplitude in amplitudes)
+    curves = tuple(known.curve(run, (law, gains), amplitude, load.band_rad_s, options) for amplitude in amplitudes)
     motions = {motion.name: _values_of(run(motion.excitation), options.absolute) for motion in load.motions}
     found = Evaluation(law, gains, curves, motions)
     return Evaluation(law, gains, curves, motions, objective.value(found.peaks))

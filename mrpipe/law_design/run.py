@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import Progress
 from mrpipe.control.law import Plant
@@ -200,13 +201,32 @@ def run_design(
     identified
         Where `rig` has a traced damper: the same rig with the damper before the tracing, for the design without it.
     """
-    kept = kept or Kept()
+    # the threads share the processors; a second level of threads inside the linear algebra would only take time
+    with threadpool_limits(1):
+        return _run_design(
+            rig, plant, settings, load, uncertainty, absolute, rng, jobs, progress, kept or Kept(), identified
+        )
+
+
+def _run_design(
+    rig: Rig,
+    plant: Plant,
+    settings: DesignSettings,
+    load: Load,
+    uncertainty: tuple[FrameUncertainty, DamperUncertainty],
+    absolute: bool,
+    rng: np.random.Generator,
+    jobs: int,
+    progress: Progress,
+    kept: Kept,
+    identified: Rig | None,
+) -> Result:
     calibrated = rig.controllers.calibrated.gains
     entries, free_entries, left_out = laws_in_the_race(settings, plant, calibrated)
     run_of = LoopOf(rig, int(rng.integers(2**32)))
     loops = Loops(run_of, run_of.at_rate(SEARCH_RATE))
     final = accurate_curves(settings, absolute=absolute)
-    reference = reference_evaluation(run_of, LAW_OF_REFERENCE, calibrated[LAW_OF_REFERENCE], load, final)
+    reference = reference_evaluation(run_of, LAW_OF_REFERENCE, calibrated[LAW_OF_REFERENCE], load, final, loops.known)
     objective = Objective(settings.weights, reference.peaks, Limits.of(settings))
 
     def part(start: float, share: float) -> Progress:
@@ -244,7 +264,7 @@ def run_design(
         LoopOf(identified, run_of.seed).at_rate(SEARCH_RATE), [*entries, *free_entries], load, objective, settings,
         replace(kept, problem=f"{kept.problem}|before the tracing"), jobs, part(0.5, 0.25),
     )  # fmt: skip
-    with_traced = evaluate(run_of, without.law, without.gains, load, objective, final)
+    with_traced = evaluate(run_of, without.law, without.gains, load, objective, final, loops.known)
     least = min(item.best.value for item in every)
     return replace(result, untraced=Untraced(without, with_traced, with_traced.value / least - 1.0))
 

@@ -11,7 +11,7 @@ from mrpipe.artifacts import Progress
 from mrpipe.control.gains import Gains
 from mrpipe.errors import DivergedError
 from mrpipe.law_design.kept import Designed, Kept, LawUnderDesign
-from mrpipe.law_design.objective import Evaluation, Load, Objective, RunOf, evaluate
+from mrpipe.law_design.objective import Evaluation, Known, Load, Objective, RunOf, evaluate
 from mrpipe.law_design.search import SearchOptions, refine, search
 from mrpipe.simulation.steady_state import CurveOptions
 
@@ -39,10 +39,13 @@ class Loops:
         Gives the loop of a law as the settings describe it.
     searched
         The same with a larger step of the plant, for the search.
+    known
+        Responses of the accurate loops.
     """
 
     accurate: RunOf
     searched: RunOf
+    known: Known = field(default_factory=Known)
 
 
 @dataclass
@@ -90,7 +93,10 @@ def design_law(
     def value(gains: Gains) -> float:
         return archive.add(evaluate(loops.searched, entry.law, gains, searched, objective, coarse))
 
-    calibrated = evaluate(loops.accurate, entry.law, entry.start, load, objective, final)
+    def accurate(gains: Gains, load: Load, options: CurveOptions) -> Evaluation:
+        return evaluate(loops.accurate, entry.law, gains, load, objective, options, loops.known)
+
+    calibrated = accurate(entry.start, load, final)
     if not entry.free:
         return Designed(entry, calibrated, calibrated, ())
     found = search(value, entry.free, fixed, options)
@@ -98,19 +104,21 @@ def design_law(
     # without accurate curves there is nothing to refine with
     if final.tolerance < coarse.tolerance:
         found = refine(
-            lambda gains: evaluate(loops.accurate, entry.law, gains, searched, objective, near).value,
+            lambda gains: accurate(gains, searched, near).value,
             entry.free,
             found,
             options,
         )
-    best = evaluate(loops.accurate, entry.law, found, load, objective, final)
+    best = accurate(found, load, final)
     if calibrated.value < best.value:
         # the accurate curves decide; the search saw the coarse ones
         best = calibrated
     return Designed(entry, best, calibrated, tuple(archive.items))
 
 
-def reference_evaluation(run_of: RunOf, law: str, gains: Gains, load: Load, final: CurveOptions) -> Evaluation:
+def reference_evaluation(
+    run_of: RunOf, law: str, gains: Gains, load: Load, final: CurveOptions, known: Known | None = None
+) -> Evaluation:
     """Return the evaluation that scales the objective.
 
     Raises
@@ -118,7 +126,7 @@ def reference_evaluation(run_of: RunOf, law: str, gains: Gains, load: Load, fina
     DivergedError
         If the reference loop itself is unstable.
     """
-    found = evaluate(run_of, law, gains, load, Objective({}), final)
+    found = evaluate(run_of, law, gains, load, Objective({}), final, known)
     if not all(map(_finite, found.peaks.values())):
         raise DivergedError(f"the reference loop under law {law} is unstable")
     return found

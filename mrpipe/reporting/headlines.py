@@ -147,6 +147,10 @@ def _why_weak(network: Mapping[str, Any]) -> str:
 
 def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
     """Return the few lines that a person wants to read of a stage; empty where its numbers speak for themselves."""
+    if stage == "design" and "pareto" in summary:
+        from mrpipe.reporting.design_words import in_lines
+
+        return in_lines(summary)
     if stage != "close-loop" or "before" not in summary:
         return []
     from mrpipe.reporting.closed_loop_words import in_words

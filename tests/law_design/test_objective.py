@@ -6,8 +6,11 @@ import math
 
 import pytest
 
-from mrpipe.law_design.objective import UNACCEPTABLE, Limits, Objective
+from mrpipe.control.gains import Gains
+from mrpipe.law_design.objective import UNACCEPTABLE, Known, Limits, Load, Objective, evaluate
 from mrpipe.law_design.options import DesignSettings
+from mrpipe.simulation.steady_state import CurveOptions
+from tests.simulation.test_steady_state import Loop, smooth
 
 pytestmark = pytest.mark.property
 
@@ -44,3 +47,22 @@ def test_each_limit_of_the_settings_is_kept_at_a_small_price(setting: str, quant
 
 def test_without_limits_nothing_is_exceeded() -> None:
     assert Limits.of(DesignSettings()).excess({}) == {}
+
+
+def test_a_loop_is_not_run_again_under_the_same_conditions() -> None:
+    loop, known, objective = Loop(smooth, 0.0), Known(), Objective({"rms_x_top_m": 1.0})
+    options = CurveOptions(points=9, refined=("rms_x_top_m",))
+
+    def runs_for(gain: float, amplitudes: tuple[float, ...], options: CurveOptions) -> int:
+        before = loop.runs
+        load = Load((6.0, 12.0), amplitudes)
+        found = evaluate(lambda law, gains: loop, "vd", Gains(gain), load, objective, options, known)
+        assert found.peaks["rms_x_top_m"] == pytest.approx(1.0, abs=1e-3)
+        return loop.runs - before
+
+    first = runs_for(1.0, (0.8,), options)
+    assert runs_for(1.0, (0.8,), options) == 0
+    # the same frequencies serve the maxima of other quantities; another amplitude, gain or accuracy does not
+    assert runs_for(1.0, (0.4, 0.8), CurveOptions(points=9)) <= first + 4
+    assert runs_for(2.0, (0.8,), options) == first
+    assert runs_for(1.0, (0.8,), CurveOptions(points=9, tolerance=1e-3, refined=("rms_x_top_m",))) == first

@@ -23,7 +23,7 @@ from mrpipe.law_design.problem import LoopOf, laws_in_the_race, scaled_force
 from mrpipe.law_design.results import design_as_json
 from mrpipe.law_design.run import Result, load_of, run_design
 from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty, draw
-from mrpipe.reporting.design import in_plain_words
+from mrpipe.reporting.design_words import in_lines, in_plain_words
 from mrpipe.simulation.loop import LoopOptions
 from mrpipe.simulation.response_curve import response_curve
 from mrpipe.simulation.rig import Rig
@@ -123,6 +123,12 @@ def test_a_design_says_what_it_would_lose_without_the_tracing(rig: Rig, plant: P
     confirmed = summary["confirmation"]
     assert confirmed["same_law_calibrated"] == confirmed["calibrated"]
     assert confirmed["design"]["gains"] == summary["laws"]["fdns"]["gains"]
+    # the command prints every law with its gains, before the conclusion
+    lines = in_lines(summary)
+    assert lines[1].split()[:3] == ["law", "best", "gains"]
+    assert lines[2].startswith("fdns") and f"{summary['laws']['fdns']['gains']['alpha_n_m']:.4g} N/m" in lines[2]
+    assert f"{1e3 * best.peaks['rms_x_top_m']:.1f}" in lines[2]
+    assert any(f"{without.regret:.1%} above" in line for line in lines)
 
 
 @pytest.mark.property

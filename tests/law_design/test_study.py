@@ -40,7 +40,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Load, CurveOptions
     seen: list[tuple[str, Load, CurveOptions]] = []
 
     def evaluate(
-        best: float, law: str, gains: Gains, load: Load, objective: Objective, options: CurveOptions
+        best: float, law: str, gains: Gains, load: Load, objective: Objective, options: CurveOptions, *_: object
     ) -> Evaluation:
         seen.append((law, load, options))
         return _evaluation(law, gains, {"rms_x_top_m": 1.0 + np.log(gains.c_n_s_m / best) ** 2})
