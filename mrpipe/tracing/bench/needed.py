@@ -1,20 +1,19 @@
 """Which of several effects are needed: not one that another form of the others makes superfluous.
 
 The search adds effects in their plain forms, to a base form with simple laws of the drive. A second effect may then
-only correct the form of the first one, or the laws. Before it is named, the richer forms of the other effects and the
-richer laws are tried without it.
+only correct the form of the first one, the laws, or the base form. Before it is named, the richer forms of the other
+effects, the richer laws and the best rival base forms are tried without it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 from mrpipe.fitting.engine import Fit, fit, start_of
-from mrpipe.tracing.bench.drive_again import with_adequate_laws
-from mrpipe.tracing.bench.race import on_all_tests
+from mrpipe.tracing.bench.race import Race, on_all_tests
 from mrpipe.tracing.bench.refine import with_best_forms
+from mrpipe.tracing.bench.rivals import Orders, best_rival, taken
 from mrpipe.tracing.bench.select import Selection, draft
 
 ITERATIONS = 15
@@ -22,9 +21,9 @@ ITERATIONS = 15
 
 
 def without_superfluous(
-    selection: Selection, declared: int, *, lead: float, yield_order: int, viscosity_order: int
+    selection: Selection, declared: int, *, lead: float, orders: Orders, race: Race | None = None, jobs: int = 1
 ) -> Selection:
-    """Return the selection without effects that richer forms of the others, or richer laws of the drive, replace.
+    """Return the selection without effects that richer forms, richer laws of the drive or a base form replace.
 
     An effect that is dropped is kept as a further term, whose cause is not proven.
 
@@ -34,43 +33,76 @@ def without_superfluous(
         Named effects with their fit.
     declared
         How many terms the campaign declares: they belong to the baseline and are never dropped.
-    yield_order, viscosity_order
+    orders
         Largest degrees of the laws of the drive.
     lead
         An effect is dropped if the fit without it has at most this multiple of the chi-square of the fit with it.
+    race
+        The models that competed; None if no other base form is tried.
+    jobs
+        Threads.
     """
-    without = partial(_without, yield_order=yield_order, viscosity_order=viscosity_order)
     kept = selection
     while kept.proven > 1 and len(kept.chosen.problem.terms) >= declared + 2:
-        named = range(declared, min(declared + kept.proven, len(kept.chosen.problem.terms)))
-        small = draft(kept.chosen)
-        full = with_best_forms(small, named)
-        place, best = min(((k, without(small, k, named)) for k in named), key=lambda item: item[1].chi_square)
-        if best.chi_square > lead * full.chi_square:
+        shorter = _shorter(kept, declared, lead, orders) or _with_rival(kept, declared, lead, orders, race, jobs)
+        if shorter is None:
             break
-        # a share of the tests has ranked them, all tests decide
-        full, best = (on_all_tests(item, kept.chosen.problem) for item in (full, best))
-        if best.chi_square > lead * full.chi_square:
-            break
-        extension = kept.extension
-        if kept is selection:
-            others = [k for k in range(len(full.problem.terms)) if k != place]
-            extension = _in_order(full, [*others, place])
-        kept = replace(
-            kept,
-            chosen=best,
-            proven=kept.proven - 1,
-            # a round that compares what remains with its rivals, the first one even where its winner was dropped
-            rounds=kept.rounds[: place - declared] or kept.rounds[:1],
-            extension=extension,
-        )
+        kept = shorter
     return kept
 
 
-def _without(found: Fit, place: int, named: range, *, yield_order: int, viscosity_order: int) -> Fit:
+def _shorter(kept: Selection, declared: int, lead: float, orders: Orders) -> Selection | None:
+    """Return the selection without one of its named effects, under the same base form; None if each is needed."""
+    small = draft(kept.chosen)
+    named = _named(kept, declared)
+    place, best = min(((k, _without(small, k, named, orders)) for k in named), key=lambda item: item[1].chi_square)
+    # richer forms only lower the error of the full model, so most pairs are confirmed without them
+    if best.chi_square > lead * small.chi_square:
+        return None
+    full = with_best_forms(small, named)
+    if best.chi_square > lead * full.chi_square:
+        return None
+    # a share of the tests has ranked them, all tests decide
+    full, best = (on_all_tests(item, kept.chosen.problem) for item in (full, best))
+    if best.chi_square > lead * full.chi_square:
+        return None
+    others = [k for k in range(len(full.problem.terms)) if k != place]
+    return replace(
+        kept,
+        chosen=best,
+        proven=kept.proven - 1,
+        # a round that compares what remains with its rivals, the first one even where its winner was dropped
+        rounds=kept.rounds[: place - declared] or kept.rounds[:1],
+        extension=_in_order(full, [*others, place]),
+    )
+
+
+def _with_rival(
+    kept: Selection, declared: int, lead: float, orders: Orders, race: Race | None, jobs: int
+) -> Selection | None:
+    """Return the selection without one of its named effects, under another base form; None if each is needed."""
+    if race is None:
+        return None
+    small, named = draft(kept.chosen), _named(kept, declared)
+    sets = [[k for k in range(len(small.problem.terms)) if k != place] for place in named]
+    found = best_rival(kept, small, sets, declared, orders, race, jobs)
+    if found is None or found[1].chi_square > lead * small.chi_square:
+        return None
+    rival, best = found
+    if best.chi_square > lead * with_best_forms(small, named).chi_square:
+        return None
+    again = taken(kept, race, rival, best)
+    return again if again.chosen.chi_square <= lead * kept.chosen.chi_square else None
+
+
+def _named(kept: Selection, declared: int) -> range:
+    return range(declared, min(declared + kept.proven, len(kept.chosen.problem.terms)))
+
+
+def _without(found: Fit, place: int, named: range, orders: Orders) -> Fit:
     """Return the fit without one term, with adequate laws of the drive and the best forms of the other named terms."""
     others = [k for k in range(len(found.problem.terms)) if k != place]
-    start = with_adequate_laws(_in_order(found, others), yield_order, viscosity_order)
+    start = orders.adequate(_in_order(found, others))
     return with_best_forms(start, range(named.start, named.stop - 1))
 
 

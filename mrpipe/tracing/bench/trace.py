@@ -32,6 +32,7 @@ from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
 from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.on_validation import OnValidation
 from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
+from mrpipe.tracing.bench.rivals import Orders, with_best_base
 from mrpipe.tracing.bench.select import Selection, forward_selection, share_of
 from mrpipe.tracing.bench.summary import Summary, Tracing
 from mrpipe.tracing.bench.testability import untestable
@@ -103,13 +104,7 @@ def trace_campaign(
     window = selection.base.problem.window_share
     if not baseline.model_error:
         window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
-    selection = without_superfluous(
-        selection,
-        len(declared),
-        lead=(options.rules.selection_by_force if baseline.model_error else options.rules.selection).lead,
-        yield_order=options.yield_order,
-        viscosity_order=options.viscosity_order,
-    )
+    selection = _needed(selection, choice, len(declared), options, jobs)
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
     reason = unnamed_reason(selection, options)
     if reason:
@@ -221,6 +216,24 @@ def _nothing_traced(
         judgement = replace(judgement, verdict=replace(judgement.verdict, sentence=words))
     report = Summary(selection, baseline, training, None, found, judgement, ordered)
     return report.build(options, (), (), untested, 0.0, [item.name for item in declared])
+
+
+def _needed(selection: Selection, choice: Choice, declared: int, options: TracingOptions, jobs: int) -> Selection:
+    """Return the selection without superfluous effects, with the base form that fits best with the others."""
+    rules = options.rules
+    orders = Orders(options.yield_order, options.viscosity_order)
+    by_force = choice.baseline.model_error
+    lead = (rules.selection_by_force if by_force else rules.selection).lead
+    kept = without_superfluous(selection, declared, lead=lead, orders=orders, race=choice.race, jobs=jobs)
+    return with_best_base(
+        kept,
+        declared,
+        orders,
+        choice.race,
+        worth_a_try=rules.refinement.worth_a_try,
+        lead=rules.race.form_lead,
+        jobs=jobs,
+    )
 
 
 def _refined(

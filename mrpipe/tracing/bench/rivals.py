@@ -1,0 +1,209 @@
+"""Other base forms with the named effects, or with fewer of them, in their best forms.
+
+The race compares base forms with effects in their plain forms. Where the true effect has a richer form, a wrong base
+form with one more effect can be ahead of the right base form. The best rivals are therefore compared again once it is
+known which effects are named, each with richer forms of the effects and adequate laws of the drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.reference import with_own_laws
+from mrpipe.tracing.bench.choose import promoted
+from mrpipe.tracing.bench.drive_again import with_adequate_laws
+from mrpipe.tracing.bench.race import Model, Race, on_all_tests
+from mrpipe.tracing.bench.refine import with_best_forms
+from mrpipe.tracing.bench.select import Selection, draft
+
+RIVALS = 5
+"""Numerical technique: base forms, in addition to the chosen one, that are compared again."""
+
+HOPELESS = 5.0
+"""Numerical technique: richer forms are not tried where the plain ones leave this multiple of the chosen fit's
+chi-square."""
+
+ITERATIONS = 15
+"""Numerical technique: most steps of a fit with another base form ..."""
+
+TOLERANCE = 1e-3
+"""Numerical technique: ... which ends where a step lowers the squares by less than this share."""
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Largest degrees of the laws of the drive.
+
+    Attributes
+    ----------
+    yield_order, viscosity_order
+        Of the yield force and of the viscosity.
+    """
+
+    yield_order: int
+    viscosity_order: int
+
+    def adequate(self, found: Fit) -> Fit:
+        """Return the fit with adequate laws of the drive."""
+        return with_adequate_laws(found, self.yield_order, self.viscosity_order)
+
+
+def rivals_of(selection: Selection, race: Race | None) -> list[Model]:
+    """Return models of the best other base forms whose effects are among those of the chosen fit, one for each form.
+
+    Parameters
+    ----------
+    selection
+        Chosen fit with its effects.
+    race
+        The models that competed; None where nothing is missing.
+    """
+    if race is None:
+        return []
+    chosen = selection.chosen.problem
+    effects = {term.effect.name for term in chosen.terms}
+    best: dict[str, tuple[float, Model]] = {}
+    for cost, model in zip(race.costs(), race.models, strict=True):
+        further = set(model.effects[len(race.own) :])
+        if model.form == chosen.base.name or not further or not further <= effects:
+            continue
+        if model.form not in best or cost < best[model.form][0]:
+            best[model.form] = (float(cost), model)
+    return [model for _, model in sorted(best.values(), key=lambda item: item[0])[:RIVALS]]
+
+
+def with_best_base(
+    selection: Selection,
+    declared: int,
+    orders: Orders,
+    race: Race | None,
+    *,
+    worth_a_try: float,
+    lead: float,
+    jobs: int = 1,
+) -> Selection:
+    """Return the selection with the base form that fits best once the effects have their best forms.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit.
+    declared
+        How many terms the campaign declares: they keep their forms.
+    orders
+        Of the laws of the drive.
+    race
+        The models that competed; None where nothing is missing.
+    worth_a_try
+        Excess of the chi-square over the noise, in units of the noise, from which other base forms are compared.
+    lead
+        Share by which the chi-square of the chosen base form must exceed that of another one.
+    jobs
+        Threads.
+    """
+    chosen = selection.chosen
+    named = range(declared, min(declared + selection.proven, len(chosen.problem.terms)))
+    if race is None or not named or chosen.chi_square < (1.0 + worth_a_try) * selection.noise:
+        return selection
+    small = draft(chosen)
+    places = range(len(small.problem.terms))
+    found = best_rival(selection, small, [places], declared, orders, race, jobs)
+    if found is None:
+        return selection
+    rival, best = found
+    if small.chi_square <= (1.0 + lead) * best.chi_square:
+        return selection
+    full = with_best_forms(orders.adequate(small), named)
+    if full.chi_square <= (1.0 + lead) * best.chi_square:
+        return selection
+    again = taken(selection, race, rival, best)
+    own = on_all_tests(full, chosen.problem)
+    return again if own.chi_square > (1.0 + lead) * again.chosen.chi_square else selection
+
+
+def with_base_of(rival: Model, small: Fit, places: Sequence[int], declared: int, orders: Orders) -> Fit:
+    """Return some of the terms of a fit with the base form of a rival, on the same samples.
+
+    Parameters
+    ----------
+    rival
+        Gives the base form and its start.
+    small
+        Gives the terms, their starts and the samples.
+    places
+        Which terms are kept.
+    declared
+        How many terms the campaign declares: they keep their forms.
+    orders
+        Of the laws of the drive.
+    """
+    given = small.problem
+    problem = replace(
+        rival.fit.problem, terms=tuple(given.terms[k] for k in places), window_share=given.window_share
+    ).on_samples_of(given)
+    start = start_of(problem, rival.fit.base_values, [small.term_values[k] for k in places])
+    found = with_own_laws(fit(problem, start, iterations=ITERATIONS, tolerance=TOLERANCE))
+    if found.chi_square > HOPELESS * small.chi_square:
+        return found
+    return with_best_forms(orders.adequate(found), range(declared, len(places)))
+
+
+def best_rival(
+    selection: Selection,
+    small: Fit,
+    sets: Sequence[Sequence[int]],
+    declared: int,
+    orders: Orders,
+    race: Race,
+    jobs: int,
+) -> tuple[Model, Fit] | None:
+    """Return the best rival with one of several sets of terms, and its fit on the draft; None without a rival.
+
+    Parameters
+    ----------
+    selection, small
+        What was chosen, and its fit on the draft.
+    sets
+        Each holds the places of the terms that are kept.
+    declared
+        How many terms the campaign declares: they keep their forms.
+    orders
+        Of the laws of the drive.
+    race
+        The models that competed.
+    jobs
+        Threads.
+    """
+    pairs = [(rival, places) for rival in rivals_of(selection, race) for places in sets]
+    if not pairs:
+        return None
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        fits = list(pool.map(lambda item: with_base_of(item[0], small, item[1], declared, orders), pairs))
+    best = min(range(len(pairs)), key=lambda place: fits[place].chi_square)
+    return pairs[best][0], fits[best]
+
+
+def taken(selection: Selection, race: Race, rival: Model, found: Fit) -> Selection:
+    """Return the selection with a rival in place of the chosen fit, fitted to all training tests.
+
+    Parameters
+    ----------
+    selection
+        What was chosen before.
+    race
+        The models that competed.
+    rival
+        Model of the race whose base form is taken.
+    found
+        The base form with its effects, fitted to the draft.
+    """
+    again = promoted(race, replace(rival, fit=found), selection.base)
+    return replace(
+        again.with_floor(selection.noise),
+        proven=len(found.problem.terms) - len(race.own),
+        nothing_missing=selection.nothing_missing,
+        extension=selection.extension,
+    )

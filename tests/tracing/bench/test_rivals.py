@@ -1,0 +1,87 @@
+"""Another base form takes the place of the chosen one where it fits better with the same effects, or with fewer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from mrpipe.dampers.library import base_form
+from mrpipe.effects.library import damper_effects
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.problem import Term
+from mrpipe.tracing.bench.needed import without_superfluous
+from mrpipe.tracing.bench.race import Race, _compared, alone, on_all_tests, with_effects_of
+from mrpipe.tracing.bench.rivals import Orders, rivals_of, with_best_base
+from mrpipe.tracing.bench.select import Selection, draft
+from mrpipe.tracing.rules import RaceRules
+from tests.tracing.bench.fits import plain_fit
+
+pytestmark = pytest.mark.planted
+
+PLANTED = "dahl+soft-stop"
+ORDERS = Orders(3, 1)
+
+
+def _with_terms(found: Fit, *forms: tuple[str, str]) -> Fit:
+    library = damper_effects()
+    terms = tuple(Term(library[effect], library[effect].form(form)) for effect, form in forms)
+    starts = []
+    for term in terms:
+        values = term.form.without_strength(found.problem.scales)
+        strengths = {p.name: p.start_values(found.problem.scales)[0] for p in term.form.parameters if p.role != "shape"}
+        starts.append({**values, **strengths})
+    problem = replace(found.problem, terms=terms)
+    return fit(problem, start_of(problem, found.base_values, starts), iterations=20)
+
+
+@cache
+def _raced(*forms: tuple[str, str]) -> tuple[Selection, Race]:
+    """Return Bouc-Wen with some effects as what was chosen, and its race with Dahl's law."""
+    plain = plain_fit(PLANTED)
+    small = draft(plain)
+    singles = alone(small, {"bouc-wen": small.problem.base.form, "dahl": base_form("dahl")})
+    models = [*singles.values()]
+    for count in range(1, len(forms) + 1):
+        models += with_effects_of(_with_terms(small, *forms[:count]), list(singles.values()))
+    race = _compared(models, plain, {}, 1.0, frozenset(), RaceRules(), 1)
+    return Selection(plain, 1.0, (), on_all_tests(models[-2], plain.problem), proven=len(forms)), race
+
+
+def _names(selection: Selection) -> tuple[str, list[str]]:
+    problem = selection.chosen.problem
+    return problem.base.name, [term.effect.name for term in problem.terms]
+
+
+def test_the_form_that_fits_best_with_the_same_effects_is_taken() -> None:
+    selection, race = _raced(("end-stop", "linear"))
+    assert _names(selection) == ("bouc-wen", ["end-stop"])
+    found = with_best_base(selection, 0, ORDERS, race, worth_a_try=0.2, lead=0.1)
+    assert _names(found) == ("dahl", ["end-stop"])
+    assert found.chosen.chi_square < 0.5 * selection.chosen.chi_square
+    assert found.ground is not None
+    assert found.ground.problem.base.name == "dahl"
+
+
+def test_a_second_effect_that_corrects_the_base_form_is_dropped() -> None:
+    selection, race = _raced(("end-stop", "linear"), ("migration", "slip"))
+    assert _names(selection) == ("bouc-wen", ["end-stop", "migration"])
+    found = without_superfluous(selection, 0, lead=1.25, orders=ORDERS, race=race)
+    assert _names(found) == ("dahl", ["end-stop"])
+    assert found.proven == 1
+
+
+def test_nothing_is_compared_where_the_chosen_fit_leaves_no_more_than_noise() -> None:
+    selection, race = _raced(("end-stop", "linear"))
+    quiet = selection.with_floor(selection.chosen.chi_square)
+    assert with_best_base(quiet, 0, ORDERS, race, worth_a_try=0.2, lead=0.1) is quiet
+
+
+def test_a_rival_has_another_form_and_no_effect_that_is_not_named() -> None:
+    selection, race = _raced(("end-stop", "linear"))
+    rivals = rivals_of(selection, race)
+    assert [(item.form, item.effects) for item in rivals] == [("dahl", ("end-stop",))]
+    assert rivals_of(selection, None) == []
+    assert np.isfinite(race.costs()).all()
