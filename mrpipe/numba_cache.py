@@ -78,6 +78,13 @@ def compiled_sources(package: Path) -> list[Path]:
     return sorted(texts[name][0] for name in found)
 
 
+def has_compiled_functions(name: str) -> bool:
+    """Return whether a module of the package imports numba."""
+    parts = Path(__file__).resolve().parent.joinpath(*name.split(".")[1:])
+    path = parts.with_suffix(".py") if parts.with_suffix(".py").is_file() else parts / "__init__.py"
+    return name != __name__ and path.is_file() and _COMPILED.search(path.read_bytes()) is not None
+
+
 def _module_of(path: Path, package: Path) -> str:
     parts = path.relative_to(package).with_suffix("").parts
     return ".".join(["mrpipe", *(parts[:-1] if parts[-1] == "__init__" else parts)])

@@ -39,6 +39,7 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
     from mrpipe.cli.checking import check_headers
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import session
+    from mrpipe.pipeline.compile_ahead import compiled_ahead
 
     started = time.monotonic()
     with session(options) as pipeline:
@@ -50,9 +51,12 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
         for name in names:
             if name != "report":
                 pipeline.check(name)
-        for name in names:
-            if name != "report":
-                pipeline.build(name)
+        with compiled_ahead(
+            [pipeline.stages[name].run.__module__ for name in names if name != "report"], pipeline.jobs
+        ):
+            for name in names:
+                if name != "report":
+                    pipeline.build(name)
         if pipeline.errors and not any(item.what in {"built", "reused"} for item in pipeline.outcomes.values()):
             raise pipeline.errors[0]
         report = _write_report(pipeline) if "report" in names else []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -126,6 +127,7 @@ def record_bench(
     rig: BenchRig,
     rng: np.random.Generator,
     progress: Progress = no_progress,
+    jobs: int = 1,
 ) -> BenchRecord:
     """Record a campaign.
 
@@ -141,6 +143,8 @@ def record_bench(
         Generator: one number is drawn, from which each test has its own.
     progress
         Called with the share done and a text.
+    jobs
+        Threads; the result does not depend on their number.
 
     Raises
     ------
@@ -160,17 +164,24 @@ def record_bench(
             sensors.force_offset_n,
         ]
     )
-    files, disturbed, total = [], 0.0, 0.0
     parts = _Shares(damper)
-    for number, (test, motion) in enumerate(zip(tests, motions, strict=True)):
+
+    def recorded(number: int) -> tuple[TestFile, float, float, FloatArray]:
+        test, motion = tests[number], motions[number]
         response = respond(damper, motion)
-        parts.add(motion, response.force)
-        file, error = _recorded(test, motion, response, rig, offsets, np.random.default_rng([seed, 2, number]))
-        files.append(file)
-        if test.role == "validation":
-            disturbed += error
-            total += float(np.sum(response.force[:: rig.fine_steps] ** 2))
-        progress((number + 1) / len(tests), test.name)
+        own = np.random.default_rng([seed, 2, number])
+        file, error = _recorded(test, motion, response, rig, offsets, own)
+        return file, error, float(np.sum(response.force[:: rig.fine_steps] ** 2)), parts.of(motion, response.force)
+
+    files, disturbed, total = [], 0.0, 0.0
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        for test, (file, error, power, part) in zip(tests, pool.map(recorded, range(len(tests))), strict=True):
+            files.append(file)
+            parts.add(part)
+            if test.role == "validation":
+                disturbed += error
+                total += power
+            progress(len(files) / len(tests), test.name)
     truth = {
         "damper": damper.name,
         "parameters": damper.numbers(),
@@ -197,19 +208,24 @@ class _Shares:
     def __init__(self, damper: TrueDamper) -> None:
         effects = damper.effects
         self._without = [damper.with_effects(effects[:k] + effects[k + 1 :]) for k in range(len(effects))]
-        self._change = np.zeros(len(effects))
-        self._force = np.zeros(len(effects))
+        self._sums = np.zeros((2, len(effects)))
 
-    def add(self, motion: FineMotion, force: FloatArray) -> None:
-        """Add a test, whose force with all effects is `force`."""
-        for index, damper in enumerate(self._without):
-            plain = respond(damper, motion).force
-            self._change[index] += float(np.sum((force - plain) ** 2))
-            self._force[index] += float(np.sum(plain**2))
+    def of(self, motion: FineMotion, force: FloatArray) -> FloatArray:
+        """Return sums over a test, whose force with all effects is `force`, for each effect, shape (2, effects).
+
+        They are the squares of the change by the effect and of the force without it.
+        """
+        plain = [respond(damper, motion).force for damper in self._without]
+        return np.array([[np.sum((force - item) ** 2) for item in plain], [np.sum(item**2) for item in plain]])
+
+    def add(self, sums: FloatArray) -> None:
+        """Add the sums of a test."""
+        self._sums += sums
 
     def shares(self) -> list[float]:
         """Return RMS of each effect over the RMS of the force without it."""
-        return [float(value) for value in np.sqrt(self._change / np.maximum(self._force, 1e-300))]
+        change, force = self._sums
+        return [float(value) for value in np.sqrt(change / np.maximum(force, 1e-300))]
 
 
 def calibrated(damper: TrueDamper, motions: Sequence[FineMotion]) -> TrueDamper:

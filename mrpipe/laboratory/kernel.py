@@ -188,7 +188,7 @@ def _rod_free(
     return speed
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def run_damper(
     base: FloatArray,
     codes: IntArray,

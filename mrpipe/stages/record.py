@@ -67,7 +67,7 @@ def _record_bench(context: StageContext) -> Mapping[str, Any]:
 
     bench = context.settings.laboratory.bench
     tests, rig, rng = _bench_order(context)
-    record = record_bench(_true_damper(context), tests, rig, rng, context.progress)
+    record = record_bench(_true_damper(context), tests, rig, rng, context.progress, context.jobs)
     declared = [item.name for item in record.damper.effects if item.declared]
     final = context.run_directory / "campaigns" / "bench"
     write_bench(final, record, rig, plan=bench.plan, data_format=bench.data_format)

@@ -63,6 +63,15 @@ def test_discriminating_plan_asks_what_the_notes_ask() -> None:
 
 
 @pytest.mark.property
+def test_threads_change_nothing(damper: TrueDamper) -> None:
+    one, two = (record_bench(damper, FEW, BenchRig(), np.random.default_rng(1), jobs=jobs) for jobs in (1, 2))
+    assert one.truth == two.truth
+    for first, second in zip(one.tests, two.tests, strict=True):
+        assert first.name == second.name
+        assert all(np.array_equal(first.columns[key], second.columns[key]) for key in first.columns)
+
+
+@pytest.mark.property
 def test_the_same_seed_gives_the_same_campaign_and_another_another(damper: TrueDamper) -> None:
     forces = [record_bench(damper, FEW, BenchRig(), np.random.default_rng(s)).tests[0].columns["F"] for s in (1, 1, 2)]
     assert np.array_equal(forces[0], forces[1])

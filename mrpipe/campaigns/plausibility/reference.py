@@ -209,10 +209,13 @@ class ReferenceMap:
         if jackknife:
             matrices, vectors = matrices - self._matrices[kept], vectors - self._vectors[kept]
         weight = 1.0 / (part.power + (0.1 * self._force) ** 2)
+        # the coefficients are linear in 1 / gain, so the equations are solved once for all rounds
+        together = matrices + weight * part.matrix
+        others, own = self._solved(together, vectors), self._solved(together, weight * part.vector[None])
         for _ in range(ROUNDS):
             size = np.clip(gains, 1e-3, 1e3)
             # a test of gain g is compared as force over g, so that its weight is that of a test of gain 1
-            found = self._solved(matrices + weight * part.matrix, vectors + weight * part.vector / size[:, None])
+            found = others + own / size[:, None]
             product = found @ part.vector
             power = np.einsum("ij,jk,ik->i", found, part.matrix, found)
             gains = np.where(power > 0.0, product / np.where(power > 0.0, power, 1.0), 0.0)
