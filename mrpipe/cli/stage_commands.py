@@ -224,6 +224,33 @@ def simulate(
 
 
 @with_common_options()
+def design(
+    options: CommonOptions,
+    damper: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DAMPER",
+            help="Damper in the structure: identified, traced (by close-loop), a set of configs/dampers, or a file. "
+            "With traced, the result also says what the design without the tracing would lose.",
+        ),
+    ] = None,
+) -> None:
+    """Find the best law and gains; the help text is that of the stage."""
+    from dataclasses import replace
+
+    if damper is not None:
+        if _several_dampers(options):
+            raise UserError(
+                "design",
+                "--damper",
+                "does not suit the configuration, because each damper of structure.dampers has its own model",
+                "leave the option out",
+            )
+        options = replace(options, overrides=[*options.overrides, f"simulate.damper={damper}"])
+    build_and_print(["design"], options)
+
+
+@with_common_options()
 def export(
     options: CommonOptions,
     what: Annotated[str, typer.Argument(metavar="WHAT", help=f"{', '.join(_EXPORTS)}; or all.")] = "controller",
@@ -274,6 +301,9 @@ def export(
 _FAMILIES: dict[str, Callable[..., None]] = {"record": record, "simulate": simulate, "export": export}
 """Commands that run one stage of a family, chosen by an option (`benchmark` has its own module)."""
 
+_WITH_OPTIONS: dict[str, Callable[..., None]] = {"design": design}
+"""Stages that are a command with options of its own."""
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program, in the order of the pipeline."""
@@ -282,7 +312,8 @@ def register(app: typer.Typer) -> None:
     families: set[str] = set()
     for name, stage in all_stages().items():
         if not stage.family:
-            app.command(name=name, help=stage.summary)(_plain_command(name))
+            command = _WITH_OPTIONS[name] if name in _WITH_OPTIONS else _plain_command(name)
+            app.command(name=name, help=stage.summary)(command)
         elif stage.family in _FAMILIES and stage.family not in families:
             families.add(stage.family)
             app.command(name=stage.family)(_FAMILIES[stage.family])

@@ -33,6 +33,10 @@ AROUND = (0.97, 1.0, 1.03)
 LAW_OF_REFERENCE = "vd"
 
 
+STANDARD_ERROR, AVERAGED_CYCLES = 5e-4, 240
+"""Relative standard error of the largest values of a result, and most cycles over which one of them is averaged. The
+minimum over a gain is so flat that an error of 0.1 % moves it by several per cent of the gain."""
+
 SEARCH_RATE = 0.5
 """Plant steps a second during the search, over those of the settings: peaks change by less than half a percent."""
 
@@ -160,7 +164,14 @@ def load_of(settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[f
 
 def accurate_curves(settings: DesignSettings, *, absolute: bool) -> CurveOptions:
     """Return how the curves of results are measured: the maxima of all quantities of the objective are refined."""
-    plain = CurveOptions(points=15, tolerance=5e-3, most_cycles=80, absolute=absolute)
+    plain = CurveOptions(
+        points=15,
+        tolerance=5e-3,
+        most_cycles=80,
+        absolute=absolute,
+        standard_error=STANDARD_ERROR,
+        most_averaged_cycles=AVERAGED_CYCLES,
+    )
     return replace(plain, refined=tuple(dict.fromkeys((*plain.refined, *settings.weights))))
 
 

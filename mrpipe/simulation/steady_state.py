@@ -104,6 +104,8 @@ class Steady:
         Cycles of the shortest run that would have given steady values.
     scatter
         Relative standard deviation from window to window, shape (q,); None where two windows agreed.
+    further
+        Values of each window of the further runs, shape (k, q) each; where there are some, their mean is the value.
     """
 
     values: FloatArray
@@ -111,6 +113,7 @@ class Steady:
     steady: bool
     cycles: int
     scatter: FloatArray | None = None
+    further: tuple[FloatArray, ...] = ()
 
 
 def steady_values(
@@ -199,7 +202,6 @@ class SteadyResponses:
     options: CurveOptions
     known: dict[float, Steady] = field(default_factory=dict)
     jobs: int = 1
-    _further: dict[float, list[FloatArray]] = field(default_factory=dict)
     _cycles: int = 0
 
     def __call__(self, omega: float) -> FloatArray:
@@ -241,7 +243,7 @@ class SteadyResponses:
         value = float(self(omega)[column])
         most = most_cycles // self.options.window_cycles
         while math.isfinite(value) and math.isfinite(error):
-            steady, runs = self.known[omega].steady, self._further.get(omega, [])
+            steady, runs = self.known[omega].steady, self.known[omega].further
             share = float(self.errors(omega)[column]) / (error * value) if value > 0.0 else 0.0
             done = sum(map(len, runs))
             if done >= most or (share <= 1.0 and (steady or len(runs) >= FEWEST_RUNS)):
@@ -254,7 +256,7 @@ class SteadyResponses:
     def _average(self, omega: float, wanted: int) -> None:
         """Run until there are that many windows of further runs, and put their mean in the place of the value."""
         options, first = self.options, self.known[omega]
-        parts = self._further.setdefault(omega, [])
+        parts = list(first.further)
         settling = first.cycles if first.steady else max(options.settling_cycles, options.most_cycles // 2)
         counts: list[int] = []
         while (missing := wanted - sum(map(len, parts)) - sum(counts)) > 0:
@@ -270,7 +272,7 @@ class SteadyResponses:
         windows = np.vstack(parts)
         values = mean_values(windows)
         errors = standard_errors(*parts)
-        self.known[omega] = Steady(values, errors, first.steady, first.cycles, _scatter(windows, values))
+        self.known[omega] = Steady(values, errors, first.steady, first.cycles, _scatter(windows, values), tuple(parts))
 
     def _windows(self, omega: float, settling: int, count: int, number: int) -> Callable[[], FloatArray | None]:
         """Return the further run of that number; it gives the values of its windows, None if it grows without bound."""

@@ -162,7 +162,7 @@ ELSEWHERE = {
         "check configs/my-tower.yaml", "run configs/my-tower.yaml", "init DIR --from FOLDER",
         "init my-rig --rig both --from essais", "show data/essais-bench", "show data/essais-frame",
     ),
-    "tests/stages/test_design.py": ("design --config thesis-design", "design --set simulate.damper=traced"),
+    "tests/stages/test_design.py": ("design --config thesis-design", "design --damper traced"),
     "tests/docs/test_readme.py": (
         "init DIR", "init my-rig", "show data/my-rig", "check configs/my-rig.yaml", "run configs/my-rig.yaml",
         "status runs/my-rig",
