@@ -69,7 +69,7 @@ def judge(tower, tests):
     result = identify_frame(tests)
     frequency = np.array([item.value for item in result.frequencies]) / (2 * np.pi)
     damping = np.array([item.value for item in result.damping])
-    found, errors = set(), []
+    found, errors, covered = set(), [], np.zeros(2, dtype=int)
     for index, value in enumerate(frequency):
         mode = int(np.argmin(np.abs(tower.frequencies_hz - value)))
         known = np.isfinite(result.mode_shapes[:, index])
@@ -77,6 +77,13 @@ def judge(tower, tests):
         close = abs(value / tower.frequencies_hz[mode] - 1) < 0.02 and shape > 0.8
         if mode not in found and close:
             found.add(mode)
+            for row, (item, true) in enumerate(
+                (
+                    (result.frequencies[index], 2 * np.pi * tower.frequencies_hz[mode]),
+                    (result.damping[index], tower.damping_ratios[mode]),
+                )
+            ):
+                covered[row] += item.low <= true <= item.high
             errors.append(
                 (
                     100 * abs(value / tower.frequencies_hz[mode] - 1),
@@ -91,6 +98,8 @@ def judge(tower, tests):
         "frequency_percent": float(worst[:, 0].max()),
         "damping_percent": float(worst[:, 1].max()),
         "assurance": float(worst[:, 2].min()),
+        "modes": len(found),
+        "covered": covered,
         "findings": result.findings,
     }
 
@@ -103,7 +112,7 @@ def main():
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
     for kind in ("forced", "ambient") if options.kind == "both" else (options.kind,):
-        passed = 0
+        passed, modes, covered = 0, 0, np.zeros(2, dtype=int)
         for seed in range(options.first_seed, options.first_seed + options.draws):
             tower, tests, label = (forced_draw if kind == "forced" else ambient_draw)(seed)
             begin = time.perf_counter()
@@ -121,15 +130,21 @@ def main():
                 and row["assurance"] >= limit[2]
             )
             passed += good
+            modes += row["modes"]
+            covered += row["covered"]
             print(
                 f"{kind} {seed}: {'pass' if good else 'FAIL'} {label}; missed {row['missed']}, "
                 f"invented {row['invented']}, frequency {row['frequency_percent']:.3f} %, damping "
-                f"{row['damping_percent']:.1f} %, MAC {row['assurance']:.4f}, {time.perf_counter() - begin:.1f} s",
+                f"{row['damping_percent']:.1f} %, MAC {row['assurance']:.4f}, in the 95 % interval {row['covered'][0]} frequencies and "
+                f"{row['covered'][1]} damping ratios of {row['modes']}, {time.perf_counter() - begin:.1f} s",
                 flush=True,
             )
             if options.verbose:
                 print("   ", "\n    ".join(row["findings"]))
-        print(f"{kind}: {passed} of {options.draws} draws within the aims")
+        print(
+            f"{kind}: {passed} of {options.draws} draws within the aims; of {modes} modes found, {covered[0]} "
+            f"frequencies and {covered[1]} damping ratios are inside their 95 % intervals"
+        )
 
 
 if __name__ == "__main__":

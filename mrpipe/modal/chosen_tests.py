@@ -113,7 +113,7 @@ def with_clocks(
         band = (options.band_low_hz, options.band_high_hz)
         again = find_modes(moved, layout, *band, tests.source, tests.decays)
         if layout.is_chain and len(again.numbers) < layout.floors:
-            again = with_missing_modes(again, moved, layout)
+            again = with_missing_modes(again, moved, layout, options.band_high_hz)
         complete_before = len(best.search.numbers) == layout.floors == len(again.numbers)
         best, clocks = ChosenTests(again, moved), more
         if complete_before:

@@ -13,6 +13,8 @@ from mrpipe.modal.records import FrameTest, FrameTests, Place
 
 _NORMAL_95 = 1.959964
 _WIDEST_DECAY_INTERVAL = 0.02
+_WIDE_INTERVAL = 0.1
+"""Half width of the 95 % interval over the damping ratio above which a finding states it."""
 
 
 def decays_of_modes(tests: FrameTests, fit: MultiModeFit) -> tuple[dict[int, DecayResult], list[str]]:
@@ -99,6 +101,12 @@ def choose_damping(
             # neither is sure: the mean of two independent methods, each by its certainty
             chosen.append(pooled(first, second))
             sources.append(f"decay and {other}")
+        if chosen[-1].half_width > _WIDE_INTERVAL * chosen[-1].value:
+            percent = 100.0 * chosen[-1].half_width / chosen[-1].value
+            findings.append(
+                f"mode {mode}: the records determine the damping ratio only to +-{percent:.0f} % (95 % interval), "
+                "because they excite this mode weakly"
+            )
         if first is None and damping_from == "decay":
             findings.append(f"mode {mode}: no free decay, damping from the {other}")
         if first is not None:

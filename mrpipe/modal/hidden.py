@@ -14,8 +14,15 @@ import numpy as np
 from mrpipe.modal.multimode import MultiModeFit, fit_modes
 from mrpipe.modal.pursuit import hidden_poles
 from mrpipe.modal.records import FrameTest
-from mrpipe.modal.search import ModeSearch
-from mrpipe.modal.selection import Layout, contradicts, largest_set
+from mrpipe.modal.search import ModeSearch, bands_to_try
+from mrpipe.modal.selection import (
+    Layout,
+    all_floors_measured,
+    certainty,
+    contradicts,
+    largest_set,
+    resolved_set,
+)
 from mrpipe.modal.spectra import RecordSpectrum, record_spectrum, thinned
 
 _LINES = 24000
@@ -23,13 +30,18 @@ _ROUNDS = 2
 _SPARE = 2
 _BAND = 1.25
 _UNCERTAIN = 0.02
-"""Relative standard error of a damping ratio from which all lines are used."""
+"""Relative standard error of a damping ratio from which all lines are used, and from which a mode may be replaced."""
 _SAME = 0.005
 """Relative change of a frequency up to which a fit has found the same mode again."""
 
 
-def with_missing_modes(search: ModeSearch, tests: Sequence[FrameTest], layout: Layout) -> ModeSearch:
+def with_missing_modes(
+    search: ModeSearch, tests: Sequence[FrameTest], layout: Layout, high_hz: float = 0.0
+) -> ModeSearch:
     """Return the modes with those added that all lines of the spectra show; the same modes where there are none.
+
+    Missing modes are first looked for up to a little above the modes found, then up to the end of the excitation. The
+    band of the modes found may end below a missing mode.
 
     Parameters
     ----------
@@ -39,17 +51,60 @@ def with_missing_modes(search: ModeSearch, tests: Sequence[FrameTest], layout: L
         The forced tests of the fit, clocks corrected.
     layout
         Floors and masses.
+    high_hz
+        Upper end of the band [Hz] set by the user; 0 means the end of the excitation.
     """
     best = search
+    end = max(high for _, high in bands_to_try(tests, search.band_hz[0], high_hz))
     for _ in range(_ROUNDS):
         missing = layout.floors - len(best.numbers)
         if missing <= 0:
             break
-        found = _with_more(best, tests, layout, missing)
-        if found is None or len(found.numbers) <= len(best.numbers):
+        near = _BAND * float(best.fit.angular_frequencies[-1]) / (2.0 * np.pi)
+        found = None
+        for top in dict.fromkeys((min(end, near), end)):
+            wide = replace(best, band_hz=(best.band_hz[0], top))
+            found = found or _with_more(wide, _spectra(wide, tests, top), layout, missing)
+        if found is None:
             break
         best = found
-    return best
+    return best if len(best.numbers) > len(search.numbers) else search
+
+
+def contested(search: ModeSearch, tests: Sequence[FrameTest], layout: Layout) -> ModeSearch:
+    """Return a complete set of modes, an uncertain mode replaced where the data support another one better.
+
+    Where the damping ratio of a mode is uncertain, its pole may be spurious and have taken the place of a mode that
+    the search did not try. The poles that the residual supports are fitted together with the modes. The set of modes
+    is chosen again, by certainty. A different set is taken only if its least certain mode is more certain.
+
+    Parameters
+    ----------
+    search
+        As many modes as floors.
+    tests
+        The forced tests of the fit, clocks corrected.
+    layout
+        Floors and masses.
+    """
+    if certainty(search.fit).min() > 1.0 / _UNCERTAIN:
+        return search
+    spectra = _spectra(search, tests)
+    known, fit = _with_hidden(search, spectra, _SPARE)
+    if fit is None:
+        return search
+    numbered = _chosen(fit, layout)
+    same = all(_is_among(omega, known) for omega in fit.angular_frequencies[list(numbered)])
+    if len(numbered) < layout.floors or same:
+        return search
+    other = _refitted(search, spectra, fit, numbered, layout)
+    if other is None or len(other.numbers) < layout.floors:
+        return search
+    return other if certainty(other.fit).min() > certainty(known).min() else search
+
+
+def _is_among(omega: float, fit: MultiModeFit) -> bool:
+    return bool(np.abs(fit.angular_frequencies / omega - 1.0).min() < _SAME)
 
 
 def sharpened(search: ModeSearch, tests: Sequence[FrameTest]) -> ModeSearch:
@@ -68,26 +123,47 @@ def sharpened(search: ModeSearch, tests: Sequence[FrameTest]) -> ModeSearch:
     return replace(search, fit=fit) if near.all() else search
 
 
-def _spectra(search: ModeSearch, tests: Sequence[FrameTest]) -> tuple[RecordSpectrum, ...]:
-    top = _BAND * float(search.fit.angular_frequencies[-1]) / (2.0 * np.pi)
-    band = (search.band_hz[0], min(search.band_hz[1], top))
-    return thinned([record_spectrum(test, band) for test in tests], _LINES)
+def _spectra(search: ModeSearch, tests: Sequence[FrameTest], top_hz: float = np.inf) -> tuple[RecordSpectrum, ...]:
+    """Return the spectra of the tests up to `top_hz`; default: up to a little above the highest mode."""
+    if not np.isfinite(top_hz):
+        top_hz = min(search.band_hz[1], _BAND * float(search.fit.angular_frequencies[-1]) / (2.0 * np.pi))
+    return thinned([record_spectrum(test, (search.band_hz[0], top_hz)) for test in tests], _LINES)
 
 
-def _with_more(search: ModeSearch, tests: Sequence[FrameTest], layout: Layout, missing: int) -> ModeSearch | None:
-    spectra = _spectra(search, tests)
+def _with_hidden(
+    search: ModeSearch, spectra: Sequence[RecordSpectrum], number: int
+) -> tuple[MultiModeFit, MultiModeFit | None]:
+    """Return the fit of the modes found, and that with up to `number` hidden poles; None where there are none."""
     known = fit_modes(spectra, search.fit.angular_frequencies, search.fit.damping_ratios, passes=2, evaluations=4)
     band = (2.0 * np.pi * 1.05 * search.band_hz[0], 0.99 * float(max(item.omega[-1] for item in spectra)))
-    extra = hidden_poles(known, band, missing + _SPARE)
+    extra = hidden_poles(known, band, number)
     if not extra:
-        return None
+        return known, None
     omega = np.concatenate([known.angular_frequencies, [item.angular_frequency for item in extra]])
     zeta = np.concatenate([known.damping_ratios, [item.damping_ratio for item in extra]])
-    fit = fit_modes(spectra, omega, zeta, passes=2, evaluations=10)
-    numbered = largest_set(fit, layout)
+    return known, fit_modes(spectra, omega, zeta, passes=2, evaluations=10)
+
+
+def _with_more(
+    search: ModeSearch, spectra: Sequence[RecordSpectrum], layout: Layout, missing: int
+) -> ModeSearch | None:
+    """Return a larger set of modes; None where the spectra support none."""
+    _, fit = _with_hidden(search, spectra, missing + _SPARE)
+    if fit is None:
+        return None
+    numbered = _chosen(fit, layout)
     if len(numbered) <= len(search.numbers):
         return None
-    return _refitted(search, spectra, fit, numbered, layout)
+    found = _refitted(search, spectra, fit, numbered, layout)
+    return found if found is not None and len(found.numbers) > len(search.numbers) else None
+
+
+def _chosen(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
+    """Return pole -> mode number (from 1); signs of shapes decide, and where they leave a mode out, resolved poles."""
+    numbered = largest_set(fit, layout, certainty(fit))
+    if len(numbered) >= layout.floors or all_floors_measured(fit, layout):
+        return numbered
+    return resolved_set(fit, layout) or numbered
 
 
 def _refitted(
@@ -96,7 +172,7 @@ def _refitted(
     """Fit the modes without the poles that are not modes; None where that makes one of them doubtful."""
     keep = sorted(numbered)
     refined = fit_modes(spectra, fit.angular_frequencies[keep], fit.damping_ratios[keep], passes=2, evaluations=10)
-    again = largest_set(refined, layout)
+    again = _chosen(refined, layout)
     if contradicts(refined, layout) or len(again) < len(keep):
         return None
     return replace(search, fit=refined.only(sorted(again)), numbers=tuple(again[pole] for pole in sorted(again)))

@@ -18,7 +18,7 @@ from mrpipe.modal.chosen_tests import ChosenTests, choose_tests, training_first,
 from mrpipe.modal.clocks import SensorClock, corrected, expected_clocks
 from mrpipe.modal.damping_choice import choose_damping, decays_of_modes
 from mrpipe.modal.decay import Estimate
-from mrpipe.modal.hidden import sharpened, with_missing_modes
+from mrpipe.modal.hidden import contested, sharpened, with_missing_modes
 from mrpipe.modal.identification import FrameIdentification, GivenShapes
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
@@ -176,7 +176,10 @@ def _identify(
         chosen = ChosenTests(without_complex(chosen.search), chosen.tests)
     if forced and layout.is_chain and len(chosen.search.numbers) < layout.floors:
         progress(0.4, "hidden modes")
-        chosen = ChosenTests(with_missing_modes(chosen.search, chosen.tests, layout), chosen.tests)
+        more = with_missing_modes(chosen.search, chosen.tests, layout, options.band_high_hz)
+        chosen = ChosenTests(more, chosen.tests)
+    if forced and layout.is_chain and len(chosen.search.numbers) == layout.floors:
+        chosen = ChosenTests(contested(chosen.search, chosen.tests, layout), chosen.tests)
     if forced:
         chosen = ChosenTests(sharpened(chosen.search, chosen.tests), chosen.tests)
     if options.modes_from == "peak-picking" and chosen.tests:
@@ -330,6 +333,8 @@ def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout, scale: Scale)
     shapes, errors = floor_shapes(fit, layout)
     measured = tuple(sorted({sensor.floor - 1 for sensor in fit.sensors}))
     possible = tuple((low + 1, high + 1) for low, high in sign_ranges(fit, layout, _LOOSE_SIGNS))
+    if len(search.numbers) == layout.floors:
+        possible = tuple((number, number) for number in search.numbers)
     return PartialModes(
         angular_frequencies=fit.angular_frequencies,
         damping_ratios=zeta,

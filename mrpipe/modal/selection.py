@@ -72,6 +72,16 @@ def strength(fit: MultiModeFit) -> FloatArray:
     return np.asarray((peak / np.sqrt(fit.noise_variance)[:, None]).max(axis=0))
 
 
+def certainty(fit: MultiModeFit) -> FloatArray:
+    """Return the reciprocal standard error of the logarithm of each damping ratio, shape (r,).
+
+    It compares a mode with the noise at its own frequency. Noise of the excitation and errors of the model are largest
+    near strong peaks, so a spurious pole there is uncertain although its response is strong.
+    """
+    modes = fit.angular_frequencies.size
+    return np.asarray(1.0 / np.sqrt(np.maximum(np.diag(fit.covariance)[modes:], 1e-30)))
+
+
 def shape_errors(fit: MultiModeFit) -> FloatArray:
     """Return the error of each shape over its norm, shape (r,)."""
     norm = np.maximum(np.linalg.norm(fit.residues, axis=0), 1e-300)
@@ -170,9 +180,14 @@ def contradicts(fit: MultiModeFit, layout: Layout) -> bool:
     return bool(not usable(fit).all() or (equal.any() and all_floors_measured(fit, layout)))
 
 
-def _numbered(fit: MultiModeFit, layout: Layout, poles: Sequence[int], tolerance: float) -> dict[int, int]:
-    """Return pole -> mode number (from 1): as many poles as possible, then the strongest, with rising sign changes."""
-    score = 1e6 + np.log(np.maximum(strength(fit), 1e-300))
+def _numbered(
+    fit: MultiModeFit, layout: Layout, poles: Sequence[int], tolerance: float, size: FloatArray | None = None
+) -> dict[int, int]:
+    """Return pole -> mode number (from 1) with rising sign changes: as many poles as possible, then the largest `size`.
+
+    `size`, shape (r,), is the strength of the poles where nothing else is given.
+    """
+    score = 1e6 + np.log(np.maximum(strength(fit) if size is None else size, 1e-300))
     ranges = sign_ranges(fit, layout, tolerance)
     best: list[tuple[float, tuple[tuple[int, int], ...]]] = [(0.0, ())] * (layout.floors + 1)
     for pole in sorted(int(item) for item in poles):
@@ -201,18 +216,40 @@ def _distinct(fit: MultiModeFit, layout: Layout, poles: Sequence[int]) -> list[i
     return sorted(kept)
 
 
-def largest_set(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
-    """Return pole -> mode number (from 1) for the largest set of poles that can be modes of the structure."""
+def largest_set(fit: MultiModeFit, layout: Layout, size: FloatArray | None = None) -> dict[int, int]:
+    """Return pole -> mode number (from 1) for the largest set of poles that can be modes of the structure.
+
+    Of several largest sets that with the largest `size`, shape (r,), is taken; default: the strength of the poles.
+    """
     may = usable(fit)
     poles = _distinct(fit, layout, [i for i in sound(fit) if may[i]])
     if not layout.is_chain:
         return {pole: number for number, pole in enumerate(poles, start=1)}
-    numbered = _numbered(fit, layout, poles, _LOOSE_TOLERANCE)
+    numbered = _numbered(fit, layout, poles, _LOOSE_TOLERANCE, size)
     if len(numbered) < min(len(poles), layout.floors) and _mutually_orthogonal(fit, layout, poles):
         # the modes of a structure that is not a chain need not follow the sign changes
         strongest = sorted(sorted(poles, key=lambda i: -float(strength(fit)[i]))[: layout.floors])
         numbered = {pole: number for number, pole in enumerate(strongest, start=1)}
     return numbered
+
+
+def resolved_set(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
+    """Return pole -> mode number (from 1) where one pole for each floor is a mode by its own evidence, else nothing.
+
+    Such a pole is usable, its shape is real, and it is farther from each more certain pole than the two half-power
+    half-widths together. The sign changes of the shapes are not used, because stiffness between floors that are not
+    neighbours changes the signs of small elements. The clocks of the sensors must have been corrected.
+    """
+    may = usable(fit)
+    real = set(real_modes(fit))
+    omega, width, size = fit.angular_frequencies, fit.damping_ratios * fit.angular_frequencies, certainty(fit)
+    kept: list[int] = []
+    for pole in sorted(_distinct(fit, layout, [i for i in sound(fit) if may[i] and i in real]), key=lambda i: -size[i]):
+        if all(abs(omega[pole] - omega[other]) > width[pole] + width[other] for other in kept):
+            kept.append(pole)
+    if len(kept) < layout.floors:
+        return {}
+    return {pole: number for number, pole in enumerate(sorted(kept[: layout.floors]), start=1)}
 
 
 def _mutually_orthogonal(fit: MultiModeFit, layout: Layout, poles: Sequence[int]) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrpipe.modal.hidden import with_missing_modes
+from mrpipe.modal.hidden import contested, with_missing_modes
 from mrpipe.modal.multimode import fit_modes
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.search import ModeSearch
@@ -25,8 +25,8 @@ def rig():
     return tower, floor, test
 
 
-def _search(tower, test, modes):
-    band = (0.3, 1.2 * float(tower.frequencies_hz[-1]))
+def _search(tower, test, modes, top_hz=None):
+    band = (0.3, top_hz or 1.2 * float(tower.frequencies_hz[-1]))
     spectra = [record_spectrum(test, band).every(4)]
     omega = 2 * np.pi * tower.frequencies_hz[modes]
     fit = fit_modes(spectra, omega, tower.damping_ratios[modes], passes=2, evaluations=6)
@@ -42,6 +42,38 @@ def test_a_mode_without_a_peak_is_added(rig):
     assert found.numbers == tuple(range(1, tower.floors + 1))
     assert found.fit.angular_frequencies / (2 * np.pi) == pytest.approx(tower.frequencies_hz, rel=0.005)
     assert found.fit.damping_ratios[hidden] == pytest.approx(tower.damping_ratios[hidden], rel=0.2)
+
+
+@pytest.mark.planted
+def test_a_mode_above_the_band_of_the_others_is_added(rig):
+    tower, _, test = rig
+    known = list(range(tower.floors - 1))
+    search = _search(tower, test, known, top_hz=0.5 * float(tower.frequencies_hz[-2:].sum()))
+    layout = Layout(tower.floors, tower.mass)
+    found = with_missing_modes(search, [test], layout)
+    assert found.numbers == tuple(range(1, tower.floors + 1))
+    assert found.fit.angular_frequencies[-1] / (2 * np.pi) == pytest.approx(tower.frequencies_hz[-1], rel=0.005)
+    assert found.band_hz[1] > tower.frequencies_hz[-1]
+    limited = with_missing_modes(search, [test], layout, high_hz=search.band_hz[1])
+    assert limited.band_hz[1] <= search.band_hz[1]
+
+
+@pytest.mark.planted
+def test_a_spurious_pole_beside_a_strong_mode_gives_way_to_the_hidden_mode(rig):
+    tower, floor, test = rig
+    hidden = hidden_modes(tower, floor)[0] - 1
+    search = _search(tower, test, list(range(tower.floors)))
+    strong = int(np.argmax(np.abs(search.fit.residues).max(axis=0)))
+    omega = np.delete(search.fit.angular_frequencies, hidden)
+    zeta = np.delete(search.fit.damping_ratios, hidden)
+    spurious = 1.006 * search.fit.angular_frequencies[strong]
+    fit = fit_modes(search.fit.spectra, np.append(omega, spurious), np.append(zeta, 0.003), passes=2, evaluations=6)
+    wrong = ModeSearch(fit, search.band_hz, search.numbers)
+    layout = Layout(tower.floors, tower.mass)
+    found = contested(wrong, [test], layout)
+    assert found.fit.angular_frequencies / (2 * np.pi) == pytest.approx(tower.frequencies_hz, rel=0.005)
+    right = contested(search, [test], layout)
+    assert right.fit.angular_frequencies == pytest.approx(search.fit.angular_frequencies, rel=0.002)
 
 
 @pytest.mark.planted
