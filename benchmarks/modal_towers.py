@@ -135,7 +135,8 @@ def main():
             print(
                 f"{kind} {seed}: {'pass' if good else 'FAIL'} {label}; missed {row['missed']}, "
                 f"invented {row['invented']}, frequency {row['frequency_percent']:.3f} %, damping "
-                f"{row['damping_percent']:.1f} %, MAC {row['assurance']:.4f}, in the 95 % interval {row['covered'][0]} frequencies and "
+                f"{row['damping_percent']:.1f} %, MAC {row['assurance']:.4f}, "
+                f"in the 95 % interval {row['covered'][0]} frequencies and "
                 f"{row['covered'][1]} damping ratios of {row['modes']}, {time.perf_counter() - begin:.1f} s",
                 flush=True,
             )
