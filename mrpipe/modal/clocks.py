@@ -151,7 +151,7 @@ def _constant_delay(fit: _SensorFit, highest: float) -> tuple[FloatArray, FloatA
     ones = np.ones(fit.time.size)
     offset, _, spread = _minimise(fit, [ones], np.zeros(1))
     delays = _SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1)
-    start = delays[int(np.argmin(fit.scanned(delays)))]
+    start = delays[int(np.argmin(fit.scanned(np.asarray(delays))))]
     if abs(start - offset[0]) <= _SCAN_PHASE / highest or len(fit.left_out.rows) < 2:
         return offset, spread
     other, _, other_spread = _minimise(fit, [ones], np.array([start]))
