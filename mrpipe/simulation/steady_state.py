@@ -238,7 +238,8 @@ class SteadyResponses:
         error
             Largest relative standard error.
         most_cycles
-            Most cycles of further runs.
+            Most cycles of further runs. An irregular response is not averaged where they are too few for the fewest
+            runs that it needs.
         """
         value = float(self(omega)[column])
         most = most_cycles // self.options.window_cycles
@@ -246,9 +247,9 @@ class SteadyResponses:
             steady, runs = self.known[omega].steady, self.known[omega].further
             share = float(self.errors(omega)[column]) / (error * value) if value > 0.0 else 0.0
             done = sum(map(len, runs))
-            if done >= most or (share <= 1.0 and (steady or len(runs) >= FEWEST_RUNS)):
-                break
             fewest = FURTHER_RUN[0] * (1 if steady else FEWEST_RUNS)
+            if done >= most or fewest > most or (share <= 1.0 and (steady or len(runs) >= FEWEST_RUNS)):
+                break
             self._average(omega, min(max(math.ceil(done * min(max(share**2, 1.0), 2.0)), done + 1, fewest), most))
             value = float(self.known[omega].values[column])
         return value

@@ -91,6 +91,15 @@ def test_the_number_of_threads_changes_nothing() -> None:
     assert found[0] == found[1]
 
 
+def test_an_irregular_response_is_not_averaged_over_too_few_runs() -> None:
+    loop = Loop(lambda _: 1.0, 1.0)
+    measured = SteadyResponses(loop, 1.0, options())
+    first, runs = measured(8.0)[X_TOP], loop.runs
+    assert not measured.known[8.0].steady
+    assert measured.accurate(8.0, X_TOP, 1e-3, 120) == first and loop.runs == runs
+    assert measured.accurate(8.0, X_TOP, 1e-3, 240) != first and loop.runs >= runs + 8
+
+
 def test_averaging_ends_at_its_most_cycles() -> None:
     measured = SteadyResponses(Loop(lambda _: 1.0, 1.0), 1.0, options())
     found = measured.accurate(8.0, X_TOP, 1e-6, 600)
