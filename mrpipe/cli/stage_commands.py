@@ -302,7 +302,7 @@ _FAMILIES: dict[str, Callable[..., None]] = {"record": record, "simulate": simul
 """Commands that run one stage of a family, chosen by an option (`benchmark` has its own module)."""
 
 _WITH_OPTIONS: dict[str, Callable[..., None]] = {"design": design}
-"""Stages that are a command with options of its own."""
+"""Stages that are a command with further options."""
 
 
 def register(app: typer.Typer) -> None:

@@ -10,21 +10,13 @@ import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.contract import Effect
-from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.problem import Term
-from mrpipe.fitting.recordings import (
-    MOST_JUDGED,
-    MOST_SAMPLES,
-    Recordings,
-    enough_tests,
-    record_tests,
-    spread_tests,
-)
+from mrpipe.fitting.recordings import MOST_JUDGED, Recordings, enough_tests, spread_tests
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline
-from mrpipe.tracing.bench.choose import Choice, choose_model, judged_by_trees
+from mrpipe.tracing.bench.baseline import Baseline
+from mrpipe.tracing.bench.choose import Choice, judged_by_trees
+from mrpipe.tracing.bench.chosen import Bench, begin, choose, recorded
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
-from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff
 from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
 from mrpipe.tracing.bench.needed import without_superfluous
 from mrpipe.tracing.bench.nuisances import observation_window
@@ -35,7 +27,6 @@ from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
 from mrpipe.tracing.bench.rivals import Orders, with_best_base
 from mrpipe.tracing.bench.select import Selection, forward_selection, share_of
 from mrpipe.tracing.bench.summary import Summary, Tracing
-from mrpipe.tracing.bench.testability import untestable
 from mrpipe.tracing.bench.verdict import Named, confidence_of, parameter_table, tied, unnamed_reason
 from mrpipe.tracing.options import TracingOptions
 
@@ -73,11 +64,11 @@ def trace_campaign(
     ordered = sort_tests(tests, rules.validation)
     usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))
     unseen = [t for t in ordered.tests if t.role == "validation"]
-    training, highest = _training(usable, options)
-    validation = _recorded(unseen, highest, options, most_samples=MOST_JUDGED)
+    bench = Bench(usable, effects, declared, rng, jobs, progress)
+    begun = begin(bench, options)
+    validation = recorded(unseen, begun.limit_hz, options, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
-    able, reasons = untestable(training, effects, rules.testability)
-    first = _first_baseline(training, declared, options)
+    training, first = begun.training, begun.first
     found = validated(first.fit, first.fit, first, training, validation, options)
     refusal = ""
     if never_yields(first.fit, options.rules.validation):
@@ -87,23 +78,15 @@ def trace_campaign(
         refusal = f"the model {options.model} does not predict the validation tests (NRMSE {error:.3g})"
     if refusal:
         return _nothing_traced(
-            f"{refusal}: nothing is traced", ordered, found, first, training, reasons, declared, options, jobs
+            f"{refusal}: nothing is traced", ordered, found, first, training, begun.reasons, declared, options, jobs
         )
-    choice = choose_model(first, training, able, list(declared), options, rng=rng, jobs=jobs, progress=progress)
-    limit = _limit_of(choice.selection.chosen, usable, highest, options)
-    if limit != highest:
-        # the filter had hidden or feigned what the models lack, so nothing that was chosen with it is kept
-        training, validation = (
-            _recorded(usable, limit, options),
-            _recorded(unseen, limit, options, most_samples=MOST_JUDGED),
-        )
-        able, reasons = untestable(training, effects, rules.testability)
-        first = _first_baseline(training, declared, options)
-        choice = choose_model(first, training, able, list(declared), options, rng=rng, jobs=jobs, progress=progress)
+    taken = choose(bench, begun)
+    options, training, choice = taken.options, taken.training, taken.choice
+    validation = recorded(unseen, taken.limit_hz, options, most_samples=MOST_JUDGED)
     baseline, selection = choice.baseline, choice.selection
     window = selection.base.problem.window_share
     if not baseline.model_error:
-        window, selection = _with_window(selection, baseline.noise, training, able, options, jobs)
+        window, selection = _with_window(selection, baseline.noise, training, taken.able, options, jobs)
     selection = _needed(selection, choice, len(declared), options, jobs)
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
     reason = unnamed_reason(selection, options)
@@ -148,51 +131,7 @@ def trace_campaign(
         judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
     causes = [held(item, judgement, options, several=len(named) > 1 and item in named) for item in causes]
     report = Summary(selection, baseline, training, offsets, found, judgement, ordered, choice.race)
-    return report.build(options, tuple(causes), further, reasons, window, [item.name for item in declared])
-
-
-def _training(tests: Sequence[PreparedTest], options: TracingOptions) -> tuple[Recordings, float]:
-    """Return the training tests and the limit of the cut-offs of their displacement [Hz]."""
-    automatic = _recorded(tests, np.inf, options)
-    if options.displacement_cutoff_hz > 0.0:
-        return automatic, np.inf
-    highest = highest_cutoff(
-        tests,
-        automatic,
-        rate_hz=options.fit_rate_hz,
-        yield_order=options.yield_order,
-        viscosity_order=options.viscosity_order,
-        rules=options.rules.nuisances,
-    )
-    return (automatic if not np.isfinite(highest) else _recorded(tests, highest, options)), highest
-
-
-def _limit_of(chosen: Fit, tests: Sequence[PreparedTest], highest: float, options: TracingOptions) -> float:
-    """Return the limit of the cut-offs [Hz] with which the chosen model leaves clearly less, else the present one."""
-    if options.displacement_cutoff_hz > 0.0:
-        return highest
-    automatic = _recorded(tests, np.inf, options)
-    return better_limit(chosen, tests, automatic, highest, rate_hz=options.fit_rate_hz, rules=options.rules.nuisances)
-
-
-def _recorded(
-    tests: Sequence[PreparedTest], highest: float, options: TracingOptions, *, most_samples: int = MOST_SAMPLES
-) -> Recordings:
-    """Return tests end to end, with the displacement filtered by criterion and up to a limit [Hz]."""
-    return record_tests(
-        tests,
-        rate_hz=options.fit_rate_hz,
-        cutoff_hz=options.displacement_cutoff_hz,
-        highest_cutoff_hz=highest,
-        most_samples=most_samples,
-    )
-
-
-def _first_baseline(training: Recordings, declared: Sequence[Effect], options: TracingOptions) -> Baseline:
-    base = declared_base(training, options.model, options.yield_order, options.viscosity_order, options.form_files)
-    return fit_baseline(
-        training, base, declared, model_error_share=options.model_error_share, rules=options.rules.noise
-    )
+    return report.build(options, tuple(causes), further, taken.reasons, window, [item.name for item in declared])
 
 
 def _nothing_traced(

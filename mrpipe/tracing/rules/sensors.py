@@ -62,6 +62,13 @@ class NuisanceRules(Section):
         description="The displacement is filtered with another limit, and everything is chosen again, if the chosen "
         "model then leaves an error that is smaller by this share.",
     )
+    rate_gain: float = Field(
+        0.1,
+        ge=0.0,
+        lt=1.0,
+        description="Models are fitted at twice the rate, and everything is chosen again, if the chosen model then "
+        "leaves an error that is smaller by this share.",
+    )
     fewest_of_session: int = Field(
         3, ge=2, description="Number of records that must agree on a gain before it counts as a gain of the session."
     )
