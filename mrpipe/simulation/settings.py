@@ -168,5 +168,5 @@ class ResonanceSettings(Section):
         "averaged over further runs until the largest values are known so accurately.",
     )
     most_averaged_cycles: int = Field(
-        400_000, ge=0, description="Most cycles over which one of the largest values is averaged; 0: no further runs."
+        200_000, ge=0, description="Most cycles over which one of the largest values is averaged; 0: no further runs."
     )
