@@ -263,7 +263,7 @@ def calibrated_from(
         position=calibration.position,
         omega_0=calibration.modes.omega_0,
         u_0=calibration.modes.u_0,
-        top_0=float(calibration.modes.shape_0[-1]),
+        top_0=calibration.modes.top_0,
         amplitude_m=amplitude_m,
         residual_force_n=_residual(damper, amplitude_m, calibration.modes),
         friction_rounding_m_s=friction_rounding_share * amplitude_m * calibration.modes.omega_0,

@@ -32,6 +32,8 @@ class LimitingModes:
         Amplitude of the free mode at the damper [1/sqrt(kg)].
     kappa
         Coupling of the two, shape_inf' M shape_0 [1]; the closed forms take it for 1.
+    top
+        Index of the top, the last degree of freedom that moves with the ground.
     """
 
     mode: int
@@ -41,6 +43,12 @@ class LimitingModes:
     shape_inf: FloatArray
     u_0: float
     kappa: float
+    top: int = -1
+
+    @property
+    def top_0(self) -> float:
+        """Amplitude of the free mode at the top [1/sqrt(kg)]."""
+        return float(self.shape_0[self.top])
 
     @property
     def nu(self) -> float:
@@ -93,7 +101,7 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
         raise UserError(f"frame {frame.name}", "stiffness", f"mode {mode} is unstable", "identify the frame again")
     basis = null_space(w[None, :])
     locked_squared, locked = eigh(basis.T @ K @ basis, basis.T @ M @ basis)
-    shape_0 = shapes[:, mode - 1] * (1.0 if shapes[-1, mode - 1] >= 0.0 else -1.0)
+    shape_0 = shapes[:, mode - 1] * (1.0 if shapes[frame.top, mode - 1] >= 0.0 else -1.0)
     shape_inf = basis @ locked[:, mode - 1]
     kappa = float(shape_inf @ M @ shape_0)
     if kappa < 0.0:
@@ -102,7 +110,7 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     omega_0, omega_inf = math.sqrt(squared[mode - 1]), math.sqrt(locked_squared[mode - 1])
     if omega_inf - omega_0 < 1e-6 * omega_0:
         raise UserError("calibrate", "position", f"mode {mode} does not move the damper", "choose another floor")
-    return LimitingModes(mode, omega_0, omega_inf, shape_0, shape_inf, u_0, kappa)
+    return LimitingModes(mode, omega_0, omega_inf, shape_0, shape_inf, u_0, kappa, frame.top)
 
 
 def static_stiffness(frame: Frame, position: FloatArray) -> float:

@@ -153,7 +153,7 @@ def write_placed(
         {
             **row,
             "u_0": item.modes.u_0,
-            "top_0": float(item.modes.shape_0[-1]),
+            "top_0": item.modes.top_0,
             "all_gains": dict(item.together),
             "weights": asdict(weight),
         }

@@ -81,6 +81,7 @@ def write_calibration(
     artifact.put("residual_force", residual_force_n, unit="N")
     artifact.put_json("skipped", dict(calibration.skipped))
     artifact.put("position", position, unit="1", dims=("floor",))
+    artifact.put("top_0", modes.top_0, unit="kg^-1/2")
     artifact.put("shape_0", modes.shape_0, unit="kg^-1/2", dims=("floor",))
     artifact.put("shape_inf", modes.shape_inf, unit="kg^-1/2", dims=("floor",))
     artifact.put("lqg/regulator_gain", calibration.regulator_gain, unit="N/m and N*s/m", dims=("state",))
@@ -191,7 +192,7 @@ def read_calibrated(artifact: Artifact) -> Calibrated:
         position=artifact.array("position"),
         omega_0=artifact.scalar("omega_0"),
         u_0=artifact.scalar("u_0"),
-        top_0=float(artifact.array("shape_0")[-1]),
+        top_0=artifact.scalar("top_0"),
         amplitude_m=artifact.scalar("amplitude"),
         residual_force_n=artifact.scalar("residual_force"),
         friction_rounding_m_s=artifact.scalar("friction_rounding"),

@@ -104,8 +104,8 @@ def choose_damping(
         if chosen[-1].half_width > _WIDE_INTERVAL * chosen[-1].value:
             percent = 100.0 * chosen[-1].half_width / chosen[-1].value
             findings.append(
-                f"mode {mode}: the records determine the damping ratio only to +-{percent:.0f} % (95 % interval), "
-                "because they excite this mode weakly"
+                f"mode {mode}: the records determine the damping ratio only to +-{percent:.0f} % (95 % interval); "
+                "longer records, or more force on this mode, determine it better"
             )
         if first is None and damping_from == "decay":
             findings.append(f"mode {mode}: no free decay, damping from the {other}")

@@ -65,7 +65,7 @@ def describe_simulation(sink: Sink, rig: DampersRig, response: DampersResponse, 
 def _histories(response: DampersResponse) -> Figure:
     figure, axes = figure_with_axes(2, 1, height=4.2)
     first = response.first
-    axes[0, 0].plot(first.time_s, 1e3 * first.displacement[:, -1], color=COLOURS[0], linewidth=0.8)
+    axes[0, 0].plot(first.time_s, 1e3 * first.displacement[:, first.top], color=COLOURS[0], linewidth=0.8)
     label(axes[0, 0], "time [s]", "top displacement [mm]")
     for number, (name, own) in enumerate(response.dampers.items()):
         axes[1, 0].plot(own.time_s, own.force, color=COLOURS[number % len(COLOURS)], linewidth=0.8, label=name)

@@ -54,7 +54,7 @@ def describe(
         "histories",
         figures.histories(
             response.time_s,
-            response.displacement[:, -1],
+            response.displacement[:, response.top],
             response.damper_displacement,
             response.force,
             response.desired_force,
@@ -75,7 +75,7 @@ def describe(
             "decay",
             figures.decay(
                 response.time_s[after],
-                response.displacement[after, -1],
+                response.displacement[after, response.top],
                 decay.peak_time_s,
                 decay.peak_m,
                 decay.point_to_point,

@@ -87,4 +87,4 @@ def adjusted_amplitude(
 def _rms_top(response: Response, excitation: Excitation) -> float:
     first, last = excitation.steady_s
     steady = (response.time_s >= first) & (response.time_s < last)
-    return float(np.sqrt(np.mean(response.displacement[steady, -1] ** 2)))
+    return float(np.sqrt(np.mean(response.displacement[steady, response.top] ** 2)))

@@ -199,5 +199,5 @@ def amplitude_for(frame: Frame, position: FloatArray, c: float, omega: float, rm
     """
     device = c * np.outer(position, position)
     damped = replace(frame, damping=frame.damping + device)
-    gain = frequency_response(damped, [omega], absolute_acceleration=False)[0, -1]
+    gain = frequency_response(damped, [omega], absolute_acceleration=False)[0, frame.top]
     return float(math.sqrt(2.0) * rms_top_m / abs(gain))

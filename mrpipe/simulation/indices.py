@@ -67,7 +67,7 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     drive_threshold
         Drive above which current counts as flowing; where it never does (passive-off) all peaks count.
     """
-    t, x, v = response.time_s, response.displacement[:, -1], response.velocity[:, -1]
+    t, x, v = response.time_s, response.displacement[:, response.top], response.velocity[:, response.top]
     turns = np.flatnonzero(v[:-1] * v[1:] < 0.0)
     # the extremum nearest to the stop is where the decay starts from: a quick one has few others
     if len(turns):
@@ -157,9 +157,9 @@ def _peak(values: FloatArray) -> float:
     return float(np.max(np.abs(values))) if len(values) else math.nan
 
 
-def _floors(count: int) -> dict[str, int]:
-    """Return label -> index of the floors that are listed: the first, the fifth where there is one, and the top."""
-    return {"1": 0, **({"5": 4} if count >= 5 else {}), "_top": count - 1}
+def _floors(columns: list[int]) -> dict[str, int]:
+    """Return label -> column of the floors that are listed: the first, the fifth where there is one, and the top."""
+    return {"1": columns[0], **({"5": columns[4]} if len(columns) >= 5 else {}), "_top": columns[-1]}
 
 
 def indices(
@@ -182,7 +182,7 @@ def indices(
     first, last = excitation.steady_s
     steady = (response.time_s >= first) & (response.time_s < last) if last > first else response.time_s >= 0.0
     result: dict[str, Any] = {}
-    for label, floor in _floors(response.displacement.shape[1]).items():
+    for label, floor in _floors(response.columns).items():
         x, a = response.displacement[steady, floor], response.acceleration[steady, floor]
         result |= {
             f"rms_x{label}_m": _rms(x),

@@ -98,6 +98,8 @@ class Response:
         Clock of the controller.
     seconds
         Wall time of the compiled loop.
+    floors
+        Columns of the degrees of freedom that move with the ground: the first floor to the top. Empty: all columns.
     """
 
     time_s: FloatArray
@@ -119,6 +121,17 @@ class Response:
     commands: FloatArray
     command_time_s: FloatArray
     seconds: float
+    floors: tuple[int, ...] = ()
+
+    @property
+    def columns(self) -> list[int]:
+        """Columns of the floors, the first floor to the top."""
+        return list(self.floors) or list(range(self.displacement.shape[1]))
+
+    @property
+    def top(self) -> int:
+        """Column of the top floor."""
+        return self.columns[-1]
 
     @property
     def energy_balance_error(self) -> float:
@@ -339,4 +352,5 @@ def _response(
         commands=commands,
         command_time_s=command_dt * np.arange(len(commands), dtype=np.float64),
         seconds=seconds,
+        floors=frame.moved_by_ground,
     )

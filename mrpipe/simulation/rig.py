@@ -298,4 +298,4 @@ def release_state(rig: Rig, settings: ExcitationSettings) -> FloatArray | None:
         return None
     shape = natural_modes(rig.frame).mode_shapes[:, 0]
     top = expected_top(rig) if settings.release_top_m is None else settings.release_top_m
-    return np.concatenate([top * shape / shape[-1], np.zeros(rig.frame.floors)])
+    return np.concatenate([top * shape / shape[rig.frame.top], np.zeros(rig.frame.floors)])

@@ -325,6 +325,7 @@ def _response(
             commands=commands[place],
             command_time_s=command_dt * np.arange(commands.shape[1], dtype=np.float64),
             seconds=seconds,
+            floors=frame.moved_by_ground,
         )
     works = np.sum([item.work_damper for item in found.values()], axis=0)
     return DampersResponse(found, np.asarray(works))

@@ -279,7 +279,8 @@ def dampers_release(rig: DampersRig, settings: ExcitationSettings) -> FloatArray
         raise UserError(
             "simulate.excitation", "release_top_m", "the first mode does not move the first damper", "give it"
         )
-    scale = known.amplitude_m / abs(stroke) if settings.release_top_m is None else settings.release_top_m / shape[-1]
+    top = float(shape[rig.frame.top])
+    scale = known.amplitude_m / abs(stroke) if settings.release_top_m is None else settings.release_top_m / top
     return np.concatenate([scale * shape, np.zeros(rig.frame.floors)])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -65,8 +66,10 @@ def values_between(response: Response, edges_s: FloatArray, absolute: bool) -> F
 
     accelerations = response.absolute_acceleration if absolute else response.acceleration
     x, stroke, shear = response.displacement, response.damper_displacement, response.base_shear
-    drifts = [x[:, 0], *(x[:, floor] - x[:, floor - 1] for floor in range(1, x.shape[1]))]
-    histories = (x[:, -1], x[:, 0], accelerations[:, 0], accelerations[:, -1], stroke)
+    floors = response.columns
+    first, top = floors[0], floors[-1]
+    drifts = [x[:, first], *(x[:, floor] - x[:, below] for below, floor in pairwise(floors))]
+    histories = (x[:, top], x[:, first], accelerations[:, first], accelerations[:, top], stroke)
     columns = [rms(history) for history in histories]
     columns += [np.max([rms(drift) for drift in drifts], axis=0), rms(shear), rms(response.drive)]
     columns += [largest(history) for history in histories]

@@ -46,6 +46,22 @@ class Frame:
         return np.ones(self.floors) if self.influence is None else self.influence
 
     @property
+    def moved_by_ground(self) -> tuple[int, ...]:
+        """Indices of the degrees of freedom that move with the ground, in their order.
+
+        Results call the first of them the first floor and the last one the top. In a frame with torsion these are the
+        translations in the direction of the ground motion, so that no rotation is given in metres.
+        """
+        size = np.abs(self.ground_influence)
+        found = np.flatnonzero(size > 1e-6 * float(np.max(size, initial=0.0)))
+        return tuple(int(index) for index in found) or tuple(range(self.floors))
+
+    @property
+    def top(self) -> int:
+        """Index of the top: the last degree of freedom that moves with the ground."""
+        return self.moved_by_ground[-1]
+
+    @property
     def ground_masses(self) -> FloatArray:
         """Force on the ground per unit absolute acceleration of each degree of freedom, r' M, shape (n,) [kg]."""
         return np.asarray(self.mass.T @ self.ground_influence)

@@ -8,11 +8,15 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from mrpipe.control import ControllerOptions, Gains, build_controller
+from mrpipe.control.limits import limiting_modes
 from mrpipe.dampers.plant import build_chain
 from mrpipe.errors import DivergedError, UserError
 from mrpipe.simulation import LoopOptions, SensorNoise, at_rest, harmonic, recorded, simulate_law, sweep
+from mrpipe.simulation.excitation import amplitude_for
+from mrpipe.simulation.indices import indices
 from mrpipe.simulation.reference import ReferenceController, reference_loop
 from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault
+from mrpipe.simulation.windows import values_between
 from mrpipe.structures import Frame, frequency_response, natural_modes, state_space
 from mrpipe.thesis.gains import THESIS_GAINS
 from tests.control.conftest import random_network
@@ -66,6 +70,48 @@ def test_viscous_damper_under_harmonic_motion_reaches_its_frequency_response(rig
     basis = np.column_stack([np.sin(8.0 * t[steady]), np.cos(8.0 * t[steady])])
     amplitude = np.hypot(*np.linalg.lstsq(basis, response.displacement[steady], rcond=None)[0])
     np.testing.assert_allclose(amplitude, rig.ideal_amplitude * gain, rtol=1e-6)
+
+
+@pytest.mark.property
+def test_rotations_that_nothing_moves_change_no_result(rig):
+    """In a frame with torsion the floors and the top are the translations that move with the ground."""
+    n = rig.frame.floors
+    places = 3 * np.arange(n)
+
+    def among_rotations(matrix, value):
+        whole = value * np.eye(3 * n)
+        whole[np.ix_(places, places)] = matrix
+        return whole
+
+    influence = np.zeros(3 * n)
+    influence[places] = 1.0
+    frame = rig.frame
+    spatial = Frame(
+        among_rotations(frame.mass, 2.0),
+        among_rotations(frame.damping, 1.0),
+        among_rotations(frame.stiffness, 5e3),
+        "with torsion",
+        influence,
+    )
+    excitation = harmonic(rig.ideal_amplitude, 8.0, cycles=12, settling_cycles=6, decay_s=4.0)
+    options = LoopOptions(tracking="continuous")
+    judged = {"residual_force_n": 18.0, "drive_limit": 4.0}
+    found = []
+    for structure in (frame, spatial):
+        position = np.eye(structure.floors)[0]
+        controller = build_controller("vd", Gains(650.0), ControllerOptions())
+        response = simulate_law(structure, None, controller, excitation, options, position=position)
+        windows = values_between(response, np.array([1.0, 4.0, 8.0]), absolute=True)
+        modes = limiting_modes(structure, position)
+        amplitude = amplitude_for(structure, position, 650.0, 8.0, 0.0243)
+        found.append((indices(response, excitation, **judged), windows, modes.top_0, amplitude))
+    (plain, plain_windows, *plain_rest), (twisted, twisted_windows, *twisted_rest) = found
+    assert spatial.top == 3 * n - 3
+    for key in plain:
+        if key.startswith(("rms_", "peak_", "damping_ratio")):
+            assert twisted[key] == pytest.approx(plain[key], rel=1e-6), key
+    np.testing.assert_allclose(twisted_windows, plain_windows, rtol=1e-6)
+    assert twisted_rest == pytest.approx(plain_rest, rel=1e-6)
 
 
 @pytest.mark.oracle

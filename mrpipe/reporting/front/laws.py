@@ -73,13 +73,14 @@ def comparison(facts: RunFacts) -> list[LawRun]:
         ground = artifact.array("ground_acceleration")
         window = _window(time, ground, summary)
         accelerations = artifact.array("absolute_acceleration")[window]
+        first, top = _ends(facts, accelerations.shape[1])
         runs.append(
             LawRun(
                 law,
                 float(summary["rms_x_top_m"]),
                 float(summary["rms_x1_m"]),
-                _rms(accelerations[:, -1]),
-                _rms(accelerations[:, 0]),
+                _rms(accelerations[:, top]),
+                _rms(accelerations[:, first]),
                 float(np.max(np.abs(artifact.array("force")[window]))),
                 _or_nan(summary.get("damping_ratio")),
                 _outside(summary),
@@ -88,6 +89,15 @@ def comparison(facts: RunFacts) -> list[LawRun]:
         bare = bare or _bare(facts, time, ground, window)
     runs.sort(key=lambda run: run.rms_top_m)
     return [*runs, bare] if bare else runs
+
+
+def _ends(facts: RunFacts, count: int) -> tuple[int, int]:
+    """Return the columns of the first floor and of the top; of `count` columns, where the frame is not known."""
+    artifact = facts.artifact("frame.h5")
+    if artifact is None:
+        return 0, count - 1
+    frame = read_frame(artifact)
+    return (frame.moved_by_ground[0], frame.top) if frame.floors == count else (0, count - 1)
 
 
 def _window(time: FloatArray, ground: FloatArray, summary: Mapping[str, Any]) -> BoolArray:
@@ -107,15 +117,17 @@ def _bare(facts: RunFacts, time: FloatArray, ground: FloatArray, window: BoolArr
         return None
     step = float(np.median(np.diff(time)))
     even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
-    response = linear_response(read_frame(artifact), np.interp(even, time, ground), step)
+    frame = read_frame(artifact)
+    response = linear_response(frame, np.interp(even, time, ground), step)
+    first, top = frame.moved_by_ground[0], frame.top
     inside = np.interp(even, time, window.astype(np.float64)) > 0.5
     nan = float("nan")
     return LawRun(
         UNCONTROLLED,
-        _rms(response.displacement[inside, -1]),
-        _rms(response.displacement[inside, 0]),
-        _rms(response.absolute_acceleration[inside, -1]),
-        _rms(response.absolute_acceleration[inside, 0]),
+        _rms(response.displacement[inside, top]),
+        _rms(response.displacement[inside, first]),
+        _rms(response.absolute_acceleration[inside, top]),
+        _rms(response.absolute_acceleration[inside, first]),
         nan,
         _or_nan(_of_first_mode(facts.summary("identify-frame"))),
         0.0,
