@@ -79,9 +79,9 @@ SMALL = {
                "identify-frame", "calibrate", "simulate-vd", "close-loop", "report"],
     "structure": {"storeys": [{"mass_kg": 100.0, "stiffness_n_m": 8.0e3, "repeat": 2}], "damping_ratio": [0.01]},
     "calibrate": {"neural": {"starts": 1, "iterations": 5, "amplitudes": 2, "frequencies": 2}},
-    "simulate": {"plant_rate_hz": 1000, "controller": {"inverse": "model"},
+    "simulate": {"plant_rate_hz": 400, "controller": {"inverse": "model"},
                  "excitation": {"kind": "harmonic", "cycles": 8, "settling_cycles": 4, "decay_s": 3.0}},
-    "resonance": {"points": 5, "most_cycles": 20, "tolerance": 0.05, "window_cycles": 2},
+    "resonance": {"points": 5, "most_cycles": 20, "tolerance": 0.05, "window_cycles": 2, "most_averaged_cycles": 0},
     "design": {"laws": ["vd", "fdns"], "amplitude_factors": [1.0], "grid": 3, "evaluations": 3, "draws": 1},
     "close_loop": {"candidates": ["accumulator"], "base_forms": ["bouc-wen"], "bootstrap_draws": 50, "laws": ["vd"]},
 }  # fmt: skip
