@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -20,10 +21,13 @@ def _load(path: Path) -> object:
 def test_an_edited_file_is_a_new_module_and_the_same_file_is_not(tmp_path: Path) -> None:
     path = tmp_path / "mine.py"
     path.write_text("VALUE = 1\n", encoding="utf-8")
+    saved = path.stat()
     first = _load(path)
     assert first.VALUE == 1  # type: ignore[attr-defined]
     assert _load(path).__name__ == first.__name__  # type: ignore[attr-defined]
     path.write_text("VALUE = 2\n", encoding="utf-8")
+    # the worst case: the same size and the same time of the last change
+    os.utime(path, ns=(saved.st_atime_ns, saved.st_mtime_ns))
     second = _load(path)
     assert second.VALUE == 2  # type: ignore[attr-defined]
     assert second.__name__ != first.__name__  # type: ignore[attr-defined]
