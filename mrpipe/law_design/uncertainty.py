@@ -127,7 +127,7 @@ def _drawn_frame(
     left = frame.mass @ shapes
     stiffness = frame.stiffness + (left * (changed**2 - omega**2)) @ left.T
     damping = frame.damping + (left * (2.0 * drawn * changed - 2.0 * ratio * omega)) @ left.T
-    return Frame(frame.mass, damping, stiffness, frame.name)
+    return replace(frame, damping=damping, stiffness=stiffness)
 
 
 def _drawn_damper(

@@ -93,7 +93,7 @@ def closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest
     controllers = ControllerFactory(frame, damper, calibrated, settings.controller, inverse)
     recorded = []
     if "campaign:closed-loop" in context.inputs:
-        recorded = measured_runs(load_campaign(context.inputs["campaign:closed-loop"]))
+        recorded = measured_runs(load_campaign(context.inputs["campaign:closed-loop"]), frame)
         if not recorded:
             context.warn("no closed-loop recording names its law and has ground motion and floor displacements")
     found = study.closed_loop(

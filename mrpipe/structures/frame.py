@@ -26,6 +26,8 @@ class Frame:
         Displacement of each degree of freedom when the ground moves by 1 m, r, shape (n,) [1]; None: ones.
     degrees_of_freedom
         Names of the degrees of freedom, length n; empty: `floor 1` and so on.
+    modal_coordinates
+        How many of the last coordinates are amplitudes of modes, as after a Craig-Bampton reduction.
     """
 
     mass: FloatArray
@@ -34,6 +36,7 @@ class Frame:
     name: str = "frame"
     influence: FloatArray | None = None
     degrees_of_freedom: tuple[str, ...] = ()
+    modal_coordinates: int = 0
 
     @property
     def floors(self) -> int:
@@ -50,9 +53,10 @@ class Frame:
         """Indices of the degrees of freedom that move with the ground, in their order.
 
         Results call the first of them the first floor and the last one the top. In a frame with torsion these are the
-        translations in the direction of the ground motion, so that no rotation is given in metres.
+        translations in the direction of the ground motion, so that no rotation is given in metres. Modal coordinates
+        are left out, because they are no motion of a place.
         """
-        size = np.abs(self.ground_influence)
+        size = np.abs(self.ground_influence)[: self.floors - self.modal_coordinates]
         found = np.flatnonzero(size > 1e-6 * float(np.max(size, initial=0.0)))
         return tuple(int(index) for index in found) or tuple(range(self.floors))
 
@@ -60,6 +64,22 @@ class Frame:
     def top(self) -> int:
         """Index of the top: the last degree of freedom that moves with the ground."""
         return self.moved_by_ground[-1]
+
+    def place_of(self, sensor: str) -> int | None:
+        """Return the degree of freedom that a floor sensor measures; None if the frame has none.
+
+        Parameters
+        ----------
+        sensor
+            Floor and direction as in the name of the channel: `3` of `floor_displacement_3`, `3_y` of
+            `floor_displacement_3_y`. A floor without a direction is counted among :attr:`moved_by_ground`.
+        """
+        floor, _, direction = sensor.partition("_")
+        name = f"floor {floor} {direction}".strip()
+        if name in self.names:
+            return self.names.index(name)
+        counted = self.moved_by_ground
+        return counted[int(floor) - 1] if not direction and int(floor) <= len(counted) else None
 
     @property
     def ground_masses(self) -> FloatArray:
@@ -84,6 +104,8 @@ def write_frame(artifact: ArtifactWriter, frame: Frame, group: str = "frame") ->
     if frame.degrees_of_freedom:
         artifact.put_json(f"{group}/degrees_of_freedom", list(frame.degrees_of_freedom))
     artifact.attributes(group, name=frame.name)
+    if frame.modal_coordinates:
+        artifact.attributes(group, modal_coordinates=frame.modal_coordinates)
 
 
 def read_frame(artifact: Artifact, group: str = "frame") -> Frame:
@@ -104,4 +126,5 @@ def read_frame(artifact: Artifact, group: str = "frame") -> Frame:
         name=str(artifact.attributes(group)["name"]),
         influence=artifact.array(f"{group}/influence") if "influence" in members else None,
         degrees_of_freedom=tuple(str(name) for name in names),
+        modal_coordinates=int(artifact.attributes(group).get("modal_coordinates", 0)),
     )

@@ -142,7 +142,8 @@ def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
             "is empty, so the damper could not be attached",
             "name at least the degrees of freedom of the damper and of the sensors",
         )
-    kept = [degree_of_freedom(frame, name, "structure.reduction.keep") for name in settings.keep]
+    # in the order of the structure, because results call the last one the top
+    kept = sorted(degree_of_freedom(frame, name, "structure.reduction.keep") for name in settings.keep)
     if settings.method == "guyan":
         return guyan(frame, kept, high)
     if settings.method == "craig-bampton":
@@ -233,8 +234,9 @@ def _projected(frame: Frame, basis: FloatArray, kept: Sequence[int], band_high_h
     load = basis.T @ frame.mass @ frame.ground_influence
     influence = np.asarray(np.linalg.solve(mass, load), dtype=np.float64)
     names = tuple(frame.names[k] for k in kept)
-    names += tuple(f"mode {k + 1}" for k in range(basis.shape[1] - len(kept)))
-    reduced = Frame(mass, damping, stiffness, f"{frame.name}, reduced", influence, names)
+    modes = basis.shape[1] - len(kept)
+    names += tuple(f"mode {k + 1}" for k in range(modes))
+    reduced = Frame(mass, damping, stiffness, f"{frame.name}, reduced", influence, names, modes)
     if band_high_hz is None:
         band_high_hz = float(natural_modes(reduced).angular_frequencies[-1]) / (4.0 * math.pi)
     error = frequency_error(frame, reduced, basis, kept, band_high_hz)

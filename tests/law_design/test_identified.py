@@ -14,7 +14,7 @@ from mrpipe.dampers.model import Addition, DamperModel, damper_from_parameter_se
 from mrpipe.law_design import uncertainty as uncertain
 from mrpipe.law_design.identified import damper_uncertainty, frame_uncertainty, traced_damper_uncertainty
 from mrpipe.law_design.problem import scaled_force
-from mrpipe.law_design.uncertainty import FrameUncertainty, draw
+from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty, draw
 from mrpipe.structures import frame_from_parameter_set
 
 pytestmark = pytest.mark.property
@@ -93,6 +93,18 @@ def test_effects_are_drawn_and_their_forces_scaled(tmp_path: Path, damper: Dampe
     scaled = scaled_force(traced, 1.5)
     assert scaled.effects[0].values == {"share": 0.6, "force": 12.0}
     assert "excite remanence" in uncertain.test_for("remanence.share")
+
+
+def test_a_drawn_frame_keeps_its_ground_motion_and_names(damper: DamperModel) -> None:
+    frame = replace(
+        frame_from_parameter_set("thesis"),
+        influence=np.array([1.0, 0.0, 1.0, 0.0, 1.0]),
+        degrees_of_freedom=tuple("abcde"),
+    )
+    known = FrameUncertainty(np.full(5, 0.01), np.full(5, 0.001))
+    drawn = draw(frame, damper, known, DamperUncertainty((), np.zeros((0, 0))), np.random.default_rng(1)).frame
+    assert (drawn.moved_by_ground, drawn.names) == ((0, 2, 4), frame.names)
+    assert not np.allclose(drawn.stiffness, frame.stiffness)
 
 
 def test_a_frame_without_intervals_is_certain(tmp_path: Path) -> None:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.errors import UserError
-from mrpipe.structures import natural_modes, shear_frame, state_space
-from mrpipe.structures.reduction import balanced, craig_bampton, guyan, modal
+from mrpipe.structures import natural_modes, read_frame, shear_frame, state_space
+from mrpipe.structures.frame import write_frame
+from mrpipe.structures.options import ReductionSettings
+from mrpipe.structures.reduction import balanced, craig_bampton, guyan, modal, reduced_structure
 
 FRAME = shear_frame(np.full(12, 100.0), np.linspace(9e5, 4e5, 12), 0.02)
 KEPT = (2, 5, 8, 11)
@@ -78,3 +84,27 @@ def test_mistakes() -> None:
     undamped = shear_frame([1.0, 1.0], [10.0, 10.0], 0.0)
     with pytest.raises(UserError, match="stable"):
         balanced(state_space(undamped), np.eye(4), 2)
+
+
+@pytest.mark.property
+def test_the_top_is_a_floor_and_no_mode_and_the_order_of_the_names_does_not_count(tmp_path: Path) -> None:
+    settings = ReductionSettings(method="craig-bampton", keep=["floor 12", "floor 3"], modes=4)
+    reduced = reduced_structure(FRAME, settings)
+    assert reduced.frame.names[:3] == ("floor 3", "floor 12", "mode 1")
+    assert np.max(np.abs(reduced.frame.ground_influence[2:])) > 0.01
+    assert reduced.frame.moved_by_ground == (0, 1)
+    assert reduced.frame.top == 1
+    with ArtifactWriter.create(tmp_path / "frame.h5", Provenance("identify-frame")) as artifact:
+        write_frame(artifact, reduced.frame)
+    assert read_frame(Artifact(tmp_path / "frame.h5")).top == 1
+
+
+@pytest.mark.property
+def test_the_place_of_a_sensor_is_found_by_its_name() -> None:
+    plain = replace(FRAME, influence=np.tile([1.0, 0.0], 6), degrees_of_freedom=())
+    torsion = replace(plain, degrees_of_freedom=tuple(f"floor {k} {axis}" for k in range(1, 7) for axis in "xy"))
+    assert FRAME.place_of("3") == 2
+    assert FRAME.place_of("13") is None
+    assert torsion.place_of("3_y") == 5
+    assert torsion.place_of("3") == torsion.place_of("3_x") == 4
+    assert torsion.place_of("3_z") is None

@@ -46,6 +46,8 @@ class LoopRun:
         Of the floors that were measured, lowest first, shape (m, q) [m/s^2]; empty where not recorded.
     damper_force
         Shape (m,) [N]; empty where not recorded.
+    displacement_of, acceleration_of
+        Degrees of freedom of the frame to which the columns belong, length p and q.
     """
 
     name: str
@@ -56,6 +58,8 @@ class LoopRun:
     displacement: FloatArray
     absolute_acceleration: FloatArray
     damper_force: FloatArray
+    displacement_of: tuple[int, ...] = ()
+    acceleration_of: tuple[int, ...] = ()
 
     @property
     def relative_acceleration(self) -> FloatArray:
@@ -77,16 +81,17 @@ class Arrangement:
     controller: Callable[[LoopRun], Controller]
 
 
-def measured_runs(campaign: Campaign) -> list[LoopRun]:
-    """Return the closed-loop recordings of a frame campaign that name their law."""
+def measured_runs(campaign: Campaign, frame: Frame) -> list[LoopRun]:
+    """Return the closed-loop recordings of a frame campaign that name their law and record a floor of the frame."""
     runs = []
     for item in campaign.recordings:
         law = str(item.details.get("law", ""))
         if item.kind != "closed-loop" or not law or "ground_acceleration" not in item.channels:
             continue
-        displacement = _floors(item.channels, "floor_displacement_")
-        if not displacement.size:
+        displacement, displacement_of = _floors(item.channels, "floor_displacement_", frame)
+        if not displacement_of:
             continue
+        acceleration, acceleration_of = _floors(item.channels, "floor_acceleration_", frame)
         given = item.details.get("gains") or {}
         runs.append(
             LoopRun(
@@ -96,17 +101,28 @@ def measured_runs(campaign: Campaign) -> list[LoopRun]:
                 item.time_s - item.time_s[0],
                 item.channels["ground_acceleration"] - np.mean(item.channels["ground_acceleration"]),
                 displacement,
-                _floors(item.channels, "floor_acceleration_"),
+                acceleration,
                 item.channels.get("damper_force", np.zeros(0)),
+                displacement_of,
+                acceleration_of,
             )
         )
     return runs
 
 
-def _floors(channels: Mapping[str, FloatArray], stem: str) -> FloatArray:
-    """Return the channels of the floors that were measured, lowest first, shape (m, p); empty where there is none."""
-    names = sorted((name for name in channels if name.startswith(stem)), key=lambda name: int(name.removeprefix(stem)))
-    return np.column_stack([channels[name] for name in names]) if names else np.zeros((0, 0))
+def _floors(channels: Mapping[str, FloatArray], stem: str, frame: Frame) -> tuple[FloatArray, tuple[int, ...]]:
+    """Return the channels that moved floors of the frame, lowest first, shape (m, p), and their degrees of freedom.
+
+    Rotations and other directions than that of the ground motion are left out, because the results are in metres and
+    name a first and a top floor.
+    """
+    places = {
+        place: values
+        for name, values in channels.items()
+        if name.startswith(stem) and (place := frame.place_of(name.removeprefix(stem))) in frame.moved_by_ground
+    }
+    order = tuple(sorted(place for place in places if place is not None))
+    return (np.column_stack([places[place] for place in order]) if order else np.zeros((0, 0))), order
 
 
 def with_unrecorded(runs: Sequence[LoopRun], laws: Sequence[str]) -> list[LoopRun]:
@@ -207,10 +223,12 @@ def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
     beyond = float(np.max(np.abs(response.damper_displacement))) / bench.tested_stroke_m
     if beyond > bench.rules.diverged:
         raise DivergedError(f"law {run.law}: the damper would move {beyond:.0f} times the stroke it was tested at")
-    found = run_indices(response.time_s, span, response.displacement, response.acceleration, response.force)
+    moved, felt = (list(of or bench.frame.moved_by_ground) for of in (run.displacement_of, run.acceleration_of))
+    displacement, acceleration = response.displacement[:, moved], response.acceleration[:, felt]
+    found = run_indices(response.time_s, span, displacement, acceleration, response.force)
     found["peak_over_tested_stroke"] = beyond
     if run.recorded:
-        top = np.interp(time, response.time_s, response.displacement[:, -1])
+        top = np.interp(time, response.time_s, displacement[:, -1])
         measured = run.displacement[:, -1] - np.mean(run.displacement[:, -1])
         found["nrmse_x_top"] = float(np.sqrt(np.mean((top - measured) ** 2) / max(np.mean(measured**2), 1e-30)))
     return found
@@ -219,7 +237,7 @@ def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
 def run_indices(
     time: FloatArray, span: tuple[float, float], displacement: FloatArray, acceleration: FloatArray, force: FloatArray
 ) -> dict[str, float]:
-    """Return RMS of first and top floor and of the damper force over the span that is judged, SI."""
+    """Return RMS of first and last column and of the damper force over the span that is judged, SI."""
     steady = (time >= span[0]) & (time <= span[1])
     found = {}
     for label, values in (("x", displacement), ("a", acceleration)):

@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mrpipe.artifacts import load_parameter_set
+from mrpipe.campaigns import Campaign, Recording
+from mrpipe.control.controller import ControllerOptions, Gains, build_controller
+from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.reporting.closed_loop import band_table, law_table, response_by_law
 from mrpipe.reporting.closed_loop_words import in_words
-from mrpipe.tracing.loop.comparison import LoopRun, judged_span, law_rows, ranking, reversed_pairs, with_unrecorded
+from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.loop import LoopOptions, simulate_law
+from mrpipe.structures import shear_frame
+from mrpipe.tracing.loop.comparison import (
+    Arrangement,
+    Bench,
+    LoopRun,
+    judged_span,
+    law_rows,
+    measured_runs,
+    predicted,
+    ranking,
+    reversed_pairs,
+    with_unrecorded,
+)
 
 
 def rows(**columns: dict[str, float]) -> list[dict[str, Any]]:
@@ -116,3 +136,33 @@ def test_words_table_and_figure_of_a_comparison() -> None:
     assert band_table(found)[2]["largest rms_x_top after [mm]"] == pytest.approx(26.0)
     assert len(response_by_law(found).axes) == 2
     assert in_words({"status": "skipped: there is no identified frame"}).startswith("Closed loop skipped")
+
+
+@pytest.mark.property
+def test_floors_are_compared_with_their_own_sensors(tmp_path: Path) -> None:
+    """A frame with torsion, floor 1 without a sensor, and a sensor across the ground motion."""
+    frame = replace(
+        shear_frame(np.full(6, 100.0), np.full(6, 9e5), 0.02),
+        influence=np.tile([1.0, 0.0], 3),
+        degrees_of_freedom=tuple(f"floor {k} {axis}" for k in range(1, 4) for axis in ("x", "turn")),
+    )
+    time = np.linspace(0.0, 10.0, 2001)
+    base = np.sin(8.0 * time) * (time > 0.0)
+    chain = damper_from_parameter_set(load_parameter_set("dampers", "set-c")).chain()
+    bench = Bench(frame, np.eye(6)[0], LoopOptions(), 1, 1.0)
+    off = build_controller("passive-off", Gains(), ControllerOptions())
+    shaken = Excitation(10.0, lambda at: np.interp(at, time, base), (0.0, 10.0))
+    whole = simulate_law(frame, chain, off, shaken, bench.options, position=bench.position)
+    moved = np.column_stack([np.interp(time, whole.time_s, column) for column in whole.displacement.T])
+    channels = {"time": time, "ground_acceleration": base}
+    channels |= {
+        f"floor_displacement_{name}": moved[:, place] for name, place in {"2_x": 2, "3_turn": 5, "3": 4}.items()
+    }
+    recording = Recording(
+        "off", "validation", 200.0, time, channels, ((0, 2001),), "closed-loop", {"law": "passive-off"}
+    )
+    (run,) = measured_runs(Campaign("loop", "shear-frame", tmp_path, (recording,)), frame)
+    assert run.displacement_of == (2, 4)
+    found = predicted(run, Arrangement(chain, lambda _: off), bench)
+    assert found["nrmse_x_top"] < 0.01
+    assert found["rms_x1_m"] == pytest.approx(float(np.std(moved[1000:, 2])), rel=0.1)
