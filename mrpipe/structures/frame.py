@@ -54,7 +54,7 @@ class Frame:
 
         Results call the first of them the first floor and the last one the top. In a frame with torsion these are the
         translations in the direction of the ground motion, so that no rotation is given in metres. Modal coordinates
-        are left out, because they are no motion of a place.
+        are left out, because they do not belong to a place.
         """
         size = np.abs(self.ground_influence)[: self.floors - self.modal_coordinates]
         found = np.flatnonzero(size > 1e-6 * float(np.max(size, initial=0.0)))

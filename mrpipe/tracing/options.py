@@ -37,6 +37,13 @@ class NamingRules(Section):
         lt=1.0,
         description="Largest evidence that counts, because a finite number of tests proves nothing.",
     )
+    least_probability: float = Field(
+        0.5,
+        ge=0.0,
+        lt=1.0,
+        description="An effect that is less likely there than this is not named; it stays in the model as a further "
+        "term, whose cause is not proven.",
+    )
     calibration: tuple[tuple[float, float], ...] = Field(
         ((0.0, 0.0), (0.5, 0.4), (0.75, 0.75), (0.95, 0.95), (1.0, 0.96)),
         description="Evidence for an effect on the bench (share of resamples that need it, times shares recovered), "

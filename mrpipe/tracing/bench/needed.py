@@ -73,7 +73,7 @@ def _shorter(kept: Selection, declared: int, lead: float, orders: Orders) -> Sel
         proven=kept.proven - 1,
         # a round that compares what remains with its rivals, the first one even where its winner was dropped
         rounds=kept.rounds[: place - declared] or kept.rounds[:1],
-        extension=_in_order(full, [*others, place]),
+        extension=in_order(full, [*others, place]),
     )
 
 
@@ -102,11 +102,11 @@ def _named(kept: Selection, declared: int) -> range:
 def _without(found: Fit, place: int, named: range, orders: Orders) -> Fit:
     """Return the fit without one term, with adequate laws of the drive and the best forms of the other named terms."""
     others = [k for k in range(len(found.problem.terms)) if k != place]
-    start = orders.adequate(_in_order(found, others))
+    start = orders.adequate(in_order(found, others))
     return with_best_forms(start, range(named.start, named.stop - 1))
 
 
-def _in_order(found: Fit, places: Sequence[int]) -> Fit:
+def in_order(found: Fit, places: Sequence[int]) -> Fit:
     """Return a fit with these terms in this order, from the values of another fit."""
     problem = replace(found.problem, terms=tuple(found.problem.terms[k] for k in places))
     values = [found.term_values[k] for k in places]

@@ -110,13 +110,14 @@ def with_best_base(
         return selection
     small = draft(chosen)
     places = range(len(small.problem.terms))
+    full = with_best_forms(orders.adequate(small), named)
+    if full.chi_square < (1.0 + worth_a_try) * selection.noise:
+        # a richer form of the effect is all that is missing
+        return selection
     found = best_rival(selection, small, [places], declared, orders, race, jobs)
     if found is None:
         return selection
     rival, best = found
-    if small.chi_square <= (1.0 + lead) * best.chi_square:
-        return selection
-    full = with_best_forms(orders.adequate(small), named)
     if full.chi_square <= (1.0 + lead) * best.chi_square:
         return selection
     again = taken(selection, race, rival, best)

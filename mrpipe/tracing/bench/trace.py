@@ -13,11 +13,12 @@ from mrpipe.effects.contract import Effect
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import MOST_JUDGED, Recordings, enough_tests, spread_tests
 from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.assess import Case, assess, unlikely, unlikely_reason, without_names
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.choose import Choice, judged_by_trees
 from mrpipe.tracing.bench.chosen import Bench, begin, choose, recorded
-from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, intervals, left_out_residual
-from mrpipe.tracing.bench.gates import held, judged, never_yields, predicts, structured, validated
+from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
+from mrpipe.tracing.bench.gates import judged, never_yields, predicts, validated
 from mrpipe.tracing.bench.needed import without_superfluous
 from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
@@ -25,9 +26,9 @@ from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.on_validation import OnValidation
 from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
 from mrpipe.tracing.bench.rivals import Orders, with_best_base
-from mrpipe.tracing.bench.select import Selection, forward_selection, share_of
+from mrpipe.tracing.bench.select import Selection, forward_selection
 from mrpipe.tracing.bench.summary import Summary, Tracing
-from mrpipe.tracing.bench.verdict import Named, confidence_of, parameter_table, tied, unnamed_reason
+from mrpipe.tracing.bench.verdict import unnamed_reason
 from mrpipe.tracing.options import TracingOptions
 
 
@@ -109,29 +110,23 @@ def trace_campaign(
         rules=rules.offsets,
         least_ratio=rules.offsets.clear if reason and selection.structured else 0.0,
     )
-    proven = selection.with_named_alone
-    named = _named(proven, choice, gains, len(declared), options, rng)
-    further = _named(selection, choice, (), len(declared) + len(named), options, rng)
-    causes = [*named, *([offsets.named()] if offsets is not None else [])]
-    if offsets is not None and any(item.effect.name == "offset" for item in named):
-        causes.pop()
-    missing = structured(selection, baseline, training, options, bool(causes))
-    found = validated(selection.base, selection.chosen, baseline, training, validation, options, offsets is not None)
-    # the class of the verdict is that of the named effects; further terms do not explain anything
-    alone = found
-    if proven is not selection:
-        alone = validated(selection.base, proven.chosen, baseline, training, validation, options, offsets is not None)
-    judgement = judged(alone, proven, training, options, causes, missing, reason, ordered, jobs)
+    case = Case(choice, training, validation, options, ordered, len(declared), offsets, jobs)
+    assessed = assess(selection, case, gains, reason, rng)
+    places = unlikely(assessed, options)
+    if places:
+        selection, gains = without_names(selection, gains, places, len(declared))
+        reason = "" if selection.proven else unlikely_reason(assessed, places)
+        assessed = assess(selection, case, gains, reason, rng, several=len(assessed.named) > 1)
+    causes, further, found, judgement = assessed.causes, assessed.further, assessed.found, assessed.judgement
     if causes and judgement.evidence.after >= judgement.evidence.before:
         # what does not lower the error on the validation tests is not named
         selection = replace(selection, chosen=selection.without_effects, named_fit=None)
-        causes, further, offsets = [], (), None
+        causes, further, offsets = (), (), None
         reason = "the effects that the training tests require do not lower the error on the validation tests"
         found = validated(selection.base, selection.chosen, baseline, training, validation, options)
-        judgement = judged(found, selection, training, options, causes, missing, reason, ordered, jobs)
-    causes = [held(item, judgement, options, several=len(named) > 1 and item in named) for item in causes]
+        judgement = judged(found, selection, training, options, causes, assessed.missing, reason, ordered, jobs)
     report = Summary(selection, baseline, training, offsets, found, judgement, ordered, choice.race)
-    return report.build(options, tuple(causes), further, taken.reasons, window, [item.name for item in declared])
+    return report.build(options, causes, further, taken.reasons, window, [item.name for item in declared])
 
 
 def _nothing_traced(
@@ -233,7 +228,7 @@ def _with_window(
 
 def _cross_validated(
     selection: Selection, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
-) -> tuple[list[Gain], Selection]:
+) -> tuple[list[Gain | None], Selection]:
     """Keep the chosen effects that lower the error on training tests left out; return the gain of each."""
     chosen = selection.chosen
     if len(chosen.problem.terms) == declared:
@@ -246,45 +241,10 @@ def _cross_validated(
     if path[-1] is not chosen:
         path = [selection.without_effects, chosen]
     errors = [left_out_residual(item, options.folds, jobs=jobs) for item in path]
-    gains: list[Gain] = []
+    gains: list[Gain | None] = []
     for before, after in itertools.pairwise(errors):
         gain = gain_of(before, after, chosen.problem, draws=options.bootstrap_draws, rng=rng)
         if not gain.significant:
             return gains, replace(selection, chosen=path[len(gains)])
         gains.append(gain)
     return gains, selection
-
-
-def _named(
-    selection: Selection,
-    choice: Choice,
-    gains: Sequence[Gain],
-    declared: int,
-    options: TracingOptions,
-    rng: np.random.Generator,
-) -> tuple[Named, ...]:
-    """Return the terms of the chosen fit behind the first `declared` ones, with parameters and confidence."""
-    chosen = selection.chosen
-    named = []
-    limits = intervals(chosen) if len(chosen.problem.terms) > declared else []
-    total = share_of(selection.without_effects, chosen, selection.noise)
-    for place, index in enumerate(range(declared, len(chosen.problem.terms))):
-        term = chosen.problem.terms[index]
-        candidates = selection.rounds[place] if place < len(selection.rounds) else ()
-        rivals: tuple[str, ...] = ()
-        if candidates and candidates[0].name == term.effect.name:
-            rivals = tied(candidates, selection.noise, options, draws=options.bootstrap_draws, rng=rng)
-        gain = gains[place] if place < len(gains) else None
-        support = choice.support(term.effect.name, options, rng)
-        named.append(
-            Named(
-                term.effect,
-                term.form.name,
-                parameter_table(chosen, index, limits[index], options.drive_unit),
-                confidence_of(total, support, gain, options),
-                rivals,
-                {name: term.effect.separated_by[name].advice for name in rivals if name in term.effect.separated_by},
-                gain,
-            )
-        )
-    return tuple(named)

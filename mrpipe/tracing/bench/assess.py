@@ -1,0 +1,201 @@
+"""Results for the chosen effects: names with probabilities, further terms, and the verdict on the validation tests.
+
+An effect is named only if it is more likely there than not. The others stay in the model as further terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrpipe.fitting.recordings import Recordings
+from mrpipe.tracing.bench.choose import Choice
+from mrpipe.tracing.bench.crossvalidation import Gain, intervals
+from mrpipe.tracing.bench.gates import held, judged, structured, validated
+from mrpipe.tracing.bench.needed import in_order
+from mrpipe.tracing.bench.odd_tests import SortedTests
+from mrpipe.tracing.bench.offsets import OffsetFinding
+from mrpipe.tracing.bench.on_validation import Judgement, OnValidation
+from mrpipe.tracing.bench.select import Selection, share_of
+from mrpipe.tracing.bench.verdict import Named, confidence_of, parameter_table, tied
+from mrpipe.tracing.options import NamingRules, TracingOptions
+
+
+@dataclass(frozen=True)
+class Case:
+    """What does not change while the names are decided.
+
+    Attributes
+    ----------
+    choice
+        The models that competed, and the baseline.
+    training, validation
+        Recordings; effects are decided on the first and judged on the second.
+    options
+        Of the tracing.
+    ordered
+        The tests with what was found wrong with them.
+    declared
+        How many terms the campaign declares: they come first and are part of the baseline.
+    offsets
+        Offset that differs between tests; None if there is none.
+    jobs
+        Processes.
+    """
+
+    choice: Choice
+    training: Recordings
+    validation: Recordings
+    options: TracingOptions
+    ordered: SortedTests
+    declared: int
+    offsets: OffsetFinding | None
+    jobs: int
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """Names, further terms and the verdict.
+
+    Attributes
+    ----------
+    named
+        The named terms of the model with their evidence, in their order.
+    causes
+        What is named, with probabilities: the named terms, and an offset between tests.
+    further
+        Terms whose cause is not proven.
+    missing
+        Whether the residual of the training tests holds more than noise.
+    found
+        Errors of the whole model on the validation tests.
+    judgement
+        Verdict on the named effects alone: further terms do not explain anything.
+    """
+
+    named: tuple[Named, ...]
+    causes: tuple[Named, ...]
+    further: tuple[Named, ...]
+    missing: bool
+    found: OnValidation
+    judgement: Judgement
+
+
+def assess(
+    selection: Selection,
+    case: Case,
+    gains: Sequence[Gain | None],
+    reason: str,
+    rng: np.random.Generator,
+    *,
+    several: bool = False,
+) -> Assessment:
+    """Return names, further terms and the verdict of a selection.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit, and further terms.
+    case
+        Everything else.
+    gains
+        Of the named effects on tests that were left out.
+    reason
+        Why nothing is named; empty if something is.
+    rng
+        Source of randomness.
+    several
+        Whether effects were named together that are further terms now: the others remain as uncertain as before.
+    """
+    options, baseline, offsets = case.options, case.choice.baseline, case.offsets
+    proven = selection.with_named_alone
+    named = _named(proven, case, gains, case.declared, rng)
+    further = _named(selection, case, (), case.declared + len(named), rng)
+    causes = [*named, *([offsets.named()] if offsets is not None else [])]
+    if offsets is not None and any(item.effect.name == "offset" for item in named):
+        causes.pop()
+    missing = structured(selection, baseline, case.training, options, bool(causes))
+    differ = offsets is not None
+    found = validated(selection.base, selection.chosen, baseline, case.training, case.validation, options, differ)
+    # the class of the verdict is that of the named effects; further terms do not explain anything
+    alone = found
+    if proven is not selection:
+        alone = validated(selection.base, proven.chosen, baseline, case.training, case.validation, options, differ)
+    judgement = judged(alone, proven, case.training, options, causes, missing, reason, case.ordered, case.jobs)
+    several = several or len(named) > 1
+    likely = tuple(held(item, judgement, options, several=several and item in named) for item in causes)
+    return Assessment(named, likely, further, missing, found, judgement)
+
+
+def unlikely(found: Assessment, rules: NamingRules) -> tuple[int, ...]:
+    """Return the places of the named terms that are less likely there than `least_probability`."""
+    return tuple(k for k in range(len(found.named)) if found.causes[k].confidence < rules.least_probability)
+
+
+def unlikely_reason(found: Assessment, places: Sequence[int]) -> str:
+    """Return why nothing is named, where every name is too unlikely."""
+    names = ", ".join(f"{found.causes[k].effect.name} (probability {found.causes[k].confidence:.2f})" for k in places)
+    return f"no effect is named: {names} lowers the error, but is more likely absent than present"
+
+
+def without_names(
+    selection: Selection, gains: Sequence[Gain | None], places: Sequence[int], declared: int
+) -> tuple[Selection, list[Gain | None]]:
+    """Return the selection with some of its named terms as further terms, and the gains of the others.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit, and further terms.
+    gains
+        Of the named effects.
+    places
+        Which of the named effects become further terms.
+    declared
+        How many terms the campaign declares.
+    """
+    alone = selection.with_named_alone.chosen
+    count = len(alone.problem.terms) - declared
+    kept = [k for k in range(count) if k not in places]
+    behind = range(declared + count, len(selection.chosen.problem.terms))
+    order = [*range(declared), *(declared + k for k in kept), *(declared + k for k in places), *behind]
+    named = selection.without_effects if not kept else in_order(alone, order[: declared + len(kept)])
+    return replace(
+        selection,
+        chosen=in_order(selection.chosen, order),
+        named_fit=named,
+        proven=len(kept),
+        rounds=tuple(selection.rounds[k] for k in kept if k < len(selection.rounds)) or selection.rounds[:1],
+    ), [gains[k] if k < len(gains) else None for k in kept]
+
+
+def _named(
+    selection: Selection, case: Case, gains: Sequence[Gain | None], declared: int, rng: np.random.Generator
+) -> tuple[Named, ...]:
+    """Return the terms of the chosen fit behind the first `declared` ones, with parameters and confidence."""
+    chosen, options = selection.chosen, case.options
+    named = []
+    limits = intervals(chosen) if len(chosen.problem.terms) > declared else []
+    total = share_of(selection.without_effects, chosen, selection.noise)
+    for place, index in enumerate(range(declared, len(chosen.problem.terms))):
+        term = chosen.problem.terms[index]
+        candidates = selection.rounds[place] if place < len(selection.rounds) else ()
+        rivals: tuple[str, ...] = ()
+        if candidates and candidates[0].name == term.effect.name:
+            rivals = tied(candidates, selection.noise, options, draws=options.bootstrap_draws, rng=rng)
+        gain = gains[place] if place < len(gains) else None
+        support = case.choice.support(term.effect.name, options, rng)
+        named.append(
+            Named(
+                term.effect,
+                term.form.name,
+                parameter_table(chosen, index, limits[index], options.drive_unit),
+                confidence_of(total, support, gain, options),
+                rivals,
+                {name: term.effect.separated_by[name].advice for name in rivals if name in term.effect.separated_by},
+                gain,
+            )
+        )
+    return tuple(named)

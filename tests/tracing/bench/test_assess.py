@@ -1,0 +1,50 @@
+"""Names that are more likely absent than present become further terms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrpipe.effects.library import damper_effects
+from mrpipe.fitting.engine import fit, start_of
+from mrpipe.fitting.problem import Term
+from mrpipe.tracing.bench.assess import without_names
+from mrpipe.tracing.bench.select import Selection
+from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.options import TracingOptions
+from tests.tracing.bench.fits import plain_fit
+from tests.tracing.bench.rig import campaign
+
+pytestmark = pytest.mark.planted
+
+
+def test_an_effect_below_the_least_probability_improves_the_model_without_a_name() -> None:
+    library = {name: damper_effects()[name] for name in ("accumulator", "inertia")}
+    options = TracingOptions(
+        base_forms=("bouc-wen",), refits=2, bootstrap_draws=100, most_effects=1, least_probability=0.99
+    )
+    found = trace_campaign(campaign("accumulator"), library, [], options, rng=np.random.default_rng(1)).summary
+    assert found["effects"] == []
+    assert [item["name"] for item in found["further_terms"]] == ["accumulator"]
+    assert found["after"]["nrmse"] < 0.6 * found["before"]["nrmse"]
+    assert found["verdict_class"] == "unknown"
+    assert "accumulator (probability 0.9" in found["verdict"]
+
+
+def test_the_term_that_loses_its_name_stands_behind_the_others() -> None:
+    plain, library = plain_fit("accumulator"), damper_effects()
+    terms = tuple(Term(library[name], library[name].forms[0]) for name in ("inertia", "accumulator"))
+    starts = [term.form.without_strength(plain.problem.scales) for term in terms]
+    for term, values in zip(terms, starts, strict=True):
+        for item in term.form.parameters:
+            if item.role == "strength":
+                values[item.name] = item.start_values(plain.problem.scales)[0]
+    problem = replace(plain.problem, terms=terms)
+    chosen = fit(problem, start_of(problem, plain.base_values, starts), iterations=10)
+    kept, gains = without_names(Selection(plain, 1.0, (), chosen, proven=2), [None, None], [0], 0)
+    assert [item.effect.name for item in kept.chosen.problem.terms] == ["accumulator", "inertia"]
+    assert [item.effect.name for item in kept.with_named_alone.chosen.problem.terms] == ["accumulator"]
+    assert (kept.proven, gains) == (1, [None])
+    assert kept.chosen.chi_square == pytest.approx(chosen.chi_square, rel=1e-3)
