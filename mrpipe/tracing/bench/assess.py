@@ -137,7 +137,9 @@ def unlikely(found: Assessment, rules: NamingRules) -> tuple[int, ...]:
 def unlikely_reason(found: Assessment, places: Sequence[int]) -> str:
     """Return why nothing is named, where every name is too unlikely."""
     names = ", ".join(f"{found.causes[k].effect.name} (probability {found.causes[k].confidence:.2f})" for k in places)
-    return f"no effect is named: {names} lowers the error, but is more likely absent than present"
+    one = len(places) == 1
+    said = "lowers the error, but is" if one else "lower the error, but each of them is"
+    return f"no effect is named: {names} {said} more likely absent than present"
 
 
 def without_names(
