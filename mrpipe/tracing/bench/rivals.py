@@ -11,9 +11,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.choose import promoted
+from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.drive_again import with_adequate_laws
 from mrpipe.tracing.bench.race import Model, Race, on_all_tests
 from mrpipe.tracing.bench.refine import with_best_forms
@@ -51,6 +54,28 @@ class Orders:
         return with_adequate_laws(found, self.yield_order, self.viscosity_order)
 
 
+@dataclass(frozen=True)
+class Unseen:
+    """How two fits are compared on tests that were left out of them.
+
+    Attributes
+    ----------
+    folds, draws
+        Of the cross-validation and its bootstrap.
+    rng
+        Source of randomness.
+    """
+
+    folds: int
+    draws: int
+    rng: np.random.Generator
+
+    def better(self, before: Fit, after: Fit, jobs: int) -> bool:
+        """Return whether the second fit predicts tests that were left out significantly better."""
+        first, second = (left_out_residual(item, self.folds, jobs=jobs) for item in (before, after))
+        return gain_of(first, second, after.problem, draws=self.draws, rng=self.rng).significant
+
+
 def rivals_of(selection: Selection, race: Race | None) -> list[Model]:
     """Return models of the best other base forms whose effects are among those of the chosen fit, one for each form.
 
@@ -83,6 +108,7 @@ def with_best_base(
     *,
     worth_a_try: float,
     lead: float,
+    unseen: Unseen,
     jobs: int = 1,
 ) -> Selection:
     """Return the selection with the base form that fits best once the effects have their best forms.
@@ -101,6 +127,8 @@ def with_best_base(
         Excess of the chi-square over the noise, in units of the noise, from which other base forms are compared.
     lead
         Share by which the chi-square of the chosen base form must exceed that of another one.
+    unseen
+        Comparison on tests that were left out, which the other base form must predict better, too.
     jobs
         Threads.
     """
@@ -122,7 +150,10 @@ def with_best_base(
         return selection
     again = taken(selection, race, rival, best)
     own = on_all_tests(full, chosen.problem)
-    return again if own.chi_square > (1.0 + lead) * again.chosen.chi_square else selection
+    if own.chi_square <= (1.0 + lead) * again.chosen.chi_square:
+        return selection
+    # a form with more freedom can fit the training tests better and predict other motions worse
+    return again if unseen.better(own, again.chosen, jobs) else selection
 
 
 def with_base_of(rival: Model, small: Fit, places: Sequence[int], declared: int, orders: Orders) -> Fit:

@@ -25,7 +25,7 @@ from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
 from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.on_validation import OnValidation
 from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
-from mrpipe.tracing.bench.rivals import Orders, with_best_base
+from mrpipe.tracing.bench.rivals import Orders, Unseen, with_best_base
 from mrpipe.tracing.bench.select import Selection, forward_selection
 from mrpipe.tracing.bench.summary import Summary, Tracing
 from mrpipe.tracing.bench.verdict import unnamed_reason
@@ -88,7 +88,7 @@ def trace_campaign(
     window = selection.base.problem.window_share
     if not baseline.model_error:
         window, selection = _with_window(selection, baseline.noise, training, taken.able, options, jobs)
-    selection = _needed(selection, choice, len(declared), options, jobs)
+    selection = _needed(selection, choice, len(declared), options, rng, jobs)
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
     reason = unnamed_reason(selection, options)
     if reason:
@@ -152,7 +152,14 @@ def _nothing_traced(
     return report.build(options, (), (), untested, 0.0, [item.name for item in declared])
 
 
-def _needed(selection: Selection, choice: Choice, declared: int, options: TracingOptions, jobs: int) -> Selection:
+def _needed(
+    selection: Selection,
+    choice: Choice,
+    declared: int,
+    options: TracingOptions,
+    rng: np.random.Generator,
+    jobs: int,
+) -> Selection:
     """Return the selection without superfluous effects, with the base form that fits best with the others."""
     rules = options.rules
     orders = Orders(options.yield_order, options.viscosity_order)
@@ -166,6 +173,7 @@ def _needed(selection: Selection, choice: Choice, declared: int, options: Tracin
         choice.race,
         worth_a_try=rules.refinement.worth_a_try,
         lead=rules.race.form_lead,
+        unseen=Unseen(options.folds, options.bootstrap_draws, rng),
         jobs=jobs,
     )
 

@@ -14,7 +14,7 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.needed import without_superfluous
 from mrpipe.tracing.bench.race import Race, _compared, alone, on_all_tests, with_effects_of
-from mrpipe.tracing.bench.rivals import Orders, rivals_of, with_best_base
+from mrpipe.tracing.bench.rivals import Orders, Unseen, rivals_of, with_best_base
 from mrpipe.tracing.bench.select import Selection, draft
 from mrpipe.tracing.rules import RaceRules
 from tests.tracing.bench.fits import plain_fit
@@ -50,6 +50,10 @@ def _raced(*forms: tuple[str, str]) -> tuple[Selection, Race]:
     return Selection(plain, 1.0, (), on_all_tests(models[-2], plain.problem), proven=len(forms)), race
 
 
+def _unseen() -> Unseen:
+    return Unseen(3, 100, np.random.default_rng(1))
+
+
 def _names(selection: Selection) -> tuple[str, list[str]]:
     problem = selection.chosen.problem
     return problem.base.name, [term.effect.name for term in problem.terms]
@@ -58,11 +62,26 @@ def _names(selection: Selection) -> tuple[str, list[str]]:
 def test_the_form_that_fits_best_with_the_same_effects_is_taken() -> None:
     selection, race = _raced(("end-stop", "linear"))
     assert _names(selection) == ("bouc-wen", ["end-stop"])
-    found = with_best_base(selection, 0, ORDERS, race, worth_a_try=0.2, lead=0.1)
+    found = with_best_base(selection, 0, ORDERS, race, worth_a_try=0.2, lead=0.1, unseen=_unseen())
     assert _names(found) == ("dahl", ["end-stop"])
     assert found.chosen.chi_square < 0.5 * selection.chosen.chi_square
     assert found.ground is not None
     assert found.ground.problem.base.name == "dahl"
+
+
+class _Worse(Unseen):
+    """Tests that were left out and that the other base form predicts worse."""
+
+    def better(self, before: Fit, after: Fit, jobs: int) -> bool:
+        assert after.chi_square < before.chi_square
+        return False
+
+
+def test_a_form_that_fits_better_but_predicts_unseen_tests_worse_is_not_taken() -> None:
+    selection, race = _raced(("end-stop", "linear"))
+    unseen = _Worse(3, 100, np.random.default_rng(1))
+    found = with_best_base(selection, 0, ORDERS, race, worth_a_try=0.2, lead=0.1, unseen=unseen)
+    assert found is selection
 
 
 def test_a_second_effect_that_corrects_the_base_form_is_dropped() -> None:
@@ -76,7 +95,7 @@ def test_a_second_effect_that_corrects_the_base_form_is_dropped() -> None:
 def test_nothing_is_compared_where_the_chosen_fit_leaves_no_more_than_noise() -> None:
     selection, race = _raced(("end-stop", "linear"))
     quiet = selection.with_floor(selection.chosen.chi_square)
-    assert with_best_base(quiet, 0, ORDERS, race, worth_a_try=0.2, lead=0.1) is quiet
+    assert with_best_base(quiet, 0, ORDERS, race, worth_a_try=0.2, lead=0.1, unseen=_unseen()) is quiet
 
 
 def test_a_rival_has_another_form_and_no_effect_that_is_not_named() -> None:
