@@ -56,7 +56,8 @@ PART = 20  # its normalised force, -1..1
 SUM_VELOCITY = 21  # velocity that the sum of (2.1) used: that of the inner element where a form has one [m/s]
 INNER_DISPLACEMENT = 22  # deformation of an inner element [m]
 OUTER_VELOCITY = 23  # velocity of the rod while an inner element's stands in its place [m/s]
-WIRE_SIZE = 24
+YIELD_LOSS = 24  # share of the yield force that effects took away, such as warm fluid (0 where unused)
+WIRE_SIZE = 25
 
 BOOKKEEPING = 6
 """Numbers that :func:`advance` keeps behind the chain's own state: work, slip, time since the last reversal, largest

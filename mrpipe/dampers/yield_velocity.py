@@ -1,7 +1,8 @@
 """Yield velocity of biviscous models, which grows with the drive.
 
 The viscosity before yield is about constant, so the velocity at which the damper yields grows with the yield force,
-therefore with the drive u: v_y = v (r + (1 - r) |u/u_max|^p).
+therefore with the drive u: v_y = v (r + (1 - r) (1 - q) |u/u_max|^p). An effect that takes the share q of the
+yield force away, such as warm fluid, lowers the growing part with it.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ BEND = shape("bend", "1", "power of the drive that the yield velocity grows with
 LARGEST_DRIVE = constant("largest_drive", "drive", "drive at which the yield velocity is given", "drive")
 
 
-@njit(float64(float64, float64, float64, float64, float64), cache=True)
-def yield_velocity(velocity: float, drive: float, rest: float, bend: float, largest: float) -> float:
-    """Return v_y = velocity (rest + (1 - rest) |drive/largest|^bend) [m/s]."""
+@njit(float64(float64, float64, float64, float64, float64, float64), cache=True)
+def yield_velocity(velocity: float, drive: float, loss: float, rest: float, bend: float, largest: float) -> float:
+    """Return v_y = velocity (rest + (1 - rest) (1 - loss) |drive/largest|^bend) [m/s]."""
     if rest == 1.0:
         return velocity
-    return velocity * max(rest + (1.0 - rest) * (abs(drive) / largest) ** bend, 0.5 * rest)
+    return velocity * max(rest + (1.0 - rest) * (1.0 - loss) * (abs(drive) / largest) ** bend, 0.5 * rest)
 
 
 def growth_of(values: Values) -> tuple[float, float, float]:

@@ -86,6 +86,12 @@ def _dead_time_and_lag(values: Values) -> list[Step]:
     return [*_dead_time({"delay": values["delay"] - lag}), *_lag(lag, lag)]
 
 
+def _dead_time_and_second_order(values: Values) -> list[Step]:
+    filtered = values["filter_share"] * values["delay"]
+    rest = _second_order({"delay": filtered, "damping_ratio": values["damping_ratio"]})
+    return [*_dead_time({"delay": values["delay"] - filtered}), *rest]
+
+
 def _rise(values: Values) -> list[Step]:
     return _lag(values["rise_time"], 0.0)
 
@@ -146,4 +152,17 @@ EFFECT = Effect(
     ),
     needs=("varying-drive",),
     separated_by={"remanence": Separation("current steps up and down at constant velocity", ("steps",))},
+    refinements=(
+        # a chain of lags of any number is near to a dead time before a filter of second order
+        EffectForm(
+            "dead-time-and-second-order",
+            "w'' + 2 zeta omega w' + omega^2 (w - u(t - T + s T)) = 0, s T = 2 zeta/omega",
+            (
+                strength("delay", "s", "delay of slow changes", "one", 0.0, 0.15, 0.002),
+                shape("filter_share", "1", "share of the filter", "one", 0.05, 0.98, (0.7,)),
+                shape("damping_ratio", "1", "below 1 it overshoots", "one", 0.25, 3.0, (0.8,)),
+            ),
+            _dead_time_and_second_order,
+        ),
+    ),
 )

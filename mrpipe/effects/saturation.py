@@ -41,6 +41,16 @@ def command_limit_step(wire: FloatArray, state: FloatArray, parameters: FloatArr
 
 
 @njit(STEP_SIGNATURE, cache=True)
+def soft_driver_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: inverse of the largest command [1/A], sharpness of the knee."""
+    inverse, power = parameters[0], parameters[1]
+    if inverse > 0.0:
+        ratio = wire[DRIVE] * inverse
+        wire[DRIVE] = ratio / (1.0 + abs(ratio) ** power) ** (1.0 / power) / inverse
+        wire[CURRENT] = wire[DRIVE]
+
+
+@njit(STEP_SIGNATURE, cache=True)
 def slewing_driver_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: inverse of the largest command [1/A], largest rate [A/s]. State: what the driver gives."""
     inverse = parameters[0]
@@ -76,6 +86,11 @@ def _command(values: Values) -> list[Step]:
     return [Step("command-limit", Phase.MOTION, command_limit_step, np.array([values["inverse_limit"]]))]
 
 
+def _soft_driver(values: Values) -> list[Step]:
+    numbers = np.array([values["inverse_limit"], values["exponent"]])
+    return [Step("soft-driver", Phase.MOTION, soft_driver_step, numbers)]
+
+
 def _slewing(values: Values) -> list[Step]:
     numbers = np.array([values["inverse_limit"], values["rate"]])
     return [Step("slewing-driver", Phase.MOTION, slewing_driver_step, numbers, 1)]
@@ -107,6 +122,7 @@ _SOFT = Parameter(
     "level",
     True,
 )
+_SHARPNESS = shape("exponent", "1", "sharpness of the knee", "one", 1.0, 40.0, (4.0, 12.0))
 
 EFFECT = Effect(
     name="saturation",
@@ -131,8 +147,14 @@ EFFECT = Effect(
         EffectForm(
             "knee",
             "u/(1 + (u/us)^n)^(1/n)",
-            (_INVERSE, shape("exponent", "1", "sharpness of the knee", "one", 1.0, 40.0, (4.0, 12.0))),
+            (_INVERSE, _SHARPNESS),
             _knee,
+        ),
+        EffectForm(
+            "soft-driver",
+            "command/(1 + (command/us)^n)^(1/n), before the lag",
+            (_INVERSE, _SHARPNESS),
+            _soft_driver,
         ),
         EffectForm(
             "slewing-driver",

@@ -88,6 +88,38 @@ def test_a_skew_is_taken_back_over_a_quick_motion(form: EffectForm) -> None:
     np.testing.assert_allclose(found[settled], expected[settled], atol=1e-6 * np.ptp(expected))
 
 
+LIMITS = [
+    ("saturation", "soft-driver", {"inverse_limit": 0.4, "exponent": 200.0}, "driver", {"inverse_limit": 0.4}),
+    (
+        "delay",
+        "dead-time-and-second-order",
+        {"delay": 0.02, "filter_share": 1.0, "damping_ratio": 0.8},
+        "second-order",
+        {"delay": 0.02, "damping_ratio": 0.8},
+    ),
+    (
+        "delay",
+        "dead-time-and-second-order",
+        {"delay": 0.02, "filter_share": 1e-3, "damping_ratio": 0.8},
+        "dead-time",
+        {"delay": 0.02},
+    ),
+]
+"""Effect, richer form with values near a limit, and the plain form to which it then reduces."""
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(("name", "richer", "values", "plain", "reduced"), LIMITS, ids=lambda item: str(item)[:30])
+def test_a_richer_form_contains_the_plain_one(
+    name: str, richer: str, values: dict[str, float], plain: str, reduced: dict[str, float]
+) -> None:
+    effect, (x, v, a, u, dt) = all_effects()[name], motion()
+    both = [effect.form(form).steps(numbers) for form, numbers in ((richer, values), (plain, reduced))]
+    found, known = (run_chain(build_chain([*base_steps(), *steps]), x, v, a, u, dt)[:, FORCE] for steps in both)
+    without = run_chain(build_chain(base_steps()), x, v, a, u, dt)[:, FORCE]
+    assert np.std(found - known) < 0.02 * np.std(known - without)
+
+
 @pytest.mark.property
 def test_the_gap_is_lost_motion() -> None:
     form = damper_effects()["backlash"].form("held")

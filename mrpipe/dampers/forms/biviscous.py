@@ -9,14 +9,15 @@ from numba import njit
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
 from mrpipe.dampers.parameters import Values, shape
-from mrpipe.dampers.plant import CURRENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.plant import CURRENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_LOSS, Phase, Step
 from mrpipe.dampers.yield_velocity import BEND, LARGEST_DRIVE, REST, growth_of, width_of, yield_velocity
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def biviscous_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: yield velocity [m/s] at the largest drive, its share without drive, power, largest drive."""
-    width = yield_velocity(parameters[0], wire[CURRENT], parameters[1], parameters[2], parameters[3])
+    rest, bend, largest = parameters[1], parameters[2], parameters[3]
+    width = yield_velocity(parameters[0], wire[CURRENT], wire[YIELD_LOSS], rest, bend, largest)
     wire[HYSTERESIS] = min(max(wire[VELOCITY] / width, -1.0), 1.0)
 
 

@@ -9,7 +9,7 @@ from numba import njit
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
 from mrpipe.dampers.parameters import Parameter, Values, shape
-from mrpipe.dampers.plant import ACCELERATION, CURRENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.plant import ACCELERATION, CURRENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_LOSS, Phase, Step
 from mrpipe.dampers.viscoplastic import rounded_sign
 from mrpipe.dampers.yield_velocity import BEND, LARGEST_DRIVE, REST, growth_of, width_of, yield_velocity
 
@@ -22,7 +22,8 @@ def hysteretic_biviscous_step(wire: FloatArray, state: FloatArray, parameters: F
     the yield velocity without drive, power, largest drive.
     """
     late = wire[VELOCITY] - parameters[1] * rounded_sign(wire[ACCELERATION], parameters[2])
-    width = yield_velocity(parameters[0], wire[CURRENT], parameters[3], parameters[4], parameters[5])
+    rest, bend, largest = parameters[3], parameters[4], parameters[5]
+    width = yield_velocity(parameters[0], wire[CURRENT], wire[YIELD_LOSS], rest, bend, largest)
     wire[HYSTERESIS] = min(max(late / width, -1.0), 1.0)
 
 
