@@ -86,8 +86,8 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     State: m, peak, path.
 
     The memory m fades with time and slip together, fast at first and ever slower: it falls by m^2 (kind 0), as
-    peak/(1 + path) (1) or exponentially (2); or it follows the drive both ways (3). What it holds up is what the drive
-    itself does not do: the larger of the two, with a rounded corner (0); the same, the remanence limited (1); added to
+    peak/(1 + path) (1) or exponentially (2, 4); or it follows the drive both ways (3). What it holds up is what the drive
+    itself does not do: the larger of the two, with a rounded corner (0, 4); the same, the remanence limited (1); added to
     the drive, less the larger that is (2); what the memory is above the drive, less the larger the drive is (3).
     """
     u = wire[CURRENT]
@@ -102,7 +102,7 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     elif kind == 1.0:
         state[2] += path
         state[0] = state[1] / (1.0 + state[2])
-    elif kind == 2.0:
+    elif kind == 2.0 or kind == 4.0:
         state[0] = state[0] * math.exp(-path)
     else:
         state[0] = u + (state[0] - u) * math.exp(-path)
@@ -111,15 +111,17 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
         state[1] = u
         state[2] = 0.0
     held = gain * state[0]
-    if u < 0.0 or held <= 0.0:
+    if held <= 0.0:
         return
-    if kind == 0.0:
-        larger, ratio = max(u, held), min(u, held) / max(u, held)
-        wire[CURRENT] = larger * (1.0 + ratio**size) ** (1.0 / size) if u > 0.0 else held
+    # a recorded drive of zero has noise of both signs, and the remanence stays where it is below zero
+    positive = max(u, 0.0)
+    if kind == 0.0 or kind == 4.0:
+        larger, ratio = max(positive, held), min(positive, held) / max(positive, held)
+        wire[CURRENT] = larger * (1.0 + ratio**size) ** (1.0 / size)
     elif kind == 1.0:
-        wire[CURRENT] = max(u, size * math.tanh(held / size))
+        wire[CURRENT] = max(positive, size * math.tanh(held / size))
     elif kind == 2.0:
-        wire[CURRENT] = u + held * math.exp(-u / size)
+        wire[CURRENT] = u + held * math.exp(-positive / size)
     elif state[0] > u:
         wire[CURRENT] = u + gain * (state[0] - u) / (1.0 + (u / size) ** 2)
 
@@ -145,10 +147,11 @@ def charging_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
         path = abs(wire[VELOCITY]) * dt / parameters[3] + dt / parameters[4]
         state[0] -= excess * (1.0 - math.exp(-path * (excess / limit) ** parameters[5]))
     kept = state[0]
-    if u < 0.0 or kept <= 0.0:
+    if kept <= 0.0:
         return
-    larger = max(u, kept)
-    wire[CURRENT] = larger * (1.0 + (min(u, kept) / larger) ** corner) ** (1.0 / corner)
+    positive = max(u, 0.0)
+    larger = max(positive, kept)
+    wire[CURRENT] = larger * (1.0 + (min(positive, kept) / larger) ** corner) ** (1.0 / corner)
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -338,6 +341,12 @@ EFFECT = Effect(
                 Parameter("time_share", "1", "share of the memory that time breaks", "one", 0.0, 1.0, (0.5,)),
             ),
             _two_memories,
+        ),
+        EffectForm(
+            "fading-corner",
+            "(u^p + (g m)^p)^(1/p), m decays to 0 over L and tau",
+            (_HELD, _LENGTH, _TIME, shape("exponent", "1", "sharpness of the corner", "one", 1.0, 30.0, (3.0, 8.0))),
+            _field(4.0, "exponent"),
         ),
         EffectForm(
             "charging",

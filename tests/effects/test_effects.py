@@ -9,9 +9,9 @@ import pytest
 
 from mrpipe.dampers.drive import driver_lag, polynomial_coefficients
 from mrpipe.dampers.hysteresis import hysteresis
-from mrpipe.dampers.plant import FORCE, build_chain, run_chain
+from mrpipe.dampers.plant import CURRENT, FORCE, build_chain, run_chain
 from mrpipe.effects.checks import checks_of
-from mrpipe.effects.contract import EffectForm
+from mrpipe.effects.contract import EffectForm, EffectScales
 from mrpipe.effects.library import all_effects, damper_effects, effects_named, load_effect_file
 from mrpipe.effects.structural.library import all_structural_effects
 from mrpipe.errors import UserError
@@ -98,6 +98,20 @@ LIMITS = [
         {"delay": 0.02, "damping_ratio": 0.8},
     ),
     (
+        "remanence",
+        "fading-corner",
+        {"gain": 0.8, "slip_length": 0.05, "relaxation_time": 2.0, "exponent": 400.0},
+        "fading",
+        {"gain": 0.8, "slip_length": 0.05, "relaxation_time": 2.0},
+    ),
+    (
+        "remanence",
+        "fading-corner",
+        {"gain": 0.8, "slip_length": 0.05, "relaxation_time": 2.0, "exponent": 2.0},
+        "fading-root",
+        {"gain": 0.8, "slip_length": 0.05, "relaxation_time": 2.0},
+    ),
+    (
         "delay",
         "dead-time-and-second-order",
         {"delay": 0.02, "filter_share": 1e-3, "damping_ratio": 0.8},
@@ -118,6 +132,22 @@ def test_a_richer_form_contains_the_plain_one(
     found, known = (run_chain(build_chain([*base_steps(), *steps]), x, v, a, u, dt)[:, FORCE] for steps in both)
     without = run_chain(build_chain(base_steps()), x, v, a, u, dt)[:, FORCE]
     assert np.std(found - known) < 0.02 * np.std(known - without)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    "name", [form.name for form in (*all_effects()["remanence"].forms, *all_effects()["remanence"].refinements)]
+)
+def test_noise_about_a_drive_of_zero_does_not_end_the_remanence(name: str) -> None:
+    form = all_effects()["remanence"].form(name)
+    x, v, a, _, dt = motion()
+    scales = EffectScales(stroke=0.009, speed=0.07, acceleration=0.6, drive=2.0, force=100.0, time=3.0)
+    values = {p.name: p.start_values(scales)[-1] for p in form.parameters} | {"gain": 0.5}
+    drive = np.where(np.arange(len(x)) < len(x) // 3, 2.0, 0.0)
+    noise = 1e-3 * (-1.0) ** np.arange(len(x))
+    chain = build_chain([*base_steps(), *form.steps(values)])
+    plain, noisy = (run_chain(chain, x, v, a, u, dt)[:, CURRENT] for u in (drive, drive + noise))
+    assert np.max(np.abs(noisy - plain)) < 0.02 * np.max(plain)
 
 
 @pytest.mark.property
