@@ -170,6 +170,17 @@ class Chain:
         return self.functions, self.parameters, self.parameter_offsets, self.state_offsets
 
 
+@njit(void(float64[::1], float64), cache=True)
+def change_yield_force(wire: FloatArray, factor: float) -> None:
+    """Multiply the yield force by a factor before the damper yields, for steps of Phase.COEFFICIENT_EFFECT.
+
+    The result differs from a factor of the hysteretic force where the form has a spring in series with the slider, or a
+    yield velocity that grows with the yield force: there the yield force also decides when the damper yields.
+    """
+    wire[YIELD_FORCE] *= factor
+    wire[YIELD_LOSS] = 1.0 - (1.0 - wire[YIELD_LOSS]) * factor
+
+
 @njit(STEP_SIGNATURE, cache=True)
 def idle_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Do nothing: padding of short chains."""

@@ -20,8 +20,9 @@ from mrpipe.dampers.plant import (
     VISCOUS_FORCE,
     Phase,
     Step,
+    change_yield_force,
 )
-from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -60,6 +61,18 @@ def direction_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     direction = v / math.sqrt(v * v + parameters[1] * parameters[1])
     force = wire[HYSTERETIC_FORCE] if parameters[2] == 0.0 else wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]
     wire[FORCE] += parameters[0] * force * direction
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: share, transition velocity [m/s]. The yield force itself differs between the directions."""
+    v = wire[VELOCITY]
+    change_yield_force(wire, 1.0 + parameters[0] * v / math.sqrt(v * v + parameters[1] * parameters[1]))
+
+
+def _yield_force(values: Values) -> list[Step]:
+    numbers = np.array([values["share"], values["transition_velocity"]])
+    return [Step("asymmetry", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers)]
 
 
 def _direction(kind: float) -> Callable[[Values], list[Step]]:
@@ -148,6 +161,17 @@ EFFECT = Effect(
             (_SHARE, shape("knee_force", "N", "force below which it fades", "force", 1e-3, 2.0, (0.03, 0.2))),
             _rounded,
             {"share": 0},
+        ),
+        EffectForm(
+            "yield-force",
+            "F_y (1 + s v/sqrt(v^2 + v_t^2)) before the damper yields",
+            (
+                strength(
+                    "share", "1", "half the difference of the two directions over their mean", "one", -0.9, 0.9, 0.05
+                ),
+                _TRANSITION,
+            ),
+            _yield_force,
         ),
     ),
 )

@@ -8,7 +8,7 @@ import numpy as np
 from numba import float64, njit, void
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import FIRST, STEP_SIGNATURE, VISCOSITY, WORK, YIELD_FORCE, YIELD_LOSS, Phase, Step
+from mrpipe.dampers.plant import FIRST, STEP_SIGNATURE, VISCOSITY, WORK, Phase, Step, change_yield_force
 from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
 
 
@@ -32,8 +32,7 @@ def heating_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
     loss = parameters[0] * state[0]
     factor = math.exp(-min(max(loss, -5.0), 20.0)) if parameters[3] == 0.0 else 1.0 / max(1.0 + loss, 0.05)
     if parameters[2] != 2.0:
-        wire[YIELD_FORCE] *= factor
-        wire[YIELD_LOSS] = 1.0 - (1.0 - wire[YIELD_LOSS]) * factor
+        change_yield_force(wire, factor)
     if parameters[2] != 1.0:
         wire[VISCOSITY] *= factor
 
@@ -51,8 +50,7 @@ def warming_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
     flat = abs(curvature) < 1e-3
     factor = math.exp(-loss) if flat else max(1.0 - curvature * loss, 0.02) ** (1.0 / curvature)
     factor = min(max(factor, 1e-3), 1e3)
-    wire[YIELD_FORCE] *= factor
-    wire[YIELD_LOSS] = 1.0 - (1.0 - wire[YIELD_LOSS]) * factor
+    change_yield_force(wire, factor)
     wire[VISCOSITY] *= factor ** parameters[3]
 
 

@@ -1,8 +1,11 @@
 """Migration: after a reversal the force rises slowly, as particles move back into the gap."""
 
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -20,8 +23,9 @@ from mrpipe.dampers.plant import (
     YIELD_FORCE,
     Phase,
     Step,
+    change_yield_force,
 )
-from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -60,6 +64,24 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
         force = wire[CURRENT]
     shape_of = 1.0 if kind == 3.0 else wire[HYSTERESIS]
     wire[FORCE] += parameters[0] * force * rise * shape_of
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: share, length [m] or time [s], exponent, kind of rise (0 slip, 1 time)."""
+    if parameters[3] == 0.0:
+        rise = 1.0 - (1.0 + wire[SLIP] / (parameters[2] * parameters[1])) ** (-parameters[2])
+    else:
+        rise = 1.0 - math.exp(-((wire[SINCE_REVERSAL] / parameters[1]) ** parameters[2]))
+    change_yield_force(wire, 1.0 + parameters[0] * rise)
+
+
+def _yield_force(size: str, power: str, kind: float) -> Callable[[Values], list[Step]]:
+    def steps(values: Values) -> list[Step]:
+        numbers = np.array([values["share"], values[size], values[power], kind])
+        return [Step("migration", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers)]
+
+    return steps
 
 
 def _step(value: float, length: float, kind: float, of: float, power: float = 1.0) -> Step:
@@ -102,6 +124,8 @@ def _own(values: Values) -> list[Step]:
 _LENGTH = shape("slip_length", "m", "path over which the force comes back", "stroke", 0.02, 0.9, (0.06, 0.15, 0.4))
 _TIME = shape("rise_time", "s", "time over which the force comes back", "stroke/speed", 0.05, 20.0, (0.2, 0.5, 2.0))
 _POWER = shape("exponent", "1", "below 1 a steep rise and a long tail", "one", 0.3, 2.0, (0.6,))
+_RATIONAL = shape("power", "1", "1: rational, large: exponential", "one", 0.2, 20.0, (1.0, 4.0))
+_LATE = strength("share", "1", "share of the yield force that comes late", "one", 0.0, 3.0, 0.05)
 _SHARE = amplitude("share", "1", "share of the yield force that comes late", "one", 0.0, 3.0)
 
 EFFECT = Effect(
@@ -160,9 +184,21 @@ EFFECT = Effect(
         EffectForm(
             "power-law",
             "alpha (1 + s (1 - (1 + slip/(p L))^-p))",
-            (_LENGTH, shape("power", "1", "1: rational, large: exponential", "one", 0.2, 20.0, (1.0, 4.0)), _SHARE),
+            (_LENGTH, _RATIONAL, _SHARE),
             _power_law,
             {"share": 0},
+        ),
+        EffectForm(
+            "yield-force",
+            "F_y (1 + s (1 - (1 + slip/(p L))^-p)) before the damper yields",
+            (_LENGTH, _RATIONAL, _LATE),
+            _yield_force("slip_length", "power", 0.0),
+        ),
+        EffectForm(
+            "yield-force-time",
+            "F_y (1 + s (1 - exp(-(t_rev/tau)^p))) before the damper yields",
+            (_TIME, replace(_POWER, starts=(1.0,)), _LATE),
+            _yield_force("rise_time", "exponent", 1.0),
         ),
     ),
 )

@@ -11,8 +11,18 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import CURRENT, DISPLACEMENT, FORCE, HYSTERESIS, STEP_SIGNATURE, YIELD_FORCE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, amplitude, shape
+from mrpipe.dampers.plant import (
+    CURRENT,
+    DISPLACEMENT,
+    FORCE,
+    HYSTERESIS,
+    STEP_SIGNATURE,
+    YIELD_FORCE,
+    Phase,
+    Step,
+    change_yield_force,
+)
+from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, amplitude, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -35,6 +45,18 @@ def pinching_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
     elif parameters[3] == 2.0:
         force = wire[CURRENT]
     wire[FORCE] -= parameters[0] * force * dip * wire[HYSTERESIS]
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: depth, half width [m], middle [m], exponent. The yield force itself has the dip."""
+    ratio = abs(wire[DISPLACEMENT] - parameters[2]) / parameters[1]
+    change_yield_force(wire, 1.0 - parameters[0] / (1.0 + ratio ** parameters[3]))
+
+
+def _yield_force(values: Values) -> list[Step]:
+    numbers = np.array([values["depth"], values["width"], values["middle"], values["exponent"]])
+    return [Step("pinching", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers)]
 
 
 def _step(value: float, width: float, dip: float, of: float = 0.0, middle: float = 0.0, power: float = 2.0) -> Step:
@@ -70,6 +92,7 @@ def _aside(kind: float) -> Callable[[Values], list[Step]]:
 _WIDTH = shape("width", "m", "half width of the dip", "stroke", 0.02, 1.0, (0.12, 0.4))
 _MIDDLE = Parameter("middle", "m", "where the dip is deepest", "stroke", -0.8, 0.8, (-0.3, 0.3))
 _NEAR_MIDDLE = replace(_MIDDLE, starts=(0.0,))
+_FLATNESS = shape("exponent", "1", "flatness", "one", 1.0, 12.0, (3.0,))
 _DEPTH = amplitude("depth", "1", "share of the yield force that is missing in the middle", "one", 0.0, 1.0)
 
 EFFECT = Effect(
@@ -105,9 +128,20 @@ EFFECT = Effect(
         EffectForm(
             "flat",
             "alpha (1 - d/(1 + (|x - m|/w)^n))",
-            (_WIDTH, _NEAR_MIDDLE, shape("exponent", "1", "flatness", "one", 1.0, 12.0, (3.0,)), _DEPTH),
+            (_WIDTH, _NEAR_MIDDLE, _FLATNESS, _DEPTH),
             _aside(3.0),
             {"depth": 0},
+        ),
+        EffectForm(
+            "yield-force",
+            "F_y (1 - d/(1 + (|x - m|/w)^n)) before the damper yields",
+            (
+                _WIDTH,
+                _NEAR_MIDDLE,
+                _FLATNESS,
+                strength("depth", "1", "share of the yield force that is missing in the middle", "one", 0.0, 1.0, 0.05),
+            ),
+            _yield_force,
         ),
     ),
 )

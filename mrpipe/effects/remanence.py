@@ -86,9 +86,10 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     State: m, peak, path.
 
     The memory m fades with time and slip together, fast at first and ever slower: it falls by m^2 (kind 0), as
-    peak/(1 + path) (1) or exponentially (2, 4); or it follows the drive both ways (3). What it holds up is what the drive
-    itself does not do: the larger of the two, with a rounded corner (0, 4); the same, the remanence limited (1); added to
-    the drive, less the larger that is (2); what the memory is above the drive, less the larger the drive is (3).
+    peak/(1 + path) (1) or exponentially (2, 4); or it follows the drive both ways (3). What it holds up is what the
+    drive itself does not do: the larger of the two, with a rounded corner (0, 4); the same, the remanence limited (1);
+    added to the drive, less the larger that is (2); what the memory is above the drive, less the larger the drive is
+    (3).
     """
     u = wire[CURRENT]
     gain, size, kind = parameters[0], parameters[3], parameters[5]

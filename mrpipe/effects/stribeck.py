@@ -9,8 +9,18 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import CURRENT, FORCE, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
-from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
+from mrpipe.dampers.plant import (
+    CURRENT,
+    FORCE,
+    HYSTERESIS,
+    STEP_SIGNATURE,
+    VELOCITY,
+    YIELD_FORCE,
+    Phase,
+    Step,
+    change_yield_force,
+)
+from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape, strength
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -32,6 +42,18 @@ def stribeck_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
     else:
         force = wire[CURRENT]
     wire[FORCE] += parameters[0] * force * fall * wire[HYSTERESIS]
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: share, velocity scale [m/s], exponent. The yield force itself falls with the speed."""
+    ratio = abs(wire[VELOCITY]) / parameters[1]
+    change_yield_force(wire, 1.0 + parameters[0] * math.exp(-(ratio ** parameters[2])))
+
+
+def _yield_force(values: Values) -> list[Step]:
+    numbers = np.array([values["share"], values["velocity_scale"], values["exponent"]])
+    return [Step("stribeck", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers)]
 
 
 def _step(value: float, scale: float, fall: float, of: float, power: float = 1.0) -> Step:
@@ -66,6 +88,7 @@ def _stretched(values: Values) -> list[Step]:
 
 _SCALE = shape("velocity_scale", "m/s", "speed at which the surplus has fallen", "speed", 0.004, 0.7, (0.06, 0.2))
 _SHARE = amplitude("share", "1", "surplus of the yield force at rest", "one", 0.0, 5.0)
+_POWER = shape("exponent", "1", "below 1 a cusp at rest", "one", 0.2, 4.0, (0.6, 1.5))
 _OWN = (
     amplitude("friction", "N", "surplus at rest without drive", "force", -0.05, 10.0),
     amplitude("friction_rate", "N/drive", "its rise with the drive", "force/drive", -10.0, 10.0),
@@ -102,9 +125,15 @@ EFFECT = Effect(
         EffectForm(
             "stretched",
             "alpha (1 + s exp(-(|v|/vs)^n))",
-            (_SCALE, shape("exponent", "1", "below 1 a cusp at rest", "one", 0.2, 4.0, (0.6, 1.5)), _SHARE),
+            (_SCALE, _POWER, _SHARE),
             _stretched,
             {"share": 0},
+        ),
+        EffectForm(
+            "yield-force",
+            "F_y (1 + s exp(-(|v|/vs)^n)) before the damper yields",
+            (_SCALE, _POWER, strength("share", "1", "surplus of the yield force at rest", "one", 0.0, 5.0, 0.05)),
+            _yield_force,
         ),
     ),
 )
