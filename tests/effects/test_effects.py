@@ -9,6 +9,7 @@ import pytest
 
 from mrpipe.dampers.drive import driver_lag, polynomial_coefficients
 from mrpipe.dampers.hysteresis import hysteresis
+from mrpipe.dampers.library import base_form
 from mrpipe.dampers.plant import CURRENT, FORCE, build_chain, run_chain
 from mrpipe.effects.checks import checks_of
 from mrpipe.effects.contract import EffectForm, EffectScales
@@ -89,6 +90,23 @@ def test_a_skew_is_taken_back_over_a_quick_motion(form: EffectForm) -> None:
 
 
 LIMITS = [
+    # the base form of this file has no series spring: a factor of the yield force is one of the hysteretic force
+    *(
+        (name, "yield-force", values, plain, values)
+        for name, plain, values in (
+            ("asymmetry", "yield-by-direction", {"share": 0.2, "transition_velocity": 0.01}),
+            ("stribeck", "stretched", {"share": 0.3, "velocity_scale": 0.02, "exponent": 1.3}),
+            ("migration", "power-law", {"share": 0.3, "slip_length": 0.004, "power": 2.0}),
+            ("pinching", "flat", {"depth": 0.3, "width": 0.002, "middle": 0.001, "exponent": 3.0}),
+        )
+    ),
+    (
+        "migration",
+        "yield-force-time",
+        {"share": 0.3, "rise_time": 0.1, "exponent": 0.8},
+        "stretched-time",
+        {"share": 0.3, "rise_time": 0.1, "exponent": 0.8},
+    ),
     ("saturation", "soft-driver", {"inverse_limit": 0.4, "exponent": 200.0}, "driver", {"inverse_limit": 0.4}),
     (
         "delay",
@@ -120,6 +138,18 @@ LIMITS = [
     ),
 ]
 """Effect, richer form with values near a limit, and the plain form to which it then reduces."""
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", ["elastic-plastic", "bingham-spring", "gamota-filisko"])
+def test_a_slider_behind_a_spring_yields_at_the_changed_force(name: str) -> None:
+    form = base_form(name)
+    values = {p.name: 1e6 for p in form.parameters} | {"exponent": 20.0, "solid_viscosity": 1e6}
+    steps = all_effects()["asymmetry"].form("yield-force").steps({"share": 0.2, "transition_velocity": 1e-4})
+    x, v, a, _, dt = motion()
+    chain = build_chain([polynomial_coefficients([100.0], [0.0]), *form.steps(values), *steps])
+    force = run_chain(chain, x, v, a, np.zeros_like(x), dt)[:, FORCE]
+    assert (np.max(force), np.min(force)) == pytest.approx((120.0, -80.0), rel=0.01)
 
 
 @pytest.mark.property
