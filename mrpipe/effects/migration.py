@@ -1,6 +1,5 @@
 """Migration: after a reversal the force rises slowly, as particles move back into the gap."""
 
-# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import math
@@ -68,18 +67,30 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
 
 @njit(STEP_SIGNATURE, cache=True)
 def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: share, length [m] or time [s], exponent, kind of rise (0 slip, 1 time)."""
+    """Parameters: share, length [m] or time [s], exponent, kind of rise (0 slip, 1 time), speed of a reversal [m/s].
+
+    State: rise at the last sample, rise before the last reversal, share of it that is gone. The flow must reach a speed
+    before it moves the particles: below it the rise from before the reversal remains.
+    """
+    if wire[FIRST] > 0.5:
+        state[:] = 0.0
+    if wire[SINCE_REVERSAL] < 1.5 * dt:
+        state[1] = state[0]
+        state[2] = 0.0
     if parameters[3] == 0.0:
         rise = 1.0 - (1.0 + wire[SLIP] / (parameters[2] * parameters[1])) ** (-parameters[2])
     else:
         rise = 1.0 - math.exp(-((wire[SINCE_REVERSAL] / parameters[1]) ** parameters[2]))
-    change_yield_force(wire, 1.0 + parameters[0] * rise)
+    fast = (wire[VELOCITY] / parameters[4]) ** 4
+    state[2] = max(state[2], fast / (1.0 + fast))
+    state[0] = state[1] + (rise - state[1]) * state[2]
+    change_yield_force(wire, 1.0 + parameters[0] * state[0])
 
 
 def _yield_force(size: str, power: str, kind: float) -> Callable[[Values], list[Step]]:
     def steps(values: Values) -> list[Step]:
-        numbers = np.array([values["share"], values[size], values[power], kind])
-        return [Step("migration", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers)]
+        numbers = np.array([values["share"], values[size], values[power], kind, values["reversal_speed"]])
+        return [Step("migration", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers, 3)]
 
     return steps
 
@@ -125,6 +136,7 @@ _LENGTH = shape("slip_length", "m", "path over which the force comes back", "str
 _TIME = shape("rise_time", "s", "time over which the force comes back", "stroke/speed", 0.05, 20.0, (0.2, 0.5, 2.0))
 _POWER = shape("exponent", "1", "below 1 a steep rise and a long tail", "one", 0.3, 2.0, (0.6,))
 _RATIONAL = shape("power", "1", "1: rational, large: exponential", "one", 0.2, 20.0, (1.0, 4.0))
+_REVERSAL = shape("reversal_speed", "m/s", "speed from which a reversal counts", "speed", 1e-4, 0.1, (0.01,))
 _LATE = strength("share", "1", "share of the yield force that comes late", "one", 0.0, 3.0, 0.05)
 _SHARE = amplitude("share", "1", "share of the yield force that comes late", "one", 0.0, 3.0)
 
@@ -191,13 +203,13 @@ EFFECT = Effect(
         EffectForm(
             "yield-force",
             "F_y (1 + s (1 - (1 + slip/(p L))^-p)) before the damper yields",
-            (_LENGTH, _RATIONAL, _LATE),
+            (_LENGTH, _RATIONAL, _REVERSAL, _LATE),
             _yield_force("slip_length", "power", 0.0),
         ),
         EffectForm(
             "yield-force-time",
             "F_y (1 + s (1 - exp(-(t_rev/tau)^p))) before the damper yields",
-            (_TIME, replace(_POWER, starts=(1.0,)), _LATE),
+            (_TIME, replace(_POWER, starts=(1.0,)), _REVERSAL, _LATE),
             _yield_force("rise_time", "exponent", 1.0),
         ),
     ),

@@ -10,7 +10,7 @@ import pytest
 from mrpipe.dampers.drive import driver_lag, polynomial_coefficients
 from mrpipe.dampers.hysteresis import hysteresis
 from mrpipe.dampers.library import base_form
-from mrpipe.dampers.plant import CURRENT, FORCE, build_chain, run_chain
+from mrpipe.dampers.plant import CURRENT, FORCE, YIELD_FORCE, build_chain, run_chain
 from mrpipe.effects.checks import checks_of
 from mrpipe.effects.contract import EffectForm, EffectScales
 from mrpipe.effects.library import all_effects, damper_effects, effects_named, load_effect_file
@@ -96,14 +96,18 @@ LIMITS = [
         for name, plain, values in (
             ("asymmetry", "yield-by-direction", {"share": 0.2, "transition_velocity": 0.01}),
             ("stribeck", "stretched", {"share": 0.3, "velocity_scale": 0.02, "exponent": 1.3}),
-            ("migration", "power-law", {"share": 0.3, "slip_length": 0.004, "power": 2.0}),
+            (
+                "migration",
+                "power-law",
+                {"share": 0.3, "slip_length": 0.004, "power": 2.0, "reversal_speed": 1e-6},
+            ),
             ("pinching", "flat", {"depth": 0.3, "width": 0.002, "middle": 0.001, "exponent": 3.0}),
         )
     ),
     (
         "migration",
         "yield-force-time",
-        {"share": 0.3, "rise_time": 0.1, "exponent": 0.8},
+        {"share": 0.3, "rise_time": 0.1, "exponent": 0.8, "reversal_speed": 1e-6},
         "stretched-time",
         {"share": 0.3, "rise_time": 0.1, "exponent": 0.8},
     ),
@@ -211,3 +215,19 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path: Path) -> None:
         load_effect_file(tmp_path / "empty.py")
     with pytest.raises(UserError, match=r"did you mean inertia\?"):
         effects_named(["inertja"])
+
+
+@pytest.mark.property
+def test_a_reversal_moves_particles_once_the_flow_is_fast_enough() -> None:
+    form = all_effects()["migration"].form("yield-force")
+    values = {"share": 0.5, "slip_length": 0.001, "power": 2.0, "reversal_speed": 0.02}
+    x, v, a, _, dt = motion()
+    chain = build_chain([*base_steps(), *form.steps(values)])
+    found = run_chain(chain, x, v, a, np.zeros_like(x), dt)[:, YIELD_FORCE] / 22.0
+    late = np.arange(len(v)) > 1000
+    # until the speed is reached the yield force stays as it was before the reversal, then it begins anew
+    assert np.min(found[late & (np.abs(v) < 0.005)]) > 1.4
+    assert np.min(found[late]) < 1.35
+    # while the motion slows down nothing changes back
+    slowing = late & (v * a < 0.0) & (np.abs(v) < 0.01)
+    assert np.min(found[slowing]) > 1.4
