@@ -69,8 +69,8 @@ class Assessment:
         Terms whose cause is not proven.
     missing
         Whether the residual of the training tests holds more than noise.
-    found
-        Errors of the whole model on the validation tests.
+    found, alone
+        Errors on the validation tests: of the whole model, and without the further terms.
     judgement
         Verdict on the named effects alone: further terms do not explain anything.
     """
@@ -80,7 +80,13 @@ class Assessment:
     further: tuple[Named, ...]
     missing: bool
     found: OnValidation
+    alone: OnValidation
     judgement: Judgement
+
+    @property
+    def further_terms_fail(self) -> bool:
+        """Whether there are further terms, and they do not lower the error on the validation tests."""
+        return bool(self.further) and self.found.nrmse(self.found.after) >= self.alone.nrmse(self.alone.after)
 
 
 def assess(
@@ -126,7 +132,7 @@ def assess(
     judgement = judged(alone, proven, case.training, options, causes, missing, reason, case.ordered, case.jobs)
     several = several or len(named) > 1
     likely = tuple(held(item, judgement, options, several=several and item in named) for item in causes)
-    return Assessment(named, likely, further, missing, found, judgement)
+    return Assessment(named, likely, further, missing, found, alone, judgement)
 
 
 def unlikely(found: Assessment, rules: NamingRules) -> tuple[int, ...]:

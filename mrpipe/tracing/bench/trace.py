@@ -112,11 +112,14 @@ def trace_campaign(
     )
     case = Case(choice, training, validation, options, ordered, len(declared), offsets, jobs)
     assessed = assess(selection, case, gains, reason, rng)
-    places = unlikely(assessed, options)
+    several, places = len(assessed.named) > 1, unlikely(assessed, options)
     if places:
         selection, gains = without_names(selection, gains, places, len(declared))
         reason = "" if selection.proven else unlikely_reason(assessed, places)
-        assessed = assess(selection, case, gains, reason, rng, several=len(assessed.named) > 1)
+        assessed = assess(selection, case, gains, reason, rng, several=several)
+    if assessed.further_terms_fail:
+        selection = selection.with_named_alone
+        assessed = assess(selection, case, gains, reason, rng, several=several)
     causes, further, found, judgement = assessed.causes, assessed.further, assessed.found, assessed.judgement
     if causes and judgement.evidence.after >= judgement.evidence.before:
         # what does not lower the error on the validation tests is not named

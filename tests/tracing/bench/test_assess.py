@@ -33,6 +33,18 @@ def test_an_effect_below_the_least_probability_improves_the_model_without_a_name
     assert "accumulator (probability 0.9" in found["verdict"]
 
 
+def test_a_further_term_that_does_not_lower_the_error_on_validation_is_left_out() -> None:
+    library = {name: damper_effects()[name] for name in ("accumulator", "inertia")}
+    options = TracingOptions(
+        base_forms=("bouc-wen",), refits=2, bootstrap_draws=100, most_effects=1, least_probability=0.99
+    )
+    planted, clean = campaign("accumulator"), campaign("none")
+    tests = [b if b.role == "validation" else a for a, b in zip(planted, clean, strict=True)]
+    found = trace_campaign(tests, library, [], options, rng=np.random.default_rng(1)).summary
+    assert (found["effects"], found["further_terms"]) == ([], [])
+    assert found["after"]["nrmse"] <= 1.01 * found["before"]["nrmse"]
+
+
 def test_the_term_that_loses_its_name_stands_behind_the_others() -> None:
     plain, library = plain_fit("accumulator"), damper_effects()
     terms = tuple(Term(library[name], library[name].forms[0]) for name in ("inertia", "accumulator"))
