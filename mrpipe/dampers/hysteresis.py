@@ -27,6 +27,10 @@ SUB_STEP = 0.05
 """Longest sub-step of other exponents, in yield displacements; the update is then accurate to about 1e-7."""
 
 
+LONGEST_PART_S = 1e-3
+"""Longest part of an interval [s] over which the yield force of a form with a spring in series is taken as constant."""
+
+
 # numbers that several base forms share
 YIELD_DISPLACEMENT = shape(
     "yield_displacement", "m", "yield force over initial stiffness", "stroke", 1e-3, 2.0, (0.05, 0.15, 0.015)
@@ -190,6 +194,12 @@ def displacement_between(
     square = _square_part(mean, speed_before, speed_after)
     linear = _linear_part(mean, speed_before, speed_after)
     return before + dt * share * (speed_before + share * (0.5 * linear + share * square / 3.0))
+
+
+@njit(int64(float64), cache=True)
+def parts_of(dt: float) -> int:
+    """Return into how many parts an interval [s] is divided where yield force and strain change together."""
+    return max(1, math.ceil(dt / LONGEST_PART_S - 1e-9))
 
 
 @njit(float64(float64, float64, float64, float64, float64, float64, float64, float64, float64), cache=True)

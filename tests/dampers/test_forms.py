@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from mrpipe.dampers.drive import polynomial_coefficients
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.forms import form_names
 from mrpipe.dampers.library import base_form, base_forms, form_of_file
 from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.parameters import Scales
+from mrpipe.dampers.plant import FORCE, build_chain, run_chain
+from mrpipe.effects.library import all_effects
 from mrpipe.errors import UserError
 from mrpipe.units import conversion
 
@@ -204,6 +207,24 @@ def test_a_form_gives_what_its_equations_integrate_to(name: str) -> None:
     truth = expected(name, t)
     error = np.sqrt(np.mean((force - truth) ** 2) / np.mean(truth**2))
     assert error < 0.003
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", ["bingham-spring", "elastic-plastic", "gamota-filisko"])
+def test_a_yield_force_that_changes_with_the_direction_is_followed_at_250_hz(name: str) -> None:
+    stiff = {key: 5.0 * number for key, number in NUMBERS[name].items() if key != "exponent"}
+    changing = all_effects()["asymmetry"].form("yield-force").steps({"share": 0.2, "transition_velocity": 0.006})
+    steps = [polynomial_coefficients([YIELD], [VISCOSITY]), *base_form(name).steps(NUMBERS[name] | stiff), *changing]
+
+    def force(dt: float) -> np.ndarray:
+        t = np.arange(0.0, 6.0, dt)
+        x = 0.008 * np.sin(9.0 * t) + 0.003 * np.sin(23.0 * t + 1.0)
+        v = 0.072 * np.cos(9.0 * t) + 0.069 * np.cos(23.0 * t + 1.0)
+        a = -0.648 * np.sin(9.0 * t) - 1.587 * np.sin(23.0 * t + 1.0)
+        return run_chain(build_chain(steps), x, v, a, np.full_like(t, DRIVE), dt)[:, FORCE]
+
+    coarse, fine = force(4e-3)[125:], force(1e-4)[::40][125:]
+    assert np.sqrt(np.mean((coarse - fine) ** 2) / np.mean(fine**2)) < 0.006
 
 
 @pytest.mark.property

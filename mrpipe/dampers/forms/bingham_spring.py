@@ -9,7 +9,7 @@ from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import displacement_between, turning_share
+from mrpipe.dampers.hysteresis import displacement_between, parts_of, turning_share
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import (
     DISPLACEMENT,
@@ -73,29 +73,42 @@ def advance_spring(deformation: float, speed: float, dt: float, yield_deformatio
 @njit(STEP_SIGNATURE, cache=True)
 def bingham_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: stiffness of the spring [N/m]. State: last displacement [m], deformation of the spring [m], last
-    velocity [m/s].
+    velocity [m/s], last yield force [N], last viscosity [N s/m].
 
-    The velocity of the Bingham element takes the place of the rod's.
+    The velocity of the Bingham element takes the place of the rod's. A long interval is divided, because the yield force
+    can change while the spring is strained.
     """
     x, v = wire[DISPLACEMENT], wire[VELOCITY]
     wire[OUTER_VELOCITY] = v
+    stiffness = parameters[0]
+    strength = max(wire[YIELD_FORCE], 0.0)
+    viscosity = max(wire[VISCOSITY], 0.0)
     if wire[FIRST] > 0.5:
         state[0] = x
         state[1] = 0.0
         state[2] = v
-    stiffness = parameters[0]
-    strength = max(wire[YIELD_FORCE], 0.0)
-    viscosity = max(wire[VISCOSITY], 0.0)
-    share = turning_share(state[0], state[2], x, v, dt)
-    turn = displacement_between(share, state[0], state[2], x, v, dt)
-    limit, relaxation = strength / stiffness, viscosity / stiffness
-    speed = (turn - state[0]) / (share * dt)
-    state[1] = advance_spring(state[1], speed, share * dt, limit, relaxation)
-    if share < 1.0:
-        speed = (x - turn) / ((1.0 - share) * dt)
-        state[1] = advance_spring(state[1], speed, (1.0 - share) * dt, limit, relaxation)
+        state[3] = strength
+        state[4] = viscosity
+    turn = turning_share(state[0], state[2], x, v, dt)
+    count = parts_of(dt)
+    begin, place, speed = 0.0, state[0], v
+    for part in range(count):
+        end = (part + 1.0) / count
+        limit = (state[3] + end * (strength - state[3])) / stiffness
+        relaxation = (state[4] + end * (viscosity - state[4])) / stiffness
+        # at most two pieces: up to the turning point of the motion, and behind it
+        for _ in range(2):
+            until = turn if begin < turn < end else end
+            after = displacement_between(until, state[0], state[2], x, v, dt)
+            length = (until - begin) * dt
+            if length > 0.0:
+                speed = (after - place) / length
+                state[1] = advance_spring(state[1], speed, length, limit, relaxation)
+            begin, place = until, after
     state[0] = x
     state[2] = v
+    state[3] = strength
+    state[4] = viscosity
     force = stiffness * state[1]
     excess = max(abs(force) - strength, 0.0)
     yielded = abs(force) >= strength * (1.0 - 1e-9) and force * speed > 0.0
@@ -109,7 +122,7 @@ def bingham_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
 
 def _steps(values: Values) -> list[Step]:
     numbers = np.array([values["spring_stiffness"]])
-    return [Step("bingham-spring", Phase.HYSTERESIS, bingham_spring_step, numbers, 3), outer_velocity()]
+    return [Step("bingham-spring", Phase.HYSTERESIS, bingham_spring_step, numbers, 5), outer_velocity()]
 
 
 FORM = BaseForm(

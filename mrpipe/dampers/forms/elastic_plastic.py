@@ -7,7 +7,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import follow_hysteresis
+from mrpipe.dampers.hysteresis import displacement_between, follow_hysteresis, parts_of
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
 
@@ -15,30 +15,42 @@ from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE
 @njit(STEP_SIGNATURE, cache=True)
 def elastic_plastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: stiffness [N/m], exponent. State: last displacement [m], force of the element [N], last
-    velocity [m/s].
+    velocity [m/s], last yield force [N].
 
     The force is the state. When the yield force rises, the element first has to be strained to the new yield force.
-    When the yield force falls below the force, the element slips until its force is the yield force.
+    When the yield force falls below the force, the element slips until its force is the yield force. A long interval is
+    divided, because the yield force can change while the element is strained.
     """
     x, v = wire[DISPLACEMENT], wire[VELOCITY]
+    # a lower limit keeps the share of the yield force defined where the damper has no yield force
+    limit = max(wire[YIELD_FORCE], 1e-9)
     if wire[FIRST] > 0.5:
         state[0] = x
         state[1] = 0.0
         state[2] = v
-    # a lower limit keeps the share of the yield force defined where the damper has no yield force
-    limit = max(wire[YIELD_FORCE], 1e-9)
-    length = limit / parameters[0]
-    share = min(max(state[1] / limit, -1.0), 1.0)
-    share = follow_hysteresis(share, state[0], state[2], x, v, dt, length, 0.5, parameters[1])
+        state[3] = limit
+    count = parts_of(dt)
+    share, place, speed = 0.0, state[0], state[2]
+    for part in range(count):
+        end = (part + 1.0) / count
+        after = displacement_between(end, state[0], state[2], x, v, dt)
+        speed_after = state[2] + end * (v - state[2])
+        held = state[3] + end * (limit - state[3])
+        share = min(max(state[1] / held, -1.0), 1.0)
+        share = follow_hysteresis(
+            share, place, speed, after, speed_after, dt / count, held / parameters[0], 0.5, parameters[1]
+        )
+        state[1] = share * held
+        place, speed = after, speed_after
     state[0] = x
-    state[1] = share * limit
     state[2] = v
+    state[3] = limit
     wire[HYSTERESIS] = share
 
 
 def _steps(values: Values) -> list[Step]:
     numbers = np.array([values["initial_stiffness"], values["exponent"]])
-    return [Step("elastic-plastic", Phase.HYSTERESIS, elastic_plastic_step, numbers, state_size=3)]
+    return [Step("elastic-plastic", Phase.HYSTERESIS, elastic_plastic_step, numbers, state_size=4)]
 
 
 FORM = BaseForm(
