@@ -75,8 +75,8 @@ def bingham_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     """Parameters: stiffness of the spring [N/m]. State: last displacement [m], deformation of the spring [m], last
     velocity [m/s], last yield force [N], last viscosity [N s/m].
 
-    The velocity of the Bingham element takes the place of the rod's. A long interval is divided, because the yield force
-    can change while the spring is strained.
+    The velocity of the Bingham element takes the place of the rod's. A long interval is divided, because the yield
+    force can change while the spring is strained.
     """
     x, v = wire[DISPLACEMENT], wire[VELOCITY]
     wire[OUTER_VELOCITY] = v
