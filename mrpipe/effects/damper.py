@@ -52,5 +52,11 @@ def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]]) -> 
     if name in artifacts:
         return read_damper(artifacts[name]())
     if name.endswith(".h5"):
+        path = Path(name).absolute()
+        if not path.is_file():
+            remedy = (
+                "name an existing damper artifact, or a set of configs/dampers, in calibrate.damper or simulate.damper"
+            )
+            raise UserError(path, "damper", "no such artifact", remedy)
         return read_damper(Artifact(Path(name)))
     return damper_from_parameter_set(load_parameter_set("dampers", name))

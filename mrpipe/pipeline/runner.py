@@ -117,11 +117,20 @@ class Pipeline:
         # inputs that no campaign can give come first, so that nothing is built for a stage that is then skipped
         for item in sorted(stage.inputs, key=self.sources.configured):
             missing = missing or self._provide(item, stage.inputs)
+        missing += self._demanded_by_settings(stage) if missing else ""
         together = all(self._is_to_be_had(item) for item in stage.optional_inputs)
         for item in stage.optional_inputs:
             if self._wanted(item, together):
                 self._provide_optional(item)
         return self._skip(stage, missing) if missing else self._run_or_reuse(stage)
+
+    def _demanded_by_settings(self, stage: Stage) -> str:
+        """Return which settings make a stage need a campaign that is not configured, so that a user can change them."""
+        required = stage.required_by(self.loaded.config)
+        named = [
+            setting for item, settings in required.items() if not self.sources.configured(item) for setting in settings
+        ]
+        return f"; {stage.name} needs it because of {', '.join(named)}" if named else ""
 
     def _failed(self, stage: Stage, error: Exception) -> Outcome:
         """Record a failure: outputs of an earlier run are kept and count as stale."""

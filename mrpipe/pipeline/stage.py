@@ -149,11 +149,16 @@ class Stage:
 
     def for_configuration(self, configuration: Any) -> Stage:
         """Return the stage with the inputs that its settings require in this configuration."""
-        more: list[str] = []
+        more = [name for name in self.required_by(configuration) if name not in self.inputs]
+        return replace(self, inputs=(*self.inputs, *more)) if more else self
+
+    def required_by(self, configuration: Any) -> dict[str, list[str]]:
+        """Return the conditional inputs that this configuration requires, each with the settings that require it."""
+        required: dict[str, list[str]] = {}
         for setting, value, name in self.conditional_inputs:
             found = configuration
             for part in setting.split("."):
                 found = getattr(found, part)
-            if found == value and name not in (*self.inputs, *more):
-                more.append(name)
-        return replace(self, inputs=(*self.inputs, *more)) if more else self
+            if found == value:
+                required.setdefault(name, []).append(f"{setting}: {'null' if value is None else value}")
+        return required

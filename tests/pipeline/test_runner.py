@@ -157,6 +157,16 @@ def test_a_setting_may_ask_for_a_further_input(make_pipeline: MakePipeline) -> N
     assert CALLS == ["third", "first", "second", "third"]
 
 
+def test_the_settings_that_make_a_stage_need_a_campaign_are_named(make_pipeline: MakePipeline) -> None:
+    demands = (("calibrate.damper", "identified", "shaken"), ("calibrate.expected_amplitude_m", None, "shaken"))
+    third = replace(STAGES["third"], optional_inputs=(), conditional_inputs=demands)
+    skipped = make_pipeline({**STAGES, "third": third}).build("third").manifest.skipped
+    assert "there is no frame campaign" in skipped
+    assert skipped.endswith(
+        "third needs it because of calibrate.damper: identified, calibrate.expected_amplitude_m: null"
+    )
+
+
 def test_optional_inputs_serve_together_so_one_that_lacks_spares_all(make_pipeline: MakePipeline) -> None:
     stages = {**STAGES, "third": replace(STAGES["third"], optional_inputs=("second", "campaign:frame"))}
     assert make_pipeline(stages).build("third").what == "skipped"
