@@ -103,13 +103,22 @@ def with_clocks(
 
     The modes are searched again after the correction, and the clocks are estimated again with these modes, because a
     mode that was missing before disturbs the phases. Modes that only wrong clocks produced disappear by it.
+
+    Steps wait for the modes: a sweep passes the modes one after another, so that a mode which was not found disturbs
+    the phases from a certain time on, as a step does.
     """
     clocks: list[SensorClock] = []
     best = chosen
+    stepped = False
     for attempt in range(_SEARCHES):
-        more, moved = _estimated(best.search.fit, chosen.tests, clocks, steps=attempt == 0)
+        incomplete = layout.is_chain and len(best.search.numbers) < layout.floors
+        steps = not stepped and (attempt > 0 or not incomplete)
+        stepped = stepped or steps
+        more, moved = _estimated(best.search.fit, chosen.tests, clocks, steps)
         if more is None:
-            break
+            if stepped:
+                break
+            continue
         band = (options.band_low_hz, options.band_high_hz)
         again = find_modes(moved, layout, *band, tests.source, tests.decays)
         if layout.is_chain and len(again.numbers) < layout.floors:

@@ -244,7 +244,7 @@ def corrected(test: FrameTest, clocks: Sequence[SensorClock]) -> FrameTest:
 
 
 def added(first: Sequence[SensorClock], second: Sequence[SensorClock]) -> list[SensorClock]:
-    """Return the sum of two corrections, of which the second has no steps."""
+    """Return the sum of two corrections, of which at most one has a step for the same sensor."""
     known = {(item.test, item.sensor): item for item in first}
     result = dict(known)
     for item in second:
@@ -258,8 +258,8 @@ def added(first: Sequence[SensorClock], second: Sequence[SensorClock]) -> list[S
             before.offset_s + item.offset_s,
             item.offset_error_s,
             before.drift + item.drift,
-            before.step_s,
-            before.step_at_s,
+            before.step_s + item.step_s,
+            item.step_at_s if item.step_s else before.step_at_s,
         )
     return list(result.values())
 

@@ -22,6 +22,7 @@ from mrpipe.modal.hidden import contested, sharpened, with_missing_modes
 from mrpipe.modal.identification import FrameIdentification, GivenShapes
 from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
+from mrpipe.modal.own_residues import with_own_residues
 from mrpipe.modal.peak_picking import pick_peaks
 from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.rigid_floors import RigidShapes, assemble_rigid, rigid_response, rigid_shapes
@@ -181,7 +182,8 @@ def _identify(
     if forced and layout.is_chain and len(chosen.search.numbers) == layout.floors:
         chosen = ChosenTests(contested(chosen.search, chosen.tests, layout), chosen.tests)
     if forced:
-        chosen = ChosenTests(sharpened(chosen.search, chosen.tests), chosen.tests)
+        sharp = sharpened(chosen.search, chosen.tests)
+        chosen = ChosenTests(replace(sharp, fit=with_own_residues(sharp.fit)), chosen.tests)
     if options.modes_from == "peak-picking" and chosen.tests:
         picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)
         chosen = replace(chosen, search=replace(chosen.search, fit=picked))
@@ -332,7 +334,9 @@ def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout, scale: Scale)
         return PartialModes(fit.angular_frequencies, zeta, fit.residues.real, fit.residue_errors, rows, open_numbers)
     shapes, errors = floor_shapes(fit, layout)
     measured = tuple(sorted({sensor.floor - 1 for sensor in fit.sensors}))
-    possible = tuple((low + 1, high + 1) for low, high in sign_ranges(fit, layout, _LOOSE_SIGNS))
+    # the numbers of the search rise; ranges that leave them out can contradict each other
+    ranges = zip(sign_ranges(fit, layout, _LOOSE_SIGNS), search.numbers, strict=True)
+    possible = tuple((min(low + 1, number), max(high + 1, number)) for (low, high), number in ranges)
     if len(search.numbers) == layout.floors:
         possible = tuple((number, number) for number in search.numbers)
     return PartialModes(

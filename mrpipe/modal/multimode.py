@@ -129,11 +129,12 @@ class _Group:
     input_noise: float = 0.0
 
 
-def _groups(spectra: Sequence[RecordSpectrum], modes: int) -> list[_Group]:
+def _groups(spectra: Sequence[RecordSpectrum], modes: int, separate: bool) -> list[_Group]:
     members: dict[tuple[bool, tuple[int, ...]], list[Sensor]] = {}
     for sensor in all_sensors(spectra):
         tests = tuple(index for index, item in enumerate(spectra) if sensor in item.sensors)
-        members.setdefault((sensor.is_displacement, tests), []).append(sensor)
+        for shared in [(index,) for index in tests] if separate else [tests]:
+            members.setdefault((sensor.is_displacement, shared), []).append(sensor)
     groups = []
     for (is_displacement, tests), sensors in members.items():
         own = [spectra[index] for index in tests]
@@ -145,14 +146,18 @@ def _groups(spectra: Sequence[RecordSpectrum], modes: int) -> list[_Group]:
     return groups
 
 
-class _Fit:
-    """Variable projection over all groups of sensors, with weights renewed from the residuals."""
+class ProjectedFit:
+    """Variable projection over all groups of sensors, with weights renewed from the residuals.
 
-    def __init__(self, spectra: Sequence[RecordSpectrum], modes: int) -> None:
-        self.groups = _groups(spectra, modes)
+    With `separate`, each test has separate residues; else tests share the residues of their common sensors.
+    """
+
+    def __init__(self, spectra: Sequence[RecordSpectrum], modes: int, separate: bool = False) -> None:
+        self.groups = _groups(spectra, modes, separate)
         self._cache: tuple[bytes, list[State]] | None = None
 
     def states(self, theta: FloatArray) -> list[State]:
+        """Return the projection of each group at theta."""
         key = theta.tobytes()
         if self._cache is None or self._cache[0] != key:
             states = []
@@ -164,6 +169,7 @@ class _Fit:
         return self._cache[1]
 
     def residual(self, theta: FloatArray) -> FloatArray:
+        """Return the weighted residuals of all groups in one column."""
         return np.concatenate([state.residual for state in self.states(theta)])
 
     def compressed(self, theta: FloatArray) -> FloatArray:
@@ -178,6 +184,7 @@ class _Fit:
             return np.asarray(np.linalg.qr(np.column_stack([jacobian, residual]), mode="r"))
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
+        """Return the derivative of the residuals by theta."""
         return np.vstack([state.jacobian for state in self.states(theta)])
 
     def renew_weights(self, theta: FloatArray) -> None:
@@ -233,7 +240,7 @@ class _Fit:
         return np.asarray(state.basis[:, columns] @ (state.coefficients[columns] * group.sigma))
 
 
-def _covariance(fit: _Fit, theta: FloatArray) -> FloatArray:
+def pole_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
     """Covariance of theta that allows for noise of the excitation, which reaches all outputs through H.
 
     A lightly damped peak has too few lines to estimate their scatter. The variance predicted from the noise of the
@@ -307,9 +314,13 @@ def fit_modes(
     """
     order = np.argsort(angular_frequencies)
     guess = np.concatenate([np.log(angular_frequencies[order]), np.log(np.clip(damping_ratios[order], 1e-5, 0.3))])
-    modes = angular_frequencies.size
-    fit = _Fit(spectra, modes)
-    theta = guess
+    fit = ProjectedFit(spectra, angular_frequencies.size)
+    return collected(fit, spectra, fitted_poles(fit, guess, passes, evaluations))
+
+
+def fitted_poles(fit: ProjectedFit, guess: FloatArray, passes: int, evaluations: int) -> FloatArray:
+    """Return theta = (ln omega, ln zeta) at the least cost, weights renewed from pass to pass."""
+    theta, modes = guess, guess.size // 2
     lower = np.concatenate([guess[:modes] - 0.03, np.full(modes, np.log(1e-6))])
     upper = np.concatenate([guess[:modes] + 0.03, np.full(modes, np.log(0.5))])
     for index in range(passes):
@@ -326,10 +337,11 @@ def fit_modes(
         theta = np.asarray(result.x)
         if index < passes - 1:
             fit.renew_weights(theta)
-    return _collect(fit, spectra, theta)
+    return theta
 
 
-def _collect(fit: _Fit, spectra: Sequence[RecordSpectrum], theta: FloatArray) -> MultiModeFit:
+def collected(fit: ProjectedFit, spectra: Sequence[RecordSpectrum], theta: FloatArray) -> MultiModeFit:
+    """Return the result of a fit with shared residues at theta, modes in rising order."""
     modes = theta.size // 2
     omega, zeta = np.exp(theta[:modes]), np.exp(theta[modes:])
     sensors, inputs = all_sensors(spectra), all_inputs(spectra)
@@ -366,7 +378,7 @@ def _collect(fit: _Fit, spectra: Sequence[RecordSpectrum], theta: FloatArray) ->
     return MultiModeFit(
         angular_frequencies=omega[order],
         damping_ratios=zeta[order],
-        covariance=_covariance(fit, theta)[np.ix_(both, both)],
+        covariance=pole_covariance(fit, theta)[np.ix_(both, both)],
         residues=shapes,
         residue_errors=shape_errors,
         coherence=_coherence(spectra, sensors, steady, measured, (omega[order], zeta[order])),

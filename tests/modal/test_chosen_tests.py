@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from mrpipe.errors import UserError
 from mrpipe.modal.chosen_tests import choose_tests, training_first, with_clocks, without_complex
 from mrpipe.modal.clocks import SensorClock, corrected
+from mrpipe.modal.multimode import MultiModeFit
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.selection import Layout
@@ -81,3 +83,23 @@ def test_a_late_sensor_is_corrected_and_sensors_in_time_are_left() -> None:
     assert {clock.sensor.floor: round(1e3 * clock.offset_s) for clock in clocks if not clock.is_zero} == {2: 12}
     error = np.abs(moved.tests[0].responses - good.responses)[50:-50, 1].max()
     assert error < 0.1 * np.abs(late.responses - good.responses)[50:-50, 1].max()
+
+
+def test_steps_of_clocks_wait_until_all_modes_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mode that was not found disturbs a sweep from the time at which it is passed, as a step of the clock does."""
+    forced = (_sweep("a", "training"),)
+    chosen, _ = choose_tests(forced, _tests(*forced), LAYOUT, OPTIONS)
+    incomplete = replace(
+        chosen, search=replace(chosen.search, fit=chosen.search.fit.only([0, 1]), numbers=chosen.search.numbers[:2])
+    )
+    allowed = []
+
+    def seen(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool = True) -> list[SensorClock]:
+        allowed.append((fit.angular_frequencies.size, steps))
+        return [SensorClock("a", tests[0].sensors[0], 1e-6, 1e-6)] if len(allowed) == 1 else []
+
+    monkeypatch.setattr("mrpipe.modal.chosen_tests.estimate_clocks", seen)
+    monkeypatch.setattr("mrpipe.modal.chosen_tests._imaginary_part", lambda fit: 1e6 - 1e3 * len(allowed))
+    with_clocks(incomplete, _tests(*forced), LAYOUT, OPTIONS)
+    assert allowed[0] == (2, False)
+    assert (3, True) in allowed

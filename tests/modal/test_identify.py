@@ -176,6 +176,16 @@ def test_modes_beyond_the_excitation_are_left_out_and_named():
 
 
 @pytest.mark.planted
+def test_signs_that_contradict_each_other_leave_the_numbers_of_the_search(monkeypatch):
+    """A poorly known shape may show more sign changes than the mode above it; this raised an error of the program."""
+    rng = np.random.default_rng(9)
+    frame = random_frame(rng, 5)
+    monkeypatch.setattr("mrpipe.modal.identify.sign_ranges", lambda fit, *_: [(4, 4)] * fit.angular_frequencies.size)
+    result = identify(frame, [sweep_test(frame, rng, replace(RIG, top_hz=7.0))])
+    assert result.numbers == tuple(range(1, len(result.numbers) + 1))
+
+
+@pytest.mark.planted
 def test_a_dead_channel_is_told():
     rng = np.random.default_rng(9)
     frame = random_frame(rng, 4)
