@@ -30,6 +30,9 @@ SUB_STEP = 0.05
 LONGEST_PART_S = 1e-3
 """Longest part of an interval [s] over which the yield force of a form with a spring in series is taken as constant."""
 
+MOST_PARTS = 4
+"""An interval is divided into at most so many parts: records thinned for a ranking of forms need no more."""
+
 
 # numbers that several base forms share
 YIELD_DISPLACEMENT = shape(
@@ -198,8 +201,8 @@ def displacement_between(
 
 @njit(int64(float64), cache=True)
 def parts_of(dt: float) -> int:
-    """Return into how many parts an interval [s] is divided where yield force and strain change together."""
-    return max(1, math.ceil(dt / LONGEST_PART_S - 1e-9))
+    """Return the number of parts of an interval [s] over which yield force and strain change together."""
+    return min(max(1, math.ceil(dt / LONGEST_PART_S - 1e-9)), MOST_PARTS)
 
 
 @njit(float64(float64, float64, float64, float64, float64, float64, float64, float64, float64), cache=True)

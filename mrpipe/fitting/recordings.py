@@ -13,7 +13,6 @@ from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.effects.contract import EffectScales
 from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.signals.spectra import cutoff_by_criterion, noise_level, signal_end
 
 SETTLING_SHARE = 0.3
 """Share of the peak-to-peak displacement travelled before forces are compared: the hysteresis begins unknown."""
@@ -33,18 +32,9 @@ MOST_JUDGED = 200_000
 JUMP_RATE_HZ = 500.0
 """Minimum sampling rate of a test with drive steps: the drive is interpolated linearly, which smears steps."""
 
-CUTOFF_MARGIN = 1.5
-"""The displacement is cut off at this multiple of the frequency above which it is below its noise."""
-
 FILTER_ORDER = 4
 """Order of the low-pass of the displacement in each direction: a gentler one attenuates random motion up to its band's
 edge by several percent, which a hysteresis turns into twice the error."""
-
-QUANTISED_SHARE = 0.5
-"""A channel with fewer different values than this share of its samples is quantised."""
-
-DISPLACEMENT_HARMONICS = 8.0
-"""Least cut-off of a displacement, in multiples of the frequency of the motion."""
 
 ACCELERATION_HARMONICS = 25.0
 """Least cut-off of a measured acceleration, in multiples of the frequency of the motion."""
@@ -216,7 +206,7 @@ def record_tests(
         _one_test(
             test,
             max(rate_hz, JUMP_RATE_HZ) if drive_jumps(test, largest) else rate_hz,
-            cutoff_hz or min(displacement_cutoff(test), highest_cutoff_hz),
+            cutoff_hz or min(test.displacement_cutoff_hz, highest_cutoff_hz),
             shared if one else test.displacement_offset_m,
             longest_s,
         )
@@ -300,7 +290,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
     if _acceleration_was_measured(test):
         # an accelerometer is far quieter than a displacement differentiated twice
         acceleration = butterworth_lowpass(
-            test.acceleration_m_s2, max(1.5 * cutoff, ACCELERATION_HARMONICS * motion_frequency(test)), rate
+            test.acceleration_m_s2, max(1.5 * cutoff, ACCELERATION_HARMONICS * test.motion_frequency_hz), rate
         )
     length = min(len(raw), int(longest_s * rate))
     stride = max(1, round(rate / max(rate_hz, 5.0 * min(cutoff, 0.1 * rate))))
@@ -309,9 +299,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
     edge = chosen / rate
     used = (path >= SETTLING_SHARE * np.ptp(smooth)) & (edge > 1.0 / cutoff) & (length / rate - edge > 1.0 / cutoff)
     band = min(cutoff, test.displacement_noise_band_hz or cutoff)
-    noise = test.displacement_noise_m or steady_noise(test.displacement_raw_m, rate) * np.sqrt(
-        min(1.0, 2.0 * band / rate)
-    )
+    noise = test.displacement_noise_m or test.channel_noise_m * np.sqrt(min(1.0, 2.0 * band / rate))
     periods = np.diff(test.cycles)
     return {
         "displacement": smooth[chosen],
@@ -323,8 +311,8 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
         "dt": stride / rate,
         "displacement_noise": noise,
         "velocity_noise": noise * 2.0 * np.pi * band / np.sqrt(3.0),
-        "force_noise": steady_noise(test.force_raw_n, rate),
-        "force_rounding": resolution(test.force_raw_n) / np.sqrt(12.0),
+        "force_noise": test.force_noise_n,
+        "force_rounding": test.force_step_n / np.sqrt(12.0),
         "force_offset": test.force_offset_n,
         "period_s": float(np.median(periods)) / rate if len(periods) else 0.0,
         "cutoff_hz": cutoff,
@@ -336,42 +324,3 @@ def _acceleration_was_measured(test: PreparedTest) -> bool:
     derived = np.gradient(test.velocity_m_s, test.dt)
     difference = test.acceleration_m_s2 - derived
     return float(np.std(difference)) > 0.02 * float(np.std(derived))
-
-
-def steady_noise(values: FloatArray, rate_hz: float) -> float:
-    """Return the standard deviation of the noise of a channel, in its unit.
-
-    Corners of a force at reversals, and jumps of a channel that was stuck for a while, reach up to the highest
-    frequencies and look like noise in a spectrum. They are few, so the median of third differences does not see them.
-    """
-    spectral = noise_level(values, rate_hz)
-    typical = float(np.median(np.abs(np.diff(values, 3)))) / (0.6745 * np.sqrt(20.0))
-    return max(min(spectral, max(typical, 0.2 * spectral)), resolution(values) / np.sqrt(12.0))
-
-
-def resolution(values: FloatArray) -> float:
-    """Return the step of a quantised channel, in its unit; 0 if all samples differ.
-
-    Rounding to steps of q adds noise of q / sqrt(12) (Widrow and Kollar, Quantization Noise, 2008).
-    """
-    levels = np.unique(values)
-    if len(levels) < 3 or len(levels) > QUANTISED_SHARE * len(values):
-        return 0.0
-    return float(np.median(np.diff(levels)))
-
-
-def displacement_cutoff(test: PreparedTest) -> float:
-    """Return the cut-off [Hz] of the displacement: where it sinks into its noise, at most a quarter of the rate."""
-    raw, rate = test.displacement_raw_m, test.sampling_rate_hz
-    found = cutoff_by_criterion(raw, rate, velocity_share=0.9995, margin=CUTOFF_MARGIN)
-    # remaining noise is differentiated twice if an effect needs the acceleration
-    found = min(found, CUTOFF_MARGIN * signal_end(raw, rate))
-    # a channel without motion has no frequency, and nothing in it is worth a filter
-    least = DISPLACEMENT_HARMONICS * motion_frequency(test) or 0.25 * rate
-    return float(min(max(found, least), 0.25 * rate, 250.0))
-
-
-def motion_frequency(test: PreparedTest) -> float:
-    """Return the frequency of a motion [Hz]: RMS velocity over RMS displacement, over 2 pi; 0 without motion."""
-    motion = float(np.std(test.displacement_m))
-    return float(np.std(test.velocity_m_s)) / (2.0 * np.pi * motion) if motion > 0.0 else 0.0

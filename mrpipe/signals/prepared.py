@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray, IntArray
+from mrpipe.signals.channel_noise import displacement_cutoff, motion_frequency, resolution, steady_noise
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,33 @@ class PreparedTest:
     def dt(self) -> float:
         """Sampling interval [s]."""
         return 1.0 / self.sampling_rate_hz
+
+    # spectra of whole records: an estimator that compares filters or rates reads them again and again
+
+    @cached_property
+    def force_noise_n(self) -> float:
+        """Standard deviation of the noise of the unfiltered force [N]."""
+        return steady_noise(self.force_raw_n, self.sampling_rate_hz)
+
+    @cached_property
+    def force_step_n(self) -> float:
+        """Step of a quantised force [N]; 0 if it is not quantised."""
+        return resolution(self.force_raw_n)
+
+    @cached_property
+    def channel_noise_m(self) -> float:
+        """Standard deviation of the noise of the unfiltered displacement over its whole band [m]."""
+        return steady_noise(self.displacement_raw_m, self.sampling_rate_hz)
+
+    @cached_property
+    def motion_frequency_hz(self) -> float:
+        """Frequency of the motion [Hz]; 0 without motion."""
+        return motion_frequency(self.displacement_m, self.velocity_m_s)
+
+    @cached_property
+    def displacement_cutoff_hz(self) -> float:
+        """Frequency above which the displacement is below its noise, with a margin [Hz]."""
+        return displacement_cutoff(self.displacement_raw_m, self.sampling_rate_hz, self.motion_frequency_hz)
 
 
 _CHANNELS = {

@@ -15,6 +15,7 @@ from mrpipe.dampers.hysteresis import (
     displacement_between,
     hysteresis,
     hysteresis_series,
+    parts_of,
     turning_share,
 )
 from mrpipe.dampers.model import bouc_wen_limits
@@ -159,3 +160,10 @@ def test_a_stiff_yield_is_followed_at_250_hz(name):
     without = hysteresis_series(x, np.array([0, len(x)]), 4e-4, 0.5, 2.0 if name == "hysteresis" else 20.0)
     assert error < 0.002
     assert error < 0.2 * np.sqrt(np.mean((without - expected) ** 2))
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(("interval_s", "parts"), [(0.5e-3, 1), (1e-3, 1), (2e-3, 2), (4e-3, 4), (20e-3, 4)])
+def test_parts_of_an_interval(interval_s: float, parts: int) -> None:
+    """Forms are ranked on records thinned to 20 ms, whose intervals in 20 parts took ten times as long."""
+    assert parts_of(interval_s) == parts

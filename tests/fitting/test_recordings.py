@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrpipe.fitting.recordings import Recordings, displacement_cutoff, motion_frequency, record_tests
+from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
 
 pytestmark = pytest.mark.property
@@ -34,7 +34,7 @@ def recordings() -> Recordings:
 
 def test_the_period_is_that_of_the_motion(recordings: Recordings) -> None:
     np.testing.assert_allclose(recordings.motion_period_s, [5.0, 0.5], rtol=0.02)
-    assert motion_frequency(sine("one", 1.3)) == pytest.approx(1.3, rel=1e-3)
+    assert sine("one", 1.3).motion_frequency_hz == pytest.approx(1.3, rel=1e-3)
 
 
 def test_no_period_is_longer_than_its_test(recordings: Recordings) -> None:
@@ -52,7 +52,7 @@ def test_blocks_last_the_same_share_of_every_period(recordings: Recordings) -> N
 
 
 def test_the_least_cut_off_rises_with_the_frequency_of_the_motion() -> None:
-    slow, fast = (displacement_cutoff(sine("one", frequency)) for frequency in (0.2, 4.0))
+    slow, fast = (sine("one", frequency).displacement_cutoff_hz for frequency in (0.2, 4.0))
     assert slow < 10.0
     assert fast >= 32.0
 
@@ -61,5 +61,5 @@ def test_a_channel_without_motion_still_has_a_cut_off() -> None:
     still = sine("still", 1.0)
     zero = np.zeros_like(still.time_s)
     still = replace(still, displacement_m=zero, velocity_m_s=zero, displacement_raw_m=zero)
-    assert displacement_cutoff(still) == 0.25 * RATE
+    assert still.displacement_cutoff_hz == 0.25 * RATE
     assert np.all(np.isfinite(record_tests([still]).displacement))

@@ -96,7 +96,7 @@ class Chosen(Start):
 
 def begin(bench: Bench, options: TracingOptions) -> Start:
     """Return the training tests, filtered by criterion or as simple base forms prefer, with the declared model."""
-    return _started(bench, options, *_training(bench.tests, options))
+    return _started(bench, options, *_training(bench.tests, options, bench.jobs))
 
 
 def choose(bench: Bench, begun: Start) -> Chosen:
@@ -113,13 +113,13 @@ def choose(bench: Bench, begun: Start) -> Chosen:
     options, fit = found.options, found.choice.selection.chosen
     faster = _at_better_rate(found.choice, bench.tests, found.limit_hz, options)
     if faster is not options:
-        limit = _limit_of(fit, bench.tests, found.limit_hz, faster)
+        limit = _limit_of(fit, bench, found.limit_hz, faster)
         samples = round(MOST_SAMPLES * faster.fit_rate_hz / options.fit_rate_hz)
         again = _at(bench, faster, limit, samples)
         if again.names == found.names:
             return again
         # a higher rate makes a model more accurate; it does not show that an effect is there or missing
-    limit = _limit_of(fit, bench.tests, found.limit_hz, options)
+    limit = _limit_of(fit, bench, found.limit_hz, options)
     return found if limit == found.limit_hz else _at(bench, options, limit)
 
 
@@ -147,7 +147,7 @@ def _choose(bench: Bench, begun: Start) -> Chosen:
     return Chosen(**vars(begun), choice=choice)
 
 
-def _training(tests: Sequence[PreparedTest], options: TracingOptions) -> tuple[Recordings, float]:
+def _training(tests: Sequence[PreparedTest], options: TracingOptions, jobs: int) -> tuple[Recordings, float]:
     """Return the training tests and the limit of the cut-offs of their displacement [Hz]."""
     automatic = recorded(tests, np.inf, options)
     if options.displacement_cutoff_hz > 0.0:
@@ -159,16 +159,25 @@ def _training(tests: Sequence[PreparedTest], options: TracingOptions) -> tuple[R
         yield_order=options.yield_order,
         viscosity_order=options.viscosity_order,
         rules=options.rules.nuisances,
+        jobs=jobs,
     )
     return (automatic if not np.isfinite(highest) else recorded(tests, highest, options)), highest
 
 
-def _limit_of(chosen: Fit, tests: Sequence[PreparedTest], highest: float, options: TracingOptions) -> float:
+def _limit_of(chosen: Fit, bench: Bench, highest: float, options: TracingOptions) -> float:
     """Return the limit of the cut-offs [Hz] with which the chosen model leaves clearly less, else the present one."""
     if options.displacement_cutoff_hz > 0.0:
         return highest
-    automatic = recorded(tests, np.inf, options)
-    return better_limit(chosen, tests, automatic, highest, rate_hz=options.fit_rate_hz, rules=options.rules.nuisances)
+    tests = bench.tests
+    return better_limit(
+        chosen,
+        tests,
+        recorded(tests, np.inf, options),
+        highest,
+        rate_hz=options.fit_rate_hz,
+        rules=options.rules.nuisances,
+        jobs=bench.jobs,
+    )
 
 
 def _at_better_rate(

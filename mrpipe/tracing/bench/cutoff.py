@@ -9,6 +9,7 @@ that hides what they lack, so the chosen model judges it again.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -49,6 +50,7 @@ def highest_cutoff(
     yield_order: int,
     viscosity_order: int,
     rules: NuisanceRules | None = None,
+    jobs: int = 1,
 ) -> float:
     """Return the upper limit of the cut-offs of the displacement [Hz]; infinite where the criterion is the best choice.
 
@@ -64,6 +66,8 @@ def highest_cutoff(
         Degrees of the laws of the drive.
     rules
         Decision thresholds; their defaults if None.
+    jobs
+        Threads; the result does not depend on their number.
     """
     rules = rules or NuisanceRules()
     limits = _limits(automatic, RATIO)
@@ -75,9 +79,10 @@ def highest_cutoff(
         recordings = record_tests(few, rate_hz=rate_hz, highest_cutoff_hz=highest)
         return min(_left(recordings, name, yield_order, viscosity_order) for name in FORMS)
 
-    best, least = np.inf, (1.0 - rules.filter_gain) * left(np.inf)
-    for item in limits:
-        error = left(item)
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        unlimited, *errors = pool.map(left, [np.inf, *limits])
+    best, least = np.inf, (1.0 - rules.filter_gain) * unlimited
+    for item, error in zip(limits, errors, strict=True):
         if error < least:
             best, least = item, error
     return best
@@ -91,6 +96,7 @@ def better_limit(
     *,
     rate_hz: float,
     rules: NuisanceRules | None = None,
+    jobs: int = 1,
 ) -> float:
     """Return the limit [Hz] with which a chosen model leaves clearly less than with the present one; else that one.
 
@@ -106,6 +112,8 @@ def better_limit(
         Rate at which models are fitted [Hz].
     rules
         Decision thresholds; their defaults if None.
+    jobs
+        Threads; the result does not depend on their number.
     """
     rules = rules or NuisanceRules()
 
@@ -115,7 +123,9 @@ def better_limit(
         problem = replace(found.problem, recordings=recordings, root_weight=weight)
         return float(np.sqrt(fit(problem, found.theta, iterations=FINE_ITERATIONS).chi_square))
 
-    errors = {limit: left(limit) for limit in {highest, np.inf, *_limits(automatic, FINE_RATIO)}}
+    limits = sorted({highest, np.inf, *_limits(automatic, FINE_RATIO)})
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        errors = dict(zip(limits, pool.map(left, limits), strict=True))
     best = min(errors, key=lambda limit: (errors[limit], -limit))
     return best if errors[best] < (1.0 - rules.filter_again) * errors[highest] else highest
 

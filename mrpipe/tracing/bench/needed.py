@@ -8,6 +8,7 @@ effects, the richer laws and the best rival base forms are tried without it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from mrpipe.fitting.engine import Fit, fit, start_of
@@ -44,22 +45,24 @@ def without_superfluous(
     """
     kept = selection
     while kept.proven > 1 and len(kept.chosen.problem.terms) >= declared + 2:
-        shorter = _shorter(kept, declared, lead, orders) or _with_rival(kept, declared, lead, orders, race, jobs)
+        shorter = _shorter(kept, declared, lead, orders, jobs) or _with_rival(kept, declared, lead, orders, race, jobs)
         if shorter is None:
             break
         kept = shorter
     return kept
 
 
-def _shorter(kept: Selection, declared: int, lead: float, orders: Orders) -> Selection | None:
+def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: int) -> Selection | None:
     """Return the selection without one of its named effects, under the same base form; None if each is needed."""
     small = draft(kept.chosen)
     named = _named(kept, declared)
-    place, best = min(((k, _without(small, k, named, orders)) for k in named), key=lambda item: item[1].chi_square)
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        without = pool.map(lambda k: _without(small, k, named, orders), named)
+        place, best = min(zip(named, without, strict=True), key=lambda item: item[1].chi_square)
     # richer forms only lower the error of the full model, so most pairs are confirmed without them
     if best.chi_square > lead * small.chi_square:
         return None
-    full = with_best_forms(small, named)
+    full = with_best_forms(small, named, jobs=jobs)
     if best.chi_square > lead * full.chi_square:
         return None
     # a share of the tests has ranked them, all tests decide
@@ -89,7 +92,7 @@ def _with_rival(
     if found is None or found[1].chi_square > lead * small.chi_square:
         return None
     rival, best = found
-    if best.chi_square > lead * with_best_forms(small, named).chi_square:
+    if best.chi_square > lead * with_best_forms(small, named, jobs=jobs).chi_square:
         return None
     again = taken(kept, race, rival, best)
     return again if again.chosen.chi_square <= lead * kept.chosen.chi_square else None

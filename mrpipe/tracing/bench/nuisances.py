@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -181,7 +183,7 @@ def _strange_to(recordings: Recordings, levels: FloatArray, share: float) -> set
 
 
 def observation_window(
-    found: Fit, shares: Sequence[float] = WINDOW_SHARES, rules: NuisanceRules | None = None
+    found: Fit, shares: Sequence[float] = WINDOW_SHARES, rules: NuisanceRules | None = None, *, jobs: int = 1
 ) -> tuple[float, Fit]:
     """Return the length of a moving average of the records (as share of each test's period), and the fit with it.
 
@@ -190,7 +192,8 @@ def observation_window(
     """
     least = (rules or NuisanceRules()).least_gain
     given = len(shares) == 1
-    trials = {share: _with(found, share) for share in shares}
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        trials = dict(zip(shares, pool.map(partial(_with, found), shares), strict=True))
     best = min(trials, key=lambda share: trials[share].cost)
     if given:
         return best, trials[best]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -164,12 +165,12 @@ class Race:
         ]
         return self.models[min(able, key=lambda place: float(costs[place]))]
 
-    def alone_on_all_tests(self, problem: Problem, names: Collection[str]) -> dict[str, Fit]:
-        """Return base forms without effects that were searched, fitted to all tests of a problem."""
+    def alone_on_all_tests(self, problem: Problem, names: Collection[str], *, jobs: int = 1) -> dict[str, Fit]:
+        """Return base forms without effects that were searched, fitted to all tests of a problem, on some threads."""
         drafted = {model.form: model.fit for model in self.models if model.effects == self.own and model.form in names}
-        return {
-            name: on_all_tests(item, problem, self.coupled, iterations=LISTED_STEPS) for name, item in drafted.items()
-        }
+        whole = partial(on_all_tests, problem=problem, coupled=self.coupled, iterations=LISTED_STEPS)
+        with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+            return dict(zip(drafted, pool.map(whole, drafted.values()), strict=True))
 
     def support(self, effect: str, lead: float, *, draws: int, rng: np.random.Generator) -> float:
         """Return the share of resamples in which the winner has an effect; tests are drawn with replacement."""

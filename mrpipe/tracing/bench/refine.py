@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -46,7 +47,7 @@ def with_richer_forms(
     rng
         Source of randomness.
     jobs
-        Processes; the result does not depend on their number.
+        Threads; the result does not depend on their number.
     rules
         Decision thresholds; their defaults if None.
     """
@@ -57,7 +58,7 @@ def with_richer_forms(
     for place in range(declared, min(declared + selection.proven, len(chosen.problem.terms))):
         if chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
             break
-        richer = _richest(chosen, place)
+        richer = _richest(chosen, place, jobs)
         if richer is None or richer.chi_square > (1.0 - rules.least_gain) * chosen.chi_square:
             continue
         if unseen is None:
@@ -88,7 +89,7 @@ def with_further_terms(
     rng
         Source of randomness.
     jobs
-        Processes; the result does not depend on their number.
+        Threads; the result does not depend on their number.
     rules
         Decision thresholds; their defaults if None.
     """
@@ -126,7 +127,7 @@ def _confirmed(
     return residual if gain.significant and gain.share > rules.least_gain else None
 
 
-def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2) -> Fit:
+def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2, *, jobs: int = 1) -> Fit:
     """Return the fit with the best forms of its terms at `places`, chosen on all tests one after another.
 
     Parameters
@@ -137,11 +138,13 @@ def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2) -> Fit:
         Which of its terms may take another form.
     rounds
         Numerical technique: how often all of them are visited, because a better form of one changes the others.
+    jobs
+        Threads; the result does not depend on their number.
     """
     for _ in range(rounds):
         before = found
         for place in places:
-            richer = _richest(found, place)
+            richer = _richest(found, place, jobs)
             if richer is not None and richer.chi_square < found.chi_square:
                 found = richer
         if found is before:
@@ -149,7 +152,7 @@ def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2) -> Fit:
     return found
 
 
-def _richest(chosen: Fit, place: int) -> Fit | None:
+def _richest(chosen: Fit, place: int, jobs: int = 1) -> Fit | None:
     """Return the best fit with another form of one term, on all tests; None where there is none to be had.
 
     The forms of the search are tried as well as the richer ones: before the other terms and the laws were final,
@@ -160,11 +163,11 @@ def _richest(chosen: Fit, place: int) -> Fit | None:
     if not forms:
         return None
     small = draft(chosen)
-    trials = [
-        _trial(small, place, form, given)
-        for form in forms
-        for given in _starts(form, small.term_values[place], small.problem.scales)
+    starts = [
+        (form, given) for form in forms for given in _starts(form, small.term_values[place], small.problem.scales)
     ]
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        trials = list(pool.map(lambda start: _trial(small, place, *start), starts))
     best = min(trials, key=lambda item: item.cost)
     problem = replace(chosen.problem, terms=best.problem.terms)
     found = fit(problem, best.theta, iterations=25)

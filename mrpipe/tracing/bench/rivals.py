@@ -138,7 +138,7 @@ def with_best_base(
         return selection
     small = draft(chosen)
     places = range(len(small.problem.terms))
-    full = with_best_forms(orders.adequate(small), named)
+    full = with_best_forms(orders.adequate(small), named, jobs=jobs)
     if full.chi_square < (1.0 + worth_a_try) * selection.noise:
         # a richer form of the effect is all that is missing
         return selection

@@ -74,6 +74,7 @@ class Summary:
     judgement: Judgement
     sorted_tests: SortedTests
     race: Race | None = None
+    jobs: int = 1
 
     def build(
         self,
@@ -220,7 +221,9 @@ class Summary:
 
     def _ladder(self, options: TracingOptions, measured: FloatArray) -> dict[str, Any]:
         base = self.selection.base
-        fits = ladder(base, {} if self.race is None else self.race.alone_on_all_tests(base.problem, LISTED_FORMS))
+        fits = ladder(
+            base, {} if self.race is None else self.race.alone_on_all_tests(base.problem, LISTED_FORMS, jobs=self.jobs)
+        )
         judged = self.found.recordings
         errors = {name: score(judged, measured, predict(f, judged)).nrmse for name, f in fits.items()}
         if options.model not in errors:

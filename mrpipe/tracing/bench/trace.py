@@ -128,7 +128,7 @@ def trace_campaign(
         reason = "the effects that the training tests require do not lower the error on the validation tests"
         found = validated(selection.base, selection.chosen, baseline, training, validation, options)
         judgement = judged(found, selection, training, options, causes, assessed.missing, reason, ordered, jobs)
-    report = Summary(selection, baseline, training, offsets, found, judgement, ordered, choice.race)
+    report = Summary(selection, baseline, training, offsets, found, judgement, ordered, choice.race, jobs)
     return report.build(options, causes, further, taken.reasons, window, [item.name for item in declared])
 
 
@@ -211,7 +211,7 @@ def _with_window(
         or not bool(np.all(training.period_s > 0.0))
     ):
         return 0.0, selection
-    share, filtered = observation_window(selection.chosen, rules=options.rules.nuisances)
+    share, filtered = observation_window(selection.chosen, rules=options.rules.nuisances, jobs=jobs)
     if share == 0.0:
         return 0.0, selection
     base, ground = (observation_window(item, (share,))[1] for item in (selection.base, selection.without_effects))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from mrpipe.fitting.recordings import record_tests, resolution
+from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
 from mrpipe.tracing.bench.weights import _factors, _robust_factors, sensor_deviation
@@ -50,13 +50,6 @@ def test_the_floor_is_the_error_of_the_true_model(corner_hz: float, step_n: floa
     assert np.sqrt(np.mean(left**2)) > 0.9 * np.sqrt(np.mean(np.concatenate(errors) ** 2))
     assert baseline.noise == pytest.approx(baseline.fit.chi_square, rel=0.5)
     assert baseline.scale.cycles > 0
-
-
-@pytest.mark.property
-def test_the_step_of_a_quantised_channel() -> None:
-    smooth = np.sin(np.linspace(0.0, 30.0, 4000))
-    assert resolution(smooth) == 0.0
-    assert resolution(np.round(smooth / 0.02) * 0.02) == pytest.approx(0.02)
 
 
 @pytest.mark.property
