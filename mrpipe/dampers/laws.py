@@ -10,6 +10,7 @@ monotone basis (sums of Bernstein polynomials) that are not negative give a poly
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -162,7 +163,11 @@ class LawShape:
 def bernstein(share: FloatArray, order: int) -> list[FloatArray]:
     """Return the Bernstein polynomials of degree `order` at `share` (0..1 on the drive's range)."""
     rest = 1.0 - share
-    return [math.comb(order, k) * share**k * rest ** (order - k) for k in range(order + 1)]
+    ones = np.ones_like(share)
+    # repeated products: a power of every sample costs many times as much
+    rising = list(itertools.accumulate([ones] + order * [share], np.multiply))
+    falling = list(itertools.accumulate([ones] + order * [rest], np.multiply))
+    return [math.comb(order, k) * rising[k] * falling[order - k] for k in range(order + 1)]
 
 
 def bernstein_to_power(order: int, limit: float) -> FloatArray:
