@@ -73,11 +73,15 @@ def _started(modules: Sequence[str]) -> subprocess.Popen[bytes] | None:
 
 
 def _mark(modules: Sequence[str]) -> Path | None:
-    """Return the file that says that these modules are in the cache; None without a cache."""
+    """Return the file that says that these modules are in the cache; None without a cache.
+
+    numba keeps the code of every copy of the sources separately, so the file is named by the place of this copy too.
+    """
     folder = cache_folder()
-    return (
-        None if folder is None else folder / f"compiled-{hashlib.sha256(' '.join(modules).encode()).hexdigest()[:16]}"
-    )
+    if folder is None:
+        return None
+    named_by = " ".join([str(Path(__file__).resolve()), *modules])
+    return folder / f"compiled-{hashlib.sha256(named_by.encode()).hexdigest()[:16]}"
 
 
 def main(modules: Sequence[str]) -> None:

@@ -41,6 +41,13 @@ def test_what_is_compiled_once_is_in_the_cache_and_is_not_compiled_again(folder:
 
 
 @pytest.mark.property
+def test_another_copy_of_the_sources_is_compiled_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = compile_ahead._mark([MODULE])
+    monkeypatch.setattr(compile_ahead, "__file__", str(folder / "copy" / "mrpipe" / "pipeline" / "compile_ahead.py"))
+    assert compile_ahead._mark([MODULE]) != here
+
+
+@pytest.mark.property
 def test_the_compiler_ends_with_the_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started = []
     real = compile_ahead._started
