@@ -281,6 +281,7 @@ def retrain_inverse(
         subsample_rows=12_000,
         subsample_iterations=100,
         iterations=20,
+        refined_rows=40_000,
     )
     trained = train(history, old.features, options, rng, jobs=jobs, progress=progress)
     judged = samples(simulated_history(chain, validation or training, drive_limit, rate, rng), old.features)
