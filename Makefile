@@ -46,7 +46,7 @@ lint: $(TEST_STAMP)  ## style, types and import rules
 	$(BIN)/lint-imports
 
 test: lint  ## linters and the whole test suite
-	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist loadscope
+	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist worksteal
 
 docs: $(DOCS_STAMP)  ## the documentation site, in build/site
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

@@ -1,6 +1,8 @@
-"""A frozen set of cases of the tracing benchmark, traced as a user's `close-loop` traces them.
+"""A frozen case of the tracing benchmark, traced as a user's `close-loop` traces it.
 
-The seeds are consecutive, so nobody has chosen the cases by their outcome. The expected verdict is the truth.
+It is the first seed of the set, so nobody has chosen it by its outcome. The expected verdict is the truth. All other
+cases, which take minutes each, are those of `make bench-tracing`; planted effects on the tests' own rigs are in
+`tests/tracing`.
 """
 
 from typing import Any
@@ -12,7 +14,7 @@ from benchmarks.tracing import run_case
 
 pytestmark = pytest.mark.planted
 
-FIRST, COUNT = 9000, 2
+FIRST, COUNT = 9000, 1
 
 
 def cases_of(kinds: tuple[str, ...]) -> list[Any]:
@@ -29,17 +31,8 @@ def traced(case: Case) -> dict[str, Any]:
     return row
 
 
-# two classes, because the suite gives each class to one process
-class TestCleanRigs:
-    @pytest.mark.parametrize("case", cases_of(("clean", "outside")))
-    def test_nothing_is_named_that_is_not_there(self, case):
-        row = traced(case)
-        assert row["found"] == []
-        assert row["right"]
-
-
-class TestPlantedEffects:
-    @pytest.mark.parametrize("case", cases_of(("single", "pair")))
-    def test_the_planted_effect_is_named_first(self, case):
-        row = traced(case)
-        assert row["right"], f"named {row['found']}: {row['verdict']}"
+@pytest.mark.parametrize("case", cases_of(("clean", "outside")))
+def test_nothing_is_named_that_is_not_there(case):
+    row = traced(case)
+    assert row["found"] == []
+    assert row["right"]

@@ -82,7 +82,7 @@ SMALL = {
     "simulate": {"plant_rate_hz": 400, "controller": {"inverse": "model"},
                  "excitation": {"kind": "harmonic", "cycles": 8, "settling_cycles": 4, "decay_s": 3.0}},
     "resonance": {"points": 5, "most_cycles": 20, "tolerance": 0.05, "window_cycles": 2, "most_averaged_cycles": 0},
-    "design": {"laws": ["vd", "fdns"], "amplitude_factors": [1.0], "grid": 3, "evaluations": 3, "draws": 1},
+    "design": {"laws": ["fdns"], "amplitude_factors": [1.0], "grid": 3, "evaluations": 3, "draws": 1},
     "close_loop": {"candidates": ["accumulator"], "base_forms": ["bouc-wen"], "bootstrap_draws": 50, "laws": ["vd"]},
 }  # fmt: skip
 """A configuration of everything that takes seconds."""
@@ -278,8 +278,8 @@ PROMISED = {
     ),
     "simulate --law vd --damper traced": ("law", "rms_x_top_m"),
     "design": (
-        "objective", "best", "laws.vd.gains.c_n_s_m", "laws.vd.peak_rms_x_top_m", "laws.vd.resonance_rad_s",
-        "laws.vd.probability_best", "pareto", "seconds",
+        "objective", "best", "laws.fdns.gains.alpha_n_m", "laws.fdns.peak_rms_x_top_m", "laws.fdns.resonance_rad_s",
+        "laws.fdns.probability_best", "pareto", "seconds",
     ),
     "train-forward": NETWORK,
     "train-inverse": NETWORK,

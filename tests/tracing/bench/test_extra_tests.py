@@ -103,7 +103,8 @@ def test_the_tests_offered_tell_rivals_further_apart(tmp_path: Path, monkeypatch
     hidden = Planted(find_form("accumulator", ""), {}, 0.06, False)
     damper = damper_from_set("set-c").with_effects([hidden])
     library = {name: damper_effects()[name] for name in ("accumulator", "end-stop")}
-    options = TracingOptions(refits=2, bootstrap_draws=50, most_effects=1, observation_filter=False)
+    forms = ("bouc-wen", "dahl", "hyperbolic-tangent")
+    options = TracingOptions(base_forms=forms, refits=2, bootstrap_draws=50, most_effects=1, observation_filter=False)
 
     def traced(tests: list[BenchTest], folder: str) -> Tracing:
         write_bench(tmp_path / folder, record_bench(damper, tests, rig, np.random.default_rng(5)), rig)

@@ -13,10 +13,12 @@ from mrpipe.tracing.bench.trace import trace_campaign
 from mrpipe.tracing.options import TracingOptions
 from tests.tracing.bench.rig import campaign
 
+FORMS = ("bouc-wen", "dahl", "hyperbolic-tangent")
+
 
 @functools.cache
 def traced(effect: str) -> Tracing:
-    options = TracingOptions(refits=2, bootstrap_draws=100, most_effects=1)
+    options = TracingOptions(base_forms=FORMS, refits=2, bootstrap_draws=100, most_effects=1)
     library = {name: damper_effects()[name] for name in ("end-stop", "accumulator")}
     return trace_campaign(campaign(effect), library, [], options, rng=np.random.default_rng(1))
 

@@ -28,7 +28,8 @@ FORMS = ("bouc-wen", "dahl", "hyperbolic-tangent")
 @functools.cache
 def traced(effect: str) -> Tracing:
     options = TracingOptions(base_forms=FORMS, refits=2, bootstrap_draws=100, most_effects=1 + effect.count("+"))
-    names = ("accumulator", "backlash", "channel-skew", "heating", "inertia", "remanence", "stribeck")
+    single = ("accumulator", "backlash", "channel-skew", "heating", "inertia", "remanence", "stribeck")
+    names = ("accumulator", "backlash", "remanence", "stribeck") if "+" in effect else single
     library = {name: damper_effects()[name] for name in names}
     return trace_campaign(campaign(effect), library, [], options, rng=np.random.default_rng(1))
 
