@@ -19,6 +19,9 @@ from pathlib import Path
 from mrpipe.numba_cache import cache_folder, has_compiled_functions
 from mrpipe.pipeline.code_version import code_version
 
+LIBRARIES = ("matplotlib.figure", "matplotlib.backends.backend_svg", "scipy.stats", "sklearn.neural_network")
+"""Libraries of later stages whose first import on a machine takes seconds, because Python compiles them to bytecode."""
+
 NICENESS = 5
 """Numerical technique: how far the compiler gives way to the stages that work meanwhile."""
 
@@ -88,6 +91,8 @@ def main(modules: Sequence[str]) -> None:
     """Import modules, which compiles their functions, and mark them as compiled."""
     with suppress(AttributeError, OSError):
         os.nice(NICENESS)
+    for name in LIBRARIES:
+        importlib.import_module(name)
     for name in modules:
         importlib.import_module(name)
     mark = _mark(modules)
