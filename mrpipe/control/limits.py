@@ -148,6 +148,28 @@ def attainable_damping(modes: LimitingModes, stiffness: float = 0.0) -> float:
     return modes.share_p2 / (1.0 + modes.nu * stiffness)
 
 
+def inherent_damping(frame: Frame, modes: LimitingModes) -> float:
+    """Return the damping ratio of the free target mode without the damper [1]: phi' C phi/(2 omega_0)."""
+    return float(modes.shape_0 @ frame.damping @ modes.shape_0) / (2.0 * modes.omega_0)
+
+
+def placement_warning(frame: Frame, modes: LimitingModes) -> str:
+    """Return what the user should know where the damper hardly acts on the target mode; empty where it does.
+
+    A damper without stiffness adds at most the damping ratio of P2 (14). Where this is less than the mode has already,
+    no gain of such a law can double the damping of the mode. Negative stiffness raises the bound by P2 (14).
+    """
+    most, present = attainable_damping(modes), inherent_damping(frame, modes)
+    if most >= present:
+        return ""
+    return (
+        f"the damper hardly acts on mode {modes.mode}: locking it raises the frequency of the mode only from "
+        f"{modes.omega_0:.4g} to {modes.omega_inf:.4g} rad/s. A damper without stiffness therefore adds a damping "
+        f"ratio of at most {most:.2g}, and the mode has {present:.2g} without it. Choose another place of the damper, "
+        "or another target mode"
+    )
+
+
 def optimal_friction(modes: LimitingModes) -> float:
     """Return alpha [N/m] of (4.25), P2 (20)."""
     return 1.0 / (modes.nu * math.hypot(1.0, FRICTION_RATIO))

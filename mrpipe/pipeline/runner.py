@@ -109,6 +109,8 @@ class Pipeline:
             outcome = self._failed(stage, error)
         self.outcomes[name] = outcome
         self._hashes.save()
+        if outcome.what in {"built", "reused"} and (mixed := self.sources.mixed_with_laboratory(name)):
+            self.logger.warning("%s: %s", name, mixed)
         return outcome
 
     def _build(self, stage: Stage) -> Outcome:

@@ -64,6 +64,29 @@ class Sources:
             self.needs_laboratory(item) for item in self.stages[provider].inputs
         )
 
+    def mixed_with_laboratory(self, recorder: str) -> str:
+        """Return what the user should know where a virtual recording is used together with data of the user; else "".
+
+        Parameters
+        ----------
+        recorder
+            Stage that records a campaign in the virtual laboratory.
+        """
+        config = self.loaded.config
+        rigs = {stage: rig.replace("-", "_") for rig, stage in CAMPAIGN_RECORDERS.items()}
+        sources = config.campaigns.model_dump()
+        given = [f"campaigns.{rig}" for rig, source in sources.items() if source not in {None, LABORATORY}]
+        structure = getattr(config, "structure", None)
+        given += ["structure"] if structure != type(structure)() else []
+        if recorder not in rigs or not given:
+            return ""
+        key = f"campaigns.{rigs[recorder]}"
+        return (
+            f"records a virtual campaign, because {key} is `{LABORATORY}`, but {' and '.join(given)} "
+            f"{'describes' if len(given) == 1 else 'describe'} your own rig: results mix both. Give your campaign as "
+            f"{key}, or null where no campaign of this kind exists"
+        )
+
     def path(self, name: str) -> Path | None:
         """Return the path of an input (whether built or not), or None if the configuration has none."""
         provider = self.provider(name)

@@ -39,6 +39,10 @@ SWEEP = (0.4, 2.4)
 ADJUSTED = ("harmonic", "sweep", "random")
 """Kinds of motion whose amplitude is found where the settings give none."""
 
+LARGEST_PLAUSIBLE_M_S2 = 9.81
+"""Amplitude of the base acceleration above which a computed one is reported: strong-motion records seldom have a peak
+above 1 g, and no structure is designed for many cycles at this level."""
+
 
 @dataclass(frozen=True)
 class Rig:
@@ -289,7 +293,21 @@ def _adjusted(
             f"under vd no base amplitude gives the expected motion: {amplitude:.3g} m/s^2 misses it by {error:.0%}; "
             "give simulate.excitation.base_amplitude_m_s2 for another"
         )
+    if warn is not None and (implausible := amplitude_warning(amplitude)):
+        warn(implausible)
     return amplitude, response if options.tracking == rig.options.tracking else None
+
+
+def amplitude_warning(amplitude_m_s2: float) -> str:
+    """Return what the user should know where a base amplitude that was computed [m/s^2] is implausible; else ""."""
+    if amplitude_m_s2 <= LARGEST_PLAUSIBLE_M_S2:
+        return ""
+    return (
+        f"the base acceleration that gives the expected motion has an amplitude of {amplitude_m_s2:.3g} m/s^2, "
+        f"more than {LARGEST_PLAUSIBLE_M_S2:.3g} m/s^2, which hardly any ground motion reaches: the damper may be too "
+        "weak for this structure, or may hardly move with the target mode. Give "
+        "simulate.excitation.base_amplitude_m_s2, or simulate.excitation.reference_rms_top_m"
+    )
 
 
 def release_state(rig: Rig, settings: ExcitationSettings) -> FloatArray | None:

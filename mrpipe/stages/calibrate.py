@@ -29,7 +29,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
     from mrpipe.control.assembly import expected_amplitude
     from mrpipe.control.calibration import balanced_weights, calibrate, validity_warnings
-    from mrpipe.control.limits import limiting_modes
+    from mrpipe.control.limits import limiting_modes, placement_warning
     from mrpipe.control.storage import calibration_to_json, write_calibration
     from mrpipe.dampers.model import read_tested
     from mrpipe.effects.damper import damper_named
@@ -50,6 +50,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     speed = amplitude * modes.omega_0
     weights = balanced_weights(modes, float(damper.quasi_static_force(speed, 0.0)), **settings.regulator.known())
     calibration = calibrate(frame, position, _options(settings, weights))
+    if hardly := placement_warning(frame, modes):
+        context.warn(hardly)
     for law, reason in calibration.skipped.items():
         context.warn(f"law {law} was skipped: {reason}")
     context.progress(0.3, "laws")

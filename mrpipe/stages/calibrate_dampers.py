@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.assembly import expected_amplitude
     from mrpipe.control.calibration import CalibrationOptions, balanced_weights
+    from mrpipe.control.limits import placement_warning
     from mrpipe.control.placed import calibrate_placed, modes_together, placed_warnings
     from mrpipe.control.placed_storage import damper_as_json, placed_dampers, together_as_json, write_placed
     from mrpipe.dampers.model import read_tested
@@ -52,6 +53,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         residual, largest = (float(model.quasi_static_force(speed, drive)) for drive in (0.0, model.drive_limit))
         rows.append(damper_as_json(item, amplitude, residual, settings.friction_rounding_share * speed))
         weights.append(balanced_weights(item.modes, residual, **settings.regulator.known()))
+        if hardly := placement_warning(frame, item.modes):
+            context.warn(f"{item.damper.name}: {hardly}")
         for line in placed_warnings(item, amplitude_m=amplitude, residual_force_n=residual, largest_force_n=largest):
             context.warn(line)
     modes = sorted({item.damper.mode for item in found} | set(range(1, min(frame.floors, 3) + 1)))

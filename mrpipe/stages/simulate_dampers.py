@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.errors import StageSkipped
     from mrpipe.reporting import several_dampers as report
+    from mrpipe.simulation.rig import amplitude_warning
     from mrpipe.simulation.several_rig import dampers_excitation, dampers_release, read_dampers_rig
     from mrpipe.simulation.several_storage import response_summary, write_dampers_response
 
@@ -23,6 +24,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         raise StageSkipped("the configuration has no structure.dampers")
     rig = read_dampers_rig(settings, structure, context.settings.calibrate.damper, context.artifact)
     excitation = dampers_excitation(rig, settings.excitation)
+    if settings.excitation.base_amplitude_m_s2 is None:
+        level = float(excitation.details.get("base_amplitude_m_s2", 0.0))
+        if implausible := amplitude_warning(level):
+            context.warn(implausible)
     context.progress(0.2, "loop")
     response = rig.run(excitation, rng=context.rng, initial_state=dampers_release(rig, settings.excitation))
     summary = response_summary(rig, response, excitation)

@@ -107,6 +107,19 @@ def test_residual_force_is_the_limit_and_not_saturation(thesis_frame, floor_one)
     assert any("vd: needs 48 N, but the damper gives at most 40 N" in line for line in weak)
 
 
+@pytest.mark.property
+def test_a_damper_that_hardly_acts_on_the_target_mode_is_reported(thesis_frame, floor_one, modes):
+    assert limits.inherent_damping(thesis_frame, modes) < limits.attainable_damping(modes)
+    assert limits.placement_warning(thesis_frame, modes) == ""
+    # the first storey is so stiff that floor 1 hardly moves
+    frame = shear_frame([100.0] * 4, [4e6, 2e4, 2e4, 2e4], [0.02] * 4)
+    near = limits.limiting_modes(frame, floor_position(4, 1))
+    said = limits.placement_warning(frame, near)
+    assert limits.attainable_damping(near) < limits.inherent_damping(frame, near) == pytest.approx(0.02, rel=0.05)
+    assert said.startswith("the damper hardly acts on mode 1: locking it raises the frequency of the mode only from ")
+    assert "and the mode has 0.02 without it" in said
+
+
 @pytest.mark.oracle
 @pytest.mark.parametrize("c,k", [(100.0, 0.0), (650.0, 0.0), (400.0, 2500.0), (300.0, -2000.0)])
 def test_exact_damping_is_that_of_the_state_space(thesis_frame, floor_one, modes, c, k):

@@ -45,6 +45,16 @@ def test_a_campaign_of_the_user_comes_from_outside(make_pipeline: MakePipeline) 
     assert sources.configured("after") and not sources.needs_laboratory("after")
 
 
+def test_a_virtual_campaign_is_reported_where_the_user_gives_the_rest(make_pipeline: MakePipeline) -> None:
+    recorders = {**STAGES, "record-frame": RECORDER}
+    alone = make_pipeline(recorders, campaigns={"bench": None, "frame": "laboratory"}).sources
+    assert alone.mixed_with_laboratory("record-frame") == ""
+    mixed = make_pipeline(recorders, campaigns={"bench": "my/bench", "frame": "laboratory"}).sources
+    said = mixed.mixed_with_laboratory("record-frame")
+    assert "campaigns.frame is `laboratory`, but campaigns.bench describes your own rig" in said
+    assert mixed.mixed_with_laboratory("second") == ""
+
+
 def test_without_a_campaign_what_reads_it_is_not_configured(make_pipeline: MakePipeline) -> None:
     sources = _sources(make_pipeline, None)
     assert sources.path("campaign:frame") is None

@@ -29,6 +29,7 @@ from mrpipe.networks.network import write_network
 from mrpipe.pipeline.runner import plain
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.simulation.rig import amplitude_warning
 from mrpipe.stages import calibrate, export_controller, export_models, export_opensees, resonance
 from mrpipe.stages.simulate import STAGES
 from mrpipe.structures import frame_from_parameter_set, natural_modes, shear_frame, write_frame
@@ -391,3 +392,11 @@ def test_a_law_that_cannot_be_calibrated_is_skipped_with_its_reason(run, monkeyp
 def test_a_law_without_a_force_is_skipped_with_a_perfect_damper(run, stage):
     with pytest.raises(StageSkipped, match=r"law passive-on commands the drive, so that a perfect damper"):
         run(stage, {"simulate": {"tracking": "ideal"}})
+
+
+@pytest.mark.property
+def test_an_implausible_base_amplitude_is_reported() -> None:
+    assert amplitude_warning(0.8) == ""
+    said = amplitude_warning(18.0)
+    assert "an amplitude of 18 m/s^2, more than 9.81 m/s^2" in said
+    assert "simulate.excitation.base_amplitude_m_s2" in said
