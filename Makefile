@@ -16,7 +16,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install -c const
 KEEP_BYTECODE := PYTHONDONTWRITEBYTECODE=
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint docs bench bench-tracing reproduce train-inverse identify-frame simulate close-loop clean
+.PHONY: help run test suite lint docs bench bench-tracing reproduce train-inverse identify-frame simulate close-loop clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -45,8 +45,12 @@ lint: $(TEST_STAMP)  ## style, types and import rules
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test: lint  ## linters and the whole test suite
+suite: $(TEST_STAMP)
 	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist worksteal
+
+# the type checker works in one process, so it runs while the tests do
+test: $(TEST_STAMP)  ## linters and the whole test suite
+	$(MAKE) --no-print-directory --jobs=2 lint suite
 
 docs: $(DOCS_STAMP)  ## the documentation site, in build/site
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
