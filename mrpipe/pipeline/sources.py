@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mrpipe.artifacts import public_data_directory
 from mrpipe.config.loader import LoadedConfig
@@ -76,7 +77,7 @@ class Sources:
         rigs = {stage: rig.replace("-", "_") for rig, stage in CAMPAIGN_RECORDERS.items()}
         sources = config.campaigns.model_dump()
         given = [f"campaigns.{rig}" for rig, source in sources.items() if source not in {None, LABORATORY}]
-        structure = getattr(config, "structure", None)
+        structure: Any = getattr(config, "structure", None)
         given += ["structure"] if structure != type(structure)() else []
         if recorder not in rigs or not given:
             return ""
