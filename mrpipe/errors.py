@@ -35,6 +35,10 @@ class UserError(MrpipeError):
         place = f"{self.source}: {where}" if where else self.source
         super().__init__(" ".join(f"{place}: {problem}; {remedy}".split()))
 
+    def __reduce__(self) -> tuple[type[UserError], tuple[str, str, str, str]]:
+        """Return how a copy is made: a process sends its errors to another one."""
+        return type(self), (self.source, self.where, self.problem, self.remedy)
+
 
 class CheckFailed(MrpipeError):
     """The program ran, but a requested check failed (exit status 1)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -38,8 +39,9 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
     """
     from mrpipe.cli.checking import check_headers
     from mrpipe.cli.output import print_json
-    from mrpipe.cli.session import session
+    from mrpipe.cli.session import session, stage_runner
     from mrpipe.pipeline.compile_ahead import compiled_ahead
+    from mrpipe.pipeline.side_by_side import build_side_by_side
 
     started = time.monotonic()
     with session(options) as pipeline:
@@ -54,9 +56,9 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
         with compiled_ahead(
             [pipeline.stages[name].run.__module__ for name in names if name != "report"], pipeline.jobs
         ):
-            for name in names:
-                if name != "report":
-                    pipeline.build(name)
+            build_side_by_side(
+                pipeline, [name for name in names if name != "report"], functools.partial(stage_runner, options)
+            )
         if pipeline.errors and not any(item.what in {"built", "reused"} for item in pipeline.outcomes.values()):
             raise pipeline.errors[0]
         report = _write_report(pipeline) if "report" in names else []

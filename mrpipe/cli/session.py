@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from mrpipe.errors import UserError
 
 if TYPE_CHECKING:
     from mrpipe.config.loader import LoadedConfig
+    from mrpipe.pipeline.execution import StageRunner
     from mrpipe.pipeline.runner import Pipeline
 
 
@@ -108,6 +110,14 @@ def pipeline_of(options: CommonOptions, loaded: LoadedConfig, *, to_log: bool = 
         quiet=options.quiet,
         campaign_given=options.campaign is not None,
     )
+
+
+def stage_runner(options: CommonOptions) -> StageRunner:
+    """Return what runs stages in another process: the same configuration, without the log file of the run."""
+    loaded = load(replace(options, quiet=True))
+    pipeline = pipeline_of(options, loaded, to_log=False)
+    pipeline.logger.setLevel(loaded.config.execution.log_level.upper())
+    return pipeline.runner
 
 
 @contextmanager

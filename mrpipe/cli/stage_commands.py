@@ -15,7 +15,8 @@ from mrpipe.errors import CheckFailed, UserError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mrpipe.pipeline.runner import Outcome, Pipeline
+    from mrpipe.pipeline.execution import Outcome
+    from mrpipe.pipeline.runner import Pipeline
 
 _EXPORTS = ("controller", "damper", "frame", "forward", "inverse", "opensees")
 _ONE_DAMPER = frozenset({"controller", "damper", "frame"})

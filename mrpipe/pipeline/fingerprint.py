@@ -84,7 +84,7 @@ class FileHashes:
         except (OSError, ValueError):
             known = None
         self._known: dict[str, Any] = known if isinstance(known, dict) else {}
-        self._changed = False
+        self._new: dict[str, Any] = {}
 
     def digest(self, path: Path) -> str:
         """Return the digest of a file, or of all files below a directory with their names; `missing` for neither.
@@ -103,8 +103,7 @@ class FileHashes:
         if isinstance(entry, list) and len(entry) == 5 and entry[:4] == state and isinstance(entry[4], str):
             return entry[4]
         value = _digest_of_file(path)
-        self._known[key] = [*state, value]
-        self._changed = True
+        self.learn({key: [*state, value]})
         return value
 
     def digest_many(self, paths: Iterable[Path], base: Path) -> str:
@@ -117,12 +116,22 @@ class FileHashes:
 
     def save(self) -> None:
         """Write what was learnt to the memory file; a directory that cannot be written only costs time later."""
-        if self._changed:
+        if self._new:
             from mrpipe.artifacts import atomic_write_text
 
             with suppress(OSError):
                 atomic_write_text(self._memory, json.dumps(self._known))
-            self._changed = False
+            self._new = {}
+
+    def learn(self, entries: Mapping[str, Any]) -> None:
+        """Add what another process learnt, as :meth:`take_new` returned it."""
+        self._known |= entries
+        self._new |= entries
+
+    def take_new(self) -> dict[str, Any]:
+        """Return what was learnt since the last call or :meth:`save`."""
+        new, self._new = self._new, {}
+        return new
 
 
 def _digest_of_file(path: Path) -> str:

@@ -38,18 +38,67 @@ def make_logger(log_file: Path, level: str, quiet: bool) -> logging.Logger:
     return logger
 
 
+def shows_bars(quiet: bool) -> bool:
+    """Return whether progress is shown as bars: on a terminal only."""
+    return sys.stderr.isatty() and not quiet
+
+
 @contextmanager
 def stage_progress(stage: str, logger: logging.Logger, quiet: bool) -> Iterator[Progress]:
     """Yield the `progress` that a stage reports to."""
-    if sys.stderr.isatty() and not quiet:
-        with _bar(stage) as progress:
-            yield progress
-    else:
+    if not shows_bars(quiet):
         yield _lines(stage, logger)
+        return
+    bars = StageBars(quiet)
+    bars.update(stage, 0.0)
+    try:
+        yield lambda fraction, text="": bars.update(stage, fraction, text)
+    finally:
+        bars.close()
 
 
-@contextmanager
-def _bar(stage: str) -> Iterator[Progress]:
+class StageBars:
+    """One bar for each stage that runs; nothing where standard error is not a terminal.
+
+    Parameters
+    ----------
+    quiet
+        Show nothing.
+    """
+
+    def __init__(self, quiet: bool) -> None:
+        self._shown = shows_bars(quiet)
+        self._bar: Any = None
+        self._rows: dict[str, Any] = {}
+
+    def update(self, stage: str, fraction: float, text: str = "") -> None:
+        """Show the share of a stage that is done, and a text."""
+        if not self._shown:
+            return
+        if self._bar is None:
+            self._bar = _empty_bar()
+            self._bar.start()
+        if stage not in self._rows:
+            self._rows[stage] = self._bar.add_task(stage, total=1.0, note="")
+        # the bar shows the remaining time already
+        self._bar.update(self._rows[stage], completed=fraction, note=_LEFT.sub("", text))
+
+    def remove(self, stage: str) -> None:
+        """Remove the bar of a stage that has ended."""
+        if stage in self._rows:
+            self._bar.remove_task(self._rows.pop(stage))
+        if not self._rows:
+            self.close()
+
+    def close(self) -> None:
+        """Remove all bars."""
+        if self._bar is not None:
+            self._bar.stop()
+        self._bar = None
+        self._rows = {}
+
+
+def _empty_bar() -> Any:
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
@@ -61,14 +110,7 @@ def _bar(stage: str) -> Iterator[Progress]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[note]}"),
     ]
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(stage, total=1.0, note="")
-
-        def progress(fraction: float, text: str = "") -> None:
-            # the bar shows the remaining time already
-            bar.update(task, completed=fraction, note=_LEFT.sub("", text))
-
-        yield progress
+    return Bar(*columns, console=Console(stderr=True), transient=True)
 
 
 def _lines(stage: str, logger: logging.Logger) -> Progress:

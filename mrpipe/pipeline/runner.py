@@ -3,41 +3,24 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import logging
-import shutil
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
-from mrpipe.artifacts import Provenance, atomic_write_text
-from mrpipe.artifacts.plain import plain
+from mrpipe.artifacts import atomic_write_text
 from mrpipe.config.loader import LoadedConfig
-from mrpipe.errors import MrpipeError, StageFailed, StageSkipped
+from mrpipe.errors import MrpipeError, StageFailed
 from mrpipe.pipeline.code_version import code_version
+from mrpipe.pipeline.execution import MANIFESTS, Order, Outcome, StageRunner, remove_outputs
 from mrpipe.pipeline.fingerprint import FileHashes, plain_settings
 from mrpipe.pipeline.manifest import Manifest, StageKey, reasons_stale
-from mrpipe.pipeline.parts import PartWriter
-from mrpipe.pipeline.progress import stage_progress
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.sources import ABSENT, Sources
-from mrpipe.pipeline.stage import Stage, StageContext
+from mrpipe.pipeline.stage import Stage
 
 LOG = "log.txt"
 PUBLIC_DATA = "public data"
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Result of one stage: `built`, `reused`, `skipped` or `failed`."""
-
-    stage: str
-    what: str
-    manifest: Manifest
-    reasons: Sequence[str] = ()
 
 
 @dataclass
@@ -85,9 +68,16 @@ class Pipeline:
 
     def __post_init__(self) -> None:
         self.stages = {name: stage.for_configuration(self.loaded.config) for name, stage in self.stages.items()}
-        self._manifests = self.run_directory / "manifests"
-        self._hashes = FileHashes(self.run_directory / "manifests" / ".hashes.json")
-        self.sources = Sources(self.loaded, self.stages, self.run_directory, self._hashes)
+        self._manifests = self.run_directory / MANIFESTS
+        self.hashes = FileHashes(self._manifests / ".hashes.json")
+        self.sources = Sources(self.loaded, self.stages, self.run_directory, self.hashes)
+
+    @property
+    def runner(self) -> StageRunner:
+        """What runs a single stage."""
+        return StageRunner(
+            self.loaded, self.stages, self.run_directory, self.logger, self.jobs, self.quiet, self.hashes
+        )
 
     # --- building ----------------------------------------------------------------------------------------------------
     def build(self, name: str) -> Outcome:
@@ -98,22 +88,60 @@ class Pipeline:
         MrpipeError
             If it fails and the run does not keep going; otherwise the outcome reports the failure.
         """
+        begun = self.begin(name)
+        return begun if isinstance(begun, Outcome) else self.finish(begun, lambda: self.runner.run(begun))
+
+    def begin(self, name: str) -> Outcome | Order:
+        """Bring everything that a stage needs up to date; return its outcome, or the order to run it.
+
+        Raises
+        ------
+        MrpipeError
+            If that fails and the run does not keep going; otherwise the outcome reports the failure.
+        """
         if name in self.outcomes:
             return self.outcomes[name]
         stage = self.stages[name]
         try:
-            outcome = self._build(stage)
+            begun = self._begin(stage)
         except Exception as error:
-            if not self.keep_going or _ends_the_run(error):
-                raise
-            outcome = self._failed(stage, error)
-        self.outcomes[name] = outcome
-        self._hashes.save()
-        if outcome.what in {"built", "reused"} and (mixed := self.sources.mixed_with_laboratory(name)):
-            self.logger.warning("%s: %s", name, mixed)
+            return self._keep(self._outcome_of(stage, error))
+        return self._keep(begun) if isinstance(begun, Outcome) else begun
+
+    def finish(self, order: Order, result: Callable[[], Outcome]) -> Outcome:
+        """Record what became of a stage that ran.
+
+        Parameters
+        ----------
+        order
+            The stage.
+        result
+            Returns its outcome, or raises what the stage raised.
+
+        Raises
+        ------
+        MrpipeError
+            If it failed and the run does not keep going; otherwise the outcome reports the failure.
+        """
+        try:
+            outcome = result()
+        except Exception as error:
+            outcome = self._outcome_of(self.stages[order.stage], error)
+        return self._keep(outcome)
+
+    def _outcome_of(self, stage: Stage, error: Exception) -> Outcome:
+        if not self.keep_going or _ends_the_run(error):
+            raise error
+        return self._failed(stage, error)
+
+    def _keep(self, outcome: Outcome) -> Outcome:
+        self.outcomes[outcome.stage] = outcome
+        self.hashes.save()
+        if outcome.what in {"built", "reused"} and (mixed := self.sources.mixed_with_laboratory(outcome.stage)):
+            self.logger.warning("%s: %s", outcome.stage, mixed)
         return outcome
 
-    def _build(self, stage: Stage) -> Outcome:
+    def _begin(self, stage: Stage) -> Outcome | Order:
         self.check(stage.name)
         missing = ""
         # inputs that no campaign can give come first, so that nothing is built for a stage that is then skipped
@@ -124,7 +152,7 @@ class Pipeline:
         for item in stage.optional_inputs:
             if self._wanted(item, together):
                 self._provide_optional(item)
-        return self._skip(stage, missing) if missing else self._run_or_reuse(stage)
+        return self._skip(stage, missing) if missing else self._reuse_or_run(stage)
 
     def _demanded_by_settings(self, stage: Stage) -> str:
         """Return which settings make a stage need a campaign that is not configured, so that a user can change them."""
@@ -219,9 +247,7 @@ class Pipeline:
         manifest = Manifest.load(self._manifests, name)
         if manifest is None or manifest.skipped:
             return False
-        return not reasons_stale(
-            manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self._hashes
-        )
+        return not reasons_stale(manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self.hashes)
 
     def _inputs_there(self, stage: Stage) -> dict[str, Path]:
         inputs = {}
@@ -251,16 +277,16 @@ class Pipeline:
             digests.setdefault(name, ABSENT)
         if stage.public_data:
             digests[PUBLIC_DATA] = self.sources.digest_of_public_data(stage.public_data)
-        settings = plain_settings(self.loaded.config, stage.settings, self._hashes)
+        settings = plain_settings(self.loaded.config, stage.settings, self.hashes)
         code = code_version(stage.run.__module__)
         return StageKey(digests, settings, code, self.loaded.config.seed)
 
-    def _run_or_reuse(self, stage: Stage) -> Outcome:
+    def _reuse_or_run(self, stage: Stage) -> Outcome | Order:
         inputs = self._inputs_there(stage)
         key = self._key(stage, inputs)
         manifest = Manifest.load(self._manifests, stage.name)
         reasons = (
-            ["--force"] if stage.name in self.force else reasons_stale(manifest, key, self.run_directory, self._hashes)
+            ["--force"] if stage.name in self.force else reasons_stale(manifest, key, self.run_directory, self.hashes)
         )
         if not reasons and manifest is not None:
             self.logger.info(
@@ -270,65 +296,46 @@ class Pipeline:
             )
             return Outcome(stage.name, "skipped" if manifest.skipped else "reused", manifest)
         self.logger.info("%-20s starts: %s", stage.name, "; ".join(reasons))
-        return self._run(stage, key, inputs, reasons)
-
-    def _run(self, stage: Stage, key: StageKey, inputs: Mapping[str, Path], reasons: Sequence[str]) -> Outcome:
-        part = PartWriter(stage.name, self.run_directory)
-        started = time.monotonic()
-        skipped = ""
-        with stage_progress(stage.name, self.logger, self.quiet) as progress:
-            context = StageContext(
-                stage=stage.name,
-                settings=SettingsView(self.loaded.config, stage.settings, stage.name),
-                inputs=inputs,
-                run_directory=self.run_directory,
-                rng=np.random.default_rng(seed_of(self.loaded.config.seed, stage.name)),
-                seed=self.loaded.config.seed,
-                jobs=self.jobs,
-                progress=progress,
-                report=part,
-                log=self.logger,
-                provenance=Provenance(stage.name, self.loaded.as_yaml(), key.inputs, self.loaded.config.seed),
-            )
-            try:
-                summary = stage.run(context)
-            except StageSkipped as reason:
-                summary, skipped = {}, str(reason)
-                self._remove_outputs(stage)
-        part.save()
-        written = [] if skipped else [*stage.outputs, *part.files]
-        outputs = {name: self._hashes.digest(self.run_directory / name) for name in written}
-        seconds = time.monotonic() - started
-        failed = "; ".join(context.failures)
-        manifest = Manifest(
-            stage.name, key, outputs, plain(summary), context.warnings, skipped, round(seconds, 3), failed
-        )
-        manifest.save(self._manifests)
-        self._hashes.save()
-        if skipped:
-            self.logger.info("%-20s skipped: %s", stage.name, skipped)
-        else:
-            self.logger.info("%-20s done in %.1f s", stage.name, seconds)
-        return Outcome(stage.name, "skipped" if skipped else "built", manifest, reasons)
+        return Order(stage.name, key, inputs, reasons)
 
     def _skip(self, stage: Stage, reason: str) -> Outcome:
         self.logger.info("%-20s skipped: %s", stage.name, reason)
         manifest = Manifest(stage.name, StageKey({}, {}, {}, self.loaded.config.seed), {}, {}, [], reason)
-        self._remove_outputs(stage)
+        remove_outputs(stage, self.run_directory)
         manifest.save(self._manifests)
         return Outcome(stage.name, "skipped", manifest)
-
-    def _remove_outputs(self, stage: Stage) -> None:
-        for name in stage.outputs:
-            path = self.run_directory / name
-            if path.is_dir():
-                shutil.rmtree(path)
-            else:
-                path.unlink(missing_ok=True)
 
     def write_config(self) -> None:
         """Keep the resolved configuration in the run directory."""
         atomic_write_text(self.run_directory / "config.yaml", self.loaded.as_yaml())
+
+    # --- what a stage waits for ---------------------------------------------------------------------------------------
+    def plan(self, names: Sequence[str]) -> list[str]:
+        """Return the named stages and those that :meth:`build` would bring up to date for them, in order."""
+        found: set[str] = set()
+
+        def add(name: str) -> None:
+            if name in found:
+                return
+            found.add(name)
+            stage = self.stages[name]
+            given = [item for item in stage.inputs if self.sources.configured(item)]
+            together = all(self._is_to_be_had(item) for item in stage.optional_inputs)
+            wanted = [item for item in stage.optional_inputs if self._wanted(item, together)]
+            # a stage that lacks a campaign is skipped: nothing is built for it
+            for item in [*(given if len(given) == len(stage.inputs) else []), *wanted]:
+                if (provider := self.sources.provider(item)) is not None:
+                    add(provider)
+
+        for name in names:
+            add(name)
+        return [name for name in self.stages if name in found]
+
+    def waits_for(self, name: str) -> set[str]:
+        """Return the stages whose results a stage may read."""
+        stage = self.stages[name]
+        items = (*stage.inputs, *stage.optional_inputs, *stage.known_inputs)
+        return {provider for item in items if (provider := self.sources.provider(item)) is not None}
 
     # --- reporting what is stale --------------------------------------------------------------------------------------
     def status(self, names: Sequence[str]) -> dict[str, list[str]]:
@@ -336,7 +343,7 @@ class Pipeline:
         found: dict[str, list[str]] = {}
         for name in names:
             self._status_of(name, found)
-        self._hashes.save()
+        self.hashes.save()
         order = list(self.stages)
         return dict(sorted(found.items(), key=lambda item: order.index(item[0])))
 
@@ -361,7 +368,7 @@ class Pipeline:
                     reasons.append(f"{provider}, which it reads, is stale")
                     stale.append(f"input {item} ")
         manifest = Manifest.load(self._manifests, name)
-        own = reasons_stale(manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self._hashes)
+        own = reasons_stale(manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self.hashes)
         # the artifact of a stale stage is there, but does not count: "missing" would send people to look for the file
         own = [reason for reason in own if not reason.startswith(tuple(stale))]
         found[name] = own if own[:1] == ["never built"] else reasons + own
@@ -371,8 +378,3 @@ class Pipeline:
 def _ends_the_run(error: Exception) -> bool:
     """Return whether no other stage can be built either: the disk is full or cannot be written."""
     return isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG}
-
-
-def seed_of(seed: int, name: str) -> list[int]:
-    """Return the entropy of a stage's generator: run's seed and stage's name, so that stages do not share draws."""
-    return [seed, int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")]

@@ -21,12 +21,12 @@ from mrpipe.artifacts import (
     load_parameter_set,
     no_progress,
 )
+from mrpipe.artifacts.plain import plain
 from mrpipe.config.model import config_model
 from mrpipe.control import laws
 from mrpipe.dampers.model import damper_from_parameter_set, write_damper, write_tested
 from mrpipe.errors import StageSkipped, UserError
 from mrpipe.networks.network import write_network
-from mrpipe.pipeline.runner import plain
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import Stage, StageContext
 from mrpipe.simulation.rig import amplitude_warning
