@@ -78,7 +78,9 @@ _COMMON: dict[str, tuple[Any, Any]] = {
         None,
     ),
     "jobs": (
-        Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes to use. Default: one a core.")],
+        Annotated[
+            int | None, typer.Option(min=1, metavar="N", help="Processes that a stage may use. Default: one a core.")
+        ],
         None,
     ),
     "seed": (Annotated[int | None, typer.Option(min=0, metavar="N", help="Seed of all randomness.")], None),

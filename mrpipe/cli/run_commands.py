@@ -53,12 +53,9 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
         for name in names:
             if name != "report":
                 pipeline.check(name)
-        with compiled_ahead(
-            [pipeline.stages[name].run.__module__ for name in names if name != "report"], pipeline.jobs
-        ):
-            build_side_by_side(
-                pipeline, [name for name in names if name != "report"], functools.partial(stage_runner, options)
-            )
+        to_build = [name for name in names if name != "report"]
+        with compiled_ahead([pipeline.stages[name].run.__module__ for name in to_build], pipeline.jobs) as compiling:
+            build_side_by_side(pipeline, to_build, functools.partial(stage_runner, options), compiling)
         if pipeline.errors and not any(item.what in {"built", "reused"} for item in pipeline.outcomes.values()):
             raise pipeline.errors[0]
         report = _write_report(pipeline) if "report" in names else []

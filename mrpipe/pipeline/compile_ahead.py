@@ -12,7 +12,7 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -42,8 +42,10 @@ def modules_of(stage_modules: Iterable[str]) -> list[str]:
 
 
 @contextmanager
-def compiled_ahead(stage_modules: Sequence[str], jobs: int) -> Iterator[None]:
+def compiled_ahead(stage_modules: Sequence[str], jobs: int) -> Iterator[Callable[[], bool]]:
     """Compile what stages need in a second process during the block; it ends with the block.
+
+    Yields a function that returns whether the process still works.
 
     Nothing is started with one process only, or if the same modules were compiled before.
 
@@ -56,7 +58,7 @@ def compiled_ahead(stage_modules: Sequence[str], jobs: int) -> Iterator[None]:
     """
     process = _started(modules_of(stage_modules)) if jobs > 1 else None
     try:
-        yield
+        yield lambda: process is not None and process.poll() is None
     finally:
         if process is not None:
             process.terminate()

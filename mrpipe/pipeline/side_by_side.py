@@ -19,11 +19,16 @@ AT_A_TIME = 2
 memory would limit before processors do."""
 
 
-def build_side_by_side(pipeline: Pipeline, names: Sequence[str], make_runner: Callable[[], StageRunner]) -> None:
+def build_side_by_side(
+    pipeline: Pipeline,
+    names: Sequence[str],
+    make_runner: Callable[[], StageRunner],
+    one_processor_is_busy: Callable[[], bool] = lambda: False,
+) -> None:
     """Bring stages and everything that they need up to date, with up to two stages at the same time.
 
-    Results do not depend on it, because a stage starts after all that it may read. A stage that nothing can accompany
-    runs in this process. With one process only, one stage runs after the other.
+    Results do not depend on it, because a stage starts after all that it may read. Until two stages can run together,
+    they run in this process. With one process only, one stage runs after the other.
 
     Parameters
     ----------
@@ -33,6 +38,8 @@ def build_side_by_side(pipeline: Pipeline, names: Sequence[str], make_runner: Ca
         Stages.
     make_runner
         Returns what runs a stage, in another process.
+    one_processor_is_busy
+        Returns whether something else needs a processor, so that one stage at a time is enough.
 
     Raises
     ------
@@ -46,8 +53,9 @@ def build_side_by_side(pipeline: Pipeline, names: Sequence[str], make_runner: Ca
     with _Crew(pipeline, make_runner) as crew:
         waiting = _Waiting(pipeline, names)
         while waiting.names or crew.running:
-            orders = waiting.orders(AT_A_TIME - len(crew.running), crew.running_names)
-            if len(orders) == 1 and not crew.running:
+            at_a_time = 1 if one_processor_is_busy() else AT_A_TIME
+            orders = waiting.orders(at_a_time - len(crew.running), crew.running_names)
+            if len(orders) == 1 and crew.is_empty:
                 alone = orders[0]
                 pipeline.finish(alone, lambda order=alone: pipeline.runner.run(order))  # type: ignore[misc]
                 continue
@@ -104,17 +112,24 @@ class _Crew:
     def running_names(self) -> list[str]:
         return [order.stage for order in self.running.values()]
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no process has been started."""
+        return not self.running and not self._idle
+
     def start(self, order: Order) -> None:
-        self._idle = [process for process in self._idle if process.alive]
-        process = self._idle.pop() if self._idle else StageProcess(self._make_runner)
+        """Run a stage in the idle process that has loaded most of its modules, or in a new one."""
+        idle = [process for process in self._idle if process.alive]
+        process = max(idle, key=lambda item: item.loaded(order)) if idle else StageProcess(self._make_runner)
+        self._idle = [item for item in idle if item is not process]
         self.running[process] = order
         process.start(order)
         self._bars.update(order.stage, 0.0)
 
     def wait(self) -> None:
-        """Wait for messages and pass them on."""
+        """Wait for messages and pass them on; return at once where nothing runs."""
         by_connection = {process.connection: process for process in self.running}
-        for connection in wait(list(by_connection)):
+        for connection in wait(list(by_connection)) if by_connection else []:
             process = by_connection[connection]  # type: ignore[index]
             order, message = self.running[process], process.receive()
             if isinstance(message, Share):

@@ -74,6 +74,11 @@ class StageProcess:
         self._process = context.Process(target=_serve, args=(theirs, make_runner), name="mrpipe stages")
         self._process.start()
         theirs.close()
+        self._modules: set[str] = set()
+
+    def loaded(self, order: Order) -> int:
+        """Return how many modules of a stage are loaded, because a stage before it needed them."""
+        return len(self._modules & set(order.key.code))
 
     def start(self, order: Order) -> None:
         """Run a stage; :meth:`receive` returns what it reports.
@@ -83,6 +88,7 @@ class StageProcess:
         OSError
             If the process has ended.
         """
+        self._modules |= set(order.key.code)
         self.connection.send(order)
 
     def receive(self) -> Message:
