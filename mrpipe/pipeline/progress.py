@@ -30,12 +30,22 @@ def make_logger(log_file: Path, level: str, quiet: bool) -> logging.Logger:
     to_file = logging.FileHandler(log_file, encoding="utf-8")
     to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     logger.addHandler(to_file)
-    to_error = logging.StreamHandler(sys.stderr)
+    to_error = _ToStandardError()
     to_error.setFormatter(logging.Formatter("%(message)s"))
     to_error.setLevel(logging.ERROR if quiet else level.upper())
     to_error.addFilter(lambda record: not getattr(record, "file_only", False))
     logger.addHandler(to_error)
     return logger
+
+
+class _ToStandardError(logging.Handler):
+    """Writes to what standard error is when a line comes: while bars are shown, lines are written above them."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            print(self.format(record), file=sys.stderr, flush=True)
+        except Exception:
+            self.handleError(record)
 
 
 def shows_bars(quiet: bool) -> bool:
