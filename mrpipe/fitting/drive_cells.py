@@ -9,9 +9,10 @@ import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.dampers.laws import LawShape
-from mrpipe.fitting.engine import Fit, centred, regressors, weighting
+from mrpipe.fitting.engine import Fit, regressors
 from mrpipe.fitting.kernel import CURRENT_AT, run_recordings
 from mrpipe.fitting.start import LEVEL_SHARE, drive_varies, mean_levels
+from mrpipe.fitting.weighting import centred, weighting
 
 BINS = 8
 """A drive that varies is sorted into so many levels."""
@@ -62,12 +63,12 @@ def cells_of(found: Fit) -> Cells:
     base = replace(problem.base, laws=(flat,) * len(problem.base.laws))
     plain = replace(problem, base=base, reference=found.laws)
     w = weighting(problem)
-    signals = regressors(plain, found.theta)[:2, w.at]
-    own = regressors(problem, found.theta)[:, w.at]
+    signals = regressors(plain, found.theta)[:2]
+    own = regressors(problem, found.theta)
     # what is neither yield force nor viscosity stays as the fit has it
     first = sum(law.count for law in problem.base.laws[:2])
-    test = problem.recordings.test[w.at]
-    force = problem.recordings.force[w.at] - found.test_offsets[test] - found.linear[first:] @ own[first:]
+    recordings, test = problem.recordings, problem.recordings.test[w.at]
+    force = recordings.force - found.test_offsets[recordings.test] - found.linear[first:] @ own[first:]
     share = run_recordings(found.chain(), problem.recordings)[CURRENT_AT][w.at] / problem.scales.drive
     if drive_varies(problem.recordings):
         part = np.clip((share * CELLS).astype(np.int64), 0, CELLS - 1)
@@ -78,7 +79,7 @@ def cells_of(found: Fit) -> Cells:
     key = np.unique(test * (CELLS + 1) + part, return_inverse=True)[1]
     rows = np.vstack([signals, force])
     constant = _one_cell(test, key)
-    rows = np.where(constant, centred(rows, w)[0], rows * w.root)
+    rows = np.where(constant, centred(rows, w)[0], rows[:, w.at] * w.root)
     return _sums(key, share, level, rows[:2], rows[2], problem.scales.drive)
 
 

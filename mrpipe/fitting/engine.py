@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrpipe.artifacts import BoolArray, FloatArray, IntArray
+from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.dampers.laws import Law
 from mrpipe.dampers.plant import Chain, Step, build_chain
 from mrpipe.fitting.averaging import moving_average
@@ -25,6 +25,7 @@ from mrpipe.fitting.kernel import (
 )
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.weighting import Weighting, centred, weighting
 
 COUPLING_PASSES = 6
 """So often the laws that a coupled form reads are renewed at the end of a fit."""
@@ -155,35 +156,6 @@ def regressors(problem: Problem, theta: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Weighting:
-    """The samples compared, their weights, and where each test begins among them."""
-
-    at: IntArray
-    root: FloatArray
-    starts: IntArray
-    sums: FloatArray
-    test: IntArray
-
-
-def weighting(problem: Problem) -> Weighting:
-    """Return the samples compared."""
-    at = np.flatnonzero(problem.root_weight)
-    root = problem.root_weight[at]
-    test = problem.recordings.test[at] if problem.offsets else np.zeros(len(at), dtype=np.int64)
-    present, starts = np.unique(test, return_index=True)
-    del present
-    sums = np.add.reduceat(root**2, starts)
-    return Weighting(at, root, starts.astype(np.int64), sums, test)
-
-
-def centred(rows: FloatArray, w: Weighting) -> tuple[FloatArray, FloatArray]:
-    """Return weighted rows without their weighted mean in each test, and the means (tests present in columns)."""
-    means = np.add.reduceat(rows * w.root**2, w.starts, axis=-1) / w.sums
-    lengths = np.diff([*w.starts, rows.shape[-1]])
-    return (rows - np.repeat(means, lengths, axis=-1)) * w.root, means
-
-
-@dataclass(frozen=True)
 class Solved:
     """A problem solved for its linear coefficients at given searched values.
 
@@ -212,17 +184,15 @@ class Solved:
 
 def solve(problem: Problem, theta: FloatArray, w: Weighting) -> Solved:
     """Return the problem solved for its linear coefficients; a coupled form reads the laws of the reference."""
-    columns = regressors(problem, theta)[:, w.at]
-    count = len(columns)
-    if not np.all(np.isfinite(columns)):
+    rows, means = centred(regressors(problem, theta), w)
+    count = len(rows)
+    # a value that is not finite makes the mean of its test not finite
+    if not np.all(np.isfinite(means)):
         wrong = np.full(len(w.at), 1e6)
         return Solved(wrong, np.zeros(count), np.zeros(len(w.starts)), np.ones(count, bool))
-    rows, means = centred(columns, w)
-    target, target_means = centred(problem.recordings.force[w.at][None], w)
     low, high = linear_bounds(problem)
-    linear, at_bound = bounded_solution(rows @ rows.T, rows @ target[0], low, high)
-    offsets = target_means[0] - linear @ means
-    return Solved(target[0] - linear @ rows, linear, offsets, at_bound)
+    linear, at_bound = bounded_solution(rows @ rows.T, rows @ w.target, low, high)
+    return Solved(w.target - linear @ rows, linear, w.target_means - linear @ means, at_bound)
 
 
 def linear_bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
@@ -324,7 +294,7 @@ def _search(problem: Problem, start: FloatArray, iterations: int, tolerance: flo
             break
         else:
             age = OLDEST_JACOBIAN
-    return finish(problem, theta, w, done)
+    return finish(problem, theta, w, found, done)
 
 
 def jacobian_of(
@@ -343,9 +313,8 @@ def jacobian_of(
     return rows
 
 
-def finish(problem: Problem, theta: FloatArray, w: Weighting, iterations: int = 0) -> Fit:
+def finish(problem: Problem, theta: FloatArray, w: Weighting, found: Solved, iterations: int = 0) -> Fit:
     """Return the fit at these searched values; the laws that a coupled form reads are then those of the fit."""
-    found = solve(problem, theta, w)
     if problem.base.form.coupled and np.any(found.linear):
         for _ in range(COUPLING_PASSES):
             laws = problem.base.laws_of(found.linear, problem.values(theta)[0], problem.scales.drive)

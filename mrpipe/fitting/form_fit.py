@@ -14,12 +14,13 @@ from mrpipe.dampers.laws import law_names
 from mrpipe.dampers.model import DamperModel
 from mrpipe.errors import DivergedError
 from mrpipe.fitting.damper import damper_model
-from mrpipe.fitting.engine import Fit, centred, finish, fit, regressors, solve, start_of, weighting
+from mrpipe.fitting.engine import Fit, finish, fit, regressors, solve, start_of
 from mrpipe.fitting.problem import Base, Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import blocks_of
 from mrpipe.fitting.settings import DamperFitSettings
 from mrpipe.fitting.start import BEGUN_STEPS, MORE_POINTS, best_starts, first_problem, followed
+from mrpipe.fitting.weighting import centred, weighting
 
 NELDER_MEAD_ITERATIONS = 1000
 NELDER_MEAD_ERROR = 0.01
@@ -234,15 +235,14 @@ def block_diagonal(blocks: list[FloatArray]) -> FloatArray:
 
 
 def _nrmse(found: Fit) -> float:
-    w = weighting(found.problem)
-    force = centred(found.problem.recordings.force[w.at][None], w)[0][0]
+    force = weighting(found.problem).target
     return float(np.sqrt(found.cost / max(float(force @ force), 1e-300)))
 
 
 def _nelder_mead(problem: Problem, begin: FloatArray) -> Fit:
     w = weighting(problem)
     low, high = problem.bounds()
-    force = centred(problem.recordings.force[w.at][None], w)[0][0]
+    force = w.target
     size = float(np.linalg.norm(force))
     rms = float(np.sqrt(np.mean(problem.recordings.force[w.at] ** 2)))
     error = NELDER_MEAD_ERROR / rms
@@ -258,7 +258,8 @@ def _nelder_mead(problem: Problem, begin: FloatArray) -> Fit:
         if best - found.fun < error:
             break
         best = found.fun
-    return finish(problem, low + np.asarray(end) * (high - low), w)
+    theta = low + np.asarray(end) * (high - low)
+    return finish(problem, theta, w, solve(problem, theta, w))
 
 
 def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -270,14 +271,14 @@ def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray
     problem = found.problem
     w = weighting(problem)
     residual = found.residual[w.at]
-    columns = centred(regressors(problem, found.theta)[:, w.at], w)[0]
+    columns = centred(regressors(problem, found.theta), w)[0]
     calculated = found.linear @ columns
     values = problem.decode(found.theta)
     slopes = []
     for place, value in enumerate(values):
         step = 1e-4 * (abs(value) or problem.scales.of(problem.searched[place][1].scale))
         theta = problem.encode([*values[:place], value + step, *values[place + 1 :]])
-        moved = centred(regressors(problem, theta)[:, w.at], w)[0]
+        moved = centred(regressors(problem, theta), w)[0]
         slopes.append((found.linear @ moved - calculated) / step)
     free = columns
     if problem.base.form.known:

@@ -12,9 +12,10 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.laws import Law, LawShape, constant_law
 from mrpipe.dampers.library import DEFAULT_FORM, base_form
-from mrpipe.fitting.engine import Fit, fit, solve, start_of, weighting
+from mrpipe.fitting.engine import Fit, fit, solve, start_of
 from mrpipe.fitting.problem import Base, Problem
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.weighting import weighting
 
 VARYING_SHARE = 0.05
 """A drive that changes within a test by this share of the largest drive counts as varying."""

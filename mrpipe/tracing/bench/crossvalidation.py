@@ -9,9 +9,10 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
-from mrpipe.fitting.engine import Fit, centred, fit, jacobian_of, predict, regressors, weighting
+from mrpipe.fitting.engine import Fit, fit, jacobian_of, predict, regressors
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.weighting import centred, weighting
 from mrpipe.tracing.bench.residual_structure import BLOCK
 
 BEYOND = 0.01
@@ -136,7 +137,7 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
     residual = found.residual[w.at]
     # the Jacobian of the projected residual gives the searched values; amplitudes are differentiated with them
     searched = jacobian_of(problem, found.theta, residual, w, low, high)
-    linear = centred(regressors(problem, found.theta)[:, w.at], w)[0]
+    linear = centred(regressors(problem, found.theta), w)[0]
     first = problem.base.columns
     deviation, tests = _jackknife(np.concatenate([-searched, linear]), residual, problem.recordings.test[w.at])
     factor = float(stats.t.ppf(0.975, max(tests - 1, 1)))

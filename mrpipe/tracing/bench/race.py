@@ -16,10 +16,11 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.dampers.form import BaseForm
-from mrpipe.fitting.engine import Fit, centred, fit, regressors, start_of, weighting
+from mrpipe.fitting.engine import Fit, fit, regressors, start_of
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.fitting.start import fit_with_form
+from mrpipe.fitting.weighting import centred, weighting
 from mrpipe.tracing.bench.select import Selection, left_of
 from mrpipe.tracing.rules import RaceRules
 
@@ -352,8 +353,7 @@ def _squares(found: Fit, problem: Problem) -> FloatArray:
     """Return the weighted squared error of a model on each test of a problem, its coefficients as they are."""
     whole = found.problem.on_samples_of(problem)
     w = weighting(whole)
-    columns = regressors(whole, found.theta)[:, w.at]
-    error = problem.recordings.force[w.at] - found.linear @ columns
+    error = problem.recordings.force - found.linear @ regressors(whole, found.theta)
     residual = centred(error[None], w)[0][0]
     sums = np.bincount(problem.recordings.test[w.at], weights=residual**2, minlength=problem.recordings.tests)
     return np.asarray(sums, dtype=np.float64)

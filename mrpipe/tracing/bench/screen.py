@@ -12,14 +12,12 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.fitting.engine import (
     Fit,
-    Weighting,
     bounded_solution,
-    centred,
     jacobian_of,
     regressors,
-    weighting,
 )
 from mrpipe.fitting.problem import Problem, Term
+from mrpipe.fitting.weighting import Weighting, centred, weighting
 
 
 @dataclass(frozen=True)
@@ -43,12 +41,27 @@ class Screened:
 
 @dataclass(frozen=True)
 class Tangent:
-    """What refitting the present model can absorb: an orthonormal basis of its weighted tangent, shape (t, m)."""
+    """What refitting the present model can absorb.
+
+    Attributes
+    ----------
+    fit
+        The present model.
+    basis
+        Orthonormal basis of its weighted tangent, shape (t, m).
+    weighting
+        The m samples compared.
+    residual
+        Weighted residual without its part in the tangent, shape (m,).
+    force
+        Force of the present model at all samples, without offsets, shape (n,) [N].
+    """
 
     fit: Fit
     basis: FloatArray
     weighting: Weighting
     residual: FloatArray
+    force: FloatArray
 
 
 def tangent_of(found: Fit) -> Tangent:
@@ -58,14 +71,14 @@ def tangent_of(found: Fit) -> Tangent:
     residual = found.residual[w.at]
     low, high = problem.bounds()
     searched = jacobian_of(problem, found.theta, residual, w, low, high)
-    linear = centred(regressors(problem, found.theta)[:, w.at], w)[0]
-    rows = np.concatenate([linear, searched])
+    columns = regressors(problem, found.theta)
+    rows = np.concatenate([centred(columns, w)[0], searched])
     norms = np.linalg.norm(rows, axis=1, keepdims=True)
     rows = rows[norms[:, 0] > 0] / norms[norms[:, 0] > 0]
     values, vectors = np.linalg.eigh(rows @ rows.T)
     keep = values > 1e-9 * values[-1]
     basis = (vectors[:, keep] / np.sqrt(values[keep])).T @ rows
-    return Tangent(found, basis, w, residual - basis.T @ (basis @ residual))
+    return Tangent(found, basis, w, residual - basis.T @ (basis @ residual), found.linear @ columns)
 
 
 def grid(term: Term, problem: Problem) -> Iterable[dict[str, float]]:
@@ -82,7 +95,7 @@ def sensitivity(term: Term, values: dict[str, float], tangent: Tangent) -> Scree
     problem = replace(found.problem, terms=(*found.problem.terms, term))
     scales = problem.scales
     extended = np.concatenate([found.theta, _encode(term, values, problem)])
-    columns = regressors(problem, extended)[:, w.at]
+    columns = regressors(problem, extended)
     before = len(found.linear)
     count = len(term.form.amplitudes)
     level = False
@@ -96,12 +109,11 @@ def sensitivity(term: Term, values: dict[str, float], tangent: Tangent) -> Scree
         strengths = [item for item in term.form.searched if item.role in ("strength", "level")]
         level = strengths[0].role == "level"
         start = 1.0 if level else values[strengths[0].name]
-        base = found.linear @ regressors(found.problem, found.theta)[:, w.at]
-        rows = ((found.linear @ columns[:before]) - base)[None] / start
+        rows = ((found.linear @ columns[:before]) - tangent.force)[None] / start
         low, high = (np.array([item]) for item in ((0.0, 3.0) if level else strengths[0].bounds(scales)))
-    if not np.all(np.isfinite(rows)):
+    rows, means = centred(rows, w)
+    if not np.all(np.isfinite(means)):
         return Screened(term, 0.0, values)
-    rows = centred(rows, w)[0]
     rows = rows - (rows @ tangent.basis.T) @ tangent.basis
     gram, right = rows @ rows.T, rows @ tangent.residual
     if not np.all(np.diag(gram) > 0.0):

@@ -11,9 +11,10 @@ from typing import TypeVar
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
-from mrpipe.fitting.engine import Fit, fit, solve, start_of, weighting
+from mrpipe.fitting.engine import Fit, fit, solve, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.weighting import weighting
 from mrpipe.tracing.bench.crossvalidation import folds_of
 from mrpipe.tracing.bench.screen import Screened, screen
 from mrpipe.tracing.rules import SelectionRules
