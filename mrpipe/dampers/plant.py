@@ -25,6 +25,7 @@ import numpy as np
 from numba import NumbaExperimentalFeatureWarning, float64, int64, njit, types, void
 
 from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.borrowed import borrowed
 from mrpipe.dampers.timing import look_ahead
 from mrpipe.errors import UserError
 
@@ -303,11 +304,12 @@ def advance(
     """
     memory = state_offsets[-1]
     begin_step(state, memory, wire, dt)
+    kept, numbers = borrowed(state), borrowed(parameters)
     for index in range(parameter_offsets.shape[0] - 1):
         functions[index](
             wire,
-            state[state_offsets[index] : state_offsets[index + 1]],
-            parameters[parameter_offsets[index] : parameter_offsets[index + 1]],
+            kept[state_offsets[index] : state_offsets[index + 1]],
+            numbers[parameter_offsets[index] : parameter_offsets[index + 1]],
             dt,
         )
     end_step(state, memory, wire, dt)

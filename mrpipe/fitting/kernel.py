@@ -10,6 +10,7 @@ import numpy as np
 from numba import float64, int64, njit, void
 
 from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.dampers.borrowed import borrowed
 from mrpipe.dampers.drive import COEFFICIENT_STEPS
 from mrpipe.dampers.plant import (
     ACCELERATION,
@@ -81,7 +82,8 @@ def _run(
 ) -> None:
     memory = state_offsets[-1]
     count = parameter_offsets.shape[0] - 1
-    state = np.zeros(memory + BOOKKEEPING)
+    kept = np.zeros(memory + BOOKKEEPING)
+    state, values = borrowed(kept), borrowed(parameters)
     wire = np.zeros(WIRE_SIZE)
     for test in range(starts.shape[0] - 1):
         step = dt[test]
@@ -102,7 +104,7 @@ def _run(
                 step_at(addresses[k])(
                     wire,
                     state[state_offsets[k] : state_offsets[k + 1]],
-                    parameters[parameter_offsets[k] : parameter_offsets[k + 1]],
+                    values[parameter_offsets[k] : parameter_offsets[k + 1]],
                     step,
                 )
                 if k == coefficients_at:
@@ -123,6 +125,7 @@ def _run(
             result[SUM_VELOCITY_AT, index] = wire[SUM_VELOCITY]
             result[PART_AT, index] = wire[PART]
             result[KNOWN_AT, index] = wire[EXTRA_FORCE]
+    kept[0] = 0.0  # keeps the memory of the state alive until here, because `state` does not
 
 
 def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...] = ()) -> FloatArray:
