@@ -120,6 +120,25 @@ def stage_runner(options: CommonOptions) -> StageRunner:
     return pipeline.runner
 
 
+def _warn_of_another_configuration(options: CommonOptions, loaded: LoadedConfig, directory: Path) -> None:
+    """Say that a run directory was made with another configuration, where the command names none."""
+    from mrpipe.artifacts.yaml_source import read_yaml
+
+    kept = directory / "config.yaml"
+    if options.config is not None or options.campaign is not None or options.quiet or not kept.is_file():
+        return
+    try:
+        name = read_yaml(kept).content.get("name")
+    except UserError:
+        return  # a damaged copy is written anew
+    if name != loaded.config.name:
+        print(
+            f"mrpipe: {directory} was made with the configuration {name}, and this command uses {loaded.config.name}: "
+            f"every stage that it needs is built again with that. To go on with {name}: --config {kept}",
+            file=sys.stderr,
+        )
+
+
 @contextmanager
 def session(options: CommonOptions) -> Iterator[Pipeline]:
     """Yield a pipeline that holds its run directory."""
@@ -128,6 +147,7 @@ def session(options: CommonOptions) -> Iterator[Pipeline]:
     loaded = load(options)
     directory = run_directory(options, loaded)
     with run_lock(directory):
+        _warn_of_another_configuration(options, loaded, directory)
         pipeline = pipeline_of(options, loaded)
         pipeline.write_config()
         yield pipeline
