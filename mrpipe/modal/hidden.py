@@ -6,13 +6,13 @@ excites shows only when all lines are used and the clocks of the sensors are cor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from mrpipe.modal.multimode import MultiModeFit, fit_modes
-from mrpipe.modal.pursuit import hidden_poles
+from mrpipe.modal.pursuit import sets_of_poles
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.search import ModeSearch, bands_to_try
 from mrpipe.modal.selection import (
@@ -28,6 +28,8 @@ from mrpipe.modal.spectra import RecordSpectrum, record_spectrum, thinned
 _LINES = 24000
 _ROUNDS = 2
 _SPARE = 2
+_SETS = 2
+"""So many sets of hidden poles are tried: the best pole of a gap may be what a strong mode leaves near its peak."""
 _BAND = 1.25
 _UNCERTAIN = 0.02
 """Relative standard error of a damping ratio from which all lines are used, and from which a mode may be replaced."""
@@ -90,7 +92,8 @@ def contested(search: ModeSearch, tests: Sequence[FrameTest], layout: Layout) ->
     if certainty(search.fit).min() > 1.0 / _UNCERTAIN:
         return search
     spectra = _spectra(search, tests)
-    known, fit = _with_hidden(search, spectra, _SPARE)
+    known, fits = _with_hidden(search, spectra, _SPARE)
+    fit = next(fits, None)
     if fit is None:
         return search
     numbered = _chosen(fit, layout)
@@ -118,7 +121,9 @@ def sharpened(search: ModeSearch, tests: Sequence[FrameTest]) -> ModeSearch:
     used = sum(item.omega.size for item in search.fit.spectra)
     if not uncertain or sum(item.omega.size for item in spectra) < 1.3 * used:
         return search
-    fit = fit_modes(spectra, search.fit.angular_frequencies, search.fit.damping_ratios, passes=2, evaluations=8)
+    fit = fit_modes(
+        spectra, search.fit.angular_frequencies, search.fit.damping_ratios, passes=2, evaluations=8, near=True
+    )
     near = np.abs(fit.angular_frequencies / search.fit.angular_frequencies - 1.0) < _SAME
     return replace(search, fit=fit) if near.all() else search
 
@@ -132,30 +137,40 @@ def _spectra(search: ModeSearch, tests: Sequence[FrameTest], top_hz: float = np.
 
 def _with_hidden(
     search: ModeSearch, spectra: Sequence[RecordSpectrum], number: int
-) -> tuple[MultiModeFit, MultiModeFit | None]:
-    """Return the fit of the modes found, and that with up to `number` hidden poles; None where there are none."""
-    known = fit_modes(spectra, search.fit.angular_frequencies, search.fit.damping_ratios, passes=2, evaluations=4)
+) -> tuple[MultiModeFit, Iterator[MultiModeFit]]:
+    """Return the fit of the modes found, and fits with up to `number` hidden poles: of each set of poles one."""
+    known = fit_modes(
+        spectra, search.fit.angular_frequencies, search.fit.damping_ratios, passes=2, evaluations=4, near=True
+    )
     band = (2.0 * np.pi * 1.05 * search.band_hz[0], 0.99 * float(max(item.omega[-1] for item in spectra)))
-    extra = hidden_poles(known, band, number)
-    if not extra:
-        return known, None
-    omega = np.concatenate([known.angular_frequencies, [item.angular_frequency for item in extra]])
-    zeta = np.concatenate([known.damping_ratios, [item.damping_ratio for item in extra]])
-    return known, fit_modes(spectra, omega, zeta, passes=2, evaluations=10)
+
+    def fits() -> Iterator[MultiModeFit]:
+        for extra in sets_of_poles(known, band, number)[:_SETS]:
+            omega = np.concatenate([known.angular_frequencies, [item.angular_frequency for item in extra]])
+            zeta = np.concatenate([known.damping_ratios, [item.damping_ratio for item in extra]])
+            yield _in_band(fit_modes(spectra, omega, zeta, passes=2, evaluations=10, near=True))
+
+    return known, fits()
+
+
+def _in_band(fit: MultiModeFit) -> MultiModeFit:
+    """Return the fit without poles beyond its lines: such a pole stands for all that lies there."""
+    lines = np.concatenate([item.omega for item in fit.spectra])
+    omega = fit.angular_frequencies
+    return fit.only(np.flatnonzero((omega >= lines.min()) & (omega <= lines.max())).tolist())
 
 
 def _with_more(
     search: ModeSearch, spectra: Sequence[RecordSpectrum], layout: Layout, missing: int
 ) -> ModeSearch | None:
     """Return a larger set of modes; None where the spectra support none."""
-    _, fit = _with_hidden(search, spectra, missing + _SPARE)
-    if fit is None:
-        return None
-    numbered = _chosen(fit, layout)
-    if len(numbered) <= len(search.numbers):
-        return None
-    found = _refitted(search, spectra, fit, numbered, layout)
-    return found if found is not None and len(found.numbers) > len(search.numbers) else None
+    for fit in _with_hidden(search, spectra, missing + _SPARE)[1]:
+        numbered = _chosen(fit, layout)
+        if len(numbered) > len(search.numbers):
+            found = _refitted(search, spectra, fit, numbered, layout)
+            if found is not None and len(found.numbers) > len(search.numbers):
+                return found
+    return None
 
 
 def _chosen(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
@@ -171,7 +186,8 @@ def _refitted(
 ) -> ModeSearch | None:
     """Fit the modes without the poles that are not modes; None where that makes one of them doubtful."""
     keep = sorted(numbered)
-    refined = fit_modes(spectra, fit.angular_frequencies[keep], fit.damping_ratios[keep], passes=2, evaluations=10)
+    omega, zeta = fit.angular_frequencies[keep], fit.damping_ratios[keep]
+    refined = _in_band(fit_modes(spectra, omega, zeta, passes=2, evaluations=10, near=True))
     again = _chosen(refined, layout)
     if contradicts(refined, layout) or len(again) < len(keep):
         return None

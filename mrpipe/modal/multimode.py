@@ -298,6 +298,7 @@ def fit_modes(
     *,
     passes: int = 3,
     evaluations: int = 30,
+    near: bool = False,
 ) -> MultiModeFit:
     """Fit the modes of all outputs of all tests together, from a first guess of the poles.
 
@@ -311,10 +312,15 @@ def fit_modes(
         Fits with weights renewed from the residuals of the one before.
     evaluations
         Bound on the evaluations of a pass.
+    near
+        Whether the guess is near the result: then the first pass has weights from its residuals. Without them the lines
+        near strong peaks outweigh a mode without a peak.
     """
     order = np.argsort(angular_frequencies)
     guess = np.concatenate([np.log(angular_frequencies[order]), np.log(np.clip(damping_ratios[order], 1e-5, 0.3))])
     fit = ProjectedFit(spectra, angular_frequencies.size)
+    if near:
+        fit.renew_weights(guess)
     return collected(fit, spectra, fitted_poles(fit, guess, passes, evaluations))
 
 

@@ -20,6 +20,8 @@ from mrpipe.modal.spectra import ComplexArray, RecordSpectrum
 _TRIAL_DAMPING = (0.003, 0.012)
 _LEAST_LINES = 12
 _NEIGHBOURS = 3
+_HALF_WIDTHS = 6.0
+"""A pole is judged by the lines within so many half-power half-widths."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,7 @@ def _residuals(fit: MultiModeFit) -> list[ComplexArray]:
 
 def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, zeta: float) -> float:
     """Return the improvement of the criterion by a pole, from the lines around it."""
-    line = max(float(np.median(np.diff(item.omega))) for item in fit.spectra)
-    half = max(6.0 * zeta * omega, _LEAST_LINES * line)
+    half = _half_width(HiddenPole(omega, zeta, 0.0), _line(fit))
     pairs = [
         _between(item, residual, omega - half, omega + half)
         for item, residual in zip(fit.spectra, residuals, strict=True)
@@ -106,6 +107,44 @@ def _unit(columns: FloatArray) -> FloatArray:
 
 def hidden_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: int) -> list[HiddenPole]:
     """Return up to `number` poles that the residual of a fit supports, best first, one between two known modes."""
+    return next(iter(sets_of_poles(fit, band_rad_s, number)), [])
+
+
+def sets_of_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: int) -> list[list[HiddenPole]]:
+    """Return sets of up to `number` poles that the residual of a fit supports.
+
+    A set has one pole between two known modes, because what a strong mode leaves near its peak must not take all
+    places. The first set has the best pole of each gap. It may be such a remainder, so that the second set has the best
+    pole that the same lines do not explain, and so on.
+
+    Parameters
+    ----------
+    fit
+        Of the known modes.
+    band_rad_s
+        Where poles are tried [rad/s].
+    number
+        Most poles of a set.
+    """
+    line = _line(fit)
+    gaps: dict[int, list[HiddenPole]] = {}
+    sets: list[list[HiddenPole]] = []
+    for pole in sorted(_tried(fit, band_rad_s), key=lambda item: -item.gain):
+        omega = pole.angular_frequency
+        taken = gaps.setdefault(int(np.searchsorted(fit.angular_frequencies, omega)), [])
+        explained = any(abs(omega - other.angular_frequency) < _half_width(other, line) for other in taken)
+        if pole.gain <= 0.0 or explained:
+            continue
+        taken.append(pole)
+        if len(taken) > len(sets):
+            sets.append([])
+        if len(sets[len(taken) - 1]) < number:
+            sets[len(taken) - 1].append(pole)
+    return sets
+
+
+def _tried(fit: MultiModeFit, band_rad_s: tuple[float, float]) -> list[HiddenPole]:
+    """Return a pole at each frequency of a fine grid that is not at a known mode."""
     residuals = _residuals(fit)
     tried: list[HiddenPole] = []
     for zeta in _TRIAL_DAMPING:
@@ -114,15 +153,14 @@ def hidden_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: int
             distance = np.abs(fit.angular_frequencies - omega)
             if np.all(distance > np.maximum(fit.damping_ratios * fit.angular_frequencies, 0.002 * omega)):
                 tried.append(HiddenPole(float(omega), zeta, _gain(fit, residuals, float(omega), zeta)))
-    chosen: list[HiddenPole] = []
-    gaps: set[int] = set()
-    for pole in sorted(tried, key=lambda item: -item.gain):
-        omega = pole.angular_frequency
-        # one pole between two known modes: what a strong mode leaves near its peak must not take all places
-        gap = int(np.searchsorted(fit.angular_frequencies, omega))
-        if pole.gain > 0.0 and gap not in gaps:
-            chosen.append(pole)
-            gaps.add(gap)
-        if len(chosen) == number:
-            break
-    return chosen
+    return tried
+
+
+def _half_width(pole: HiddenPole, line: float) -> float:
+    """Return half the width of the lines that judge a pole [rad/s]; `line` is the distance of two lines [rad/s]."""
+    return max(_HALF_WIDTHS * pole.damping_ratio * pole.angular_frequency, _LEAST_LINES * line)
+
+
+def _line(fit: MultiModeFit) -> float:
+    """Return the distance of two lines of the coarsest spectrum [rad/s]."""
+    return max(float(np.median(np.diff(item.omega))) for item in fit.spectra)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mrpipe.modal import pursuit
 from mrpipe.modal.multimode import MultiModeFit, fit_modes
-from mrpipe.modal.pursuit import hidden_poles
+from mrpipe.modal.pursuit import HiddenPole, hidden_poles, sets_of_poles
 from mrpipe.modal.spectra import record_spectrum
 from mrpipe.structures import complex_modes, frame_from_parameter_set
 from tests.modal.rig import Rig, random_test
@@ -46,3 +47,18 @@ def test_a_complete_fit_leaves_no_pole_of_weight(spectrum) -> None:
     complete = hidden_poles(_fit(spectrum, [0, 1, 2, 3, 4]), BAND, 3)
     partial = hidden_poles(_fit(spectrum, [0, 1, 2, 4]), BAND, 1)
     assert max((pole.gain for pole in complete), default=0.0) < 0.05 * partial[0].gain
+
+
+def test_the_second_set_has_what_the_best_pole_of_a_gap_does_not_explain(spectrum, monkeypatch) -> None:
+    """The remainder of a strong mode near its peak took the place of a hidden mode in the same gap (tower 312)."""
+    fit = _fit(spectrum, [0, 2, 4])
+    first, second, third = 2.0 * np.pi * np.array([1.29, 3.85, 7.94])
+    tried = [HiddenPole(first, 0.012, 200.0), HiddenPole(1.02 * first, 0.012, 150.0), HiddenPole(second, 0.003, 100.0)]
+    tried += [HiddenPole(third, 0.003, 50.0), HiddenPole(0.7 * third, 0.003, -5.0)]
+    monkeypatch.setattr(pursuit, "_tried", lambda *_: tried)
+    sets = [[pole.angular_frequency for pole in chosen] for chosen in sets_of_poles(fit, BAND, 2)]
+    assert sets == [[first, third], [second]]
+    assert [[pole.angular_frequency for pole in chosen] for chosen in sets_of_poles(fit, BAND, 1)] == [
+        [first],
+        [second],
+    ]
