@@ -135,16 +135,49 @@ def assess(
     return Assessment(named, likely, further, missing, found, alone, judgement)
 
 
-def unlikely(found: Assessment, rules: NamingRules) -> tuple[int, ...]:
+def with_likely_names(
+    selection: Selection, case: Case, gains: Sequence[Gain | None], reason: str, rng: np.random.Generator
+) -> tuple[Selection, Assessment]:
+    """Return the selection with the names that are more likely there than absent, and its assessment.
+
+    A name that is too unlikely goes, and its effect becomes a further term. That changes the probabilities of the other
+    names, so that they are assessed again until every one is likely enough. Further terms that do not lower the error
+    on the validation tests are left out.
+
+    Parameters
+    ----------
+    selection, case
+        What is assessed.
+    gains
+        Of the named effects on left-out tests.
+    reason
+        Why nothing is named, where that is already known.
+    rng
+        For intervals.
+    """
+    assessed = assess(selection, case, gains, reason, rng)
+    several = len(assessed.named) > 1
+    doubts: list[Named] = []
+    while (places := _unlikely(assessed, case.options)) or assessed.further_terms_fail:
+        if places:
+            doubts += [assessed.causes[k] for k in places]
+            selection, gains = without_names(selection, gains, places, case.declared)
+            reason = "" if selection.proven else _unlikely_reason(doubts)
+        else:
+            selection = selection.with_named_alone
+        assessed = assess(selection, case, gains, reason, rng, several=several)
+    return selection, assessed
+
+
+def _unlikely(found: Assessment, rules: NamingRules) -> tuple[int, ...]:
     """Return the places of the named terms that are less likely there than `least_probability`."""
     return tuple(k for k in range(len(found.named)) if found.causes[k].confidence < rules.least_probability)
 
 
-def unlikely_reason(found: Assessment, places: Sequence[int]) -> str:
+def _unlikely_reason(doubts: Sequence[Named]) -> str:
     """Return why nothing is named, where every name is too unlikely."""
-    names = ", ".join(f"{found.causes[k].effect.name} (probability {found.causes[k].confidence:.2f})" for k in places)
-    one = len(places) == 1
-    said = "lowers the error, but is" if one else "lower the error, but each of them is"
+    names = ", ".join(f"{item.effect.name} (probability {item.confidence:.2f})" for item in doubts)
+    said = "lowers the error, but is" if len(doubts) == 1 else "lower the error, but each of them is"
     return f"no effect is named: {names} {said} more likely absent than present"
 
 

@@ -13,7 +13,7 @@ from mrpipe.effects.contract import Effect
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import MOST_JUDGED, Recordings, enough_tests, spread_tests
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.assess import Case, assess, unlikely, unlikely_reason, without_names
+from mrpipe.tracing.bench.assess import Case, with_likely_names
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.choose import Choice, judged_by_trees
 from mrpipe.tracing.bench.chosen import Bench, begin, choose, recorded
@@ -111,15 +111,7 @@ def trace_campaign(
         least_ratio=rules.offsets.clear if reason and selection.structured else 0.0,
     )
     case = Case(choice, training, validation, options, ordered, len(declared), offsets, jobs)
-    assessed = assess(selection, case, gains, reason, rng)
-    several, places = len(assessed.named) > 1, unlikely(assessed, options)
-    if places:
-        selection, gains = without_names(selection, gains, places, len(declared))
-        reason = "" if selection.proven else unlikely_reason(assessed, places)
-        assessed = assess(selection, case, gains, reason, rng, several=several)
-    if assessed.further_terms_fail:
-        selection = selection.with_named_alone
-        assessed = assess(selection, case, gains, reason, rng, several=several)
+    selection, assessed = with_likely_names(selection, case, gains, reason, rng)
     causes, further, found, judgement = assessed.causes, assessed.further, assessed.found, assessed.judgement
     if causes and judgement.evidence.after >= judgement.evidence.before:
         # what does not lower the error on the validation tests is not named

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mrpipe.effects.library import damper_effects
-from mrpipe.fitting.engine import fit, start_of
+from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
-from mrpipe.tracing.bench.assess import without_names
+from mrpipe.tracing.bench import assess as module
+from mrpipe.tracing.bench.assess import with_likely_names, without_names
 from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.trace import trace_campaign
 from mrpipe.tracing.options import TracingOptions
@@ -45,7 +47,8 @@ def test_a_further_term_that_does_not_lower_the_error_on_validation_is_left_out(
     assert found["after"]["nrmse"] <= 1.01 * found["before"]["nrmse"]
 
 
-def test_the_term_that_loses_its_name_stands_behind_the_others() -> None:
+def _two_terms() -> tuple[Fit, Fit]:
+    """Return a fit without effects, and one with two."""
     plain, library = plain_fit("accumulator"), damper_effects()
     terms = tuple(Term(library[name], library[name].forms[0]) for name in ("inertia", "accumulator"))
     starts = [term.form.without_strength(plain.problem.scales) for term in terms]
@@ -54,9 +57,32 @@ def test_the_term_that_loses_its_name_stands_behind_the_others() -> None:
             if item.role == "strength":
                 values[item.name] = item.start_values(plain.problem.scales)[0]
     problem = replace(plain.problem, terms=terms)
-    chosen = fit(problem, start_of(problem, plain.base_values, starts), iterations=10)
+    return plain, fit(problem, start_of(problem, plain.base_values, starts), iterations=10)
+
+
+def test_the_term_that_loses_its_name_stands_behind_the_others() -> None:
+    plain, chosen = _two_terms()
     kept, gains = without_names(Selection(plain, 1.0, (), chosen, proven=2), [None, None], [0], 0)
     assert [item.effect.name for item in kept.chosen.problem.terms] == ["accumulator", "inertia"]
     assert [item.effect.name for item in kept.with_named_alone.chosen.problem.terms] == ["accumulator"]
     assert (kept.proven, gains) == (1, [None])
     assert kept.chosen.chi_square == pytest.approx(chosen.chi_square, rel=1e-3)
+
+
+def test_the_names_that_stay_are_judged_again_when_another_one_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without Stribeck friction an end stop had the probability 0.15, and was still named."""
+    plain, chosen = _two_terms()
+    likely = [(0.9, 0.3), (0.15,), ()]
+
+    def assess(selection, case, gains, reason, rng, *, several=False):
+        assert several is (len(likely) < 3)
+        terms = selection.chosen.problem.terms
+        causes = [SimpleNamespace(effect=t.effect, confidence=c) for t, c in zip(terms, likely.pop(0), strict=False)]
+        return SimpleNamespace(named=causes, causes=causes, further_terms_fail=False, reason=reason)
+
+    monkeypatch.setattr(module, "assess", assess)
+    case = SimpleNamespace(options=TracingOptions(), declared=0)
+    selection = Selection(plain, 1.0, (), chosen, proven=2)
+    kept, found = with_likely_names(selection, case, [None, None], "", np.random.default_rng(1))
+    assert (kept.proven, likely, found.named) == (0, [], [])
+    assert "accumulator (probability 0.30), inertia (probability 0.15) lower the error" in found.reason
