@@ -27,7 +27,7 @@ def load(options: CommonOptions) -> LoadedConfig:
     if options.seed is not None:
         overrides.append(f"seed={options.seed}")
     if options.campaign is not None:
-        overrides = [*_of_campaign(options.campaign), *overrides]
+        overrides = [*_of_campaign(options.campaign, default=options.config is None), *overrides]
     path = options.config or default_config_path()
     if options.config is None and options.campaign is None and not options.quiet and not Path("configs").is_dir():
         print(
@@ -38,8 +38,12 @@ def load(options: CommonOptions) -> LoadedConfig:
     return load_config(path, overrides, options.settings)
 
 
-def _of_campaign(path: Path) -> list[str]:
-    """Return the settings that a campaign on the command line stands for: its place, and the run's name and title."""
+def _of_campaign(path: Path, *, default: bool) -> list[str]:
+    """Return the settings that a campaign on the command line stands for: its place, and the run's name and title.
+
+    The default configuration does not look for modes over amplitude, because its virtual frame is linear. A measured
+    frame may depend on the amplitude, so that the search is on where `default` says that no configuration was named.
+    """
     import json
     import re
 
@@ -47,12 +51,14 @@ def _of_campaign(path: Path) -> list[str]:
 
     name = read_header(path).campaign
     stem = re.sub(r"[^\w.+-]+", "-", name).strip("-.") or "campaign"
-    settings = {
+    settings: dict[str, str | bool] = {
         f"campaigns.{rig_key(path)}": _absolute(path),
         "name": stem,
         "description": f"Measured campaign {name}.",
         "report.title": name,
     }
+    if default and rig_key(path) == "frame":
+        settings["identify_frame.amplitude_dependence"] = True
     return [f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in settings.items()]
 
 

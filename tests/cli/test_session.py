@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mrpipe.cli.options import CommonOptions
-from mrpipe.cli.session import session
+from mrpipe.cli.session import load, session
 
 
 @pytest.mark.property
@@ -32,3 +32,32 @@ def test_a_run_of_the_same_configuration_is_continued_in_silence(
         with session(CommonOptions(run=tmp_path)):
             pass
     assert "was made with" not in capsys.readouterr().err
+
+
+_FRAME = """campaign: tower
+rig: shear-frame
+sampling_rate_hz: 200.0
+declared_effects: []
+frame: {floor_masses_kg: [5.95]}
+channels:
+  ground_acceleration: {column: a, unit: m/s^2, scale: 1.0}
+  floor_acceleration_1: {column: b, unit: m/s^2, scale: 1.0}
+tests:
+- {name: sweep, file: sweep.h5, role: training, kind: sweep}
+"""
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    ("named", "overrides", "searched"), [(False, [], True), (True, [], False), (False, ["x"], False)]
+)
+def test_modes_over_amplitude_are_looked_for_in_a_measured_frame(
+    named: bool, overrides: list[str], searched: bool, tmp_path: Path
+) -> None:
+    """The default configuration does not look for them, because its virtual frame is linear."""
+    (tmp_path / "campaign.yaml").write_text(_FRAME)
+    given = tmp_path / "given.yaml"
+    given.write_text("name: given\nidentify_frame: {amplitude_dependence: false}\n")
+    changes = ["identify_frame.amplitude_dependence=false"] if overrides else []
+    options = CommonOptions(config=given if named else None, campaign=tmp_path, overrides=changes)
+    assert load(options).config.identify_frame.amplitude_dependence is searched
