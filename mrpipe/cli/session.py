@@ -49,17 +49,17 @@ def _of_campaign(path: Path, *, default: bool) -> list[str]:
 
     from mrpipe.campaigns.header import read_header
 
-    name = read_header(path).campaign
+    name, key = read_header(path).campaign, rig_key(path)
     stem = re.sub(r"[^\w.+-]+", "-", name).strip("-.") or "campaign"
     settings: dict[str, str | bool] = {
-        f"campaigns.{rig_key(path)}": _absolute(path),
+        f"campaigns.{key}": _absolute(path),
         "name": stem,
         "description": f"Measured campaign {name}.",
         "report.title": name,
     }
-    if default and rig_key(path) == "frame":
+    if default and key == "frame":
         settings["identify_frame.amplitude_dependence"] = True
-    return [f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in settings.items()]
+    return [f"{setting}={json.dumps(value, ensure_ascii=False)}" for setting, value in settings.items()]
 
 
 def _absolute(path: Path) -> str:

@@ -14,14 +14,13 @@ from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.laws import LawShape
 from mrpipe.fitting.drive_laws import LawChoice, choose_laws
 from mrpipe.fitting.engine import fit, regressors
-from mrpipe.fitting.form_fit import FitMethod, FormFit, fit_form, form_problem
+from mrpipe.fitting.form_fit import FitMethod, FormFit, fit_form, form_problem, nrmse_of
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import bench_recordings, blocks_of, thinned
 from mrpipe.fitting.scoring import PooledScore, TestScore, pool, score_tests
 from mrpipe.fitting.settings import DamperFitSettings
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
-from mrpipe.fitting.weighting import weighting
 from mrpipe.signals.prepared import PreparedTest
 
 T = TypeVar("T")
@@ -264,8 +263,7 @@ def _drafts(
         problem = form_problem(small, base_of(small, form, laws), offsets=options.offsets)
         # one start is enough to rank: forms that may win are searched further on all samples
         found = best_fit(problem, starts=1)
-        force = weighting(problem).target
-        return float(np.sqrt(found.cost / max(float(force @ force), 1e-300))), found.base_values
+        return nrmse_of(found), found.base_values
 
     found = _each(draft, forms, jobs, lambda done, text: progress(0.4 * done, f"rank {text}"))
     names = [form.name for form in forms]

@@ -169,7 +169,7 @@ def fit_form(
         else:
             ends.append(fit(problem, begin, iterations=method.iterations, tolerance=1e-7))
     ends.sort(key=lambda item: item.cost)
-    return form_fit(ends[0], method, drive_unit, tuple(_nrmse(end) for end in ends))
+    return form_fit(ends[0], method, drive_unit, tuple(nrmse_of(end) for end in ends))
 
 
 def _begins(problem: Problem, method: FitMethod) -> list[FloatArray]:
@@ -196,12 +196,12 @@ def form_fit(found: Fit, method: FitMethod, drive_unit: str, start_nrmse: tuple[
     return FormFit(
         fit=found,
         model=damper_model(found, drive_unit, assumed_eta=method.assumed_eta),
-        training_nrmse=_nrmse(found),
+        training_nrmse=nrmse_of(found),
         covariance=covariance,
         names=names,
         correlation=correlation,
         at_bound=bound,
-        start_nrmse=start_nrmse or (_nrmse(found),),
+        start_nrmse=start_nrmse or (nrmse_of(found),),
     )
 
 
@@ -234,7 +234,8 @@ def block_diagonal(blocks: list[FloatArray]) -> FloatArray:
     return matrix
 
 
-def _nrmse(found: Fit) -> float:
+def nrmse_of(found: Fit) -> float:
+    """Return the weighted residual of a fit over the weighted force, both without the offset of each test."""
     force = weighting(found.problem).target
     return float(np.sqrt(found.cost / max(float(force @ force), 1e-300)))
 
@@ -242,8 +243,7 @@ def _nrmse(found: Fit) -> float:
 def _nelder_mead(problem: Problem, begin: FloatArray) -> Fit:
     w = weighting(problem)
     low, high = problem.bounds()
-    force = w.target
-    size = float(np.linalg.norm(force))
+    size = float(np.linalg.norm(w.target))
     rms = float(np.sqrt(np.mean(problem.recordings.force[w.at] ** 2)))
     error = NELDER_MEAD_ERROR / rms
     options = {"maxiter": NELDER_MEAD_ITERATIONS, "fatol": 0.01 * error, "xatol": 1e-4}

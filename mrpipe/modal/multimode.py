@@ -313,8 +313,7 @@ def fit_modes(
     evaluations
         Bound on the evaluations of a pass.
     near
-        Whether the guess is near the result: then the first pass has weights from its residuals. Without them the lines
-        near strong peaks outweigh a mode without a peak.
+        The first pass has weights from the residuals of the guess; else strong peaks outweigh a mode without a peak.
     """
     order = np.argsort(angular_frequencies)
     guess = np.concatenate([np.log(angular_frequencies[order]), np.log(np.clip(damping_ratios[order], 1e-5, 0.3))])

@@ -60,7 +60,7 @@ def _residuals(fit: MultiModeFit) -> list[ComplexArray]:
 
 def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, zeta: float) -> float:
     """Return the improvement of the criterion by a pole, from the lines around it."""
-    half = _half_width(HiddenPole(omega, zeta, 0.0), _line(fit))
+    half = _half_width(omega, zeta, _line(fit))
     pairs = [
         _between(item, residual, omega - half, omega + half)
         for item, residual in zip(fit.spectra, residuals, strict=True)
@@ -132,7 +132,10 @@ def sets_of_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: in
     for pole in sorted(_tried(fit, band_rad_s), key=lambda item: -item.gain):
         omega = pole.angular_frequency
         taken = gaps.setdefault(int(np.searchsorted(fit.angular_frequencies, omega)), [])
-        explained = any(abs(omega - other.angular_frequency) < _half_width(other, line) for other in taken)
+        explained = any(
+            abs(omega - other.angular_frequency) < _half_width(other.angular_frequency, other.damping_ratio, line)
+            for other in taken
+        )
         if pole.gain <= 0.0 or explained:
             continue
         taken.append(pole)
@@ -156,9 +159,9 @@ def _tried(fit: MultiModeFit, band_rad_s: tuple[float, float]) -> list[HiddenPol
     return tried
 
 
-def _half_width(pole: HiddenPole, line: float) -> float:
+def _half_width(omega: float, zeta: float, line: float) -> float:
     """Return half the width of the lines that judge a pole [rad/s]; `line` is the distance of two lines [rad/s]."""
-    return max(_HALF_WIDTHS * pole.damping_ratio * pole.angular_frequency, _LEAST_LINES * line)
+    return max(_HALF_WIDTHS * zeta * omega, _LEAST_LINES * line)
 
 
 def _line(fit: MultiModeFit) -> float:
