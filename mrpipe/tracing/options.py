@@ -55,6 +55,11 @@ class NamingRules(Section):
         ((0.0, 0.0), (0.8, 0.17), (0.95, 0.75), (1.0, 0.75)),
         description="The same for each of several named effects: one of them may correct the form of another.",
     )
+    calibration_of_part: tuple[tuple[float, float], ...] = Field(
+        ((0.0, 0.0), (0.5, 0.4), (0.75, 0.63), (1.0, 0.63)),
+        description="The same for an effect that is named alone but explains only part of what is missing: on the "
+        "planted benchmark 4 of 6 such effects were there, the others were shapes outside the library.",
+    )
     noise_share: float = Field(
         0.1,
         ge=0.0,
@@ -62,7 +67,7 @@ class NamingRules(Section):
         "is not known better.",
     )
 
-    @field_validator("calibration", "calibration_of_several")
+    @field_validator("calibration", "calibration_of_several", "calibration_of_part")
     @classmethod
     def _calibration_rises(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
         evidence, probability = zip(*value, strict=True) if value else ((), ())

@@ -131,7 +131,7 @@ def assess(
         alone = validated(selection.base, proven.chosen, baseline, case.training, case.validation, options, differ)
     judgement = judged(alone, proven, case.training, options, causes, missing, reason, case.ordered, case.jobs)
     several = several or len(named) > 1
-    likely = tuple(held(item, judgement, options, several=several and item in named) for item in causes)
+    likely = tuple(held(item, judgement, options, several=several, chosen=item in named) for item in causes)
     return Assessment(named, likely, further, missing, found, alone, judgement)
 
 

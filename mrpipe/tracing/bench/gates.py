@@ -100,10 +100,29 @@ def structured(
     return learnt or structure_p_value(base.residual, states_of(base, training)) < options.rules.validation.whiteness
 
 
-def held(item: Named, judgement: Judgement, rules: NamingRules, *, several: bool) -> Named:
-    """Return an effect with its confidence as a probability; `several` if it is named together with others.
+def held(item: Named, judgement: Judgement, rules: NamingRules, *, several: bool, chosen: bool = True) -> Named:
+    """Return an effect with its confidence as a probability.
 
-    The evidence is lowered by the share that is not recovered on the validation tests.
+    Parameters
+    ----------
+    item
+        The effect with its evidence.
+    judgement
+        The verdict on the validation tests.
+    rules
+        They hold the probabilities.
+    several
+        Whether the effect is named together with others.
+    chosen
+        Whether it was chosen among the effects of the library; offsets of tests are measured, not chosen.
+
+    Notes
+    -----
+    The evidence is lowered by the share that is not recovered on the validation tests. An effect that explains only
+    part of what is missing may stand for one that the library lacks, so that its probability is another one.
     """
-    share = 1.0 if judgement.verdict.kind == "explained" else judgement.evidence.share
-    return replace(item, confidence=calibrated(item.confidence * share, rules, several=several))
+    kind = judgement.verdict.kind
+    evidence = item.confidence * (1.0 if kind == "explained" else judgement.evidence.share)
+    partly = chosen and kind == "partly explained"
+    probability = calibrated(evidence, rules, several=several and chosen, partly=partly)
+    return replace(item, confidence=probability)

@@ -55,8 +55,8 @@ class Evidence:
         Whether effects are named.
     base_changed
         Whether another base form than the declared one is taken.
-    events
-        Of single events that do not repeat when motion and drive repeat.
+    events, disturbance
+        Of single events, and of a force that grows with the speed, which do not repeat when motion and drive repeat.
     """
 
     before: float
@@ -68,14 +68,16 @@ class Evidence:
     effects: bool
     base_changed: bool = False
     events: float = 0.0
+    disturbance: float = 0.0
 
-    def eventful(self, rules: ValidationRules) -> bool:
-        """Return whether most of the error beyond noise is due to events that do not repeat.
+    def unrepeatable(self, rules: ValidationRules) -> bool:
+        """Return whether most of the error beyond noise is due to forces that do not repeat.
 
-        No model of motion and drive can learn such events, so its ceiling does not show that nothing is missing.
+        No model of motion and drive can learn such forces, so its ceiling does not show that nothing is missing.
         """
         excess = self.after**2 - self.floor**2
-        return self.after > rules.noise_floors * self.floor and self.events**2 >= rules.accounts * excess
+        unrepeated = self.events**2 + self.disturbance**2
+        return self.after > rules.noise_floors * self.floor and unrepeated >= rules.accounts * excess
 
     @property
     def share(self) -> float:
@@ -101,7 +103,7 @@ def classify(evidence: Evidence, rules: ValidationRules) -> VerdictClass:
         return "unknown"
     explained = reached(evidence, rules)
     if evidence.base_changed and not evidence.effects:
-        accounts = evidence.share >= rules.accounts and not evidence.eventful(rules)
+        accounts = evidence.share >= rules.accounts and not evidence.unrepeatable(rules)
         # a ceiling far above the noise shows what flexible models learn from motion and drive, not that nothing is left
         beyond = evidence.structured and evidence.after > rules.noise_floors * evidence.floor
         return "base form" if (explained or accounts) and not beyond else "unknown"
@@ -112,7 +114,7 @@ def reached(evidence: Evidence, rules: ValidationRules) -> bool:
     """Return whether the error is at the noise floor, or at the ceiling on every validation test."""
     if evidence.after <= rules.within_floors * evidence.floor:
         return True
-    if evidence.eventful(rules):
+    if evidence.unrepeatable(rules):
         return False
     return bool(evidence.conditions) and all(item.explained(rules) for item in evidence.conditions)
 

@@ -18,7 +18,7 @@ from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, worst
 from mrpipe.tracing.bench.nuisances import RecordGain, record_gains
 from mrpipe.tracing.bench.residual_structure import correlation_p_value
 from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, training_agreements
-from mrpipe.tracing.bench.weights import noise_variances
+from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, noise_variances
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Comparable, Verdict
 
@@ -46,8 +46,8 @@ class OnValidation:
         Whether every test has its own offset.
     gains
         Gain of each test by the final model.
-    events
-        Root mean square of the force of events that do not repeat in repeated training motion [N].
+    scale
+        Noise in repeated training motion, and the force that does not repeat there and is not noise.
     """
 
     recordings: Recordings
@@ -59,7 +59,7 @@ class OnValidation:
     noise_components: dict[str, float]
     own_offsets: bool
     gains: dict[str, RecordGain]
-    events: float = 0.0
+    scale: NoiseScale = AS_SHOWN
 
     @property
     def score_before(self) -> Score:
@@ -153,7 +153,7 @@ def on_validation(
     }
     components = {name: float(np.sqrt(np.mean(values[used]))) / power for name, values in parts.items()}
     return OnValidation(
-        recordings, validation, judged.measured, before, after, floor, components, shared is None, gains, scale.events
+        recordings, validation, judged.measured, before, after, floor, components, shared is None, gains, scale
     )
 
 
@@ -290,6 +290,7 @@ def _evidence(
                 upper,
             )
         )  # fmt: skip
+    power = max(_rms(found.measured[part & found.recordings.used]), 1e-12)
     return Evidence(
         found.nrmse(found.before, part),
         found.nrmse(found.after, part),
@@ -299,7 +300,8 @@ def _evidence(
         structured,
         effects,
         changed,
-        found.events / max(_rms(found.measured[part & found.recordings.used]), 1e-12),
+        found.scale.events / power,
+        found.scale.disturbance / power,
     )
 
 
@@ -319,15 +321,23 @@ def _sentence(
         )
     if kind == "base form":
         return f"the base form: {base_taken} explains what is missing, and no effect is named"
-    if evidence.eventful(rules):
+    if evidence.unrepeatable(rules):
         return (
-            "unknown: most of what remains on the validation tests are single events, which do not repeat when motion "
-            "and drive repeat, and no effect explains them"
+            f"unknown: most of what remains on the validation tests {_unrepeated(evidence)}, and no effect explains it"
         )
     if reason and evidence.structured:
         return reason
     ratio = evidence.after / max(evidence.floor, 1e-12)
     return f"unknown: the error on the validation tests is {ratio:.3g} times the noise floor, and no effect explains it"
+
+
+def _unrepeated(evidence: Evidence) -> str:
+    if evidence.events >= evidence.disturbance:
+        return "consists of single events, which do not repeat when motion and drive repeat"
+    return (
+        "is a disturbance that grows with the speed and does not repeat when motion and drive repeat (it differs from "
+        "cycle to cycle)"
+    )
 
 
 def open_tests(judgement: Judgement, rules: ValidationRules) -> tuple[str, ...]:

@@ -106,7 +106,7 @@ def confidence_of(share: float, support: float, gain: Gain | None, rules: Naming
     return round(float(proven * support * held * rules.most_confidence), 3)
 
 
-def calibrated(evidence: float, rules: NamingRules, *, several: bool = False) -> float:
+def calibrated(evidence: float, rules: NamingRules, *, several: bool = False, partly: bool = False) -> float:
     """Return the probability that an effect with this evidence is really there, by the planted benchmark.
 
     Parameters
@@ -117,8 +117,11 @@ def calibrated(evidence: float, rules: NamingRules, *, several: bool = False) ->
         They hold the probabilities.
     several
         Whether the effect is named together with others.
+    partly
+        Whether the named effects explain only part of what is missing.
     """
-    known, probability = zip(*(rules.calibration_of_several if several else rules.calibration), strict=True)
+    alone = rules.calibration_of_part if partly else rules.calibration
+    known, probability = zip(*(rules.calibration_of_several if several else alone), strict=True)
     return round(float(np.interp(evidence, known, probability)), 3)
 
 

@@ -58,6 +58,8 @@ class NoiseScale:
         Number of pairs of repeated tests and of repeated cycles that the factors are estimated from.
     events
         Root mean square, over all samples of these pairs, of the force of single events that do not repeat [N].
+    disturbance
+        The same of a force that does not repeat and that grows with the speed [N].
     """
 
     force: float = 1.0
@@ -65,6 +67,7 @@ class NoiseScale:
     repeats: int = 0
     cycles: int = 0
     events: float = 0.0
+    disturbance: float = 0.0
 
     @property
     def source(self) -> str:
@@ -118,7 +121,10 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     """Return the noise in repeated tests and cycles, in units of the noise that the channels show.
 
     The error of a model is the same function of the motion in both repeats, so it cancels in the difference of their
-    residuals. Squared differences are regressed on the two variances; neither factor is negative.
+    residuals. Squared differences are regressed on the two variances, and on one that grows with the speed; no factor
+    is negative. The noise of a channel does not depend on the speed, so that the third part is not noise: it is a force
+    that motion and drive do not determine, such as a disturbance that is not in step with the motion, or a damper that
+    changes from cycle to cycle.
     """
     rules = rules or NoiseRules()
     problem = found.problem
@@ -126,6 +132,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     repeats, cycles = _repeats(recordings, rules), _cycles(recordings, rules)
     residual = np.divide(found.residual, root, out=np.zeros_like(root), where=root > 0.0)
     force, motion = noise_variances(found, recordings)
+    growing = force * _relative_speed(recordings)
     rows, targets, steps = [], [], []
     for first, second in (*repeats, *cycles):
         begin, part = _aligned(recordings, first, second)
@@ -133,7 +140,9 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         both = (root[first] > 0.0) & (root[begin] > 0.0) & (root[end] > 0.0)
         a, b, c = first[both], begin[both], end[both]
         left, right = (1.0 - part) ** 2, part**2
-        rows.append(np.stack([values[a] + left * values[b] + right * values[c] for values in (force, motion)], axis=1))
+        rows.append(
+            np.stack([values[a] + left * values[b] + right * values[c] for values in (force, motion, growing)], axis=1)
+        )
         steps.append(12.0 * recordings.force_rounding[recordings.test[a]] ** 2)
         targets.append(np.square(residual[a] - (1.0 - part) * residual[b] - part * residual[c]))
     used = root > 0.0
@@ -141,13 +150,10 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         limit = _limit(residual[used], force[used] + motion[used])
         return NoiseScale(limit, limit)
     columns, target = np.concatenate(rows), np.concatenate(targets)
-    factors, without = _factors(columns, target, 1.0), target
-    robust, limited = _robust_factors(columns, target, np.concatenate(steps))
-    if float(np.sum(target - limited)) > rules.events * float(np.sum(target)):
-        factors, without = robust, limited
+    factors, without, disturbed = _parts_of_differences(columns, target, np.concatenate(steps), rules)
     # a difference holds the events of both repeats
-    events = float(np.sqrt(0.5 * np.mean(target - without)))
-    target = without
+    events, disturbance = (float(np.sqrt(0.5 * np.mean(part))) for part in (target - without, disturbed))
+    target = without - disturbed
     # no part exceeds the difference: the force overall, the motion where its own part is largest
     most = columns[:, 1] >= np.quantile(columns[:, 1], TOP)
     parts = ((target, columns[:, 0]), (target[most], columns[most, 1]))
@@ -159,7 +165,44 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     rounding = recordings.force_rounding[recordings.test] ** 2
     force_factor = max(force_factor, float(np.sum(rounding)) / max(float(np.sum(force)), 1e-300))
     limit = _limit(residual[used], (force_factor * force + motion_factor * motion)[used])
-    return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events)
+    return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events, disturbance)
+
+
+def _parts_of_differences(
+    columns: FloatArray, target: FloatArray, step_squared: FloatArray, rules: NoiseRules
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the factors of force and motion noise, the differences without events, and the disturbance in them.
+
+    Parameters
+    ----------
+    columns
+        Variances of the difference due to force noise, motion noise, and a force that grows with the speed, shape
+        (n, 3).
+    target
+        Squared differences, shape (n,).
+    step_squared
+        Square of what rounding alone can change, shape (n,).
+    rules
+        From which share on events and a disturbance are separated from the noise.
+    """
+    with_growing = _factors(columns, target, 1.0)
+    # each squared difference is divided in proportion to what is expected of it
+    expected = columns * with_growing
+    growing = target * expected[:, 2] / np.maximum(expected.sum(axis=1), 1e-300)
+    if float(np.sum(growing)) >= rules.disturbance * float(np.sum(target)):
+        return with_growing[:2], target, growing
+    noise, nothing = columns[:, :2], np.zeros(len(target))
+    robust, limited = _robust_factors(noise, target, step_squared)
+    if float(np.sum(target - limited)) > rules.events * float(np.sum(target)):
+        return robust, limited, nothing
+    return _factors(noise, target, 1.0), target, nothing
+
+
+def _relative_speed(recordings: Recordings) -> FloatArray:
+    """Return the speed in units of the RMS speed of its test, shape (n,)."""
+    power = np.bincount(recordings.test, weights=recordings.velocity**2, minlength=recordings.tests)
+    rms = np.sqrt(power / np.maximum(np.bincount(recordings.test, minlength=recordings.tests), 1))
+    return np.asarray(np.abs(recordings.velocity) / np.maximum(rms, 1e-300)[recordings.test])
 
 
 def _factors(columns: FloatArray, target: FloatArray, start: float) -> FloatArray:
@@ -167,8 +210,8 @@ def _factors(columns: FloatArray, target: FloatArray, start: float) -> FloatArra
 
     The scatter of squared differences is proportional to their mean, so they are weighted by their mean.
     """
-    together = columns.sum(axis=1)
-    expected, factors = start * together, np.ones(2)
+    together = columns[:, :2].sum(axis=1)
+    expected, factors = start * together, np.ones(columns.shape[1])
     for _ in range(WEIGHTED):
         weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
         factors = optimize.nnls(columns * weights[:, None], target * weights)[0]

@@ -41,6 +41,14 @@ class NoiseRules(Section):
         description="Differences of repeated motion are events, not noise, if deviations beyond twice the expected "
         "one hold this share of their squared sum; of normal noise they hold 8 percent.",
     )
+    disturbance: float = Field(
+        0.25,
+        gt=0.0,
+        lt=1.0,
+        description="Differences of repeated motion hold a disturbance that is not noise, if this share of their "
+        "squared sum grows with the speed; the noise of a channel does not depend on the speed, and on rigs with known "
+        "noise at most 5 percent seem to.",
+    )
     least_factor: float = Field(
         0.25,
         gt=0.0,

@@ -6,8 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from mrpipe.tracing.bench.gates import never_yields
+from mrpipe.effects.library import damper_effects
+from mrpipe.tracing.bench.gates import held, never_yields
+from mrpipe.tracing.bench.judgement import Evidence
+from mrpipe.tracing.bench.on_validation import Judgement
+from mrpipe.tracing.bench.verdict import Named
+from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import ValidationRules
+from mrpipe.tracing.verdict import Verdict, VerdictClass
 from tests.tracing.bench.fits import plain_fit
 
 pytestmark = pytest.mark.planted
@@ -19,3 +25,19 @@ def test_a_damper_that_stays_elastic_in_all_tests_is_recognised() -> None:
     recordings = found.problem.recordings
     small = replace(recordings, displacement=recordings.displacement / 500.0, velocity=recordings.velocity / 500.0)
     assert never_yields(replace(found, problem=replace(found.problem, recordings=small)), ValidationRules())
+
+
+def test_an_effect_that_explains_a_part_is_less_probable() -> None:
+    """Half a derivative of the displacement, which the library lacks, was named migration: it removed most of it."""
+    item = Named(damper_effects()["migration"], "slow-hysteresis", {}, 0.98)
+    evidence = Evidence(0.05, 0.018, 0.004, 0.012, (), structured=True, effects=True)
+
+    def confidence(kind: VerdictClass, *, chosen: bool = True, several: bool = False) -> float:
+        judgement = Judgement(Verdict(kind, ""), evidence, 0.012, (0.012, 0.012), None)
+        return held(item, judgement, NamingRules(), several=several, chosen=chosen).confidence
+
+    assert confidence("explained") > 0.9
+    assert NamingRules().least_probability < confidence("partly explained") < 0.7
+    # offsets are measured test by test: nothing else can be taken for them
+    assert confidence("partly explained", chosen=False) > 0.9
+    assert confidence("explained", several=True) < 0.8

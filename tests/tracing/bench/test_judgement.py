@@ -94,8 +94,11 @@ def test_more_evidence_is_never_less_probable(pair: list[float]) -> None:
     rules = NamingRules()
     for several in (False, True):
         assert 0.0 <= calibrated(less, rules, several=several) <= calibrated(more, rules, several=several) < 1.0
+        assert calibrated(less, rules, partly=True) <= calibrated(more, rules, partly=True) < 1.0
     # one of several effects may correct the form of another
     assert calibrated(more, rules, several=True) <= calibrated(more, rules)
+    # an effect that leaves something may stand for one that the library lacks
+    assert calibrated(more, rules, partly=True) <= calibrated(more, rules)
 
 
 @pytest.mark.property
