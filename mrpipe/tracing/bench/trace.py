@@ -28,6 +28,7 @@ from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
 from mrpipe.tracing.bench.rivals import Orders, Unseen, with_best_base
 from mrpipe.tracing.bench.select import Selection, forward_selection
 from mrpipe.tracing.bench.summary import Summary, Tracing
+from mrpipe.tracing.bench.unnamed import without_beaten_names
 from mrpipe.tracing.bench.verdict import unnamed_reason
 from mrpipe.tracing.options import TracingOptions
 
@@ -111,6 +112,9 @@ def trace_campaign(
         least_ratio=rules.offsets.clear if reason and selection.structured else 0.0,
     )
     case = Case(choice, training, validation, options, ordered, len(declared), offsets, jobs)
+    if not reason:
+        compared = Unseen(options.folds, options.bootstrap_draws, rng)
+        selection, gains, reason = without_beaten_names(selection, gains, len(declared), compared, jobs)
     selection, assessed = with_likely_names(selection, case, gains, reason, rng)
     causes, further, found, judgement = assessed.causes, assessed.further, assessed.found, assessed.judgement
     if causes and judgement.evidence.after >= judgement.evidence.before:
