@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.amplitude_fit import AmplitudeDependence
-from mrpipe.modal.clocks import SensorClock
-from mrpipe.modal.decay import DecayResult, Estimate
-from mrpipe.modal.lscf import PoleCandidate
-from mrpipe.modal.multimode import MultiModeFit
+from mrpipe.modal.amplitude.law_fit import AmplitudeDependence
+from mrpipe.modal.clocks.delays import SensorClock
+from mrpipe.modal.decays.decay import DecayResult, Estimate
+from mrpipe.modal.fit.lscf import PoleCandidate
+from mrpipe.modal.fit.result import MultiModeFit
+from mrpipe.modal.matrices.tridiagonal import TridiagonalFit
 from mrpipe.modal.records import FrameTest
-from mrpipe.modal.tridiagonal import TridiagonalFit
 from mrpipe.modal.verification import FrequencyVerification, TimeVerification
 from mrpipe.structures import Frame
 

@@ -10,32 +10,32 @@ from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
-from mrpipe.modal.ambient import find_ambient_modes
-from mrpipe.modal.amplitude_fit import amplitude_finding, find_amplitude_dependence
-from mrpipe.modal.assembly import Assembly, PartialModes, assemble_partial
-from mrpipe.modal.checks import check_mode_matrix, orthogonal_shapes
-from mrpipe.modal.chosen_tests import ChosenTests, choose_tests, training_first, with_clocks, without_complex
-from mrpipe.modal.clocks import SensorClock, corrected, expected_clocks
-from mrpipe.modal.damping_choice import choose_damping, decays_of_modes
-from mrpipe.modal.decay import Estimate
-from mrpipe.modal.hidden import contested, sharpened, with_missing_modes
+from mrpipe.modal.ambient.modes import find_ambient_modes
+from mrpipe.modal.amplitude.law_fit import amplitude_finding, find_amplitude_dependence
+from mrpipe.modal.clocks.delays import SensorClock, corrected, expected_clocks
+from mrpipe.modal.decays.choice import choose_damping, decays_of_modes
+from mrpipe.modal.decays.decay import Estimate
+from mrpipe.modal.fit.own_residues import with_own_residues
+from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.identification import FrameIdentification, GivenShapes
-from mrpipe.modal.multimode import MultiModeFit
+from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial
+from mrpipe.modal.matrices.rigid_floors import RigidShapes, assemble_rigid, rigid_response, rigid_shapes
+from mrpipe.modal.matrices.scaling import Scale, find_scale, masses_of
+from mrpipe.modal.matrices.tridiagonal import fit_tridiagonal
 from mrpipe.modal.options import IdentificationOptions
-from mrpipe.modal.own_residues import with_own_residues
-from mrpipe.modal.peak_picking import pick_peaks
 from mrpipe.modal.records import FrameTest, FrameTests
-from mrpipe.modal.rigid_floors import RigidShapes, assemble_rigid, rigid_response, rigid_shapes
-from mrpipe.modal.scaling import Scale, find_scale, masses_of
-from mrpipe.modal.search import ModeSearch, check_channels
-from mrpipe.modal.selection import (
+from mrpipe.modal.search.checks import check_mode_matrix, orthogonal_shapes
+from mrpipe.modal.search.chosen_tests import ChosenTests, choose_tests, training_first, with_clocks, without_complex
+from mrpipe.modal.search.forced_modes import ModeSearch, check_channels
+from mrpipe.modal.search.hidden import contested, sharpened, with_missing_modes
+from mrpipe.modal.search.peak_picking import pick_peaks
+from mrpipe.modal.search.selection import (
     LEAST_COHERENCE,
     Layout,
     all_floors_measured,
     floor_shapes,
     sign_ranges,
 )
-from mrpipe.modal.tridiagonal import fit_tridiagonal
 from mrpipe.modal.verification import (
     TimeVerification,
     compare_in_time,

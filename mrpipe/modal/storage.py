@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import ArtifactWriter, FloatArray
-from mrpipe.modal.clocks import SensorClock
-from mrpipe.modal.decay import DecayResult, Estimate
+from mrpipe.modal.clocks.delays import SensorClock
+from mrpipe.modal.decays.decay import DecayResult, Estimate
 from mrpipe.modal.identification import FrameIdentification
 from mrpipe.structures import complex_modes, natural_modes, write_frame
 

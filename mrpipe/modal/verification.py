@@ -8,7 +8,7 @@ import numpy as np
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.multimode import MultiModeFit
+from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.spectra import ComplexArray
 from mrpipe.structures import Frame, frequency_response

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.decay import DecayResult
+from mrpipe.modal.decays.decay import DecayResult
 from mrpipe.modal.spectra import FrequencyResponses
 from mrpipe.modal.verification import FrequencyVerification, TimeVerification
 from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import Artifact, FloatArray, load_parameter_set
-from mrpipe.modal.checks import modal_coupling, wrong_signs
-from mrpipe.modal.decay import linear_envelope, logarithmic_envelope
+from mrpipe.modal.decays.decay import linear_envelope, logarithmic_envelope
+from mrpipe.modal.search.checks import modal_coupling, wrong_signs
 from mrpipe.modal.storage import off_band_share
 from mrpipe.structures import (
     Frame,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mrpipe.campaigns import load_campaign
-from mrpipe.modal.clocks import corrected, expected_clocks
+from mrpipe.modal.clocks.delays import corrected, expected_clocks
 from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.records import frame_tests
 from mrpipe.modal.verification import compare_in_time

@@ -1,0 +1,307 @@
+"""Modes from responses alone: ambient vibration, or earthquakes without a ground channel.
+
+pyOMA2 estimates the poles at many model orders (stochastic subspace identification or pLSCF). Poles
+that keep frequency and shape over the orders form clusters, and the choice among these is that of the forced tests.
+Frequency and damping are then refined by maximum likelihood, which also gives their intervals; errors of the shapes
+come from leaving out one block of the record at a time (jackknife). Tests with different sensors are separate set-ups,
+which are merged by the sensors that they share. Without the input, neither modal masses nor participations can be
+known: the scale of M, C and K then comes from given masses or from added masses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import signal
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import UserError, install_extra
+from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Pole, Records
+from mrpipe.modal.ambient.refine import refine_by_spectra
+from mrpipe.modal.ambient.setups import SetUp, merge_set_ups, pooled_poles
+from mrpipe.modal.fit.lscf import PoleCandidate
+from mrpipe.modal.fit.result import MultiModeFit
+from mrpipe.modal.records import FrameTest
+from mrpipe.modal.search.forced_modes import ModeSearch
+from mrpipe.modal.search.selection import Layout, complete_set, largest_set
+from mrpipe.modal.spectra import ComplexArray
+
+_BLOCKS = 8
+_PERIODS = 1.5
+"""Length of the correlation functions in periods of the lowest peak."""
+_MOST_BLOCK_ROWS = 80
+_LEAST_BLOCK_ROWS = 20
+_FREQUENCY_TOLERANCE = 0.01
+_LEAST_ASSURANCE = 0.9
+_LEAST_COLLINEARITY = 0.5
+_LARGEST_SPREAD = 4.0
+_SEGMENT_PERIODS = 40.0
+_LEAST_COMMON = 0.25
+_MARGIN = 1.15
+_COPY_RANGE = 0.1
+_COPY_ASSURANCE = 0.7
+
+
+@dataclass(frozen=True)
+class _Cluster:
+    """Poles of several orders that are one: medians, shape turned to real, and how many orders have it."""
+
+    angular_frequency: float
+    damping_ratio: float
+    shape: FloatArray
+    collinearity: float
+    orders: int
+
+
+def _lowest_peak_hz(tests: Sequence[FrameTest], low_hz: float) -> float:
+    test = tests[0]
+    length = int(min(test.responses.shape[0], max(256, 40.0 / low_hz * test.sampling_rate_hz)))
+    frequency, power = signal.welch(test.responses, fs=test.sampling_rate_hz, nperseg=length, axis=0)
+    total = np.sum(power / power.sum(axis=0), axis=1)
+    total[frequency < low_hz] = 0.0
+    peaks = signal.find_peaks(total, height=0.05 * total.max())[0]
+    return float(frequency[peaks[0] if peaks.size else int(np.argmax(total))])
+
+
+def _common_motion_ends_hz(test: FrameTest, first_hz: float) -> float:
+    """Return the frequency above which the sensors have no motion in common [Hz].
+
+    At a resonance all sensors move together, so that the largest eigenvalue of their coherence matrix is near the
+    number of sensors; noise of the sensors and local forces leave it near 1.
+    """
+    rate, (samples, sensors) = test.sampling_rate_hz, test.responses.shape
+    length = int(min(samples / 16, _SEGMENT_PERIODS / first_hz * rate))
+    values = test.responses - test.responses.mean(axis=0)
+    frequency, _, segments = signal.stft(values, fs=rate, nperseg=max(length, 16), axis=0, boundary=None)
+    cross = np.einsum("fit,fjt->fij", segments, segments.conj())
+    size = np.sqrt(np.maximum(np.real(np.einsum("fii->fi", cross)), 1e-300))
+    largest = np.linalg.eigvalsh(cross / (size[:, :, None] * size[:, None, :]))[:, -1]
+    common = np.flatnonzero(largest >= 1.0 + _LEAST_COMMON * (sensors - 1))
+    return _MARGIN * max(float(frequency[common[-1]]) if common.size else 0.0, 2.0 * first_hz)
+
+
+def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> Records:
+    """Filter, decimate and cut the responses; a record spans the modes that a chain of floors can have."""
+    rate = tests[0].sampling_rate_hz
+    first = _lowest_peak_hz(tests, low_hz)
+    # the highest mode of a uniform chain lies (4 n + 2)/pi above the lowest; real ones spread more
+    spread = _LARGEST_SPREAD * (4.0 * layout.floors + 2.0) / np.pi
+    high = high_hz or min(spread * first, 0.45 * rate, _common_motion_ends_hz(tests[0], first))
+    factor = max(1, int(rate / (2.6 * high)))
+    sections = signal.butter(4, max(0.5 * low_hz, 0.2 * first), btype="highpass", fs=rate, output="sos")
+    per_test = max(2, round(_BLOCKS / len(tests)))
+    blocks: list[FloatArray] = []
+    for test in tests:
+        values = signal.sosfiltfilt(sections, test.responses - test.responses.mean(axis=0), axis=0)
+        if factor > 1:
+            values = signal.resample_poly(values, 1, factor, axis=0)
+        blocks += [np.ascontiguousarray(part.T) for part in np.array_split(values, per_test)]
+    own_rate = rate / factor
+    rows = int(np.clip(round(_PERIODS * own_rate / first), _LEAST_BLOCK_ROWS, _MOST_BLOCK_ROWS))
+    return Records(tuple(blocks), own_rate, rows, high)
+
+
+def _assurance(first: ComplexArray, second: ComplexArray) -> float:
+    return float(np.abs(np.vdot(first, second)) ** 2)
+
+
+def _clusters(poles: Sequence[Pole]) -> list[_Cluster]:
+    """Group poles of neighbouring frequency and equal shape, at most one of each order in a group."""
+    groups: list[list[Pole]] = []
+    for pole in sorted(poles, key=lambda item: item.order, reverse=True):
+        best: list[Pole] | None = None
+        for group in groups:
+            centre = float(np.median([item.angular_frequency for item in group]))
+            near = abs(pole.angular_frequency - centre) < _FREQUENCY_TOLERANCE * centre
+            if near and _assurance(pole.shape, group[0].shape) > _LEAST_ASSURANCE:
+                best = group
+                break
+        if best is None:
+            groups.append([pole])
+        elif all(item.order != pole.order for item in best):
+            best.append(pole)
+    return [_summary(group) for group in groups]
+
+
+def _summary(group: Sequence[Pole]) -> _Cluster:
+    reference = group[0].shape
+    turned = np.mean([item.shape * np.exp(-1j * np.angle(np.vdot(reference, item.shape))) for item in group], axis=0)
+    # the phase that makes the shape as real as it can be
+    turned = turned * np.exp(-0.5j * np.angle(np.sum(turned**2)))
+    collinearity = float(np.abs(np.sum(turned**2)) / np.sum(np.abs(turned) ** 2))
+    return _Cluster(
+        float(np.median([item.angular_frequency for item in group])),
+        float(np.median([item.damping_ratio for item in group])),
+        np.asarray(turned.real / np.linalg.norm(turned.real)),
+        collinearity,
+        len(group),
+    )
+
+
+def _without_copies(clusters: Sequence[_Cluster]) -> list[_Cluster]:
+    """Return the clusters without those that repeat the shape of a more stable one nearby: high orders split a pole."""
+    kept: list[_Cluster] = []
+    for item in sorted(clusters, key=lambda cluster: (-cluster.orders, -cluster.collinearity)):
+        near = [known for known in kept if abs(known.angular_frequency / item.angular_frequency - 1.0) < _COPY_RANGE]
+        if all((known.shape @ item.shape) ** 2 < _COPY_ASSURANCE for known in near):
+            kept.append(item)
+    return kept
+
+
+def _matched(clusters: Sequence[_Cluster], pole: _Cluster) -> _Cluster | None:
+    near = [item for item in clusters if abs(item.angular_frequency / pole.angular_frequency - 1.0) < 0.03]
+    same = [item for item in near if (item.shape @ pole.shape) ** 2 > 0.5]
+    return max(same, key=lambda item: (item.orders, (item.shape @ pole.shape) ** 2), default=None)
+
+
+def _jackknife(
+    statistics: Sequence[ComplexArray | FloatArray],
+    records: Records,
+    estimator: Estimator,
+    orders: Sequence[int],
+    firm: Sequence[_Cluster],
+) -> tuple[FloatArray, FloatArray]:
+    """Return the covariance of (ln omega, ln zeta), shape (2r, 2r), and errors of the shapes, shape (s, r)."""
+    modes, sensors = len(firm), firm[0].shape.size
+    logs, shapes = [], []
+    total = np.sum(np.array(statistics), axis=0)
+    few = orders[:: max(1, len(orders) // 3)]
+    for left_out in statistics:
+        mean = (total - left_out) / (len(statistics) - 1)
+        clusters = _clusters(estimator.poles(mean, records, few))
+        row, sheet = np.full(2 * modes, np.nan), np.full((sensors, modes), np.nan)
+        for index, pole in enumerate(firm):
+            match = _matched(clusters, pole)
+            if match is not None:
+                row[index] = np.log(match.angular_frequency / pole.angular_frequency)
+                row[modes + index] = np.log(match.damping_ratio / pole.damping_ratio)
+                sheet[:, index] = match.shape * np.sign(match.shape @ pole.shape)
+        logs.append(row)
+        shapes.append(sheet)
+    count = len(statistics)
+    spread = np.sqrt((count - 1) * np.nanvar(np.array(logs), axis=0))
+    errors = np.sqrt((count - 1) * np.nanvar(np.array(shapes), axis=0))
+    return np.diag(np.nan_to_num(spread, nan=1.0) ** 2), np.nan_to_num(errors, nan=1.0)
+
+
+def _as_fit(
+    test: FrameTest, firm: Sequence[_Cluster], covariance: FloatArray, errors: FloatArray, density: FloatArray
+) -> MultiModeFit:
+    """Return clusters in the form of a fit; shapes are scaled by the response at their frequency."""
+    order = np.argsort([item.angular_frequency for item in firm])
+    both = np.concatenate([order, order + len(firm)])
+    size = density[order]
+    zeta = np.array([item.damping_ratio for item in firm])[order]
+    residues = np.column_stack([firm[i].shape for i in order]) * size * 2.0 * zeta
+    empty: tuple[ComplexArray, ...] = ()
+    return MultiModeFit(
+        angular_frequencies=np.array([item.angular_frequency for item in firm])[order],
+        damping_ratios=zeta,
+        covariance=covariance[np.ix_(both, both)],
+        residues=residues.astype(np.complex128),
+        residue_errors=errors[:, order] * size * 2.0 * zeta,
+        coherence=np.tile(np.array([item.collinearity for item in firm])[order], (residues.shape[0], 1)),
+        steady=empty,
+        measured=empty,
+        omega=(),
+        excitation=empty,
+        noise_variance=np.ones(residues.shape[0]),
+        sensors=test.sensors,
+        participations=np.ones((1, len(firm)), dtype=np.complex128),
+        input_residues=np.full((residues.shape[0], 1, len(firm)), np.nan, dtype=np.complex128),
+    )
+
+
+def find_ambient_modes(
+    tests: Sequence[FrameTest],
+    layout: Layout,
+    low_hz: float,
+    high_hz: float,
+    source: Path,
+    method: str = "ssi",
+) -> ModeSearch:
+    """Return the modes that the responses of ambient tests show.
+
+    Parameters
+    ----------
+    tests
+        Tests with the same sensors and sampling rate form a set-up. Set-ups must share sensors.
+    layout
+        Floors and masses.
+    low_hz, high_hz
+        Band; 0 for `high_hz` takes a band that follows from the lowest peak and the number of floors.
+    source
+        campaign.yaml, for messages.
+    method
+        Name in :data:`~mrpipe.modal.ambient.poles.ESTIMATORS`.
+
+    Raises
+    ------
+    UserError
+        If pyOMA2 is not installed, a set-up shares no sensor with the others, or no mode is found.
+    """
+    try:
+        import pyoma2  # noqa: F401
+    except ImportError as error:
+        place = f"tests.{tests[0].name}"
+        raise UserError(source, place, "ambient tests need pyOMA2", install_extra("ambient")) from error
+    groups: dict[object, list[FrameTest]] = {}
+    for test in tests:
+        groups.setdefault((test.sensors, test.sampling_rate_hz), []).append(test)
+    set_ups, candidates, tops = [], [], []
+    for group in groups.values():
+        set_up, found, top = _set_up(group, layout, (low_hz, high_hz), source, ESTIMATORS[method])
+        set_ups.append(set_up)
+        candidates += found
+        tops.append(top)
+    merged = merge_set_ups(set_ups, source) if len(set_ups) > 1 else None
+    fit = set_ups[0].fit if merged is None else merged.fit
+    chosen = complete_set(fit, layout)
+    numbered = dict(zip(chosen, range(1, len(chosen) + 1), strict=True)) if chosen else largest_set(fit, layout)
+    if not numbered:
+        raise UserError(source, "ambient tests", "no mode found", "record longer, or set identify_frame.band_high_hz")
+    modes = list(numbered)
+    if merged is None:
+        refined = refine_by_spectra(fit.only(modes), set_ups[0].tests)
+    else:
+        refined = pooled_poles(merged.fit.only(modes), [
+            (positions, refine_by_spectra(item.fit.only(own), item.tests))
+            for item, positions, own in merged.parts(modes)
+        ])  # fmt: skip
+    return ModeSearch(refined, (low_hz, max(tops)), tuple(numbered.values()), tuple(candidates))
+
+
+def _set_up(
+    tests: Sequence[FrameTest], layout: Layout, band_hz: tuple[float, float], source: Path, estimator: Estimator
+) -> tuple[SetUp, list[PoleCandidate], float]:
+    """Return the stable poles of tests with the same sensors, all candidates, and the end of the band [Hz]."""
+    records = _records(tests, layout, *band_hz)
+    orders = estimator.orders(layout.floors, len(tests[0].sensors))
+    statistics = [estimator.statistic(block, records) for block in records.blocks]
+    poles = estimator.poles(np.mean(np.array(statistics), axis=0), records, orders)
+    clusters = [item for item in _clusters(poles) if item.angular_frequency > 2.0 * np.pi * band_hz[0]]
+    most = max((item.orders for item in clusters), default=0)
+    firm = [item for item in clusters if item.orders >= 0.5 * most and item.collinearity > _LEAST_COLLINEARITY]
+    firm = _without_copies(firm)
+    if not firm:
+        remedy = "record longer, or set identify_frame.band_high_hz"
+        raise UserError(source, f"tests.{tests[0].name}", "no stable pole in an ambient test", remedy)
+    covariance, errors = _jackknife(statistics, records, estimator, orders, firm)
+    fit = _as_fit(tests[0], firm, covariance, errors, _response_at(tests, firm))
+    found = [PoleCandidate(item.angular_frequency, item.damping_ratio, item.orders) for item in clusters]
+    return SetUp(tuple(tests), fit), found, records.high_hz
+
+
+def _response_at(tests: Sequence[FrameTest], firm: Sequence[_Cluster]) -> FloatArray:
+    """Return the spectral amplitude of the responses at the frequency of each cluster over the median, shape (r,)."""
+    test = tests[0]
+    length = int(min(test.responses.shape[0], 4096))
+    frequency, power = signal.welch(test.responses, fs=test.sampling_rate_hz, nperseg=length, axis=0)
+    total = np.sqrt(np.sum(power, axis=1))
+    floor = float(np.median(total))
+    return np.array(
+        [total[int(np.argmin(np.abs(2.0 * np.pi * frequency - item.angular_frequency)))] / floor for item in firm]
+    )

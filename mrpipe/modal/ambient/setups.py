@@ -1,0 +1,214 @@
+"""Merging of ambient set-ups: sensors that move from test to test, and reference sensors that stay.
+
+Ambient shapes have no scale. Each set-up therefore gives shapes with an unknown factor for every mode, and the
+sensors that two set-ups share (reference sensors) determine the ratio of these factors. Modes of different set-ups
+belong together where frequencies are near and the shapes at the shared sensors are alike. A set-up that does not show a
+mode as a stable pole gives its shape by the strongest singular vector of the spectral densities at the frequency of the
+mode.
+
+Source: Au (2011), Assembling mode shapes by least squares, Mechanical Systems and Signal Processing 25.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.errors import UserError
+from mrpipe.modal.fit.result import MultiModeFit
+from mrpipe.modal.records import FrameTest, Sensor
+
+_NEAR = 0.03
+"""Relative difference up to which frequencies of two set-ups may belong to one mode."""
+_ALIKE = 0.7
+"""Modal assurance at the shared sensors from which two shapes may belong to one mode."""
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """Tests with the same sensors, and the stable poles that they show."""
+
+    tests: tuple[FrameTest, ...]
+    fit: MultiModeFit
+
+
+@dataclass(frozen=True)
+class Merged:
+    """Modes of several set-ups in one fit; `places` holds for each set-up the index of each mode, -1 without one."""
+
+    fit: MultiModeFit
+    set_ups: tuple[SetUp, ...]
+    places: tuple[tuple[int, ...], ...]
+
+    def parts(self, modes: Sequence[int]) -> list[tuple[SetUp, list[int], list[int]]]:
+        """Return for each set-up the positions within `modes` that it shows, and their indices in its own fit."""
+        found = []
+        for item, own in zip(self.set_ups, self.places, strict=True):
+            positions = [i for i, mode in enumerate(modes) if own[mode] >= 0]
+            if positions:
+                found.append((item, positions, [own[modes[i]] for i in positions]))
+        return found
+
+
+@dataclass
+class _Shape:
+    """A mode while set-ups are added: values and standard errors of the sensors known so far."""
+
+    omega: float
+    values: dict[Sensor, float]
+    errors: dict[Sensor, float]
+    places: dict[int, int]
+
+
+def merge_set_ups(set_ups: Sequence[SetUp], source: Path) -> Merged:
+    """Return the modes of all set-ups with shapes at all sensors.
+
+    Raises
+    ------
+    UserError
+        If a set-up shares no sensor with the others.
+    """
+    base = max(range(len(set_ups)), key=lambda i: set_ups[i].fit.angular_frequencies.size)
+    shapes = _shapes_of(set_ups[base].fit, base)
+    known = set(set_ups[base].fit.sensors)
+    waiting = [i for i in range(len(set_ups)) if i != base]
+    while waiting:
+        index = max(waiting, key=lambda i: len(known & set(set_ups[i].fit.sensors)))
+        own = set_ups[index]
+        shared = [sensor for sensor in own.fit.sensors if sensor in known]
+        if not shared:
+            raise UserError(
+                source,
+                f"tests.{own.tests[0].name}",
+                "has no sensor in common with the other ambient tests",
+                "keep at least one sensor (reference) at the same place in all set-ups",
+            )
+        for shape in shapes:
+            _add(shape, index, own, shared)
+        known |= set(own.fit.sensors)
+        waiting.remove(index)
+    return _collect(set_ups, base, shapes)
+
+
+def _shapes_of(fit: MultiModeFit, index: int) -> list[_Shape]:
+    return [
+        _Shape(
+            float(fit.angular_frequencies[mode]),
+            dict(zip(fit.sensors, fit.residues[:, mode].real.tolist(), strict=True)),
+            dict(zip(fit.sensors, fit.residue_errors[:, mode].tolist(), strict=True)),
+            {index: mode},
+        )
+        for mode in range(fit.angular_frequencies.size)
+    ]
+
+
+def _add(shape: _Shape, index: int, own: SetUp, shared: Sequence[Sensor]) -> None:
+    """Scale the shape of a set-up by the shared sensors and join it."""
+    fit = own.fit
+    rows = [fit.sensors.index(sensor) for sensor in shared]
+    reference = np.array([shape.values[sensor] for sensor in shared])
+    near = np.flatnonzero(np.abs(fit.angular_frequencies / shape.omega - 1.0) < _NEAR)
+    alike = [(_assurance(fit.residues[rows, mode].real, reference), int(mode)) for mode in near]
+    alike = [item for item in alike if item[0] > _ALIKE]
+    if alike:
+        # one shared sensor makes all shapes alike: then the nearest frequency decides
+        gaps = np.abs(fit.angular_frequencies - shape.omega)
+        best = max(alike, key=lambda item: (round(item[0], 2), -float(gaps[item[1]])))[1]
+        values, errors = fit.residues[:, best].real, fit.residue_errors[:, best]
+        shape.places[index] = best
+    else:
+        values, errors = _singular_vector(own.tests, shape.omega)
+    scale = float(values[rows] @ reference) / max(float(values[rows] @ values[rows]), 1e-300)
+    reference_error = np.array([shape.errors[sensor] for sensor in shared])
+    # error of the scale from the noise of both set-ups at the shared sensors
+    noise = np.sqrt(reference_error**2 + (scale * errors[rows]) ** 2)
+    relative = float(np.linalg.norm(noise)) / max(float(np.linalg.norm(reference)), 1e-300)
+    for row, sensor in enumerate(fit.sensors):
+        value, error = scale * float(values[row]), abs(scale) * float(np.hypot(errors[row], relative * values[row]))
+        if sensor in shape.values:
+            first, second = 1.0 / max(shape.errors[sensor], 1e-300) ** 2, 1.0 / max(error, 1e-300) ** 2
+            value = (first * shape.values[sensor] + second * value) / (first + second)
+            error = float(1.0 / np.sqrt(first + second))
+        shape.values[sensor], shape.errors[sensor] = value, error
+
+
+def _assurance(first: FloatArray, second: FloatArray) -> float:
+    return float((first @ second) ** 2) / max(float((first @ first) * (second @ second)), 1e-300)
+
+
+def _singular_vector(tests: Sequence[FrameTest], omega: float) -> tuple[FloatArray, FloatArray]:
+    """Return the strongest singular vector of the spectral densities near a frequency, and its errors, shape (s,)."""
+    sensors = tests[0].responses.shape[1]
+    density = np.zeros((sensors, sensors), dtype=np.complex128)
+    count = 0
+    for test in tests:
+        values = np.fft.rfft(test.responses - test.responses.mean(axis=0), axis=0)
+        lines = 2.0 * np.pi * np.fft.rfftfreq(test.responses.shape[0], 1.0 / test.sampling_rate_hz)
+        near = np.abs(lines / omega - 1.0) < 0.5 * _NEAR
+        density += values[near].T @ values[near].conj()
+        count += int(np.count_nonzero(near))
+    power, vectors = (np.asarray(item, dtype=np.float64) for item in np.linalg.eigh(np.real(density)))
+    rest = float(power[:-1].mean()) if sensors > 1 else 0.0
+    error = np.sqrt(rest / max(float(power[-1]), 1e-300) / max(count, 1) * sensors)
+    return np.asarray(vectors[:, -1]), np.full(sensors, float(error))
+
+
+def _collect(set_ups: Sequence[SetUp], base: int, shapes: Sequence[_Shape]) -> Merged:
+    fit = set_ups[base].fit
+    sensors = tuple(sorted({sensor for item in set_ups for sensor in item.fit.sensors}))
+    residues = np.array([[shape.values[sensor] for shape in shapes] for sensor in sensors])
+    errors = np.array([[shape.errors[sensor] for shape in shapes] for sensor in sensors])
+    merged = replace(
+        fit,
+        residues=residues.astype(np.complex128),
+        residue_errors=errors,
+        coherence=np.tile(fit.coherence[0], (len(sensors), 1)),
+        noise_variance=np.ones(len(sensors)),
+        sensors=sensors,
+        input_residues=np.full((len(sensors), 1, len(shapes)), np.nan, dtype=np.complex128),
+    )
+    places = tuple(tuple(shape.places.get(index, -1) for shape in shapes) for index in range(len(set_ups)))
+    return Merged(merged, tuple(set_ups), places)
+
+
+def pooled_poles(fit: MultiModeFit, parts: Sequence[tuple[Sequence[int], MultiModeFit]]) -> MultiModeFit:
+    """Return a merged fit with the weighted means of the poles of its set-ups.
+
+    Parameters
+    ----------
+    fit
+        Modes with merged shapes.
+    parts
+        For each set-up: the modes that it shows, and its own fit of these. Where set-ups differ by more than their
+        errors (temperature), the error of the mean grows with the scatter.
+    """
+    modes = fit.angular_frequencies.size
+    logs = [np.log(fit.angular_frequencies), np.log(fit.damping_ratios)]
+    variances = [np.diag(fit.covariance)[:modes].copy(), np.diag(fit.covariance)[modes:].copy()]
+    for mode in range(modes):
+        own = [(item, list(positions).index(mode)) for positions, item in parts if mode in positions]
+        for which in (0, 1):
+            values = np.array([
+                np.log((item.angular_frequencies, item.damping_ratios)[which][place]) for item, place in own
+            ])  # fmt: skip
+            if not values.size:
+                continue
+            weight = np.array([
+                1.0 / max(item.covariance[which * item.angular_frequencies.size + place,
+                                          which * item.angular_frequencies.size + place], 1e-16)
+                for item, place in own
+            ])  # fmt: skip
+            mean = float(weight @ values / weight.sum())
+            scatter = float(weight @ (values - mean) ** 2) / max(values.size - 1, 1)
+            logs[which][mode] = mean
+            variances[which][mode] = max(1.0, scatter) / weight.sum()
+    return replace(
+        fit,
+        angular_frequencies=np.exp(logs[0]),
+        damping_ratios=np.exp(logs[1]),
+        covariance=np.diag(np.concatenate(variances)),
+    )

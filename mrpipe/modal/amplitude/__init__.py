@@ -1,0 +1,1 @@
+"""Laws of frequency and damping over amplitude."""

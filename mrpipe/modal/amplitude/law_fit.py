@@ -1,0 +1,399 @@
+"""Fit of modes over amplitude to forced tests, and the proof on tests that were left out.
+
+Laws of frequency and damping are fitted to the records in the time domain by least squares inside the band; shapes and
+the contribution of higher modes are the linear part. Each record has the same weight. Laws are used only where they
+predict records that were left out of the fit better than constant modes do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.amplitude.laws import (
+    AmplitudeLaws,
+    AmplitudeModel,
+    Measure,
+    Motion,
+    initial_state,
+    input_columns,
+    simulated,
+)
+from mrpipe.modal.fit.result import MultiModeFit
+from mrpipe.modal.records import FrameTest, Place, Sensor
+from mrpipe.modal.spectra import ComplexArray
+
+_LEAST_GAIN = 0.05
+_SUFFICIENT = 0.03
+"""RMS error over RMS response below which constant modes serve. A natural frequency
+that is wrong by a fiftieth of the half-power bandwidth leaves about as much."""
+_LEAST_ENERGY = 0.05
+"""Share of the energy of a mode below the smallest amplitude at which its law is reported."""
+_EVALUATIONS = 25
+_STEP = 1e-5
+_START_SOFTENING = 0.005
+_START_DAMPING = 0.3
+
+
+@dataclass(frozen=True)
+class AmplitudeDependence:
+    """Result of the cross-validation and the model fitted to all records.
+
+    Attributes
+    ----------
+    model
+        Model with the best law.
+    left_out
+        Name of what was left out of each fit: a test, or a part of the only test.
+    constant_error, error
+        Squared error over squared response of what was left out, one value a fit: constant modes and the best law.
+    """
+
+    model: AmplitudeModel
+    left_out: tuple[str, ...]
+    constant_error: tuple[float, ...]
+    error: tuple[float, ...]
+
+
+class _Record:
+    """A test as the fit needs it: spectra inside the band of that part of its time that counts."""
+
+    def __init__(self, test: FrameTest, model: _Common, name: str, counts: FloatArray) -> None:
+        self.name = name
+        self.test = test
+        self.counts = counts
+        self.dt = 1.0 / test.sampling_rate_hz
+        frequency = np.fft.rfftfreq(test.responses.shape[0], self.dt)
+        self.lines = (frequency >= model.band_hz[0]) & (frequency <= model.band_hz[1])
+        self.inputs = input_columns(test, model.inputs)
+        self.forces = self.inputs @ model.gains
+        self.rows = [model.sensors.index(sensor) for sensor in test.sensors]
+        target = self.spectra(test.responses - test.responses.mean(axis=0))
+        self.power = float(np.sum(np.abs(target) ** 2))
+        self.scale = np.maximum(np.linalg.norm(target, axis=0), 1e-300)
+        self.target = target / self.scale
+        self.input_spectra = self.spectra(self.inputs)
+        self.initial = np.zeros((model.modes, 2))
+
+    def spectra(self, histories: FloatArray) -> ComplexArray:
+        return np.asarray(np.fft.rfft(histories * self.counts[:, None], axis=0)[self.lines])
+
+
+@dataclass(frozen=True)
+class _Common:
+    """What all fits share."""
+
+    sensors: tuple[Sensor, ...]
+    inputs: tuple[Place, ...]
+    gains: FloatArray
+    band_hz: tuple[float, float]
+    modes: int
+
+
+def _common(fit: MultiModeFit) -> _Common:
+    """Return inputs and gains: modes are scaled to the sensor that moves most, so that amplitudes are metres there."""
+    most = np.argmax(np.abs(fit.residues), axis=0)
+    columns = np.arange(fit.residues.shape[1])
+    signs = np.array([-1.0 if place.floor == 0 else 1.0 for place in fit.inputs])
+    gains = signs[:, None] * np.real(fit.residues[most, columns] * fit.participations)
+    low = min(float(item[0]) for item in fit.omega) / (2.0 * np.pi)
+    # beyond its highest mode the model is that of modes above the band
+    high = 1.15 * float(fit.angular_frequencies[-1]) / (2.0 * np.pi)
+    return _Common(fit.sensors, fit.inputs, gains, (low, high), columns.size)
+
+
+class _Problem:
+    """Errors of the records for given laws; shapes and direct terms by linear least squares, a sensor at a time."""
+
+    def __init__(self, common: _Common, records: Sequence[_Record], measure: Measure) -> None:
+        self.common = common
+        self.records = records
+        self.measure: Measure = measure
+
+    def laws(self, theta: FloatArray) -> AmplitudeLaws:
+        r = self.common.modes
+        references = np.exp(theta[4 * r :])
+        return AmplitudeLaws(
+            self.measure,
+            np.exp(theta[:r]),
+            np.exp(theta[r : 2 * r]),
+            theta[2 * r : 3 * r],
+            theta[3 * r : 4 * r],
+            np.broadcast_to(references, (r,)) if references.size == 1 else references,
+        )
+
+    def bases(self, laws: AmplitudeLaws, record: _Record) -> tuple[ComplexArray, ComplexArray]:
+        """Return the columns for displacements and for accelerations of a record, each of shape (lines, r + k)."""
+        motion = _simulated_record(laws, record)
+        none = np.zeros((0, 0), dtype=np.complex128)
+        kinds = record.test.is_displacement
+        return (
+            np.hstack([record.spectra(motion.displacement), record.input_spectra]) if any(kinds) else none,
+            none if all(kinds) else np.hstack([record.spectra(motion.acceleration), record.input_spectra]),
+        )
+
+    def solve(self, theta: FloatArray) -> tuple[FloatArray, list[ComplexArray]]:
+        """Return coefficients, shape (sensors, r + k), and the relative error spectra of each record."""
+        laws = self.laws(theta)
+        bases = [self.bases(laws, record) for record in self.records]
+        width = self.common.modes + len(self.common.inputs)
+        coefficients = np.zeros((len(self.common.sensors), width))
+        grams = [[np.real(basis.conj().T @ basis) for basis in pair] for pair in bases]
+        for row, sensor in enumerate(self.common.sensors):
+            left, right = np.zeros((width, width)), np.zeros(width)
+            for record, pair, gram in zip(self.records, bases, grams, strict=True):
+                if row in record.rows:
+                    kind, column = int(not sensor.is_displacement), record.rows.index(row)
+                    weight = 1.0 / record.scale[column]
+                    left += weight**2 * gram[kind]
+                    right += weight * np.real(pair[kind].conj().T @ record.target[:, column])
+            size = np.sqrt(np.maximum(np.diag(left), 1e-300))
+            coefficients[row] = np.linalg.lstsq(left / np.outer(size, size), right / size, rcond=1e-12)[0] / size
+        errors = [self.errors(record, pair, coefficients) for record, pair in zip(self.records, bases, strict=True)]
+        return coefficients, errors
+
+    def start_in_motion(self, theta: FloatArray) -> None:
+        """Estimate the motion at the first sample of each record, with the coefficients of records at rest."""
+        laws, r = self.laws(theta), self.common.modes
+        coefficients = self.solve(theta)[0]
+        shapes, direct = coefficients[:, :r], coefficients[:, r:]
+        for record in self.records:
+            arguments = (record.test, record.inputs, record.forces, self.common.sensors)
+            record.initial = initial_state(laws, shapes, direct, *arguments)
+
+    def errors(
+        self, record: _Record, pair: tuple[ComplexArray, ComplexArray], coefficients: FloatArray
+    ) -> ComplexArray:
+        parts = []
+        for column, (row, sensor) in enumerate(zip(record.rows, record.test.sensors, strict=True)):
+            simulated = pair[int(not sensor.is_displacement)] @ coefficients[row]
+            parts.append(record.target[:, column] - simulated / record.scale[column])
+        return np.column_stack(parts)
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        errors = np.concatenate([item.ravel() for item in self.solve(theta)[1]])
+        return np.concatenate([errors.real, errors.imag])
+
+    def left_out_error(self, theta: FloatArray, coefficients: FloatArray, record: _Record) -> float:
+        """Return squared error over squared response of a record that is not part of the fit."""
+        error = self.errors(record, self.bases(self.laws(theta), record), coefficients)
+        return float(np.sum(np.abs(error * record.scale) ** 2) / max(record.power, 1e-300))
+
+
+def _jacobian(problem: _Problem, theta: FloatArray, free: Sequence[int], start: FloatArray | None = None) -> FloatArray:
+    """Return the derivatives of the residual with respect to the free parameters; `start` is the residual itself."""
+    start = problem.residual(theta) if start is None else start
+    columns = []
+    for index in free:
+        moved = theta.copy()
+        moved[index] += _STEP
+        columns.append((problem.residual(moved) - start) / _STEP)
+    return np.column_stack(columns)
+
+
+def _start(common: _Common, fit: MultiModeFit, level: FloatArray) -> FloatArray:
+    r = common.modes
+    return np.concatenate([np.log(fit.angular_frequencies), np.log(fit.damping_ratios), np.zeros(2 * r), np.log(level)])
+
+
+def _free(problem: _Problem, theta: FloatArray) -> list[int]:
+    """Return the parameters that a fit changes: frequency and damping alone for constant modes."""
+    return list(range(2 * problem.common.modes if problem.measure == "constant" else theta.size))
+
+
+def _fitted(problem: _Problem, theta: FloatArray, evaluations: int = _EVALUATIONS) -> FloatArray:
+    """Return the parameters after least squares from a start."""
+    r = problem.common.modes
+    free = _free(problem, theta)
+    levels = theta.size - 4 * r
+    reach = np.concatenate([_reach(r), np.full(levels, 3.0)])
+
+    def whole(values: FloatArray) -> FloatArray:
+        result = theta.copy()
+        result[free] = values
+        return result
+
+    last: tuple[FloatArray, FloatArray] | None = None
+
+    def residual(values: FloatArray) -> FloatArray:
+        nonlocal last
+        last = values.copy(), problem.residual(whole(values))
+        return last[1]
+
+    def jacobian(values: FloatArray) -> FloatArray:
+        known = last[1] if last is not None and np.array_equal(last[0], values) else None
+        return _jacobian(problem, whole(values), free, known)
+
+    result = least_squares(
+        residual,
+        theta[free],
+        jac=jacobian,
+        bounds=((theta - reach)[free], (theta + reach)[free]),
+        x_scale=(0.1 * reach)[free],
+        max_nfev=evaluations,
+        ftol=1e-4,
+        xtol=1e-5,
+    )
+    return whole(np.asarray(result.x))
+
+
+def _levels(problem: _Problem, theta: FloatArray) -> FloatArray:
+    """Return a middle amplitude of each mode [m], shape (r,), and of the whole motion for laws of that measure."""
+    values = [simulated(problem.laws(theta), record.forces, record.dt) for record in problem.records]
+    if problem.measure == "motion":
+        return np.array([max(0.3 * float(np.median([item.amplitude.max() for item in values])), 1e-12)])
+    peaks = np.array([np.abs(item.displacement).max(axis=0) for item in values])
+    return np.asarray(np.maximum(0.3 * np.median(peaks, axis=0), 1e-12))
+
+
+def _begin(problem: _Problem, constant: FloatArray) -> FloatArray | None:
+    """Return the start of a law from the fit of constant modes; None if no law can reduce their error (score test).
+
+    The start is the better one of a linear step from constant modes and of laws that soften a little.
+    """
+    r = problem.common.modes
+    theta = np.concatenate([constant[: 4 * r], np.log(_levels(problem, constant))])
+    residual = problem.residual(theta)
+    jacobian = _jacobian(problem, theta, range(4 * r), residual)
+    size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    costs = []
+    for count in (2 * r, 4 * r):
+        part = jacobian[:, :count] / size[:count]
+        step = np.linalg.lstsq(part, residual, rcond=1e-10)[0]
+        costs.append(float(np.sum((residual - part @ step) ** 2)))
+    if costs[1] > (1.0 - _LEAST_GAIN) * costs[0]:
+        return None
+    reach = 0.9 * _reach(r)
+    linear = theta.copy()
+    linear[: 4 * r] -= np.clip(step / size, -reach, reach)
+    level = np.log(2.0)
+    theta[2 * r : 3 * r], theta[3 * r : 4 * r] = _START_SOFTENING, _START_DAMPING
+    theta[:r] += _START_SOFTENING * level
+    theta[r : 2 * r] -= _START_DAMPING * level
+    return min((linear, theta), key=lambda item: float(np.sum(problem.residual(item) ** 2)))
+
+
+def _reach(modes: int) -> FloatArray:
+    """Return how far a fit may go from its start: frequency, damping, and their two exponents of each mode."""
+    return np.repeat([0.06, 1.8, 0.15, 1.5], modes)
+
+
+def _folds(tests: Sequence[FrameTest], common: _Common) -> tuple[list[_Record], list[_Record]]:
+    """Return the records of the fit, and the parts left out in turn: a test, or half the energy of the only one."""
+    whole = [_Record(test, common, test.name, np.ones(test.responses.shape[0])) for test in tests]
+    if len(whole) > 1:
+        return whole, whole
+    test = tests[0]
+    energy = np.cumsum(np.sum((test.responses - test.responses.mean(axis=0)) ** 2, axis=1))
+    first = np.asarray(energy <= 0.5 * energy[-1], dtype=np.float64)
+    halves = [
+        _Record(test, common, f"{test.name}, first half", first),
+        _Record(test, common, f"{test.name}, second half", 1.0 - first),
+    ]
+    return whole, halves
+
+
+def find_amplitude_dependence(fit: MultiModeFit, tests: Sequence[FrameTest]) -> AmplitudeDependence | None:
+    """Return modes over amplitude if they predict records left out of the fit better than constant modes.
+
+    Parameters
+    ----------
+    fit
+        Constant modes: the start, and the shapes that scale the amplitudes.
+    tests
+        Training tests, with measured excitation and corrected clocks. A single test is divided into two halves of
+        equal energy of the response.
+
+    Returns
+    -------
+    The model fitted to all tests, and the errors of the fits that left one out; None where no law is better.
+    """
+    common = _common(fit)
+    whole, parts = _folds(tests, common)
+    problem = _Problem(common, whole, "constant")
+    start = _start(common, fit, np.ones(1))
+    problem.start_in_motion(start)
+    for part in parts:
+        # parts of one test share its start
+        part.initial = next(record.initial for record in whole if record.test is part.test)
+    constant = _fitted(problem, start)
+    power = sum(record.target.shape[1] for record in whole)
+    if float(np.sum(problem.residual(constant) ** 2)) < _SUFFICIENT**2 * power:
+        return None
+    fits: dict[Measure, FloatArray] = {"constant": constant}
+    measures: tuple[Measure, ...] = ("motion", "mode")
+    for measure in measures:
+        problem = _Problem(common, whole, measure)
+        start_of_law = _begin(problem, constant)
+        if start_of_law is not None:
+            fits[measure] = _fitted(problem, start_of_law)
+    if len(fits) == 1:
+        return None
+    errors = {measure: _left_out(common, parts, measure, theta) for measure, theta in fits.items()}
+    best = min(errors, key=lambda measure: float(np.mean(errors[measure])))
+    if best == "constant":
+        return None
+    names = tuple(record.name for record in parts)
+    model = _model(_Problem(common, whole, best), fits[best])
+    return AmplitudeDependence(model, names, tuple(errors["constant"]), tuple(errors[best]))
+
+
+def _left_out(common: _Common, parts: Sequence[_Record], measure: Measure, start: FloatArray) -> list[float]:
+    """Return the error of each part for a fit to the others."""
+    errors = []
+    for part in parts:
+        problem = _Problem(common, [other for other in parts if other is not part], measure)
+        theta = _fitted(problem, start)
+        errors.append(problem.left_out_error(theta, problem.solve(theta)[0], part))
+    return errors
+
+
+def _model(problem: _Problem, theta: FloatArray) -> AmplitudeModel:
+    common, laws = problem.common, problem.laws(theta)
+    coefficients = problem.solve(theta)[0]
+    shapes, direct = coefficients[:, : common.modes], coefficients[:, common.modes :]
+    smallest, largest = _seen(problem, laws)
+    return AmplitudeModel(laws, common.sensors, common.inputs, common.gains, shapes, direct, largest, smallest)
+
+
+def _seen(problem: _Problem, laws: AmplitudeLaws) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest and the largest amplitude that counts for each mode over all records, shape (r,) each [m].
+
+    The smallest is the amplitude below which the records hold 5 % of the energy of the mode: what is seen below it is
+    mostly noise.
+    """
+    motions = [_simulated_record(laws, record) for record in problem.records]
+    own = np.abs(np.concatenate([item.displacement for item in motions]))
+    if laws.measure == "motion":
+        amplitude = np.concatenate([item.amplitude for item in motions])[:, None] * np.ones(own.shape[1])
+    else:
+        amplitude = own
+    order = np.argsort(amplitude, axis=0)
+    energy = np.cumsum(np.take_along_axis(own**2, order, axis=0), axis=0)
+    first = np.argmax(energy >= _LEAST_ENERGY * energy[-1], axis=0)
+    place = np.take_along_axis(order, first[None], axis=0)
+    return np.take_along_axis(amplitude, place, axis=0)[0], np.asarray(amplitude.max(axis=0))
+
+
+def _simulated_record(laws: AmplitudeLaws, record: _Record) -> Motion:
+    return simulated(laws, record.forces, record.dt, record.initial)
+
+
+def amplitude_finding(result: AmplitudeDependence) -> str:
+    """Return one line for the user: how far the modes change over the amplitudes seen, and what the laws gain."""
+    model = result.model
+    low, high = model.laws.at(model.smallest_m), model.laws.at(model.largest_m)
+    mode = int(np.argmax(np.abs(high[0] / low[0] - 1.0)))
+    seen = (
+        f"{omega[mode] / (2 * np.pi):.4g} Hz and {100 * zeta[mode]:.2g} % damping at {1e3 * reached[mode]:.2g} mm"
+        for (omega, zeta), reached in ((low, model.smallest_m), (high, model.largest_m))
+    )
+    before, after = (100.0 * np.sqrt(np.mean(values)) for values in (result.constant_error, result.error))
+    return (
+        f"modes depend on the amplitude: mode {mode + 1} from {' to '.join(seen)}; on data left out of the fit the RMS "
+        f"error falls from {before:.0f} to {after:.0f} % of the response"
+    )

@@ -1,0 +1,1 @@
+"""Clocks of sensors: delays, drifts and steps, and their proof."""

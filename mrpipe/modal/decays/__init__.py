@@ -1,0 +1,1 @@
+"""Damping ratios from free decays."""

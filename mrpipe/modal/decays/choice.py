@@ -1,0 +1,116 @@
+"""Damping ratio of each mode from free decays and from the multi-mode fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.decays.decay import DecayMethod, DecayResult, Estimate, analyse_decay
+from mrpipe.modal.fit.result import MultiModeFit
+from mrpipe.modal.records import FrameTest, FrameTests, Place
+
+_NORMAL_95 = 1.959964
+_WIDEST_DECAY_INTERVAL = 0.02
+_WIDE_INTERVAL = 0.1
+"""Half width of the 95 % interval over the damping ratio above which a finding states it."""
+
+
+def decays_of_modes(tests: FrameTests, fit: MultiModeFit) -> tuple[dict[int, DecayResult], list[str]]:
+    """Return the most certain free decay of each mode, by mode number from 1, and messages for the user."""
+    results: dict[int, DecayResult] = {}
+    findings = []
+    for test in tests.decays:
+        common, shapes = _same_sensors(test, fit)
+        if common is None:
+            findings.append(f"test {test.name}: none of its sensors is in a forced test; it was left out")
+            continue
+        result = analyse_decay(common, shapes, fit.angular_frequencies, fit.damping_ratios)
+        if result is None:
+            findings.append(f"test {test.name}: fewer than six peaks of a free decay exceed the noise; it was left out")
+            continue
+        known = results.get(result.mode)
+        if known is None or result.exponential_fit.half_width < known.exponential_fit.half_width:
+            results[result.mode] = result
+    return results, findings
+
+
+def _same_sensors(test: FrameTest, fit: MultiModeFit) -> tuple[FrameTest | None, FloatArray]:
+    """Return a decay test with those sensors that the fit also has, and the shapes at them, shape (s, r)."""
+    known = [Place(sensor.floor, sensor.direction) for sensor in fit.sensors]
+    columns = [i for i, sensor in enumerate(test.sensors) if Place(sensor.floor, sensor.direction) in known]
+    if not columns:
+        return None, np.zeros((0, fit.angular_frequencies.size))
+    places = tuple(Place(test.sensors[i].floor, test.sensors[i].direction) for i in columns)
+    part = replace(
+        test,
+        responses=test.responses[:, columns],
+        is_displacement=tuple(test.is_displacement[i] for i in columns),
+        places=places,
+    )
+    return part, np.real(fit.residues[[known.index(place) for place in places]])
+
+
+def pooled(first: Estimate, second: Estimate) -> Estimate:
+    """Return the mean of two independent estimates, weighted by the inverse of their variances."""
+    weights = np.array([1.0 / max(item.half_width, 1e-12) ** 2 for item in (first, second)])
+    value = float(weights @ [first.value, second.value] / weights.sum())
+    return Estimate.of(value, float(1.0 / np.sqrt(weights.sum())) / _NORMAL_95)
+
+
+def choose_damping(
+    sweep: tuple[Estimate, ...],
+    decays: dict[int, DecayResult],
+    damping_from: str,
+    other: str,
+    method: DecayMethod = "exponential-fit",
+) -> tuple[tuple[Estimate, ...], tuple[str, ...], list[str]]:
+    """Choose the damping ratio of each mode.
+
+    Parameters
+    ----------
+    sweep
+        Damping ratios of the multi-mode fit, one a mode.
+    decays
+        Free decays by mode number from 1.
+    damping_from
+        `decay` to prefer free decays; otherwise the fit counts.
+    other
+        Name of the tests of the fit, for the source and for messages.
+    method
+        How the damping ratio is read from a decay.
+
+    Returns
+    -------
+    Damping ratios, their sources, and messages for the user.
+    """
+    chosen: list[Estimate] = []
+    sources: list[str] = []
+    findings: list[str] = []
+    for mode, second in enumerate(sweep, start=1):
+        decay = decays.get(mode)
+        first = decay.damping_ratio(method) if decay else None
+        if first is None or damping_from != "decay":
+            chosen.append(second)
+            sources.append(other)
+        elif first.half_width <= _WIDEST_DECAY_INTERVAL * first.value or method != "exponential-fit":
+            chosen.append(first)
+            sources.append("decay")
+        else:
+            # neither is sure: the mean of two independent methods, each by its certainty
+            chosen.append(pooled(first, second))
+            sources.append(f"decay and {other}")
+        if chosen[-1].half_width > _WIDE_INTERVAL * chosen[-1].value:
+            percent = 100.0 * chosen[-1].half_width / chosen[-1].value
+            findings.append(
+                f"mode {mode}: the records determine the damping ratio only to +-{percent:.0f} % (95 % interval); "
+                "longer records, or more force on this mode, determine it better"
+            )
+        if first is None and damping_from == "decay":
+            findings.append(f"mode {mode}: no free decay, damping from the {other}")
+        if first is not None:
+            apart = abs(first.value - second.value)
+            if apart > first.half_width + second.half_width + 0.1 * second.value:
+                findings.append(f"mode {mode}: damping is {first.value:.2g} by decay, {second.value:.2g} by sweep")
+    return tuple(chosen), tuple(sources), findings

@@ -1,0 +1,1 @@
+"""Fit of poles to whole-record spectra: linear part, projection, covariance, first poles."""

@@ -1,0 +1,64 @@
+"""Covariance of fitted poles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.modal.fit.projected import ProjectedFit
+
+
+def pole_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
+    """Covariance of theta that allows for noise of the excitation, which reaches all outputs through H.
+
+    A lightly damped peak has too few lines to estimate their scatter. The variance predicted from the noise of the
+    whole band is taken where it is the larger one.
+    """
+    jacobian, residual = fit.jacobian(theta), fit.residual(theta)
+    inverse = np.linalg.pinv(jacobian.T @ jacobian)
+    parameters = theta.size
+    predicted, observed = np.zeros_like(inverse), np.zeros_like(inverse)
+    start = 0
+    for group, state in zip(fit.groups, fit.states(theta), strict=True):
+        total, outputs = group.problem.total, len(group.sensors)
+        part = slice(start, start + state.residual.size)
+        start = part.stop
+        own = jacobian[part].reshape(2, total, outputs, parameters)
+        error = residual[part].reshape(2, total, outputs)
+        scores = np.einsum("clop,clo->lp", own, error)
+        observed += scores.T @ scores
+        line = group.weight**2
+        predicted += np.einsum("clop,cloq,l->pq", own, own, line, optimize=True)
+        response = fit.steady(group, state) / np.sqrt(fit.input_power(group))[:, None]
+        common = (group.weight * group.input_noise)[:, None] * response / group.sigma
+        carried = np.einsum("lop,lo->lp", own[0] - 1j * own[1], common)
+        predicted += 0.5 * (carried.real.T @ carried.real + carried.imag.T @ carried.imag)
+    both = np.stack([inverse @ predicted @ inverse, inverse @ observed @ inverse])
+    spread = np.sqrt(np.max(np.diagonal(both, axis1=1, axis2=2), axis=0))
+    own_spread = np.sqrt(np.diag(both[0]))
+    return np.asarray(both[0] * np.outer(spread / own_spread, spread / own_spread))
+
+
+def clustered_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
+    """Covariance of theta that also allows for what a sensor has wrong in one test over all lines of a peak.
+
+    An error of a sensor's clock or cross-talk is alike from line to line, and noise of single lines does not show it.
+    Each sensor in each test is therefore one cluster of the robust covariance (Liang and Zeger 1986). The larger
+    variance of this and of :func:`pole_covariance` counts.
+    """
+    covariance = pole_covariance(fit, theta)
+    jacobian, residual = fit.jacobian(theta), fit.residual(theta)
+    inverse = np.linalg.pinv(jacobian.T @ jacobian)
+    scores, start = [], 0
+    for group, state in zip(fit.groups, fit.states(theta), strict=True):
+        part = slice(start, start + state.residual.size)
+        start = part.stop
+        shape = (2 * group.problem.total, len(group.sensors))
+        scores.append(np.einsum("lop,lo->op", jacobian[part].reshape(*shape, -1), residual[part].reshape(shape)))
+    spread = np.vstack(scores) @ inverse
+    clusters = spread.shape[0]
+    if clusters < 2:
+        return covariance
+    variance = np.sum(spread**2, axis=0) * clusters / (clusters - 1)
+    ratio = np.sqrt(np.maximum(variance / np.diag(covariance), 1.0))
+    return np.asarray(covariance * np.outer(ratio, ratio))

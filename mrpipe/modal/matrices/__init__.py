@@ -1,0 +1,1 @@
+"""Mass, damping and stiffness from modes: scale, orthogonality, storey models, rigid floors."""

@@ -1,0 +1,64 @@
+"""Damping of ambient modes by maximum likelihood, and the band in which sensors move together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrpipe.modal.ambient.modes import _common_motion_ends_hz
+from mrpipe.modal.ambient.refine import refine_by_spectra
+from mrpipe.modal.fit.multimode import fit_modes
+from mrpipe.modal.records import FrameTest, Place
+from mrpipe.modal.spectra import record_spectrum
+from tests.modal.towers import Sensors, ambient_test, random_tower
+
+RATE = 50.0
+
+
+@pytest.fixture(scope="module")
+def tower():
+    return random_tower(np.random.default_rng(4), floors=4)
+
+
+@pytest.fixture(scope="module")
+def ambient(tower):
+    seen = ambient_test(
+        tower, np.random.default_rng(7), Sensors(noise=0.03, crosstalk=0.03), rate=RATE, duration_s=1800
+    )
+    places = tuple(Place(i + 1) for i in range(tower.floors))
+    return FrameTest("ambient", "ambient", RATE, None, seen, (False,) * tower.floors, places=places)
+
+
+def _wrong_fit(tower, ambient, factors):
+    """Modes with the true shapes, and damping that is wrong by a factor each."""
+    forced = replace(ambient, kind="random", excitation=ambient.responses[:, 0])
+    spectra = [record_spectrum(forced, (0.5 * tower.frequencies_hz[0], 1.1 * tower.frequencies_hz[-1])).every(20)]
+    fit = fit_modes(spectra, 2 * np.pi * tower.frequencies_hz, tower.damping_ratios, passes=1, evaluations=1)
+    return replace(
+        fit,
+        angular_frequencies=2 * np.pi * tower.frequencies_hz * 1.003,
+        damping_ratios=tower.damping_ratios * factors,
+        residues=tower.shapes.astype(np.complex128),
+    )
+
+
+@pytest.mark.planted
+def test_damping_that_is_wrong_by_factors_is_corrected_and_its_interval_holds(tower, ambient):
+    fit = refine_by_spectra(_wrong_fit(tower, ambient, np.array([0.3, 3.0, 0.25, 2.0])), [ambient])
+    assert fit.angular_frequencies / (2 * np.pi) == pytest.approx(tower.frequencies_hz, rel=0.005)
+    assert fit.damping_ratios == pytest.approx(tower.damping_ratios, rel=0.25)
+    errors = np.sqrt(np.diag(fit.covariance))[tower.floors :]
+    apart = np.abs(np.log(fit.damping_ratios / tower.damping_ratios))
+    assert np.all(apart < 3.5 * errors)
+    assert np.all(errors < 0.2)
+
+
+@pytest.mark.planted
+def test_the_band_reaches_beyond_the_highest_mode(tower, ambient):
+    end = _common_motion_ends_hz(ambient, float(tower.frequencies_hz[0]))
+    assert end > tower.frequencies_hz[-1]
+    # sensors that show nothing but their own noise have no motion in common
+    noise = replace(ambient, responses=np.random.default_rng(1).standard_normal(ambient.responses.shape))
+    assert _common_motion_ends_hz(noise, 1.0) < 3.0

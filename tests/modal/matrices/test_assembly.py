@@ -1,0 +1,88 @@
+"""From incomplete modes to mass, damping and stiffness: what is determined comes back, what is not is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial, can_scale
+from mrpipe.modal.search.selection import Layout
+from mrpipe.structures import complex_modes, modal_assurance, natural_modes, shear_frame
+
+pytestmark = pytest.mark.planted
+
+MASSES = np.array([6.0, 5.5, 5.0, 4.5])
+STOREYS = np.array([9000.0, 7000.0, 8000.0, 6000.0])
+RATIOS = np.array([0.004, 0.006, 0.008, 0.01])
+FRAME = shear_frame(MASSES, STOREYS, RATIOS)
+MODES = natural_modes(FRAME)
+NORMALISED = MODES.mode_shapes / np.sqrt(np.einsum("ir,ij,jr->r", MODES.mode_shapes, FRAME.mass, MODES.mode_shapes))
+ALL = tuple(range(4))
+
+
+def _modes(
+    count: int = 4, measured: tuple[int, ...] = ALL, driven: int = -1, numbers: tuple[int, ...] = ()
+) -> PartialModes:
+    chosen = [number - 1 for number in numbers] or list(range(count))
+    shapes = np.zeros((4, len(chosen)))
+    shapes[list(measured)] = MODES.mode_shapes[np.ix_(list(measured), chosen)]
+    errors = np.full(shapes.shape, np.inf)
+    errors[list(measured)] = 1e-3
+    known = [(number + 1, number + 1) for number in chosen]
+    return PartialModes(
+        MODES.angular_frequencies[chosen], RATIOS[chosen], shapes, errors, measured, tuple(known),
+        NORMALISED[driven, chosen] ** 2 if driven >= 0 else None, driven,
+    )  # fmt: skip
+
+
+def _assembled(modes: PartialModes, masses: np.ndarray, chain: bool = True) -> Assembly:
+    return assemble_partial(modes, masses, Layout(4, masses, chain), Path("campaign.yaml"))
+
+
+def test_all_modes_with_a_floor_without_a_sensor_give_the_whole_frame() -> None:
+    found = _assembled(_modes(measured=(0, 1, 3)), MASSES)
+    assert found.frame is not None and found.numbers == (1, 2, 3, 4)
+    assert np.linalg.norm(found.frame.stiffness - FRAME.stiffness) < 0.01 * np.linalg.norm(FRAME.stiffness)
+    assert np.diag(modal_assurance(found.shapes, MODES.mode_shapes)).min() > 0.999
+    assert complex_modes(found.frame).damping_ratios == pytest.approx(RATIOS, rel=0.01)
+    assert any("floors without a sensor (3)" in line for line in found.findings)
+
+
+def test_missing_modes_are_named_and_get_the_mean_damping() -> None:
+    found = _assembled(_modes(numbers=(1, 3)), MASSES)
+    assert found.frame is not None and found.numbers == (1, 3)
+    assert np.linalg.norm(found.frame.stiffness - FRAME.stiffness) < 0.01 * np.linalg.norm(FRAME.stiffness)
+    assert complex_modes(found.frame).damping_ratios == pytest.approx([0.004, 0.006, 0.008, 0.006], rel=0.02)
+    assert "2 of 4 modes were found; modes 2, 4 are not determined" in found.findings[0]
+
+
+def test_unknown_masses_follow_from_the_measured_force() -> None:
+    found = _assembled(_modes(driven=1), np.full(4, np.nan))
+    assert found.masses == pytest.approx(MASSES, rel=0.01)
+    assert np.all(found.mass_intervals[:, 0] <= found.masses) and np.all(found.masses <= found.mass_intervals[:, 1])
+    assert any("scaled by the measured force" in line for line in found.findings)
+
+
+def test_without_a_mass_and_a_force_only_the_modes_are_left() -> None:
+    unknown = np.full(4, np.nan)
+    assert not can_scale(unknown, _modes()) and can_scale(MASSES, _modes()) and can_scale(unknown, _modes(driven=0))
+    found = _assembled(_modes(measured=(0, 1, 3)), unknown)
+    assert found.frame is None and found.storeys is None
+    assert np.isnan(found.shapes[2]).all() and np.isfinite(found.shapes[[0, 1, 3]]).all()
+    assert "no mass is known and no force" in found.findings[0]
+
+
+def test_sensors_in_several_directions_give_no_chain() -> None:
+    found = _assembled(_modes(), MASSES, chain=False)
+    assert found.frame is None and "several directions" in found.findings[0]
+
+
+def test_a_frame_that_is_no_chain_of_storeys_is_warned_of() -> None:
+    modes = _modes()
+    stiffer = PartialModes(
+        modes.angular_frequencies * np.array([1.0, 1.12, 1.0, 1.0]), modes.damping_ratios, modes.shapes, modes.errors,
+        modes.measured, modes.possible_numbers,
+    )  # fmt: skip
+    assert any("misses the frequency of mode" in line for line in _assembled(stiffer, MASSES).findings)
