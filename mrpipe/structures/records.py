@@ -17,7 +17,8 @@ from scipy.signal import resample_poly
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.readers.cosmos import ENDINGS as V2_ENDINGS
-from mrpipe.campaigns.readers.cosmos import read_strong_motion
+from mrpipe.campaigns.readers.peer import peer_record, refuse_integrated
+from mrpipe.campaigns.readers.strong_motion import read_strong_motion
 from mrpipe.errors import UserError
 from mrpipe.units import to_si
 
@@ -40,7 +41,6 @@ _CLOCK_NAME = re.compile(r"^\W*(t|time|zeit)\b", re.IGNORECASE)
 _ADVICE = "give its unit, as --set benchmark.base_isolated.motion.unit=g (or ten_storey)"
 _POINTS = re.compile(r"NPTS\s*[=:]\s*(\d+)", re.IGNORECASE)
 _INTERVAL = re.compile(r"\bDT\s*[=:]\s*([0-9.]+(?:E[-+]?\d+)?)", re.IGNORECASE)
-_OLD_HEADER = re.compile(r"^\s*(\d+)\s+([0-9.]+(?:E[-+]?\d+)?)\s+NPTS\s*,\s*DT", re.IGNORECASE | re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,7 @@ def read_motion(
     path = Path(path)
     if not path.is_file():
         raise UserError(path, "", "no such record", "give the path of a ground-motion file")
+    refuse_integrated(path)
     if path.suffix.lower() == ".at2":
         raw = _read_at2(path)
     elif path.suffix.lower() == ".mat":
@@ -190,31 +191,12 @@ def _numbers(line: str) -> list[float] | None:
 
 
 def _read_at2(path: Path) -> _Raw:
-    lines = _text(path).splitlines()
-    first = next((i for i, line in enumerate(lines) if _numbers(line) and i >= 2), len(lines))
-    header = "\n".join(lines[:first])
-    old = _OLD_HEADER.search(header)
-    points = _POINTS.search(header)
-    interval = _INTERVAL.search(header)
-    count = int(points.group(1)) if points else int(old.group(1)) if old else None
-    step = float(interval.group(1)) if interval else float(old.group(2)) if old else None
-    if count is None or step is None:
-        raise UserError(path, "header", "has no NPTS and DT", "an AT2 file says NPTS= 1234, DT= .0050 SEC in line 4")
-    samples: list[float] = []
-    for number, line in enumerate(lines[first:], start=first + 1):
-        row = _numbers(line)
-        if row is None:
-            raise UserError(path, f"line {number}", "is not a row of numbers", "leave text to the four header lines")
-        samples.extend(row)
-    if len(samples) != count:
-        raise UserError(
-            path, "NPTS", f"promises {count} points, the file holds {len(samples)}", "correct the header or the file"
-        )
-    return _Raw(np.array(samples)[:, None], step, header)
+    record = peer_record(path, _text(path))
+    return _Raw(record.samples[:, None], record.interval_s, record.header)
 
 
 def _read_v2(path: Path) -> _Raw:
-    """Return the first two horizontal channels of a CSMIP or COSMOS V2 file, or of a zip that contains some."""
+    """Return the first two horizontal channels of a CSMIP or COSMOS V2 file, or of a zip of V2 or AT2 files."""
     channels = [item for item in read_strong_motion(path) if not item.vertical][:2]
     if not channels:
         raise UserError(path, "", "holds no horizontal channel", "give a record with a horizontal channel")

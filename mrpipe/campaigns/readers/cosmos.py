@@ -1,39 +1,50 @@
-"""Strong-motion records as data centres distribute them: CSMIP and COSMOS V2 files, alone or in a zip of CESMD."""
+"""Strong-motion records in the formats CSMIP V2 and COSMOS V1.20, as data centres distribute them."""
 
 from __future__ import annotations
 
 import re
-import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.campaigns.columns import DataFile
-from mrpipe.campaigns.readers.reader import Reader, require_size
-from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
 from mrpipe.units import conversion
 
 _DATA = re.compile(
-    r"^\s*(\d+)\s+(?:points\s+of\s+)?(accel|veloc|displ)\w*\.?\s+(?:data|pts|points)\b(.*)$", re.IGNORECASE
+    r"^\s*(\d+)\s+(?:points\s+of\s+)?(?:(?:raw|(?:un)?cor\w*|instr?\w*)[.\s-]+)*"
+    r"(accel|veloc|displ)\w*\.?\s+(?:data|pts|points)\b(.*)$",
+    re.IGNORECASE,
 )
 _STEP = re.compile(r"spaced\s+at\s+([\d.]+)\s*sec", re.IGNORECASE)
 _SECONDS = re.compile(r"approx\.?\s+([\d.]+)\s*sec", re.IGNORECASE)
-_FORMAT = re.compile(r"\(\s*(\d+)\s*[feg]\s*(\d+)\.\d+\s*\)", re.IGNORECASE)
-_UNIT = re.compile(
-    r"(?:units?\s*=\s*|in\s+)(cm/s(?:ec)?\^?2|cm/s(?:ec)?/s(?:ec)?|m/s(?:ec)?\^?2|gals?|g)\b", re.IGNORECASE
-)
+_RATE = re.compile(r"([\d.]+)\s*samples/sec", re.IGNORECASE)
+_REAL_VALUES = re.compile(r"^\s*(\d+)\s+real-header\s+values\b[^\n]*$", re.IGNORECASE | re.MULTILINE)
+_INTEGER_VALUES = re.compile(r"^\s*(\d+)\s+integer-header\s+values\b[^\n]*$", re.IGNORECASE | re.MULTILINE)
+_FORMAT = re.compile(r"\(\s*(?:\d+p,?\s*)?\d*\s*[fegdi]\s*(\d+)(?:\.\d+)?\s*(?:e\d*)?\s*\)", re.IGNORECASE)
+"""Fortran format of the samples; some programs write the E of the exponent behind the width."""
+_UNIT = re.compile(r"(?:units?\s*=\s*|\bin\s+)([a-z]+(?:\s*[/^*.]\s*[a-z0-9]+)*)", re.IGNORECASE)
+_TENTH_OF_G = "g/10"
 _CHANNEL = re.compile(
     r"\bchan(?:nel)?\.?\s*#?\s*(\d+)\b(?:\s*[:,]\s*([^\n]*?))?(?:\s{3,}|$)", re.IGNORECASE | re.MULTILINE
 )
-_VERTICAL = re.compile(r"\b(up|vert\w*|dn|down|ud)\b", re.IGNORECASE)
+_STATION_CHANNEL = re.compile(
+    r"^\s*sta\s+chan?\b\s*:?\s*(\w+)\s*:?\s*([^\n(]*?)\s*\((?:rcrdr|recorder)[^)\n]*\)"
+    r"(?:[^\S\n]*location:[^\S\n]*([^\n]*?))?\s*$",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""Line 9 of COSMOS: channel, azimuth and location."""
+_VERTICAL = re.compile(r"\b(up|vert\w*|dn|down|ud|[a-z]nz)\b", re.IGNORECASE)
+_UP, _DOWN, _ANY_VERTICAL = 400, 401, 402
+"""Azimuths that COSMOS gives to vertical channels."""
+_AZIMUTH, _RECORDED_STEP_S, _STEP_MS = 53, 33, 61
+"""Places of the azimuth among the integers, and of sampling intervals among the reals of the header, from 0."""
 _WIDTH = 10
 _RATES_HZ = (50.0, 100.0, 120.0, 125.0, 200.0, 240.0, 250.0, 400.0, 500.0, 1000.0)
-ENDINGS = (".v2", ".v2c", ".v1")
-LARGEST_ARCHIVE = 2**30
+ENDINGS = (".v2", ".v2c", ".v1", ".v1c")
 
 
 @dataclass(frozen=True)
@@ -58,46 +69,23 @@ class StrongMotion:
     vertical: bool
 
 
-def read_strong_motion(path: Path) -> list[StrongMotion]:
-    """Return the accelerations of all channels of a V2 file, or of all V2 files in a zip.
+def cosmos_channels(path: Path, text: str) -> Iterator[StrongMotion]:
+    """Return the accelerations of all channels of a V2 file.
 
     Formats: CSMIP volume 2 (`... points of accel data equally spaced at .005 sec, in cm/sec2`) and COSMOS V1.20
     (`... acceleration pts, approx 36 secs, units=cm/sec2 (04),Format=(8f10.3)`). Velocities and displacements are left
     out.
 
+    Parameters
+    ----------
+    path, text
+        The file, for messages, and its content.
+
     Raises
     ------
     UserError
-        If no acceleration is found, or a block holds fewer numbers than it promises.
+        If a block holds fewer numbers than it promises, or no acceleration unit.
     """
-    found: list[StrongMotion] = []
-    for text in _texts(path):
-        found += _channels(path, text)
-    if not found:
-        raise UserError(path, "", "holds no acceleration in V2 form", "give a .V2 file, or a zip that contains some")
-    names = [item.name for item in found]
-    return [
-        item if names.count(item.name) == 1 else StrongMotion(f"{item.name} #{index + 1}", *_rest(item))
-        for index, item in enumerate(found)
-    ]
-
-
-def _rest(item: StrongMotion) -> tuple[FloatArray, float, bool]:
-    return item.acceleration_m_s2, item.interval_s, item.vertical
-
-
-def _texts(path: Path) -> Iterator[str]:
-    if path.suffix.lower() != ".zip":
-        yield path.read_text(encoding="latin-1")
-        return
-    with zipfile.ZipFile(path) as archive:
-        members = [item for item in archive.infolist() if Path(item.filename).suffix.lower() in ENDINGS]
-        require_size(path, sum(item.file_size for item in members), path.stat().st_size)
-        for item in sorted(members, key=lambda member: member.filename):
-            yield archive.read(item).decode("latin-1")
-
-
-def _channels(path: Path, text: str) -> Iterator[StrongMotion]:
     lines = text.splitlines()
     begin = 0
     for index, line in enumerate(lines):
@@ -106,32 +94,56 @@ def _channels(path: Path, text: str) -> Iterator[StrongMotion]:
             continue
         header = "\n".join(lines[begin:index])
         count = int(said[1])
+        factor = _factor(path, index + 1, said[3])
         values, begin = _numbers(path, lines, index, count, said[3])
-        unit = _UNIT.search(said[3])
-        named = list(_CHANNEL.finditer(header))
-        number = named[-1][1] if named else "1"
-        place = (named[-1][2] or "").strip() if named else ""
+        number, place = _name(header)
         yield StrongMotion(
             name=f"{number}: {place}" if place else number,
-            acceleration_m_s2=values * conversion(unit[1].lower() if unit else "cm/s^2", quantity="acceleration"),
+            acceleration_m_s2=values * factor,
             interval_s=_interval(path, said[3], header, count),
-            vertical=bool(_VERTICAL.search(place)),
+            vertical=bool(_VERTICAL.search(f"{number} {place}")) or _is_vertical(header),
         )
 
 
+def _name(header: str) -> tuple[str, str]:
+    """Return number (or code) of the channel and its direction and location, as the header gives them."""
+    station = list(_STATION_CHANNEL.finditer(header))
+    if station:
+        return station[-1][1], ", ".join(part for part in (station[-1][2], station[-1][3]) if part)
+    named = list(_CHANNEL.finditer(header))
+    return (named[-1][1], (named[-1][2] or "").strip()) if named else ("1", "")
+
+
+def _factor(path: Path, line: int, said: str) -> float:
+    """Return the factor from the numbers of a block to m/s^2; without a unit they are cm/s^2, as CSMIP writes them."""
+    unit = _UNIT.search(said)
+    written = re.sub(r"\s", "", unit[1]).lower().rstrip(".") if unit else "cm/s^2"
+    if written == _TENTH_OF_G:
+        return 0.1 * conversion("g", quantity="acceleration")
+    try:
+        return conversion(written, quantity="acceleration")
+    except UserError:
+        raise UserError(
+            path,
+            f"line {line}",
+            f"gives the samples in {written}, which is no unit of acceleration",
+            "download the corrected record (volume 2), which is in cm/s^2",
+        ) from None
+
+
 def _numbers(path: Path, lines: list[str], index: int, count: int, said: str) -> tuple[FloatArray, int]:
-    """Return the numbers of a block in columns of fixed width, and the line after it."""
+    """Return the numbers of a block, and the line after it: in columns of fixed width, else between blanks."""
     form = _FORMAT.search(said)
-    width = int(form[2]) if form else _WIDTH
+    width = int(form[1]) if form else _WIDTH
     values: list[float] = []
     row = index + 1
     while len(values) < count and row < len(lines):
         line = lines[row].rstrip()
-        pieces = [line[start : start + width] for start in range(0, len(line), width)]
-        try:
-            values += [float(piece) for piece in pieces if piece.strip()]
-        except ValueError:
+        numbers = _floats(line[start : start + width] for start in range(0, len(line), width))
+        numbers = _floats(line.split()) if numbers is None else numbers
+        if numbers is None:
             break
+        values += numbers
         row += 1
     if len(values) != count:
         problem = f"promises {count} values, {len(values)} follow"
@@ -139,39 +151,60 @@ def _numbers(path: Path, lines: list[str], index: int, count: int, said: str) ->
     return np.asarray(values), row
 
 
+def _floats(pieces: Iterable[str]) -> list[float] | None:
+    try:
+        return [float(piece) for piece in pieces if piece.strip()]
+    except ValueError:
+        return None
+
+
 def _interval(path: Path, said: str, header: str, count: int) -> float:
-    """Return the sampling interval [s]: stated, else from the length and the real header values of COSMOS."""
+    """Return the sampling interval [s].
+
+    CSMIP states it in the line before the samples. COSMOS states only a rounded duration there; the first interval of
+    the header that agrees with it counts, and without one the usual rate that agrees.
+    """
     step = _STEP.search(said)
     if step:
         return float(step[1])
     length = _SECONDS.search(said)
     if not length:
         raise UserError(path, "header", "states no sampling interval", "give a V2 file with `spaced at` or `approx`")
-    about = float(length[1]) / count
-    stated = [float(item) for item in re.findall(r"(?<![\d.])(?:\d+\.\d+|\.\d+)(?![\d.])", header)]
-    near = [item for item in stated if abs(item / about - 1.0) < 0.05]
-    usual = [1.0 / rate for rate in _RATES_HZ if abs(1.0 / rate / about - 1.0) < 0.05]
-    both = [item for item in near if any(abs(item / other - 1.0) < 1e-6 for other in usual)]
-    return (both or usual or near or [about])[0]
+    seconds = float(length[1])
+    reals = _header_values(_REAL_VALUES, header)
+    stated = [reals[_STEP_MS] * 1e-3] if len(reals) > _STEP_MS else []
+    stated += [reals[_RECORDED_STEP_S], reals[_RECORDED_STEP_S] * 1e-3] if len(reals) > _RECORDED_STEP_S else []
+    stated += [1.0 / float(rate) for rate in reversed(_RATE.findall(header)) if float(rate) > 0.0]
+    # the duration is rounded or cut to whole seconds
+    agrees = partial(_agrees, count=count, seconds=seconds)
+    for candidates in (
+        stated,
+        sorted((1.0 / rate for rate in _RATES_HZ), key=lambda item: abs(item * count - seconds)),
+    ):
+        if suitable := list(filter(agrees, candidates)):
+            return suitable[0]
+    return seconds / count
 
 
-def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
-    """Return the channels as columns in m/s^2; all must have the clock of the first."""
-    channels = read_strong_motion(path)
-    interval = channels[0].interval_s
-    if any(abs(item.interval_s / interval - 1.0) > 1e-6 for item in channels):
-        raise UserError(path, "", "its channels differ in sampling interval", "give the channels in separate files")
-    columns = {item.name: item.acceleration_m_s2 for item in channels}
-    aliases = {name.partition(":")[0]: name for name in columns}
-    length = channels[0].acceleration_m_s2.size
-    return DataFile(
-        path=path,
-        names=tuple(columns),
-        fetch=columns.__getitem__,
-        time_s=np.asarray(interval * np.arange(length), dtype=np.float64),
-        sampling_rate_hz=1.0 / interval,
-        aliases=aliases,
-    )
+def _agrees(interval_s: float, count: int, seconds: float) -> bool:
+    return interval_s > 0.0 and abs(interval_s * count - seconds) <= max(1.0, 0.01 * seconds)
 
 
-READER = Reader((*ENDINGS, ".zip"), _read)
+def _header_values(heading: re.Pattern[str], header: str) -> list[float]:
+    """Return the numbers that follow a heading of COSMOS, such as `100 Real-header values follow on 20 lines`."""
+    found = list(heading.finditer(header))
+    if not found:
+        return []
+    count = int(found[-1][1])
+    values: list[float] = []
+    for line in header[found[-1].end() :].splitlines()[1:]:
+        numbers = _floats(line.split())
+        if numbers is None or len(values) >= count:
+            break
+        values += numbers
+    return values[:count]
+
+
+def _is_vertical(header: str) -> bool:
+    integers = _header_values(_INTEGER_VALUES, header)
+    return len(integers) > _AZIMUTH and integers[_AZIMUTH] in (_UP, _DOWN, _ANY_VERTICAL)
