@@ -130,7 +130,7 @@ def test_units_of_cosmos_and_azimuths_of_vertical_channels(tmp_path: Path) -> No
         assert channel.vertical and channel.interval_s == 0.005
         np.testing.assert_allclose(channel.acceleration_m_s2, factor * GROUND, rtol=1e-6, atol=1e-6)
     (tmp_path / "a.v1").write_text(text.replace("units=in/sec2 (07)", "units=counts (50)"))
-    with pytest.raises(UserError, match="samples in counts, which is no unit of acceleration"):
+    with pytest.raises(UserError, match="samples in counts, which is not a unit of acceleration"):
         read_strong_motion(tmp_path / "a.v1")
 
 

@@ -126,7 +126,7 @@ def _factor(path: Path, line: int, said: str) -> float:
         raise UserError(
             path,
             f"line {line}",
-            f"gives the samples in {written}, which is no unit of acceleration",
+            f"gives the samples in {written}, which is not a unit of acceleration",
             "download the corrected record (volume 2), which is in cm/s^2",
         ) from None
 
