@@ -72,6 +72,8 @@ def explain(
         section = section_of(model, path[:-1])
         known = list(section.model_fields) if section is not None else []
         return UserError(source, where, "unknown key", nearest(str(path[-1]), known))
+    if first["type"] == "missing":
+        return UserError(source, where, "is missing", "give this setting")
     given = first.get("input")
     problem = f"is {shown(given)}" if not isinstance(given, Mapping) else "is a section with settings"
     return UserError(source, where, problem, expected(first))

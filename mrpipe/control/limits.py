@@ -66,11 +66,16 @@ class LimitingModes:
         return (self.omega_inf - self.omega_0) / self.omega_0
 
 
+STILL = 1e-9
+"""Stroke of a mode over that of the mode with the largest one, below which only rounding moves the damper."""
+
+
 def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> LimitingModes:
     """Solve the free (4.4) and the locked eigenproblem; (4.5), (4.6), P2 (6).
 
     The locked problem is that on the subspace w'x = 0. The locked mode that belongs to the target is the one of the
-    same number: locking raises each frequency to at most the next one.
+    same number: locking raises each frequency to at most the next one. Modes that do not move the damper, such as those
+    across its direction, are the same in both problems and are not counted.
 
     Parameters
     ----------
@@ -99,18 +104,37 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     squared, shapes = eigh(K, M)
     if squared[mode - 1] <= 0.0:
         raise UserError(f"frame {frame.name}", "stiffness", f"mode {mode} is unstable", "identify the frame again")
-    basis = null_space(w[None, :])
+    moving = moving_modes(w, shapes)
+    if mode not in moving:
+        listed = ", ".join(map(str, moving[:6]))
+        problem = f"mode {mode} does not move the damper"
+        raise UserError("calibrate", "position", problem, f"choose another place, or a target mode among {listed}")
+    if len(moving) == n:
+        basis = null_space(w[None, :])
+    else:
+        coupled = shapes[:, np.array(moving) - 1]
+        basis = coupled @ null_space((w @ coupled)[None, :])
     locked_squared, locked = eigh(basis.T @ K @ basis, basis.T @ M @ basis)
+    partner = moving.index(mode)
+    if partner >= locked_squared.size:
+        problem = f"mode {mode} is the last one that moves the damper, so that it has no locked partner"
+        raise UserError("calibrate", "mode", problem, f"choose one of {', '.join(map(str, moving[:-1][:6]))}")
     shape_0 = shapes[:, mode - 1] * (1.0 if shapes[frame.top, mode - 1] >= 0.0 else -1.0)
-    shape_inf = basis @ locked[:, mode - 1]
+    shape_inf = basis @ locked[:, partner]
     kappa = float(shape_inf @ M @ shape_0)
     if kappa < 0.0:
         shape_inf, kappa = -shape_inf, -kappa
     u_0 = float(w @ shape_0)
-    omega_0, omega_inf = math.sqrt(squared[mode - 1]), math.sqrt(locked_squared[mode - 1])
+    omega_0, omega_inf = math.sqrt(squared[mode - 1]), math.sqrt(locked_squared[partner])
     if omega_inf - omega_0 < 1e-6 * omega_0:
         raise UserError("calibrate", "position", f"mode {mode} does not move the damper", "choose another floor")
     return LimitingModes(mode, omega_0, omega_inf, shape_0, shape_inf, u_0, kappa, frame.top)
+
+
+def moving_modes(position: FloatArray, shapes: FloatArray) -> list[int]:
+    """Return the numbers (from 1) of the modes that move a damper; `shapes` are normalised to the mass."""
+    stroke = np.abs(position @ shapes)
+    return [int(place) + 1 for place in np.flatnonzero(stroke > STILL * float(np.max(stroke)))]
 
 
 def static_stiffness(frame: Frame, position: FloatArray) -> float:

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from mrpipe.artifacts import Artifact, ArtifactWriter
+from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import law_named, law_names
+from mrpipe.control.limits import moving_modes
 from mrpipe.control.lqg import Weights
 from mrpipe.control.placed import PlacedCalibration, PlacedDamper
 from mrpipe.control.storage import Calibrated, finite
@@ -40,7 +41,7 @@ def placed_dampers(frame: Frame, entries: Sequence[DamperSettings], target_mode:
     entries
         Section `structure.dampers`.
     target_mode
-        Of dampers that name none.
+        Of dampers that name none; the first mode after it where it does not move the damper.
 
     Raises
     ------
@@ -57,17 +58,24 @@ def placed_dampers(frame: Frame, entries: Sequence[DamperSettings], target_mode:
         name = damper_name(entry, place)
         if any(item.name == name for item in result):
             raise UserError(where, f"name: {name}", "occurs more than once", "give different names")
+        position = device_position(frame, *entry.between, where=f"{where}.between")
         result.append(
             PlacedDamper(
                 name=name,
-                position=device_position(frame, *entry.between, where=f"{where}.between"),
+                position=position,
                 law=entry.law,
-                mode=entry.target_mode or target_mode,
+                mode=entry.target_mode or _first_moving(frame, position, target_mode),
                 gains=entry.gains,
                 brace_n_m=entry.brace_stiffness_n_m or math.inf,
             )
         )
     return result
+
+
+def _first_moving(frame: Frame, position: FloatArray, target_mode: int) -> int:
+    """Return the target mode, or the first one after it that moves the damper (one in the other direction)."""
+    moving = moving_modes(position, natural_modes(frame).mode_shapes)
+    return next((mode for mode in moving if mode >= target_mode), target_mode)
 
 
 def accelerometers_of(frame: Frame, names: Sequence[str | int]) -> tuple[int, ...]:

@@ -46,6 +46,17 @@ class Clock:
         """Return the base acceleration at the ends of the steps [m/s^2], shape (steps + 1,)."""
         return np.ascontiguousarray(excitation.at(self.dt * np.arange(self.steps + 1, dtype=np.float64)))
 
+    def inputs(self, excitation: Excitation) -> FloatArray:
+        """Return the inputs at the ends of the steps, shape (steps + 1, m): base acceleration, then those of `places`.
+
+        An excitation that does not shake the base has zeros there.
+        """
+        histories = self.ground(excitation)
+        if not excitation.places:
+            return histories[:, None]
+        ground = np.zeros((len(histories), 0 if excitation.shakes_ground else 1))
+        return np.ascontiguousarray(np.column_stack([ground, histories]))
+
 
 def clock_of(duration_s: float, rate_hz: float, plant_rate_hz: float, record_rate_hz: float) -> Clock:
     """Return the time steps of a run.

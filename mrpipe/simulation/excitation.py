@@ -15,15 +15,35 @@ from mrpipe.structures import Frame, frequency_response
 
 
 @dataclass(frozen=True)
+class Place:
+    """Where an input acts that is not the base acceleration along the influence vector.
+
+    Attributes
+    ----------
+    name
+        For tables, such as `ground y`.
+    shape
+        Shape (n,): displacement of each degree of freedom per metre of the ground, or share of the force at each.
+    force
+        Whether it is a force [N]; else an acceleration of the ground [m/s^2].
+    """
+
+    name: str
+    shape: FloatArray
+    force: bool
+
+
+@dataclass(frozen=True)
 class Excitation:
-    """Base acceleration over time.
+    """What acts on the structure over time: the base acceleration, and what `places` describe.
 
     Attributes
     ----------
     duration_s
         Length of the run.
     at
-        From times (m,) [s] to base accelerations (m,) [m/s^2].
+        From times (m,) [s] to base accelerations (m,) [m/s^2]. With `places`: shape (m, k), a column for the base
+        acceleration if there is one, then one for each place.
     steady_s
         From when to when the response is steady and its indices are taken.
     decay_from_s
@@ -32,6 +52,10 @@ class Excitation:
         Of a harmonic, else NaN.
     details
         For tables and JSON.
+    places
+        What acts in addition to, or in place of, the base acceleration.
+    shakes_ground
+        Whether the first column of `at` is the base acceleration along the influence vector.
     """
 
     duration_s: float
@@ -40,6 +64,8 @@ class Excitation:
     decay_from_s: float = math.nan
     frequency_rad_s: float = math.nan
     details: dict[str, Any] = field(default_factory=dict)
+    places: tuple[Place, ...] = ()
+    shakes_ground: bool = True
 
 
 _SETTINGS = ExcitationSettings()
@@ -176,7 +202,7 @@ def recorded(time_s: FloatArray, acceleration_m_s2: FloatArray, *, scale: float 
     Parameters
     ----------
     time_s, acceleration_m_s2
-        Shape (m,), clock strictly rising.
+        Shape (m,), clock strictly rising; accelerations of several inputs have shape (m, k).
     scale
         Factor on the record.
     """
@@ -184,7 +210,13 @@ def recorded(time_s: FloatArray, acceleration_m_s2: FloatArray, *, scale: float 
     a = scale * np.asarray(acceleration_m_s2, dtype=np.float64)
     duration = float(t[-1])
     details = {"kind": "recorded", "peak_m_s2": float(np.max(np.abs(a)))}
-    return Excitation(duration, lambda at: np.interp(at, t, a), (0.0, duration), details=details)
+
+    def at(times: FloatArray) -> FloatArray:
+        if a.ndim == 1:
+            return np.asarray(np.interp(times, t, a))
+        return np.column_stack([np.interp(times, t, column) for column in a.T])
+
+    return Excitation(duration, at, (0.0, duration), details=details)
 
 
 def at_rest(duration_s: float) -> Excitation:

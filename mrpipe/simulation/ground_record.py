@@ -1,14 +1,21 @@
-"""A recorded base acceleration from a text file of two columns."""
+"""Recorded histories that act on a structure: records as they are downloaded, or text of a clock and columns."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.readers.cosmos import StrongMotion
+from mrpipe.campaigns.readers.peer import refuse_integrated
+from mrpipe.campaigns.readers.strong_motion import ENDINGS, read_strong_motion
 from mrpipe.errors import UserError
 from mrpipe.units import to_si
+
+HORIZONTAL = 2
+"""Channels of a strong-motion record that are used where none is named: the first ones that are horizontal."""
 
 
 def read_ground_record(
@@ -18,42 +25,115 @@ def read_ground_record(
     file_setting: str = "simulate.excitation.file",
     unit_setting: str = "simulate.excitation.file_unit",
 ) -> tuple[FloatArray, FloatArray]:
-    """Return time [s] and acceleration [m/s^2], shape (m,) each.
+    """Return time [s] and acceleration [m/s^2] of the first history of a record, shape (m,) each.
+
+    Parameters and errors are those of :func:`read_histories`.
+    """
+    time, histories = read_histories(path, unit, file_setting=file_setting, unit_setting=unit_setting)
+    return time, histories[:, 0]
+
+
+def read_histories(
+    path: Path,
+    unit: str,
+    *,
+    channels: Sequence[str | int] = (),
+    quantity: str = "acceleration",
+    file_setting: str = "simulate.excitation.file",
+    unit_setting: str = "simulate.excitation.file_unit",
+) -> tuple[FloatArray, FloatArray]:
+    """Return time [s], shape (m,), and histories in SI, shape (m, k).
 
     Parameters
     ----------
     path
-        Text or CSV: time [s] and acceleration in two columns, numbers divided by blanks, commas or semicolons; lines
-        that do not begin with a number are headers.
+        PEER AT2, COSMOS or CSMIP V2, or a zip of them; else text or CSV: time [s] and one or more columns, numbers
+        divided by blanks, commas or semicolons; lines that do not begin with a number are headers.
     unit
-        Of the acceleration.
+        Of the columns of a text file.
+    channels
+        Names or numbers (from 1) of the histories; empty: all columns of a text file, and the first two horizontal
+        channels of a record.
+    quantity
+        `acceleration` or `force`.
     file_setting, unit_setting
         Settings that name file and unit, for messages.
 
     Raises
     ------
     UserError
-        If the file is missing, a row has fewer than two numbers, or the clock does not rise.
+        If the file is missing, a row has other numbers of columns, the clock does not rise, or a channel is not there.
     """
     if not path.name:
-        raise UserError(file_setting, "", "is empty", "name a text file of two columns, time [s] and acceleration")
+        raise UserError(file_setting, "", "is empty", "name a text file of time [s] and acceleration, or a record")
     if not path.is_file():
-        raise UserError(file_setting, str(path), "there is no such file", "name a text file of two columns")
-    rows = []
+        raise UserError(file_setting, str(path), "there is no such file", "name a text file or a record")
+    refuse_integrated(path)
+    if path.suffix.lower() in ENDINGS:
+        if quantity != "acceleration":
+            raise UserError(path, "", "holds accelerations", f"give a text file of time [s] and {quantity}")
+        return _from_record(path, channels)
+    table = _table(path)
+    names = [str(number) for number in range(1, table.shape[1])]
+    columns = [_place(path, item, names) + 1 for item in channels] or list(range(1, table.shape[1]))
+    return table[:, 0], to_si(table[:, columns], unit, where=unit_setting, quantity=quantity)
+
+
+def _from_record(path: Path, channels: Sequence[str | int]) -> tuple[FloatArray, FloatArray]:
+    found = read_strong_motion(path)
+    names = [item.name for item in found]
+    chosen = [found[_place(path, item, names)] for item in channels]
+    chosen = chosen or [item for item in found if not item.vertical][:HORIZONTAL]
+    if not chosen:
+        raise UserError(path, "", "holds no horizontal channel", f"name one of {', '.join(names)} in file_channels")
+    return _joined(path, chosen)
+
+
+def _joined(path: Path, chosen: Sequence[StrongMotion]) -> tuple[FloatArray, FloatArray]:
+    interval = chosen[0].interval_s
+    for item in chosen:
+        if abs(item.interval_s / interval - 1.0) > 1e-6:
+            problem = f"{item.name} has the interval {item.interval_s:g} s, {chosen[0].name} {interval:g} s"
+            raise UserError(path, "file_channels", problem, "name channels with one interval")
+    length = min(item.acceleration_m_s2.size for item in chosen)
+    histories = np.column_stack([item.acceleration_m_s2[:length] for item in chosen])
+    return interval * np.arange(length, dtype=np.float64), histories
+
+
+def _place(path: Path, channel: str | int, names: Sequence[str]) -> int:
+    """Return the index of a channel that is named, or numbered as in its name (`3: 90 Deg`) or else from 1."""
+    text = str(channel).strip()
+    numbers = [name.partition(":")[0] for name in names]
+    for known in (list(names), numbers):
+        if known.count(text) == 1:
+            return known.index(text)
+    if text.isdigit() and 1 <= int(text) <= len(names) and not any(item.isdigit() for item in numbers):
+        return int(text) - 1
+    raise UserError(path, f"channel {text}", "is not in the record", f"it has {', '.join(names)}")
+
+
+def _table(path: Path) -> FloatArray:
+    rows: list[list[float]] = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
         words = line.replace(",", " ").replace(";", " ").split()
         if not words or not (words[0][0].isdigit() or words[0][0] in "+-."):
             continue
         try:
-            rows.append((float(words[0]), float(words[1])))
-        except (ValueError, IndexError) as error:
+            row = [float(word) for word in words]
+        except ValueError as error:
             raise UserError(path, f"line {number}", "has no two numbers", "write time and acceleration") from error
-    table = np.array(rows, dtype=np.float64).reshape(-1, 2)
-    if len(table) < 2:
-        raise UserError(path, "", f"holds {len(table)} rows of numbers", "give at least two")
+        if len(row) < 2:
+            raise UserError(path, f"line {number}", "has no two numbers", "write time and acceleration")
+        if rows and len(row) != len(rows[0]):
+            problem = f"has {len(row)} numbers, the first row {len(rows[0])}"
+            raise UserError(path, f"line {number}", problem, "write time and the same histories in each row")
+        rows.append(row)
+    if len(rows) < 2:
+        raise UserError(path, "", f"holds {len(rows)} rows of numbers", "give at least two")
+    table = np.array(rows, dtype=np.float64)
     wrong = np.flatnonzero(~(np.diff(table[:, 0]) > 0.0))
     if wrong.size:
         raise UserError(path, f"row {wrong[0] + 2}", "time does not rise", "give a strictly rising clock in seconds")
     if not np.all(np.isfinite(table)):
-        raise UserError(path, "", "holds a number that is not finite", "give finite accelerations")
-    return table[:, 0], to_si(table[:, 1], unit, where=unit_setting, quantity="acceleration")
+        raise UserError(path, "", "holds a number that is not finite", "give finite numbers")
+    return table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -256,3 +257,27 @@ def _energy(response: Response, steady: BoolArray, excitation: Excitation) -> di
         cycles = seconds * excitation.frequency_rad_s / (2.0 * math.pi)
         result |= {"energy_damper_per_cycle_j": damper / cycles, "energy_frame_per_cycle_j": frame / cycles}
     return result
+
+
+def places_table(response: Response, names: Sequence[str], excitation: Excitation) -> list[dict[str, Any]]:
+    """Return RMS values and peaks of every degree of freedom, a row each; those of a rotation are in rad and rad/s^2.
+
+    Parameters
+    ----------
+    response, excitation
+        Of the run; RMS values are taken where the response is steady.
+    names
+        Of the degrees of freedom.
+    """
+    first, last = excitation.steady_s
+    steady = (response.time_s >= first) & (response.time_s <= last)
+    return [
+        {
+            "name": name,
+            "rms_displacement_m": _rms(response.displacement[steady, column]),
+            "peak_displacement_m": _peak(response.displacement[steady, column]),
+            "rms_absolute_acceleration_m_s2": _rms(response.absolute_acceleration[steady, column]),
+            "peak_absolute_acceleration_m_s2": _peak(response.absolute_acceleration[steady, column]),
+        }
+        for column, name in enumerate(names)
+    ]

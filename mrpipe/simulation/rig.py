@@ -20,13 +20,16 @@ from mrpipe.control.storage import read_calibrated_with
 from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import Chain
 from mrpipe.effects.damper import damper_named
+from mrpipe.errors import UserError
 from mrpipe.simulation import excitation as kinds
 from mrpipe.simulation.adjustment import SETTLED, adjusted_amplitude
 from mrpipe.simulation.excitation import Excitation
-from mrpipe.simulation.ground_record import read_ground_record
+from mrpipe.simulation.ground_record import HORIZONTAL, read_histories
+from mrpipe.simulation.inputs import acting_as_forces, in_two_directions
 from mrpipe.simulation.loop import RECORD_RATE_HZ, LoopOptions, Response, simulate_law
 from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault, SensorNoise
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
+from mrpipe.simulation.several import LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
 from mrpipe.structures.over_amplitude import read_frame_at
 
@@ -108,6 +111,11 @@ class Rig:
         DivergedError
             If the response grows without bound.
         """
+        if excitation.places:
+            device = LoopDamper("damper", self.position, chain or self.damper.chain(), controller)
+            return simulate_dampers(
+                self.frame, [device], excitation, self.options, rng=rng, initial_state=initial_state
+            ).first
         return simulate_law(
             self.frame,
             self.damper.chain() if chain is None else chain,
@@ -142,6 +150,7 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact], ga
         frame = read_frame_at(artifact("identify-frame"), settings.frame_amplitude_m)
     else:
         frame = frame_from_parameter_set(settings.frame)
+    frame = frame.turned(settings.excitation.direction_deg)
     dampers = {name: partial(artifact, stage) for name, stage in DAMPERS.items()}
     damper = damper_named(settings.damper, dampers)
     controllers = ControllerFactory(
@@ -197,11 +206,53 @@ def excitation_of(
         If a recorded motion cannot be read, or no amplitude gives the demanded response.
     """
     free = rig.controllers.calibrated.omega_0
-    amplitude, viscous = settings.base_amplitude_m_s2, None
+    amplitude, viscous = known_amplitude(settings), None
     if amplitude is None and settings.kind in ADJUSTED:
         amplitude, viscous = _adjusted(rig, settings, lambda tried: harmonic_excitation(settings, free, tried), warn)
         viscous = viscous if settings.factor == 1.0 and settings.kind == "harmonic" else None
-    return excitation_at(settings, free, amplitude or 0.0), viscous
+    return acting(excitation_at(settings, free, amplitude or 0.0), settings, rig.frame), viscous
+
+
+def known_amplitude(settings: ExcitationSettings) -> float | None:
+    """Return the amplitude of the motion [m/s^2] or force [N] that the settings give; None where it is to be found.
+
+    Raises
+    ------
+    UserError
+        If the amplitude of a force is not given, because only that of a base acceleration can be found.
+    """
+    if not settings.force_at:
+        return settings.base_amplitude_m_s2
+    if settings.force_amplitude_n is None and settings.kind in ADJUSTED:
+        raise UserError(
+            "simulate.excitation", "force_amplitude_n", "is not given", "give the amplitude of the force [N]"
+        )
+    return settings.force_amplitude_n
+
+
+def acting(excitation: Excitation, settings: ExcitationSettings, frame: Frame) -> Excitation:
+    """Return the excitation with the places at which its histories act.
+
+    Raises
+    ------
+    UserError
+        If a place does not exist, or the structure has no second direction.
+    """
+    if settings.kind == "free-decay":
+        return excitation
+    if settings.force_at:
+        return acting_as_forces(excitation, frame, settings.force_at, "simulate.excitation.force_at")
+    histories = int(excitation.at(np.zeros(1))[0].size)
+    if histories == 1:
+        return excitation
+    if histories != HORIZONTAL:
+        raise UserError(
+            settings.file,
+            "",
+            f"holds {histories} histories",
+            "name one or two of them in simulate.excitation.file_channels",
+        )
+    return in_two_directions(excitation, frame, settings.file)
 
 
 def excitation_at(settings: ExcitationSettings, free_rad_s: float, amplitude_m_s2: float) -> Excitation:
@@ -223,8 +274,7 @@ def excitation_at(settings: ExcitationSettings, free_rad_s: float, amplitude_m_s
     """
     factor = settings.factor
     if settings.kind == "recorded":
-        time_s, acceleration = read_ground_record(Path(settings.file), settings.file_unit)
-        return kinds.recorded(time_s, acceleration, scale=factor)
+        return kinds.recorded(*_record(settings), scale=factor)
     if settings.kind == "free-decay":
         return kinds.at_rest(settings.decay_s)
     if settings.kind == "sweep":
@@ -244,6 +294,21 @@ def excitation_at(settings: ExcitationSettings, free_rad_s: float, amplitude_m_s
             ramp_s=settings.ramp_cycles * period,
         )
     return harmonic_excitation(settings, free_rad_s, factor * amplitude_m_s2)
+
+
+def _record(settings: ExcitationSettings) -> tuple[FloatArray, FloatArray]:
+    """Return time and histories, (m,) where there is one and (m, k) where there are several."""
+    quantity = "force" if settings.force_at else "acceleration"
+    time_s, histories = read_histories(
+        Path(settings.file), settings.file_unit, channels=settings.file_channels, quantity=quantity
+    )
+    if settings.file_y:
+        second = "simulate.excitation.file_y"
+        other_s, other = read_histories(Path(settings.file_y), settings.file_unit, file_setting=second)
+        # on the clock of the first; a record that ends earlier is at rest after its end
+        second_history = np.interp(time_s, other_s - other_s[0] + time_s[0], other[:, 0], right=0.0)
+        histories = np.column_stack([histories[:, 0], second_history])
+    return time_s, histories[:, 0] if histories.shape[1] == 1 else histories
 
 
 def harmonic_excitation(settings: ExcitationSettings, free_rad_s: float, amplitude_m_s2: float) -> Excitation:

@@ -68,9 +68,32 @@ class ExcitationSettings(Section):
     )
     random_seed: int = Field(1, ge=0, description="Seed of random motion; all laws meet the same motion.")
     file: str = Field(
-        "", description="Recorded base acceleration: text or CSV of two columns, time [s] and acceleration."
+        "",
+        description="Recorded motion: PEER AT2, COSMOS or CSMIP V2, a zip of them, or text of time [s] and one column "
+        "for each history. Two components act in the two directions of the structure (`structure.influence_y`).",
     )
-    file_unit: str = Field("m/s^2", description="Unit of the recorded acceleration, such as g or cm/s^2.")
+    file_y: str = Field("", description="Record of the second direction, where each direction has its own file.")
+    file_unit: str = Field(
+        "m/s^2", description="Unit of the histories in a text file, such as g, cm/s^2 or, for forces, kN."
+    )
+    file_channels: tuple[str | int, ...] = Field(
+        (),
+        description="Channels of the record that are used, by name or number; empty: all columns of a text file, the "
+        "first two horizontal channels of a V2 file or a zip.",
+    )
+    direction_deg: float = Field(
+        0.0,
+        description="Direction of the ground motion, from the first direction of the structure towards the second one; "
+        "a record of two components is turned as a whole.",
+    )
+    force_at: dict[str | int, float] = Field(
+        {},
+        description="Degrees of freedom on which a force acts in place of ground motion (shaker, wind), each with a "
+        "factor. The histories of a file belong to them in this order; one history acts on all.",
+    )
+    force_amplitude_n: float | None = Field(
+        None, gt=0.0, description="With `force_at`: amplitude of a harmonic force or sweep; random forces have its RMS."
+    )
 
 
 class SensorFaultSettings(Section):

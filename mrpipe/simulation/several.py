@@ -33,6 +33,7 @@ from mrpipe.simulation import several_kernel as kernel
 from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import clock_of
 from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.inputs import Inputs, inputs_of
 from mrpipe.simulation.loop import LoopOptions, Response, base_shear
 from mrpipe.simulation.sensors import add_fault, sensor_noise
 from mrpipe.structures import Frame, discretise_first_order, state_space
@@ -117,7 +118,7 @@ def simulate_dampers(
     dampers
         At least one; their controllers have the same rate.
     excitation
-        Base acceleration; its duration is that of the run.
+        What acts on the structure; its duration is that of the run.
     options
         How the loop is run.
     regulator
@@ -140,7 +141,7 @@ def simulate_dampers(
     rate = dampers[0].controller.options.rate_hz
     clock = clock_of(excitation.duration_s, rate, options.plant_rate_hz, options.record_rate_hz)
     dt, samples = clock.dt, clock.samples
-    ground = clock.ground(excitation)
+    inputs = inputs_of(frame, excitation)
     positions = np.ascontiguousarray([item.position for item in dampers], dtype=np.float64)
     counts = np.zeros(kernel.I_SIZE, dtype=np.int64)
     counts[kernel.I_STEPS], counts[kernel.I_PER_SAMPLE], counts[kernel.I_RECORD] = (
@@ -156,11 +157,12 @@ def simulate_dampers(
     for chain in chains:
         chain.check_interval(dt)
     commands = np.zeros((k, samples, COMMAND_SIZE))
-    record = np.zeros((clock.records, 3 * n + k * kernel.T_DEVICE + kernel.T_SIZE))
+    record = np.zeros((clock.records, 3 * n + k * kernel.T_DEVICE + kernel.T_INPUTS + inputs.count))
     z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
     began = time.perf_counter()
     kernel.compiled(k)(
-        counts, dt, _plant(frame, positions, dt), positions, _devices(dampers, chains, options, dt), ground, z,
+        counts, dt, _plant(frame, inputs, positions, dt), positions, _devices(dampers, chains, options, dt),
+        clock.inputs(excitation), z,
         *_packed_chains(chains), *_packed_controllers(dampers), *_packed_regulator(frame, dampers, regulator),
         _noise(dampers, options, samples, n, rng), commands, record,
     )  # fmt: skip
@@ -168,7 +170,7 @@ def simulate_dampers(
     if not np.all(np.isfinite(record)):
         laws = ", ".join(item.controller.law for item in dampers)
         raise DivergedError(f"laws {laws}: the response grows without bound; lower the negative stiffness")
-    return _response(record, commands, dampers, frame, dt * clock.every, dt * clock.per_sample, seconds)
+    return _response(record, commands, dampers, frame, inputs, dt * clock.every, dt * clock.per_sample, seconds)
 
 
 def _check(frame: Frame, dampers: Sequence[LoopDamper], options: LoopOptions) -> None:
@@ -199,13 +201,15 @@ def _check(frame: Frame, dampers: Sequence[LoopDamper], options: LoopOptions) ->
             )
 
 
-def _plant(frame: Frame, positions: FloatArray, dt: float) -> tuple[FloatArray, ...]:
-    n = frame.floors
-    space = state_space(frame, -positions.T)
-    Ad, B0, B1 = discretise_first_order(space.A, space.B, dt)
-    step_matrix = np.column_stack([Ad, B0[:, 0], B1[:, 0], B0[:, 1:]])
-    columns = np.vstack([frame.ground_influence, frame.ground_masses])
-    arrays = (step_matrix.T, B1[:, 1:].T, space.A[n:].T, space.B[n:, 1:].T,
+def _plant(frame: Frame, inputs: Inputs, positions: FloatArray, dt: float) -> tuple[FloatArray, ...]:
+    n, m = frame.floors, inputs.count
+    # the first column of the state space is the ground motion, which is among the inputs here
+    space = state_space(frame, np.column_stack([inputs.loads, -positions.T]))
+    B = space.B[:, 1:]
+    Ad, B0, B1 = discretise_first_order(space.A, B, dt)
+    step_matrix = np.column_stack([Ad, B0[:, :m], B1[:, :m], B0[:, m:]])
+    columns = np.vstack([inputs.influence.T, -inputs.loads.T, inputs.direct(frame).T])
+    arrays = (step_matrix.T, B1[:, m:].T, space.A[n:].T, B[n:, m:].T,
               frame.mass, frame.damping, frame.stiffness, columns)  # fmt: skip
     return tuple(np.ascontiguousarray(item, dtype=np.float64) for item in arrays)
 
@@ -293,15 +297,17 @@ def _response(
     commands: FloatArray,
     dampers: Sequence[LoopDamper],
     frame: Frame,
+    inputs: Inputs,
     dt: float,
     command_dt: float,
     seconds: float,
 ) -> DampersResponse:
     n, k = frame.floors, len(dampers)
     tail = record[:, 3 * n + k * kernel.T_DEVICE :]
-    ground = tail[:, kernel.T_GROUND]
+    histories = tail[:, kernel.T_INPUTS :]
     absolute = record[:, 2 * n : 3 * n]
-    shear = base_shear(frame, absolute)
+    shear = base_shear(frame, absolute) - np.einsum("ti,i->t", histories, inputs.pushed(frame))
+    moved = np.einsum("ti,fi->tf", histories, inputs.influence)
     found: dict[str, Response] = {}
     for place, item in enumerate(dampers):
         own = record[:, 3 * n + place * kernel.T_DEVICE :]
@@ -309,14 +315,14 @@ def _response(
             time_s=dt * np.arange(len(record), dtype=np.float64),
             displacement=record[:, :n],
             velocity=record[:, n : 2 * n],
-            acceleration=absolute - np.outer(ground, frame.ground_influence),
+            acceleration=absolute - moved,
             absolute_acceleration=absolute,
             damper_displacement=own[:, kernel.T_X],
             damper_velocity=own[:, kernel.T_V],
             force=own[:, kernel.T_FORCE],
             drive=own[:, kernel.T_DRIVE],
             desired_force=own[:, kernel.T_DESIRED],
-            ground_acceleration=ground,
+            ground_acceleration=histories[:, 0],
             base_shear=shear,
             work_in=tail[:, kernel.T_WORK_IN],
             work_damper=own[:, kernel.T_WORK],

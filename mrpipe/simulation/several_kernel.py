@@ -54,7 +54,8 @@ I_STEPS, I_PER_SAMPLE, I_DELAY, I_TRACK, I_RECORD, I_SIZE = 0, 1, 2, 3, 4, 5
 D_C, D_K, D_CLIPPED, D_FLEXIBILITY, D_LAG, D_COMMAND, D_CENTRAL, D_SIZE = 0, 1, 2, 3, 4, 5, 6, 8
 # --- columns of the record after [z, absolute accelerations]: these of each damper, then those of the run ---
 T_X, T_V, T_FORCE, T_DRIVE, T_DESIRED, T_WORK, T_DEVICE = 0, 1, 2, 3, 4, 5, 6
-T_GROUND, T_WORK_IN, T_WORK_FRAME, T_ENERGY, T_SIZE = 0, 1, 2, 3, 4
+T_WORK_IN, T_WORK_FRAME, T_ENERGY, T_INPUTS = 0, 1, 2, 3
+"""After the energy follow the inputs; the first of them is the ground acceleration."""
 # --- what is known of each damper from step to step ---
 X, V, F, SLOPE, CURRENT, STATE_SIZE = 0, 1, 2, 3, 4, 5
 
@@ -118,10 +119,10 @@ def _chain_force(
 
 @njit(cache=True)
 def _sense(
-    accelerations: FloatArray, influence: FloatArray, w: FloatArray, device: FloatArray, ground: float, rod: float,
+    accelerations: FloatArray, moved: FloatArray, w: FloatArray, device: FloatArray, ground: float, rod: float,
     noise: FloatArray, measured: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill the readings of one damper's sensors.
+    """Fill the readings of one damper's sensors; `moved` is the acceleration of each place by the ground alone.
 
     In the noise, infinity marks a reading that repeats the one before, minus infinity one that is 0.
     """
@@ -129,7 +130,7 @@ def _sense(
     relative = rod
     for floor in range(w.shape[0]):
         measured[MEASURED_FLOORS + floor] = accelerations[floor] + noise[MEASURED_FLOORS + floor]
-        relative += w[floor] * (accelerations[floor] - influence[floor] * ground)
+        relative += w[floor] * (accelerations[floor] - moved[floor])
     measured[MEASURED_GROUND] = ground + noise[MEASURED_GROUND]
     measured[MEASURED_DISPLACEMENT] = device[X] + noise[MEASURED_DISPLACEMENT]
     measured[MEASURED_VELOCITY] = device[V] + noise[MEASURED_VELOCITY]
@@ -140,6 +141,18 @@ def _sense(
             measured[channel] = before[channel]
         elif noise[channel] == -math.inf:
             measured[channel] = 0.0
+
+
+@njit(cache=True)
+def _add_inputs(
+    direct: FloatArray, influence: FloatArray, inputs: FloatArray, accelerations: FloatArray, moved: FloatArray
+) -> None:  # fmt: skip
+    """Add the accelerations of the inputs that act as forces, and put those of the ground at each place in `moved`."""
+    for floor in range(moved.shape[0]):
+        moved[floor] = 0.0
+        for i in range(inputs.shape[0]):
+            accelerations[floor] += direct[i, floor] * inputs[i]
+            moved[floor] += influence[i, floor] * inputs[i]
 
 
 @njit(cache=True)
@@ -162,25 +175,28 @@ def _central(
 
 
 def _run(
-    counts: IntArray, dt: float, plant: Any, positions: FloatArray, devices: FloatArray, ground: FloatArray,
+    counts: IntArray, dt: float, plant: Any, positions: FloatArray, devices: FloatArray, inputs: FloatArray,
     z: FloatArray, chains: Any, parameters: FloatArray, offsets: Any, damper_states: FloatArray, laws: Any,
     numbers: FloatArray, layouts: IntArray, places: IntArray, memories: FloatArray, regulator: Any, members: IntArray,
     noise: FloatArray, commands: FloatArray, record: FloatArray,
 ) -> None:  # fmt: skip
     """Run the loop; see :mod:`mrpipe.simulation.several` for the arrays.
 
-    `plant` holds the transposed step matrix (2n + 2 + k, 2n), what one newton of each damper at the end of the step
-    adds to the state (k, 2n), the transposed lower half of A, accelerations of one newton (k, n), M, C, K, and the rows
-    r and M r of the ground motion.
+    `plant` holds the transposed step matrix (2n + 2m + k, 2n), what one newton of each damper at the end of the step
+    adds to the state (k, 2n), the transposed lower half of A, accelerations of one newton (k, n), M, C, K, and three
+    rows for each of the m inputs, (3m, n): displacement of each place per metre of the ground, minus the force of one
+    unit, and acceleration by it that is not in the lower half of A.
     """
     step_matrix, at_end, lower, gains, M, C, K, columns = plant
     k, n = positions.shape
+    m = inputs.shape[1]
     size = 2 * n
     track, per_sample, every = counts[I_TRACK], counts[I_PER_SAMPLE], counts[I_RECORD]
     parameter_offsets, state_offsets, parameter_starts, state_starts = offsets
     settled = SETTLED_LAW if track == TRACK_LAW else SETTLED
-    influence, pull = columns[0], columns[1]
-    before, free = np.zeros(size + 2 + k), np.zeros(size)
+    influence, pull, direct = columns[:m], columns[m : 2 * m], columns[2 * m :]
+    before, free = np.zeros(size + 2 * m + k), np.zeros(size)
+    moved, pushed, pushed_end = np.zeros(n), np.zeros(m), np.zeros(m)
     known, accelerations = np.zeros((k, STATE_SIZE)), np.zeros(n)
     braces = np.zeros((k, 3))  # deformation now and two steps back, with the rate in the last column
     measured = np.zeros((k, MEASURED_FLOORS + n))
@@ -202,9 +218,10 @@ def _run(
                 cross_a[d, e] += positions[d, floor] * (accelerations[floor] + gains[e, floor])
     before[:size] = z
     state = before[:size]
-    loss, work_in, work_frame, pushed = quadratic(C, state[n:]), 0.0, 0.0, 0.0
+    loss, work_in, work_frame = quadratic(C, state[n:]), 0.0, 0.0
     for floor in range(n):
-        pushed += pull[floor] * state[floor]
+        for i in range(m):
+            pushed[i] += pull[i, floor] * state[floor]
         for d in range(k):
             known[d, X] += positions[d, floor] * state[floor]
             known[d, V] += positions[d, floor] * state[n + floor]
@@ -213,20 +230,14 @@ def _run(
         if step % per_sample == 0:
             sample += 1
             multiply(lower, state, accelerations)
+            _add_inputs(direct, influence, inputs[step], accelerations, moved)
             for d in range(k):
                 for floor in range(n):
                     accelerations[floor] += gains[d, floor] * forces[d]
             for d in range(k):
                 _sense(
-                    accelerations,
-                    influence,
-                    positions[d],
-                    known[d],
-                    ground[step],
-                    rod[d],
-                    noise[d, sample],
-                    measured[d],
-                )
+                    accelerations, moved, positions[d], known[d], inputs[step, 0], rod[d], noise[d, sample], measured[d]
+                )  # fmt: skip
             if members.shape[0] > 0:
                 for index in range(members.shape[0]):
                     central_forces[index] = commands[members[index], max(sample - 1, 0), COMMAND_FORCE]
@@ -278,6 +289,7 @@ def _run(
             written += 1
             row[:size] = state
             multiply(lower, state, accelerations)
+            _add_inputs(direct, influence, inputs[step], accelerations, moved)
             stored = 0.5 * (quadratic(M, state[n:]) + quadratic(K, state[:n]))
             for d in range(k):
                 stored += 0.5 * devices[d, D_FLEXIBILITY] * forces[d] ** 2
@@ -289,28 +301,26 @@ def _run(
                 own[T_WORK] = works[d]
             row[size : 3 * n] = accelerations
             tail = row[3 * n + k * T_DEVICE :]
-            tail[T_GROUND], tail[T_WORK_IN], tail[T_WORK_FRAME], tail[T_ENERGY] = (
-                ground[step],
-                work_in,
-                work_frame,
-                stored,
-            )
+            tail[T_WORK_IN], tail[T_WORK_FRAME], tail[T_ENERGY] = work_in, work_frame, stored
+            tail[T_INPUTS:] = inputs[step]
         if step == counts[I_STEPS]:
             break
         # --- the structure without the forces at the end of the step
-        before[size], before[size + 1] = ground[step], ground[step + 1]
+        for i in range(m):
+            before[size + i], before[size + m + i] = inputs[step, i], inputs[step + 1, i]
         for d in range(k):
-            before[size + 2 + d] = forces[d]
+            before[size + 2 * m + d] = forces[d]
             known[d, CURRENT] += devices[d, D_LAG] * (asked[d] - known[d, CURRENT])
         multiply(step_matrix, before, free)
         multiply(lower, free, accelerations)
+        _add_inputs(direct, influence, inputs[step + 1], accelerations, moved)
         for d in range(k):
             flexibility = devices[d, D_FLEXIBILITY]
             free_motion[d, 0], free_motion[d, 1], free_motion[d, 2] = 0.0, 0.0, 0.0
             for floor in range(n):
                 free_motion[d, 0] += positions[d, floor] * free[floor]
                 free_motion[d, 1] += positions[d, floor] * free[n + floor]
-                free_motion[d, 2] += positions[d, floor] * (accelerations[floor] - influence[floor] * ground[step + 1])
+                free_motion[d, 2] += positions[d, floor] * (accelerations[floor] - moved[floor])
             # deformation of the brace at the end of the step: its rate is (3 b - 4 b1 + b2)/(2 dt)
             free_motion[d, 1] += (4.0 * braces[d, 0] - braces[d, 1]) / (2.0 * dt)
             motion[d, 3] = cross_x[d, d] - flexibility
@@ -351,12 +361,15 @@ def _run(
             for index in range(size):
                 free[index] += at_end[d, index] * forces[d]
         # --- energy and motion at the end of the step
-        loss_end, pushed_end = quadratic(C, free[n:]), 0.0
-        for floor in range(n):
-            pushed_end += pull[floor] * free[floor]
-        work_in -= 0.5 * (ground[step] + ground[step + 1]) * (pushed_end - pushed)
+        loss_end = quadratic(C, free[n:])
+        for i in range(m):
+            pushed_end[i] = 0.0
+            for floor in range(n):
+                pushed_end[i] += pull[i, floor] * free[floor]
+            work_in -= 0.5 * (inputs[step, i] + inputs[step + 1, i]) * (pushed_end[i] - pushed[i])
+            pushed[i] = pushed_end[i]
         work_frame += 0.5 * (loss + loss_end) * dt
-        loss, pushed = loss_end, pushed_end
+        loss = loss_end
         for d in range(k):
             deformation = devices[d, D_FLEXIBILITY] * forces[d]
             rate = (3.0 * deformation - 4.0 * braces[d, 0] + braces[d, 1]) / (2.0 * dt)
@@ -379,7 +392,7 @@ _V, _M, _I = float64[::1], float64[:, ::1], int64[::1]
 def compiled(count: int) -> Any:
     """Return the loop compiled for `count` dampers."""
     signature = void(
-        _I, float64, types.UniTuple(_M, 8), _M, _M, _V, _V, types.UniTuple(CHAIN_FUNCTIONS, count), _V,
+        _I, float64, types.UniTuple(_M, 8), _M, _M, _M, _V, types.UniTuple(CHAIN_FUNCTIONS, count), _V,
         types.Tuple((int64[:, ::1], int64[:, ::1], _I, _I)), _V, types.UniTuple(LAW_FUNCTION, count), _V, _I,
         int64[:, ::1], _V, types.UniTuple(_M, 5), _I, float64[:, :, ::1], float64[:, :, ::1], _M,
     )  # fmt: skip

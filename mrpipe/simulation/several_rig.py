@@ -22,7 +22,7 @@ from mrpipe.errors import UserError
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions
 from mrpipe.simulation.resonance import BAND
-from mrpipe.simulation.rig import ADJUSTED, excitation_at, loop_options
+from mrpipe.simulation.rig import ADJUSTED, acting, excitation_at, known_amplitude, loop_options
 from mrpipe.simulation.settings import ExcitationSettings, SimulateSettings
 from mrpipe.simulation.several import DampersResponse, LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, natural_modes, read_frame
@@ -200,7 +200,7 @@ def read_dampers_rig(
                 f"is {value}, but the section structure gives the structure and its dampers",
                 f"leave simulate.{key} out; give the model in structure.dampers",
             )
-    frame = read_frame(artifact("identify-frame"))
+    frame = read_frame(artifact("identify-frame")).turned(settings.excitation.direction_deg)
     known = read_placed(artifact("calibrate"))
     dampers = tuple(
         RigDamper(
@@ -242,10 +242,10 @@ def dampers_excitation(rig: DampersRig, settings: ExcitationSettings) -> Excitat
         If a recorded motion cannot be read, or no damper has a linear equivalent and the amplitude is not given.
     """
     free = rig.dampers[0].known.calibrated.omega_0
-    amplitude = settings.base_amplitude_m_s2
+    amplitude = known_amplitude(settings)
     if amplitude is None and settings.kind in ADJUSTED:
         amplitude = _amplitude(rig, settings.frequency_rad_s or free)
-    return excitation_at(settings, free, amplitude or 0.0)
+    return acting(excitation_at(settings, free, amplitude or 0.0), settings, rig.frame)
 
 
 def _amplitude(rig: DampersRig, omega: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mrpipe.artifacts import ArtifactWriter
 from mrpipe.simulation.excitation import Excitation
-from mrpipe.simulation.indices import indices
+from mrpipe.simulation.indices import indices, places_table
 from mrpipe.simulation.several import DampersResponse
 from mrpipe.simulation.several_rig import DampersRig
 
@@ -72,6 +72,7 @@ def response_summary(rig: DampersRig, response: DampersResponse, excitation: Exc
     return {
         **run,
         "dampers": rows,
+        "degrees_of_freedom": places_table(response.first, rig.frame.names, excitation),
         "energy_balance_error": response.energy_balance_error,
         "excitation": excitation.details,
     }

@@ -53,6 +53,11 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         residual, largest = (float(model.quasi_static_force(speed, drive)) for drive in (0.0, model.drive_limit))
         rows.append(damper_as_json(item, amplitude, residual, settings.friction_rounding_share * speed))
         weights.append(balanced_weights(item.modes, residual, **settings.regulator.known()))
+        if entry.target_mode is None and item.damper.mode != settings.target_mode:
+            context.warn(
+                f"{item.damper.name}: mode {settings.target_mode} does not move this damper, so that it is calibrated "
+                f"for mode {item.damper.mode}"
+            )
         if hardly := placement_warning(frame, item.modes):
             context.warn(f"{item.damper.name}: {hardly}")
         for line in placed_warnings(item, amplitude_m=amplitude, residual_force_n=residual, largest_force_n=largest):

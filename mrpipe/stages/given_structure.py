@@ -21,7 +21,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.structures.reduction import reduced_structure
 
     settings = context.settings.structure
-    full = structure_from_settings(settings, read_matrix)
+    full = structure_from_settings(settings, read_matrix, warn=context.warn)
     reduced = reduced_structure(full, settings.reduction)
     if settings.reduction.method != "none":
         context.warn(
@@ -29,7 +29,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
             f"({settings.reduction.method}); the largest error of the response to ground motion up to "
             f"{reduced.band_high_hz:.3g} Hz is {100.0 * reduced.error:.2g} % of the largest response"
         )
-    summary = given_summary(full, reduced, floor_heights(settings))
+    summary = given_summary(full, reduced, floor_heights(settings, read_matrix))
     with context.write("frame.h5") as artifact:
         write_given(artifact, reduced, summary)
     section.describe(context.report, reduced.frame, summary)

@@ -29,7 +29,7 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
     from mrpipe.dampers.model import read_tested
     from mrpipe.errors import StageSkipped
     from mrpipe.reporting import simulate as report
-    from mrpipe.simulation.indices import indices
+    from mrpipe.simulation.indices import indices, places_table
     from mrpipe.simulation.rig import DAMPERS, excitation_of, read_rig, release_state
     from mrpipe.simulation.storage import write_response
     from mrpipe.simulation.training_range import check_ranges, ranges_as_json
@@ -67,6 +67,8 @@ def _run(context: StageContext, law: str) -> Mapping[str, Any]:
         artifact.attributes("/", law=law)
     report.describe(context.report, law, rig, response, excitation, values, against)
     report.describe_ranges(context.report, ranges)
+    if excitation.places:
+        values["degrees_of_freedom"] = places_table(response, rig.frame.names, excitation)
     details = {"excitation": excitation.details, "drive_unit": rig.damper.drive_unit}
     return {"law": law, **values, **details, "training_range": ranges_as_json(ranges)}
 

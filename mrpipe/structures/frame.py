@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,8 @@ class Frame:
         For tables.
     influence
         Displacement of each degree of freedom when the ground moves by 1 m, r, shape (n,) [1]; None: ones.
+    influence_y
+        The same for ground motion in the second direction; None: the structure has one direction.
     degrees_of_freedom
         Names of the degrees of freedom, length n; empty: `floor 1` and so on.
     modal_coordinates
@@ -37,6 +39,7 @@ class Frame:
     influence: FloatArray | None = None
     degrees_of_freedom: tuple[str, ...] = ()
     modal_coordinates: int = 0
+    influence_y: FloatArray | None = None
 
     @property
     def floors(self) -> int:
@@ -47,6 +50,33 @@ class Frame:
     def ground_influence(self) -> FloatArray:
         """Influence vector r of the ground motion, shape (n,)."""
         return np.ones(self.floors) if self.influence is None else self.influence
+
+    def turned(self, degrees: float) -> Frame:
+        """Return the same structure with the directions of the ground motion turned from x towards y.
+
+        Parameters
+        ----------
+        degrees
+            Angle of the first direction against x.
+
+        Raises
+        ------
+        UserError
+            If the structure has no second direction.
+        """
+        if degrees == 0.0:
+            return self
+        if self.influence_y is None:
+            raise UserError(
+                "simulate.excitation",
+                "direction_deg",
+                f"is {degrees:g}, but the structure has no second direction",
+                "give structure.influence_y",
+            )
+        # the cosine of 90 degrees is not exactly zero in radians
+        turn = np.round(np.exp(1j * np.radians(degrees)), 15)
+        x, y = self.ground_influence, self.influence_y
+        return replace(self, influence=turn.real * x + turn.imag * y, influence_y=turn.real * y - turn.imag * x)
 
     @property
     def moved_by_ground(self) -> tuple[int, ...]:
@@ -84,7 +114,11 @@ class Frame:
     @property
     def ground_masses(self) -> FloatArray:
         """Force on the ground per unit absolute acceleration of each degree of freedom, r' M, shape (n,) [kg]."""
-        return np.asarray(self.mass.T @ self.ground_influence)
+        return self.ground_masses_of(self.ground_influence)
+
+    def ground_masses_of(self, influence: FloatArray) -> FloatArray:
+        """Return M' r for an influence vector r, shape (n,)."""
+        return np.asarray(self.mass.T @ influence)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -101,6 +135,8 @@ def write_frame(artifact: ArtifactWriter, frame: Frame, group: str = "frame") ->
         artifact.put(f"{group}/{name}", getattr(frame, name), unit=unit, dims=("floor", "floor_of_cause"))
     if frame.influence is not None:
         artifact.put(f"{group}/influence", frame.influence, unit="1", dims=("floor",))
+    if frame.influence_y is not None:
+        artifact.put(f"{group}/influence_y", frame.influence_y, unit="1", dims=("floor",))
     if frame.degrees_of_freedom:
         artifact.put_json(f"{group}/degrees_of_freedom", list(frame.degrees_of_freedom))
     artifact.attributes(group, name=frame.name)
@@ -127,4 +163,5 @@ def read_frame(artifact: Artifact, group: str = "frame") -> Frame:
         influence=artifact.array(f"{group}/influence") if "influence" in members else None,
         degrees_of_freedom=tuple(str(name) for name in names),
         modal_coordinates=int(artifact.attributes(group).get("modal_coordinates", 0)),
+        influence_y=artifact.array(f"{group}/influence_y") if "influence_y" in members else None,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +13,25 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.structures.frame import Frame
-from mrpipe.structures.options import MatrixEntry, StructureSettings
+from mrpipe.structures.options import MatrixEntry, StoreyColumn, StructureSettings
 from mrpipe.structures.shear_frames import frame_from_modes, frame_from_parameter_set, modal_damping_matrix, shear_frame
 from mrpipe.units import conversion, same_unit_dimension
 
 Reader = Callable[[Path, str], Any]
 """From a file and the name of a variable in it (empty: the only table) to its content."""
 
+_GROUND = ("ground", "0")
+
 SYMMETRY = 1e-8
 """Largest relative asymmetry of M and K that is taken for rounding."""
 
 
-def structure_from_settings(settings: StructureSettings, read: Reader, name: str = "structure") -> Frame:
+def structure_from_settings(
+    settings: StructureSettings,
+    read: Reader,
+    name: str = "structure",
+    warn: Callable[[str], None] | None = None,
+) -> Frame:
     """Return the structure that the settings describe.
 
     Parameters
@@ -34,6 +42,8 @@ def structure_from_settings(settings: StructureSettings, read: Reader, name: str
         Reads a variable of a data file.
     name
         Of the structure.
+    warn
+        Called with what the user should know.
 
     Raises
     ------
@@ -44,28 +54,33 @@ def structure_from_settings(settings: StructureSettings, read: Reader, name: str
         "frame": bool(settings.frame),
         "file": bool(settings.file or settings.mass.file),
         "storeys": bool(settings.storeys),
+        "storey_table": settings.storey_table.given,
         "mode_shapes": bool(settings.mode_shapes),
     }
     given = [way for way, there in ways.items() if there]
     if len(given) != 1:
         problem = "describes no structure" if not given else f"describes it {len(given)} times: {', '.join(given)}"
-        raise UserError("structure", "", problem, "give frame, or matrices (file), or storeys, or mode_shapes")
+        raise UserError("structure", "", problem, "give frame, matrices (file), storeys, storey_table or mode_shapes")
     if given == ["storeys"]:
         frame = _from_storeys(settings, name)
+    elif given == ["storey_table"]:
+        frame = _from_table(settings, read, name)
     elif given == ["mode_shapes"]:
         frame = _from_modes(settings, name)
     elif given == ["frame"]:
         frame = frame_from_parameter_set(settings.frame)
     else:
         frame = _from_matrices(settings, read, name)
-    return Frame(
+    full = Frame(
         frame.mass,
         frame.damping,
         frame.stiffness,
         name,
-        _influence(settings, frame.floors),
+        _influence("influence", settings.influence, frame.floors),
         _names(settings, frame.floors),
+        influence_y=_influence("influence_y", settings.influence_y, frame.floors),
     )
+    return without_massless(full, warn)
 
 
 def _from_storeys(settings: StructureSettings, name: str) -> Frame:
@@ -74,6 +89,38 @@ def _from_storeys(settings: StructureSettings, name: str) -> Frame:
     return shear_frame(
         [row.mass_kg for row in rows], [row.stiffness_n_m for row in rows], ratios, name=name, source="structure"
     )
+
+
+def _from_table(settings: StructureSettings, read: Reader, name: str) -> Frame:
+    table = settings.storey_table
+    mass = _column("mass", table.mass, table.file, read, "kg")
+    stiffness = _column("stiffness", table.stiffness, table.file, read, "N/m")
+    if len(mass) != len(stiffness):
+        raise UserError(
+            "structure",
+            "storey_table",
+            f"has {len(mass)} masses and {len(stiffness)} stiffnesses",
+            "give both for each storey",
+        )
+    return shear_frame(mass, stiffness, _ratios(settings, len(mass)), name=name, source="structure.storey_table")
+
+
+def _column(key: str, column: StoreyColumn, file: str, read: Reader, si: str) -> FloatArray:
+    where = f"structure.storey_table.{key}"
+    if column.values:
+        values: Any = column.values
+    elif file and column.name:
+        values = read(Path(file), column.name)
+    else:
+        raise UserError(where, "", "has neither values nor a column", "give values, or storey_table.file and name")
+    try:
+        found = np.asarray(values, dtype=np.float64).ravel()
+    except (TypeError, ValueError) as error:
+        raise UserError(where, column.name, "is not a column of numbers", "name another column") from error
+    if not np.all(np.isfinite(found)) or np.any(found <= 0.0):
+        row = int(np.flatnonzero(~(np.isfinite(found) & (found > 0.0)))[0])
+        raise UserError(where, f"storey {row + 1}", f"is {found[row]:g}", "give a positive number for each storey")
+    return found * _factor(column.unit or si, si, f"{where}.unit")
 
 
 def _from_modes(settings: StructureSettings, name: str) -> Frame:
@@ -102,19 +149,24 @@ def _from_matrices(settings: StructureSettings, read: Reader, name: str) -> Fram
             "structure", "stiffness", f"is {_size(stiffness)}, the mass is {_size(mass)}", "give matrices of one size"
         )
     mass, stiffness = _symmetric("mass", mass), _symmetric("stiffness", stiffness)
-    if np.min(np.linalg.eigvalsh(mass)) <= 0.0:
+    with_mass = np.any(mass != 0.0, axis=0)
+    if not np.any(with_mass) or np.min(np.linalg.eigvalsh(mass[np.ix_(with_mass, with_mass)])) <= 0.0:
         raise UserError(
             "structure",
             "mass",
             "is not positive definite",
-            "remove degrees of freedom without mass by static condensation before, or give them a small mass",
+            "correct the signs, or remove the degrees of freedom whose masses depend on each other",
         )
     if settings.damping.name or settings.damping.file:
         damping = _matrix("damping", settings.damping, settings, read, "N*s/m")
         if damping.shape != (n, n):
             raise UserError("structure", "damping", f"is {_size(damping)}", f"give a matrix of {n} x {n}")
     else:
-        damping = modal_damping_matrix(mass, stiffness, _ratios(settings, n))
+        condensed = without_massless(Frame(mass, np.zeros((n, n)), stiffness))
+        damping = np.zeros((n, n))
+        damping[np.ix_(with_mass, with_mass)] = modal_damping_matrix(
+            condensed.mass, condensed.stiffness, _ratios(settings, condensed.floors)
+        )
     return Frame(mass, damping, stiffness, name)
 
 
@@ -168,10 +220,10 @@ def _ratios(settings: StructureSettings, count: int) -> FloatArray:
     return np.array(given + [given[-1]] * (count - len(given)))
 
 
-def _influence(settings: StructureSettings, count: int) -> FloatArray | None:
-    if not settings.influence:
+def _influence(key: str, values: Sequence[float], count: int) -> FloatArray | None:
+    if not values:
         return None
-    return np.array(_as_many("influence", settings.influence, count))
+    return np.array(_as_many(key, values, count))
 
 
 def _names(settings: StructureSettings, count: int) -> tuple[str, ...]:
@@ -190,8 +242,56 @@ def _as_many(key: str, values: Sequence[Any], count: int) -> Sequence[Any]:
     return values
 
 
-def floor_heights(settings: StructureSettings) -> list[float] | None:
+def without_massless(frame: Frame, warn: Callable[[str], None] | None = None) -> Frame:
+    """Return the structure without its degrees of freedom that have no mass.
+
+    Their static condensation is exact, because nothing but springs acts on them. Dashpots on them must be proportional
+    to the springs, as with damping proportional to the stiffness.
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    warn
+        Called with the names of what was removed.
+
+    Raises
+    ------
+    UserError
+        If a degree of freedom has neither mass nor stiffness.
+    """
+    keep = np.any(frame.mass != 0.0, axis=0)
+    if np.all(keep):
+        return frame
+    places, gone = np.flatnonzero(keep), np.flatnonzero(~keep)
+    inner = frame.stiffness[np.ix_(gone, gone)]
+    if np.linalg.matrix_rank(inner) < len(gone):
+        nowhere = ", ".join(frame.names[place] for place in gone[:6])
+        raise UserError("structure", nowhere, "has neither mass nor a spring", "remove it, or give it a mass")
+    basis = np.zeros((frame.floors, len(places)))
+    basis[places] = np.eye(len(places))
+    basis[gone] = -np.linalg.solve(inner, frame.stiffness[np.ix_(gone, places)])
+    mass, damping, stiffness = (basis.T @ item @ basis for item in (frame.mass, frame.damping, frame.stiffness))
+    names = [frame.names[place] for place in gone]
+    listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+    if warn is not None:
+        warn(f"{len(names)} degrees of freedom without mass were condensed, which is exact: {listed}")
+    return replace(
+        frame,
+        mass=mass,
+        damping=damping,
+        stiffness=0.5 * (stiffness + stiffness.T),
+        influence=None if frame.influence is None else frame.influence[places],
+        influence_y=None if frame.influence_y is None else frame.influence_y[places],
+        degrees_of_freedom=tuple(frame.names[place] for place in places),
+    )
+
+
+def floor_heights(settings: StructureSettings, read: Reader) -> list[float] | None:
     """Return the height of each floor above the ground [m]; None if a storey has no height."""
+    column = settings.storey_table.height
+    if settings.storey_table.given and (column.name or column.values):
+        return np.cumsum(_column("height", column, settings.storey_table.file, read, "m")).tolist()
     heights = [row.height_m for row in settings.storeys for _ in range(row.repeat)]
     known = [height for height in heights if height is not None]
     return np.cumsum(known).tolist() if heights and len(known) == len(heights) else None
@@ -221,11 +321,13 @@ def device_position(
 ) -> FloatArray:
     """Return the connectivity vector w, shape (n,), of a device between two degrees of freedom, or one and ground.
 
-    The device's displacement is w'x = x_first - x_second.
+    The device's displacement is w'x = x_first - x_second; the ground may be named first or second.
     """
+    if str(first) in _GROUND:
+        first, second = second, first
     w = np.zeros(frame.floors)
     w[degree_of_freedom(frame, first, where)] = 1.0
-    if str(second) not in ("ground", "0"):
+    if str(second) not in _GROUND:
         w[degree_of_freedom(frame, second, where)] -= 1.0
     if not np.any(w):
         raise UserError(

@@ -89,6 +89,7 @@ def given_summary(full: Frame, reduced: Reduced, heights_m: list[float] | None =
         # after a reduction the coordinates are no longer the floors
         "heights_m": heights_m if frame is full else None,
         "influence": frame.ground_influence.tolist(),
+        "influence_y": None if frame.influence_y is None else frame.influence_y.tolist(),
         "frequency_intervals_hz": [[value, value] for value in frequencies.tolist()],
         "damping_ratio_intervals": [[value, value] for value in damping_ratios.tolist()],
         "damping_source": ["given"] * omega.size,

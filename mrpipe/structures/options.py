@@ -21,6 +21,28 @@ class Storey(Section):
     repeat: int = Field(1, ge=1, description="How many storeys in a row are like this one.")
 
 
+class StoreyColumn(Section):
+    """One quantity of a storey table, with its unit."""
+
+    name: str = Field("", description="Column in `storey_table.file`.")
+    values: tuple[float, ...] = Field((), description="The values themselves, lowest storey first, without a file.")
+    unit: str = Field("", description="Unit, such as t, kip*s^2/in, kN/mm, ft; empty: SI.")
+
+
+class StoreyTable(Section):
+    """A storey table with units, from a file or as lists."""
+
+    file: str = Field("", description="File with a row for each storey, lowest storey first (.csv, .mat, .h5, .json).")
+    mass: StoreyColumn = Field(StoreyColumn(name="mass"), description="Mass of the floor above each storey.")
+    stiffness: StoreyColumn = Field(StoreyColumn(name="stiffness"), description="Lateral stiffness of each storey.")
+    height: StoreyColumn = Field(StoreyColumn(), description="Height of each storey; without name and values: unknown.")
+
+    @property
+    def given(self) -> bool:
+        """Whether a table is given."""
+        return bool(self.file or self.mass.values)
+
+
 class MatrixEntry(Section):
     """Where a matrix is, and its unit."""
 
@@ -73,11 +95,13 @@ class ReductionSettings(Section):
     method: Literal["none", "guyan", "craig-bampton", "modal", "balanced"] = Field(
         "none",
         description="`guyan`: static condensation; `craig-bampton`: static condensation plus fixed-interface modes; "
-        "`modal`: the lowest modes. The degrees of freedom in `keep` stay. `balanced` is refused by identify-frame, "
-        "because it gives no matrices.",
+        "`modal`: the lowest modes; `balanced`: the shapes that ground motion and forces on `keep` excite most. The "
+        "degrees of freedom in `keep` stay.",
     )
     keep: tuple[str, ...] = Field((), description="Degrees of freedom that stay, by name or number from 1.")
-    modes: int = Field(10, ge=1, description="Modes that stay (craig-bampton: fixed-interface modes; balanced: pairs).")
+    modes: int = Field(
+        10, ge=1, description="Modes that stay (craig-bampton: fixed-interface modes; balanced: all coordinates)."
+    )
     band_high_hz: float | None = Field(
         None, gt=0.0, description="Highest frequency at which the error is stated; null: that of the last mode kept."
     )
@@ -100,6 +124,7 @@ class StructureSettings(Section):
         (0.01,), min_length=1, description="Damping ratio of the modes; the last one holds for all further modes."
     )
     storeys: tuple[Storey, ...] = Field((), description="Storey table of a shear frame, lowest storey first.")
+    storey_table: StoreyTable = Field(StoreyTable(), description="Storey table with units, or from a file.")
     frequencies_hz: tuple[float, ...] = Field((), description="Natural frequencies, with `mode_shapes` and masses.")
     mode_shapes: tuple[tuple[float, ...], ...] = Field(
         (), description="A row per degree of freedom, a column per mode; as many modes as degrees of freedom."
@@ -110,6 +135,9 @@ class StructureSettings(Section):
         (),
         description="Displacement of each degree of freedom when the ground moves by 1 m; empty: 1 for all. A rotation "
         "or a direction across the motion has 0.",
+    )
+    influence_y: tuple[float, ...] = Field(
+        (), description="The same for ground motion in the second direction; empty: the structure has one direction."
     )
     reduction: ReductionSettings = Field(ReductionSettings(), description="Reduction of a large structure.")
     dampers: tuple[DamperSettings, ...] = Field(
@@ -126,7 +154,9 @@ class StructureSettings(Section):
     @property
     def given(self) -> bool:
         """Whether a structure is given at all."""
-        return bool(self.frame or self.file or self.storeys or self.mode_shapes or self.mass.file)
+        return bool(
+            self.frame or self.file or self.storeys or self.storey_table.given or self.mode_shapes or self.mass.file
+        )
 
     def in_folder(self, folder: Path) -> StructureSettings:
         """Return the same settings with the paths of all files resolved against a folder."""
@@ -139,4 +169,5 @@ class StructureSettings(Section):
             for key, entry in (("mass", self.mass), ("stiffness", self.stiffness), ("damping", self.damping))
         }
         frame = resolved(self.frame) if self.frame.endswith((".yaml", ".yml")) else self.frame
-        return self.changed(frame=frame, file=resolved(self.file), **entries)
+        table = self.storey_table.changed(file=resolved(self.storey_table.file))
+        return self.changed(frame=frame, file=resolved(self.file), storey_table=table, **entries)

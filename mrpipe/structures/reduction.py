@@ -1,8 +1,8 @@
 """Reduction of a large structure: static condensation, Craig-Bampton, modal and balanced truncation.
 
-All methods except balanced truncation return a structure, with M, C, K and an influence vector. The error of a
-reduction is the largest deviation of the frequency response to ground motion, at the degrees of freedom that stay, over
-the largest response.
+All methods except :func:`balanced`, which truncates a state space, return a structure with M, C, K and an influence
+vector. The error of a reduction is the largest deviation of the frequency response to ground motion, at the degrees of
+freedom that stay, over the largest response.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, eigh, solve_continuous_lyapunov, svd
+from scipy.linalg import cholesky, eigh, null_space, solve_continuous_lyapunov, solve_triangular, svd
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
-from mrpipe.structures.dynamics import StateSpace, natural_modes
+from mrpipe.structures.dynamics import StateSpace, natural_modes, state_space
 from mrpipe.structures.frame import Frame
 from mrpipe.structures.given import degree_of_freedom
 from mrpipe.structures.options import ReductionSettings
@@ -119,22 +119,69 @@ def modal(frame: Frame, modes: int, kept: Sequence[int] = (), band_high_hz: floa
     return _projected(frame, basis, list(kept), band_high_hz)
 
 
+def balanced_structure(
+    frame: Frame, kept: Sequence[int], coordinates: int, band_high_hz: float | None = None
+) -> Reduced:
+    """Keep the shapes that ground motion and forces on `kept` excite most: balanced truncation that leaves M, C and K.
+
+    For symmetric M, C and K and outputs at the places of the forces, the position part of the controllability Gramian
+    and the velocity part of the observability Gramian are equal in the inner product of the mass. Both are diagonal in
+    the eigenvectors of the former, and the truncation is a projection that keeps the structure symmetric and stable
+    (position-velocity balancing: Meyer and Srinivasan 1996; Reis and Stykel 2008). The basis is turned so that its
+    first coordinates are the displacements of `kept`.
+
+    Parameters
+    ----------
+    frame
+        Structure; all modes need damping.
+    kept
+        Indices of the degrees of freedom whose forces and displacements count, from 0.
+    coordinates
+        Number of coordinates of the reduced structure, at least as many as `kept`.
+    band_high_hz
+        Up to where the error is stated; None: half the last natural frequency of the reduced structure.
+
+    Raises
+    ------
+    UserError
+        If there are fewer coordinates than places to keep, or a mode has no damping.
+    """
+    kept, _ = _partition(frame, kept)
+    coordinates = min(coordinates, frame.floors)
+    if coordinates < len(kept):
+        problem = f"is {coordinates}, and keep has {len(kept)} entries"
+        raise UserError("structure.reduction", "modes", problem, "give at least as many as degrees of freedom to keep")
+    forces = np.eye(frame.floors)[:, kept]
+    motions = [frame.mass @ vector for vector in (frame.ground_influence, frame.influence_y) if vector is not None]
+    loads = np.column_stack([*motions, forces])
+    # each input alone would store the same energy at rest, so that none counts more by its unit
+    loads /= np.sqrt(np.einsum("ni,ni->i", loads, np.linalg.solve(frame.stiffness, loads)))
+    space = state_space(frame, loads)
+    _require_stable(space)
+    B = space.B[:, 1:]
+    gramian = solve_continuous_lyapunov(space.A, -B @ B.T)[: frame.floors, : frame.floors]
+    # the eigenvectors of P M, by its symmetric form L' P L with M = L L'
+    lower = cholesky(frame.mass, lower=True)
+    sizes, vectors = eigh(lower.T @ gramian @ lower)
+    shapes = solve_triangular(lower.T, vectors[:, np.argsort(sizes)[::-1]][:, :coordinates])
+    rows = shapes[kept]
+    inner = np.asarray(null_space(rows)) if coordinates > len(kept) else np.zeros((coordinates, 0))
+    basis = shapes @ np.column_stack([np.linalg.pinv(rows), inner])
+    return _projected(frame, basis, kept, band_high_hz)
+
+
 def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
     """Reduce a structure as the settings say; without a reduction its coordinates and its response stay the same.
 
     Raises
     ------
     UserError
-        If a degree of freedom in `keep` does not exist, `keep` is empty, or the method gives no matrices.
+        If a degree of freedom in `keep` does not exist, or `keep` is empty.
     """
     high = settings.band_high_hz
     if settings.method == "none":
         everything = tuple(range(frame.floors))
         return Reduced(frame, np.eye(frame.floors), everything, 0.0, high or 0.0)
-    if settings.method == "balanced":
-        raise UserError(
-            "structure.reduction", "method", "balanced truncation gives no M, C and K", "use craig-bampton or modal"
-        )
     if not settings.keep:
         raise UserError(
             "structure.reduction",
@@ -148,6 +195,8 @@ def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
         return guyan(frame, kept, high)
     if settings.method == "craig-bampton":
         return craig_bampton(frame, kept, settings.modes, high)
+    if settings.method == "balanced":
+        return balanced_structure(frame, kept, settings.modes, high)
     return modal(frame, settings.modes, kept, high)
 
 
@@ -173,14 +222,7 @@ def balanced(space: StateSpace, outputs: FloatArray, order: int) -> tuple[FloatA
     UserError
         If the system is not stable.
     """
-    poles = np.linalg.eigvals(space.A)
-    if np.max(poles.real) >= -1e-9 * np.max(np.abs(poles)):
-        raise UserError(
-            "structure.reduction",
-            "method",
-            "balanced truncation needs a stable structure with damping",
-            "give a positive damping ratio, or use craig-bampton",
-        )
+    _require_stable(space)
     controllable = solve_continuous_lyapunov(space.A, -space.B @ space.B.T)
     observable = solve_continuous_lyapunov(space.A.T, -outputs.T @ outputs)
     left, right = _root(controllable), _root(observable)
@@ -193,25 +235,42 @@ def balanced(space: StateSpace, outputs: FloatArray, order: int) -> tuple[FloatA
     return back @ space.A @ into, back @ space.B, outputs @ into, bound
 
 
+def _require_stable(space: StateSpace) -> None:
+    poles = np.linalg.eigvals(space.A)
+    if np.max(poles.real) >= -1e-9 * np.max(np.abs(poles)):
+        raise UserError(
+            "structure.reduction",
+            "method",
+            "balanced truncation needs a stable structure with damping",
+            "give a positive damping ratio, or use craig-bampton",
+        )
+
+
 def frequency_error(frame: Frame, reduced: Frame, basis: FloatArray, places: Sequence[int], high_hz: float) -> float:
     """Return the largest error of the response to ground motion over the largest response, from 0 to `high_hz`.
 
-    The lines lie at the natural frequencies and between them, because a resonance is narrow.
+    Where the ground moves nothing, the response is that to a force on all places. The lines lie at the natural
+    frequencies and between them, because a resonance is narrow.
     """
     omega = natural_modes(frame).angular_frequencies
     omega = omega[(omega > 0.0) & (omega <= 2.0 * math.pi * high_hz)]
     between = np.linspace(0.0, 2.0 * math.pi * high_hz, 200)[1:]
     lines = np.unique(np.concatenate([omega, between]))
     rows = list(places) if len(places) else list(range(frame.floors))
-    full = _response(frame, lines)[:, rows]
-    small = (_response(reduced, lines) @ basis.T)[:, rows]
+    load = -(frame.mass @ frame.ground_influence)
+    if not np.any(load):
+        load[rows] = 1.0
+    full = _response(frame, lines, load)[:, rows]
+    small = (_response(reduced, lines, basis.T @ load) @ basis.T)[:, rows]
     return float(np.max(np.abs(full - small)) / np.max(np.abs(full)))
 
 
-def _response(frame: Frame, omega: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
-    load = (frame.mass @ frame.ground_influence).astype(np.complex128)
+def _response(
+    frame: Frame, omega: FloatArray, load: FloatArray
+) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
+    force = load.astype(np.complex128)
     return np.array([
-        np.linalg.solve(frame.stiffness + 1j * w * frame.damping - w**2 * frame.mass, -load) for w in omega
+        np.linalg.solve(frame.stiffness + 1j * w * frame.damping - w**2 * frame.mass, force) for w in omega
     ])  # fmt: skip
 
 
@@ -231,12 +290,14 @@ def _projected(frame: Frame, basis: FloatArray, kept: Sequence[int], band_high_h
     mass, stiffness = 0.5 * (mass + mass.T), 0.5 * (stiffness + stiffness.T)
     damping = basis.T @ frame.damping @ basis
     # the load of the ground motion is projected; with the reduced mass it defines the influence vector
-    load = basis.T @ frame.mass @ frame.ground_influence
-    influence = np.asarray(np.linalg.solve(mass, load), dtype=np.float64)
+    influence, influence_y = (
+        None if vector is None else np.asarray(np.linalg.solve(mass, basis.T @ frame.mass @ vector), dtype=np.float64)
+        for vector in (frame.ground_influence, frame.influence_y)
+    )
     names = tuple(frame.names[k] for k in kept)
     modes = basis.shape[1] - len(kept)
     names += tuple(f"mode {k + 1}" for k in range(modes))
-    reduced = Frame(mass, damping, stiffness, f"{frame.name}, reduced", influence, names, modes)
+    reduced = Frame(mass, damping, stiffness, f"{frame.name}, reduced", influence, names, modes, influence_y)
     if band_high_hz is None:
         band_high_hz = float(natural_modes(reduced).angular_frequencies[-1]) / (4.0 * math.pi)
     error = frequency_error(frame, reduced, basis, kept, band_high_hz)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration import (
@@ -20,8 +21,10 @@ from mrpipe.control.linearisation import (
     equivalent_stiffness,
     friction_stiffness,
 )
+from mrpipe.control.placed_storage import placed_dampers
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame, complex_modes, floor_position, shear_frame, storey_position
+from mrpipe.structures.options import DamperSettings
 from mrpipe.thesis.gains import THESIS_GAINS
 
 
@@ -185,3 +188,21 @@ def test_sources_of_gains(thesis_frame, floor_one):
         assert calibration.laws["vd"].gains.c_n_s_m == pytest.approx(c, rel=1e-3)
     gains = calibration.laws["fdns"].gains
     assert law_named("fdns").gains_as_json(gains) == {"alpha_n_m": pytest.approx(3127.6, rel=1e-3)}
+
+
+@pytest.mark.property
+def test_modes_across_the_damper_do_not_count() -> None:
+    along = shear_frame([25.0] * 3, [3.0e4] * 3, 0.01)
+    across = shear_frame([25.0] * 3, [2.0e4] * 3, 0.01)
+    both = Frame(*(block_diag(getattr(across, key), getattr(along, key)) for key in ("mass", "damping", "stiffness")))
+    w = np.eye(6)[3]
+    expected = limits.limiting_modes(along, w[3:], 1)
+    found = limits.limiting_modes(both, w, 2)
+    assert (found.omega_0, found.omega_inf) == pytest.approx((expected.omega_0, expected.omega_inf))
+    assert found.u_0**2 == pytest.approx(expected.u_0**2)
+    with pytest.raises(
+        UserError, match="mode 1 does not move the damper; choose another place, or a target mode among 2, "
+    ):
+        limits.limiting_modes(both, w, 1)
+    entries = (DamperSettings(between=(4, "ground")), DamperSettings(between=(1, "ground")))
+    assert [item.mode for item in placed_dampers(both, entries, 1)] == [2, 1]

@@ -5,13 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
+from scipy.sparse import csc_matrix
 
 from mrpipe.errors import UserError
 from mrpipe.structures import natural_modes, shear_frame
-from mrpipe.structures.given import degree_of_freedom, device_position, structure_from_settings
-from mrpipe.structures.options import MatrixEntry, Storey, StructureSettings
+from mrpipe.structures.given import degree_of_freedom, device_position, floor_heights, structure_from_settings
+from mrpipe.structures.given_storage import read_matrix
+from mrpipe.structures.options import MatrixEntry, Storey, StoreyColumn, StoreyTable, StructureSettings
 
 FRAME = shear_frame([2.0, 3.0, 1.0], [500.0, 400.0, 300.0], 0.02)
 
@@ -67,7 +70,8 @@ def test_a_storey_table_is_a_shear_frame() -> None:
         ({"storeys": (Storey(mass_kg=1.0, stiffness_n_m=1.0),)}, CONTENT, "", "2 times"),
         ({}, {**CONTENT, "K": FRAME.stiffness[:2, :2]}, "stiffness", "2 x 2"),
         ({}, {**CONTENT, "K": FRAME.stiffness + np.diag([9.0, 9.0], 1)}, "stiffness[1, 2]", "mirror"),
-        ({}, {**CONTENT, "M": np.diag([1.0, 0.0, 1.0])}, "mass", "positive definite"),
+        ({}, {**CONTENT, "M": np.diag([1.0, -2.0, 1.0])}, "mass", "positive definite"),
+        ({"influence_y": (1.0, 0.0)}, CONTENT, "influence_y", "2 entries"),
         ({}, {**CONTENT, "K": "text"}, "K", "numbers"),
         ({}, {**CONTENT, "K": np.full((3, 3), np.nan)}, "K[1, 1]", "not finite"),
         ({"mass": MatrixEntry(name="M", unit="N/m")}, CONTENT, "structure.mass.unit", "not a unit"),
@@ -88,6 +92,7 @@ def test_devices_by_name_and_number() -> None:
     assert degree_of_freedom(frame, "pier") == degree_of_freedom(frame, 3) == 2
     np.testing.assert_array_equal(device_position(frame, "pier", "deck x"), [-1.0, 0.0, 1.0])
     np.testing.assert_array_equal(device_position(frame, 2), [0.0, 1.0, 0.0])
+    np.testing.assert_array_equal(device_position(frame, "ground", 2), [0.0, 1.0, 0.0])
     for first, second in (("pier", "pier"), ("cable", "ground"), (4, "ground"), (0, "ground")):
         with pytest.raises(UserError):
             device_position(frame, first, second)
@@ -127,3 +132,71 @@ def test_the_tall_building_as_published(public_data: Path) -> None:
     np.testing.assert_allclose(
         natural_modes(frame).angular_frequencies[:5] / (2.0 * np.pi), [0.16, 0.765, 1.992, 3.790, 6.395], rtol=5e-3
     )
+
+
+@pytest.mark.property
+def test_degrees_of_freedom_without_mass_are_condensed_exactly() -> None:
+    # a cantilever of two elements: rotations have no mass
+    element = np.array([[12.0, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+    K = np.zeros((4, 4))
+    K[:2, :2] += element[2:, 2:]
+    K += element
+    M = np.diag([2.0, 0.0, 3.0, 0.0])
+    warnings: list[str] = []
+    frame = structure_from_settings(
+        settings(
+            damping_ratio=(0.02,),
+            damping=MatrixEntry(),
+            degrees_of_freedom=("u1", "r1", "u2", "r2"),
+            influence=(1.0, 0.0, 1.0, 0.0),
+        ),
+        reader({"M": M, "K": K}),
+        warn=warnings.append,
+    )
+    assert frame.names == ("u1", "u2") and "r1, r2" in warnings[0]
+    np.testing.assert_allclose(np.linalg.inv(frame.stiffness), np.linalg.inv(K)[::2, ::2], rtol=1e-10)
+    np.testing.assert_allclose(frame.ground_influence, [1.0, 1.0])
+    modes = natural_modes(frame)
+    ratios = np.diag(modes.mode_shapes.T @ frame.damping @ modes.mode_shapes) / (2.0 * modes.angular_frequencies)
+    np.testing.assert_allclose(ratios, 0.02)
+    with pytest.raises(UserError, match="neither mass nor a spring"):
+        structure_from_settings(
+            settings(damping=MatrixEntry()), reader({"M": np.diag([1.0, 0]), "K": np.diag([1.0, 0])})
+        )
+
+
+@pytest.mark.golden
+def test_a_storey_table_with_units_from_a_file_and_as_lists(tmp_path: Path) -> None:
+    (tmp_path / "storeys.csv").write_text("storey,m,k,h\n1,0.5,100,144\n2,0.4,80,120\n")
+    table = StoreyTable(
+        file=str(tmp_path / "storeys.csv"),
+        mass=StoreyColumn(name="m", unit="kip*s^2/in"),
+        stiffness=StoreyColumn(name="k", unit="kip/in"),
+        height=StoreyColumn(name="h", unit="in"),
+    )
+    kip_per_inch = 4448.2216152605 / 0.0254
+    given = StructureSettings(storey_table=table)
+    frame = structure_from_settings(given, read_matrix)
+    np.testing.assert_allclose(np.diag(frame.mass), np.array([0.5, 0.4]) * kip_per_inch)
+    np.testing.assert_allclose(frame.stiffness, np.array([[180.0, -80.0], [-80.0, 80.0]]) * kip_per_inch)
+    np.testing.assert_allclose(floor_heights(given, read_matrix), [144 * 0.0254, 264 * 0.0254])
+    lists = StoreyTable(
+        mass=StoreyColumn(values=(5.0, 4.0), unit="t"), stiffness=StoreyColumn(values=(9.0,), unit="kN/mm")
+    )
+    with pytest.raises(UserError, match="2 masses and 1 stiffnesses"):
+        structure_from_settings(StructureSettings(storey_table=lists), read_matrix)
+    with pytest.raises(UserError, match="storey 1: is -5"):
+        wrong = lists.changed(mass=StoreyColumn(values=(-5.0,), unit="t"))
+        structure_from_settings(StructureSettings(storey_table=wrong), read_matrix)
+
+
+@pytest.mark.golden
+def test_sparse_matrices_of_matlab_7_3(tmp_path: Path) -> None:
+    sparse = csc_matrix(FRAME.stiffness)
+    with h5py.File(tmp_path / "model.mat", "w") as file:
+        group = file.create_group("K")
+        group.attrs["MATLAB_sparse"] = np.uint64(3)
+        group["data"], group["ir"], group["jc"] = sparse.data, sparse.indices, sparse.indptr
+        file["M"] = FRAME.mass
+    np.testing.assert_allclose(read_matrix(tmp_path / "model.mat", "K"), FRAME.stiffness)
+    np.testing.assert_allclose(read_matrix(tmp_path / "model.mat", "M"), FRAME.mass)

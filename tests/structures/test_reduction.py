@@ -13,7 +13,7 @@ from mrpipe.errors import UserError
 from mrpipe.structures import natural_modes, read_frame, shear_frame, state_space
 from mrpipe.structures.frame import write_frame
 from mrpipe.structures.options import ReductionSettings
-from mrpipe.structures.reduction import balanced, craig_bampton, guyan, modal, reduced_structure
+from mrpipe.structures.reduction import balanced, balanced_structure, craig_bampton, guyan, modal, reduced_structure
 
 FRAME = shear_frame(np.full(12, 100.0), np.linspace(9e5, 4e5, 12), 0.02)
 KEPT = (2, 5, 8, 11)
@@ -108,3 +108,34 @@ def test_the_place_of_a_sensor_is_found_by_its_name() -> None:
     assert torsion.place_of("3_y") == 5
     assert torsion.place_of("3") == torsion.place_of("3_x") == 4
     assert torsion.place_of("3_z") is None
+
+
+@pytest.mark.property
+def test_a_balanced_structure_is_symmetric_stable_and_better_than_one_with_the_lowest_modes() -> None:
+    # what a force on the third floor excites most is not the lowest modes
+    kept = [2, 11]
+    balanced_one, lowest = balanced_structure(FRAME, kept, 5, 12.0), craig_bampton(FRAME, kept, 3, 12.0)
+    assert balanced_one.frame.floors == lowest.frame.floors == 5
+    assert balanced_one.frame.names == ("floor 3", "floor 12", "mode 1", "mode 2", "mode 3")
+    assert balanced_one.error < 0.05
+    np.testing.assert_allclose(balanced_one.basis[kept], np.eye(2, 5), atol=1e-9)
+    for matrix in (balanced_one.frame.mass, balanced_one.frame.stiffness):
+        np.testing.assert_allclose(matrix, matrix.T)
+        assert np.min(np.linalg.eigvalsh(matrix)) > 0.0
+    assert np.max(np.linalg.eigvals(state_space(balanced_one.frame).A).real) < 0.0
+    errors = [balanced_structure(FRAME, kept, count, 12.0).error for count in (3, 5, 8, 12)]
+    assert np.all(np.diff(errors) < 0.0) and errors[-1] < 1e-8
+    chosen = reduced_structure(
+        FRAME, ReductionSettings(method="balanced", keep=["3", "12"], modes=5, band_high_hz=12.0)
+    )
+    assert chosen.error == pytest.approx(balanced_one.error)
+    with pytest.raises(UserError, match="modes: is 1, and keep has 2 entries"):
+        balanced_structure(FRAME, kept, 1)
+
+
+@pytest.mark.property
+def test_both_directions_of_the_ground_are_reduced() -> None:
+    two = replace(FRAME, influence=np.tile([1.0, 0.0], 6), influence_y=np.tile([0.0, 1.0], 6))
+    for reduced in (guyan(two, KEPT), craig_bampton(two, KEPT, 3), balanced_structure(two, KEPT, 8)):
+        for vector, small in ((two.influence, reduced.frame.influence), (two.influence_y, reduced.frame.influence_y)):
+            np.testing.assert_allclose(reduced.frame.mass @ small, reduced.basis.T @ two.mass @ vector)

@@ -12,13 +12,20 @@ from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.readers.reader import Reader, require_size
 from mrpipe.campaigns.schema import TextEntry
 
+_SPARSE = "MATLAB_sparse"
+"""Attribute of a group that holds a sparse matrix of MATLAB 7.3; its value is the number of rows."""
+
 
 def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
     """Return the datasets of an HDF5 file; each field of a compound dataset is one column."""
     names: list[str] = []
 
     def note(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+        if _SPARSE in item.attrs:
+            names.append(name)
+        elif name.rpartition("/")[0] in names:
+            return  # a part of a sparse matrix
+        elif isinstance(item, h5py.Dataset) and not name.startswith("#"):
             fields = item.dtype.names
             names.extend(f"{name}/{field}" for field in fields) if fields else names.append(name)
 
@@ -28,6 +35,8 @@ def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
 
     def fetch(name: str) -> Any:
         with h5py.File(path, "r") as handle:
+            if name in handle and _SPARSE in handle[name].attrs:
+                return _sparse(path, handle[name])
             table, _, field = name.rpartition("/")
             inside = name not in handle or not isinstance(handle[name], h5py.Dataset)
             dataset = handle[table] if inside else handle[name]
@@ -44,6 +53,17 @@ def read_hdf5(path: Path, matlab: bool = False) -> DataFile:
         sampling_rate_hz=None if rate is None else float(rate),
         aliases=aliases,
     )
+
+
+def _sparse(path: Path, group: Any) -> Any:
+    """Return a sparse matrix of MATLAB: column starts `jc`, and rows `ir` and values `data` where it is not empty."""
+    from scipy.sparse import csc_matrix
+
+    starts = np.asarray(group["jc"][()], dtype=np.int64)
+    rows = int(group.attrs[_SPARSE])
+    require_size(path, 8 * rows * (starts.size - 1), group.file.id.get_filesize())
+    values, places = (np.asarray(group[name][()]) if name in group else np.zeros(0) for name in ("data", "ir"))
+    return csc_matrix((values, places.astype(np.int64), starts), shape=(rows, starts.size - 1)).toarray()
 
 
 def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:

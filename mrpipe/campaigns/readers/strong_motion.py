@@ -75,7 +75,7 @@ def _members(path: Path, content: bytes, depth: int = 0) -> list[tuple[Path, byt
     """Return name and content of the records in an archive and in the archives within it."""
     found: list[tuple[Path, bytes]] = []
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        # a Mac adds a file ._NAME of its own to each file
+        # a Mac adds a file ._NAME to each file
         items = [item for item in archive.infolist() if not Path(item.filename).name.startswith("._")]
         chosen = [item for item in items if Path(item.filename).suffix.lower() in ENDINGS]
         require_size(path, sum(item.file_size for item in chosen), len(content))
