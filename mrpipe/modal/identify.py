@@ -27,6 +27,7 @@ from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.search.checks import check_mode_matrix, orthogonal_shapes
 from mrpipe.modal.search.chosen_tests import ChosenTests, choose_tests, training_first, with_clocks, without_complex
 from mrpipe.modal.search.forced_modes import ModeSearch, check_channels
+from mrpipe.modal.search.free_response import with_decays
 from mrpipe.modal.search.hidden import contested, sharpened, with_missing_modes
 from mrpipe.modal.search.peak_picking import pick_peaks
 from mrpipe.modal.search.selection import (
@@ -183,7 +184,9 @@ def _identify(
         chosen = ChosenTests(contested(chosen.search, chosen.tests, layout), chosen.tests)
     if forced:
         sharp = sharpened(chosen.search, chosen.tests)
-        chosen = ChosenTests(replace(sharp, fit=with_own_residues(sharp.fit)), chosen.tests)
+        # a fit of the forced tests alone does not have what decay tests show better
+        whole = with_decays(with_own_residues(sharp.fit), tests.decays)
+        chosen = ChosenTests(replace(sharp, fit=whole), chosen.tests)
     if options.modes_from == "peak-picking" and chosen.tests:
         picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)
         chosen = replace(chosen, search=replace(chosen.search, fit=picked))
@@ -193,9 +196,11 @@ def _identify(
     decays, notes = decays_of_modes(tests, fit)
     findings += notes
     modes = fit.angular_frequencies.size
-    error = np.sqrt(np.diag(fit.covariance))
-    frequencies = tuple(Estimate.of(w, w * e) for w, e in zip(fit.angular_frequencies, error[:modes], strict=True))
-    sweep = tuple(Estimate.of(z, z * e) for z, e in zip(fit.damping_ratios, error[modes:], strict=True))
+    poles = np.concatenate([fit.angular_frequencies, fit.damping_ratios])
+    freedom = fit.freedom if fit.freedom.size else np.full(poles.size, np.inf)
+    errors = np.sqrt(np.diag(fit.covariance))
+    estimates = tuple(map(Estimate.of_logarithm, poles.tolist(), errors.tolist(), freedom.tolist()))
+    frequencies, sweep = estimates[:modes], estimates[modes:]
     damping, sources, notes = choose_damping(
         sweep, decays, options.damping_from, "sweep" if forced else "ambient", options.decay_method
     )

@@ -141,49 +141,75 @@ def _minimise(
     return value, cost, spread
 
 
-def _constant_delay(fit: _SensorFit, highest: float) -> tuple[FloatArray, FloatArray]:
-    """Return the constant delay, shape (1,), and its standard error.
+def _constant_delay(fit: _SensorFit, highest: float) -> tuple[FloatArray, float, FloatArray]:
+    """Return the constant delay, shape (1,), its cost, and its standard error.
 
     The cost has several minima, about half a period of a strong mode apart, because real residues may have either
     sign. The minimum nearest to zero is replaced by another one only if that one predicts modes which were left out
     of its estimate better.
     """
     ones = np.ones(fit.time.size)
-    offset, _, spread = _minimise(fit, [ones], np.zeros(1))
+    offset, cost, spread = _minimise(fit, [ones], np.zeros(1))
     delays = _SCAN_PHASE / highest * np.arange(-_SCAN_STEPS, _SCAN_STEPS + 1)
     start = delays[int(np.argmin(fit.scanned(np.asarray(delays))))]
     if abs(start - offset[0]) <= _SCAN_PHASE / highest or len(fit.left_out.rows) < 2:
-        return offset, spread
-    other, _, other_spread = _minimise(fit, [ones], np.array([start]))
+        return offset, cost, spread
+    other, other_cost, other_spread = _minimise(fit, [ones], np.array([start]))
     costs = [fit.left_out_costs([([ones], value)]) for value in (other, offset)]
-    return (other, other_spread) if fit.left_out.proves(*costs) else (offset, spread)
+    return (other, other_cost, other_spread) if fit.left_out.proves(*costs) else (offset, cost, spread)
+
+
+def _supported(fit: _SensorFit, better: float, worse: float, parameters: int) -> bool:
+    """Return whether the Bayesian information criterion takes a delay with so many more parameters.
+
+    A delay that only fits noise can predict the lines that were left out by chance, and several places of a step are
+    tried for each sensor. The proof by such lines is therefore not enough by itself.
+    """
+    rows = fit.q.shape[0] - fit.q.shape[1]
+    return bool(rows * np.log(worse / max(better, 1e-300)) > parameters * np.log(rows))
 
 
 def _sensor_clock(fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highest: float) -> SensorClock:
-    """Return the delay of a sensor: none, constant, drifting or with a step, each proven against the simpler ones."""
+    """Return the delay of a sensor: none, constant, drifting or with a step.
+
+    Each form must be proven against the simpler ones by modes that were left out, and supported by all lines.
+    """
     ones, time = np.ones(fit.time.size), fit.time
-    offset, spread = _constant_delay(fit, highest)
+    offset, cost, spread = _constant_delay(fit, highest)
     best = SensorClock(name, sensor, 0.0, float(spread[0]))
     if len(fit.left_out.rows) < 2:
         return best
-    cost = fit.left_out_costs([([], np.zeros(0))])
+    simple, simple_cost, free = fit.left_out_costs([([], np.zeros(0))]), float(fit.scanned(np.zeros(1))[0]), 1
     own = fit.left_out_costs([([ones], offset)])
-    if fit.left_out.proves(own, cost):
-        best, cost = SensorClock(name, sensor, float(offset[0]), float(spread[0])), own
-    value, _, spread = _minimise(fit, [ones, time], np.array([offset[0], 0.0]))
+    if fit.left_out.proves(own, simple) and _supported(fit, cost, simple_cost, 1):
+        best = SensorClock(name, sensor, float(offset[0]), float(spread[0]))
+        simple, simple_cost, free = own, cost, 0
+    value, drift_cost, spread = _minimise(fit, [ones, time], np.array([offset[0], 0.0]))
     drift = fit.left_out_costs([([ones, time], value)])
-    changes = fit.left_out.proves(drift, cost)
-    forms = _step_forms(fit, offset) if steps else []
-    step = fit.left_out_costs([(shape, size) for shape, size, *_ in forms]) if forms else cost
-    if forms and fit.left_out.proves(step, cost) and fit.left_out.proves(step, drift):
-        _, value, spread, _, at = min(forms, key=lambda item: item[3])
-        best = SensorClock(name, sensor, float(value[0]), float(spread[0]), 0.0, float(value[1]), at)
-    elif changes or (forms and fit.left_out.proves(step, cost)):
-        # where only a step is proven against a constant delay, but not against a drift, the drift has fewer parameters
+    changes = fit.left_out.proves(drift, simple) and _supported(fit, drift_cost, simple_cost, 1 + free)
+    stepping = _step(fit, offset) if steps else None
+    if stepping is not None:
+        left_out, size, size_spread, step_cost, at = stepping
+        proven = fit.left_out.proves(left_out, simple) and _supported(fit, step_cost, simple_cost, 2 + free)
+        if proven and fit.left_out.proves(left_out, drift) and _supported(fit, step_cost, drift_cost, 1):
+            best = SensorClock(name, sensor, float(size[0]), float(size_spread[0]), 0.0, float(size[1]), at)
+            changes = False
+        # where a step is proven against a constant delay, but not against a drift, the drift has fewer parameters
+        changes = changes or (proven and not best.step_s)
+    if changes:
         best = SensorClock(name, sensor, float(value[0]), float(spread[0]), float(value[1]))
     if float(np.abs(best.delay(time)).max()) * highest < _LEAST_PHASE:
         return SensorClock(name, sensor, 0.0, best.offset_error_s)
     return best
+
+
+def _step(fit: _SensorFit, offset: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
+    """Return of the best step: left-out costs, coefficients (offset and step), their errors, cost, and place [s]."""
+    forms = _step_forms(fit, offset)
+    left_out = fit.left_out_costs([(shape, size) for shape, size, *_ in forms])
+    shape, size, _, _, at = min(forms, key=lambda item: item[3])
+    value, cost, spread = _minimise(fit, shape, size)
+    return left_out, value, spread, cost, at
 
 
 def _step_forms(

@@ -107,10 +107,14 @@ def choose_damping(
                 f"mode {mode}: the records determine the damping ratio only to +-{percent:.0f} % (95 % interval); "
                 "longer records, or more force on this mode, determine it better"
             )
-        if first is None and damping_from == "decay":
-            findings.append(f"mode {mode}: no free decay, damping from the {other}")
         if first is not None:
             apart = abs(first.value - second.value)
             if apart > first.half_width + second.half_width + 0.1 * second.value:
                 findings.append(f"mode {mode}: damping is {first.value:.2g} by decay, {second.value:.2g} by sweep")
+    without = [str(mode) for mode in range(1, len(sweep) + 1) if mode not in decays]
+    if without and damping_from == "decay":
+        tests = "forced tests" if other == "sweep" else f"{other} tests"
+        findings.append(
+            f"no free decay of mode{'s' if len(without) > 1 else ''} {', '.join(without)}: damping from the {tests}"
+        )
     return tuple(chosen), tuple(sources), findings

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import signal
+from scipy import signal, stats
 from scipy.optimize import least_squares
 
 from mrpipe.artifacts import FloatArray
@@ -33,6 +33,15 @@ class Estimate:
     def of(value: float, standard_error: float) -> Estimate:
         """Return value +- 1.96 standard errors."""
         return Estimate(value, value - _NORMAL_95 * standard_error, value + _NORMAL_95 * standard_error)
+
+    @staticmethod
+    def of_logarithm(value: float, standard_error: float, freedom: float = np.inf) -> Estimate:
+        """Return the interval of a positive value whose logarithm has a standard error of so many degrees of freedom.
+
+        The quantile is that of Student's t, because a standard error from a few groups is itself uncertain.
+        """
+        factor = float(np.exp(stats.t.ppf(0.975, freedom) * standard_error))
+        return Estimate(value, value / factor, value * factor)
 
     @property
     def half_width(self) -> float:

@@ -39,26 +39,38 @@ def pole_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
     return np.asarray(both[0] * np.outer(spread / own_spread, spread / own_spread))
 
 
-def clustered_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
+def clustered_covariance(fit: ProjectedFit, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Covariance of theta that also allows for what a sensor has wrong in one test over all lines of a peak.
 
     An error of a sensor's clock or cross-talk is alike from line to line, and noise of single lines does not show it.
     Each sensor in each test is therefore one cluster of the robust covariance (Liang and Zeger 1986). The larger
     variance of this and of :func:`pole_covariance` counts.
+
+    Returns
+    -------
+    Covariance, shape (2r, 2r), and the degrees of freedom of each standard error, shape (2r,): the clusters less one
+    where the clusters count (Cameron and Miller 2015), else infinite.
     """
     covariance = pole_covariance(fit, theta)
+    freedom = np.full(theta.size, np.inf)
     jacobian, residual = fit.jacobian(theta), fit.residual(theta)
     inverse = np.linalg.pinv(jacobian.T @ jacobian)
     scores, start = [], 0
     for group, state in zip(fit.groups, fit.states(theta), strict=True):
         part = slice(start, start + state.residual.size)
         start = part.stop
-        shape = (2 * group.problem.total, len(group.sensors))
-        scores.append(np.einsum("lop,lo->op", jacobian[part].reshape(*shape, -1), residual[part].reshape(shape)))
+        rows, outputs = group.problem.rows, len(group.sensors)
+        # real parts of the lines of all tests of the group, then their imaginary parts
+        shape = (2, group.problem.total, outputs)
+        products = jacobian[part].reshape(*shape, -1) * residual[part].reshape(*shape, 1)
+        edges = np.concatenate([[0], np.cumsum(rows)[:-1]])
+        by_test = np.add.reduceat(products.sum(axis=0), edges, axis=0)
+        scores.append(by_test.reshape(len(rows) * outputs, -1))
     spread = np.vstack(scores) @ inverse
     clusters = spread.shape[0]
     if clusters < 2:
-        return covariance
+        return covariance, freedom
     variance = np.sum(spread**2, axis=0) * clusters / (clusters - 1)
     ratio = np.sqrt(np.maximum(variance / np.diag(covariance), 1.0))
-    return np.asarray(covariance * np.outer(ratio, ratio))
+    freedom[ratio > 1.0] = clusters - 1.0
+    return np.asarray(covariance * np.outer(ratio, ratio)), freedom

@@ -24,30 +24,29 @@ _SAME = 0.005
 
 
 def with_own_residues(fit: MultiModeFit) -> MultiModeFit:
-    """Return the fit with poles, and their covariance, that give each test separate residues.
+    """Return the fit with poles that give each test separate residues, and the errors of all poles by clusters.
 
     Residues of each test are taken by the Bayesian information criterion. The shapes remain those that the tests share
-    at these poles. Without several tests, or without evidence, the same fit is returned.
+    at these poles. Without several tests, or without evidence, the poles stay as they are.
 
     Parameters
     ----------
     fit
         A fit with shared residues.
     """
-    if len(fit.spectra) < 2:
-        return fit
     modes = fit.angular_frequencies.size
     start = np.concatenate([np.log(fit.angular_frequencies), np.log(fit.damping_ratios)])
     shared, own = (ProjectedFit(fit.spectra, modes, separate) for separate in (False, True))
     for item in (shared, own):
         item.renew_weights(start)
         item.renew_weights(start)
-    if information(own, start) >= information(shared, start):
-        return fit
-    theta = fitted_poles(own, start, _PASSES, _EVALUATIONS)
-    if np.abs(theta[:modes] - start[:modes]).max() > _SAME:
-        return fit
-    return replace(collected(shared, fit.spectra, theta), covariance=clustered_covariance(own, theta))
+    chosen, theta = shared, start
+    if len(fit.spectra) > 1 and information(own, start) < information(shared, start):
+        moved = fitted_poles(own, start, _PASSES, _EVALUATIONS)
+        if np.abs(moved[:modes] - start[:modes]).max() <= _SAME:
+            chosen, theta = own, moved
+    covariance, freedom = clustered_covariance(chosen, theta)
+    return replace(collected(shared, fit.spectra, theta), covariance=covariance, freedom=freedom)
 
 
 def information(fit: ProjectedFit, theta: FloatArray) -> float:

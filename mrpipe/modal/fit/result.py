@@ -52,6 +52,8 @@ class MultiModeFit:
         The spectra that were fitted.
     transients
         One entry a test, shape (m, s): contribution of the ends of the record.
+    freedom
+        Shape (2r,): degrees of freedom of the standard errors in `covariance`; empty where all come from many lines.
     """
 
     angular_frequencies: FloatArray
@@ -71,6 +73,7 @@ class MultiModeFit:
     input_residues: ComplexArray = field(default_factory=lambda: np.ones((1, 1, 1), dtype=np.complex128))
     spectra: tuple[RecordSpectrum, ...] = ()
     transients: tuple[ComplexArray, ...] = ()
+    freedom: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def mode_coherence(self) -> FloatArray:
         """Coherence at each peak, shape (r,): mean over floors, weighted by the squared shape."""
@@ -87,6 +90,7 @@ class MultiModeFit:
             angular_frequencies=self.angular_frequencies[index],
             damping_ratios=self.damping_ratios[index],
             covariance=self.covariance[np.ix_(both, both)],
+            freedom=self.freedom[both] if self.freedom.size else self.freedom,
             residues=self.residues[:, index],
             residue_errors=self.residue_errors[:, index],
             coherence=self.coherence[:, index],

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.linalg import expm
-from scipy.optimize import lsq_linear, minimize
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.matrices.completion import completed_shapes
 from mrpipe.modal.matrices.tridiagonal import TridiagonalFit, fit_partial, storeys_of
 from mrpipe.modal.matrices.updating import MeasuredModes, UpdatedModel
 from mrpipe.modal.search.selection import Layout
@@ -120,7 +119,7 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
     zeta[index] = modes.damping_ratios
     storeys = storeys_of(updated)
     if len(index) == layout.floors:
-        shapes = _completed(shapes, modes, updated.masses)
+        shapes = completed_shapes(shapes, modes.errors, modes.measured, updated.masses, modes.angular_frequencies)
         frame = frame_from_modes(
             shapes, modes.angular_frequencies, zeta, updated.masses, name="identified", source=source
         )
@@ -173,7 +172,11 @@ def _findings(updated: UpdatedModel, modes: PartialModes, layout: Layout, unknow
     worst = float(np.abs(updated.frequency_error).max())
     if worst > _MODEL_ERROR:
         mode = updated.numbers[int(np.argmax(np.abs(updated.frequency_error)))]
-        findings.append(f"the storey model misses the frequency of mode {mode} by {100.0 * worst:.1f} %")
+        instead = "K follows from the modes instead" if not missing else "K is therefore uncertain"
+        findings.append(
+            f"springs between neighbouring floors alone miss the frequency of mode {mode} by {100.0 * worst:.1f} %; "
+            f"{instead}"
+        )
     if modes.driven >= 0 and np.any(updated.mass_high > updated.mass_low):
         findings.append(f"unknown masses were scaled by {modes.scaled_by}")
     return findings
@@ -189,77 +192,3 @@ def _expanded(modes: PartialModes, model: FloatArray, index: FloatArray) -> Floa
         scale = float(own @ modes.shapes[rows, column] / (own @ own))
         shapes[unknown, column] = scale * model[unknown, mode]
     return shapes
-
-
-def _completed(shapes: FloatArray, modes: PartialModes, masses: FloatArray) -> FloatArray:
-    """Return the shapes orthogonal to the mass; the rows of floors with a sensor decide.
-
-    With L = M^(1/2) the mass-normalised shapes form an orthogonal matrix. Its measured rows A are known up to a scale
-    d_r of each mode, and A diag(d^2) A' = 1 gives these scales. The other rows span the complement of the measured
-    ones. Of all rotations of the complement the one is taken that leaves the smallest stiffness between floors that
-    are not neighbours, because the measurements cannot show it.
-    """
-    root = np.sqrt(masses)[:, None]
-    rows = list(modes.measured)
-    unknown = [row for row in range(shapes.shape[0]) if row not in modes.measured]
-    scaled = root * shapes
-    scaled = scaled / np.linalg.norm(scaled, axis=0)
-    if not unknown:
-        whole = _nearest_orthonormal(scaled)
-    else:
-        whole = np.empty_like(scaled)
-        whole[rows] = _nearest_orthonormal(scaled[rows] * _mode_scales(scaled[rows]))
-        rest = scaled[unknown] - scaled[unknown] @ whole[rows].T @ whole[rows]
-        whole[unknown] = _rotated(whole, unknown, _nearest_orthonormal(rest), modes.angular_frequencies, masses)
-    return np.asarray(whole / root)
-
-
-def _mode_scales(rows: FloatArray) -> FloatArray:
-    """Return d (n,) of A diag(d^2) A' = 1 by least squares, or ones if there is no positive solution."""
-    size = rows.shape[0]
-    upper = [(i, j) for i in range(size) for j in range(i, size)]
-    if len(upper) < rows.shape[1]:
-        return np.ones(rows.shape[1])
-    matrix = np.array([rows[i] * rows[j] for i, j in upper])
-    squared = lsq_linear(matrix, [float(i == j) for i, j in upper], bounds=(1e-6, np.inf)).x
-    return np.asarray(np.sqrt(squared))
-
-
-def _rotated(
-    whole: FloatArray, unknown: list[int], start: FloatArray, angular_frequencies: FloatArray, masses: FloatArray
-) -> FloatArray:
-    """Return the rows of floors without a sensor, rotated and reflected for the least stiffness beyond neighbours."""
-    count, floors = len(unknown), whole.shape[0]
-    beyond = np.abs(np.subtract.outer(np.arange(floors), np.arange(floors))) > 1
-    root = np.sqrt(masses)
-    pairs = [(i, j) for i in range(count) for j in range(i + 1, count)]
-
-    def rows_of(angles: FloatArray, signs: FloatArray) -> FloatArray:
-        turn = np.zeros((count, count))
-        for (i, j), angle in zip(pairs, angles, strict=True):
-            turn[i, j], turn[j, i] = angle, -angle
-        return np.asarray(signs[:, None] * (expm(turn) @ start))
-
-    def cost(angles: FloatArray, signs: FloatArray) -> float:
-        trial = whole.copy()
-        trial[unknown] = rows_of(angles, signs)
-        stiffness = root[:, None] * (trial * angular_frequencies**2) @ trial.T * root
-        scale = np.sqrt(np.diag(stiffness))
-        relative = stiffness / np.outer(scale, scale)
-        # a positive element between neighbours would be a negative storey stiffness
-        wrong = np.maximum(np.diag(relative, 1), 0.0)
-        return float(np.sum(relative[beyond] ** 2) + 2.0 * np.sum(wrong**2))
-
-    best = (np.inf, start)
-    for choice in range(2**count):
-        signs = np.array([1.0 if choice >> bit & 1 else -1.0 for bit in range(count)])
-        for angle in np.linspace(0.0, np.pi, 7)[:-1] if pairs else (0.0,):
-            first = np.full(len(pairs), angle)
-            angles = minimize(cost, first, args=(signs,)).x if pairs else first
-            best = min(best, (cost(angles, signs), rows_of(angles, signs)), key=lambda item: item[0])
-    return best[1]
-
-
-def _nearest_orthonormal(rows: FloatArray) -> FloatArray:
-    left, _, right = np.linalg.svd(rows, full_matrices=False)
-    return np.asarray(left @ right)

@@ -151,17 +151,19 @@ def _replaced(fit: MultiModeFit, mode: int, found: FreeMode) -> MultiModeFit:
     errors[:, mode] = abs(strength) * found.errors
     coherence[:, mode] = np.maximum(coherence[:, mode], found.quality)
     omega, zeta, covariance = fit.angular_frequencies.copy(), fit.damping_ratios.copy(), fit.covariance.copy()
-    modes = omega.size
+    modes, freedom = omega.size, fit.freedom.copy()
     if found.damping_error / found.damping_ratio < np.sqrt(covariance[modes + mode, modes + mode]):
         omega[mode], zeta[mode] = found.angular_frequency, found.damping_ratio
         for place, error in ((mode, found.damping_error), (modes + mode, found.damping_error / found.damping_ratio)):
             covariance[place, :] = covariance[:, place] = 0.0
             covariance[place, place] = error**2
+            freedom[place : place + 1] = np.inf
     return replace(
         fit,
         angular_frequencies=omega,
         damping_ratios=zeta,
         covariance=covariance,
+        freedom=freedom,
         residues=residues,
         residue_errors=errors,
         coherence=coherence,

@@ -61,7 +61,8 @@ def pick_peaks(tests: Sequence[FrameTest], fit: MultiModeFit, band_hz: tuple[flo
     measured = [(test, *transfer_functions(test, band_hz)) for test in tests]
     omegas = fit.angular_frequencies.copy()
     residues = fit.residues.copy()
-    covariance = fit.covariance.copy()
+    covariance, freedom = fit.covariance.copy(), fit.freedom.copy()
+    freedom[: omegas.size] = np.inf
     for mode, omega in enumerate(fit.angular_frequencies):
         others = np.delete(fit.angular_frequencies, mode)
         reach = min(SEARCHED * omega, *(0.5 * np.abs(others - omega)))
@@ -79,7 +80,7 @@ def pick_peaks(tests: Sequence[FrameTest], fit: MultiModeFit, band_hz: tuple[flo
             half_width = 0.5 * AVERAGED_LINES * (lines[1] - lines[0])
             covariance[mode, mode] = (half_width / _NORMAL_95 / lines[place]) ** 2
             residues[:, mode] = _shape(response[place], test, fit, mode)
-    return replace(fit, angular_frequencies=omegas, residues=residues, covariance=covariance)
+    return replace(fit, angular_frequencies=omegas, residues=residues, covariance=covariance, freedom=freedom)
 
 
 def _shape(response: ComplexArray, test: FrameTest, fit: MultiModeFit, mode: int) -> ComplexArray:

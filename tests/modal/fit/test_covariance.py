@@ -30,6 +30,10 @@ def test_standard_errors_grow_with_the_noise() -> None:
     assert errors[1] / errors[0] == pytest.approx(np.full(6, 10.0), rel=0.3)
 
 
-def test_clusters_only_widen() -> None:
+def test_clusters_only_widen_and_count_as_few_degrees_of_freedom() -> None:
     fit = _fit(0.03)
-    assert np.all(np.diag(clustered_covariance(fit, TRUE)) >= np.diag(pole_covariance(fit, TRUE)))
+    covariance, freedom = clustered_covariance(fit, TRUE)
+    widened = np.diag(covariance) > np.diag(pole_covariance(fit, TRUE))
+    assert np.all(np.diag(covariance) >= 0.999 * np.diag(pole_covariance(fit, TRUE)))
+    # five sensors in one test
+    assert np.array_equal(freedom, np.where(widened, len(fit.groups[0].sensors) - 1.0, np.inf))
