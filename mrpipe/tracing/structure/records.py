@@ -97,30 +97,21 @@ _FLOORS = ("floor_acceleration_", "floor_displacement_")
 
 
 def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
-    """Return the recordings of a campaign of a shear frame.
+    """Return the recordings of a campaign of a shear frame that moves in one direction.
 
     Parameters
     ----------
     campaign
-        The campaign.
+        The campaign, or one direction of it (:mod:`mrpipe.tracing.structure.directions`).
     rate_hz
         Rate to which faster records are decimated.
 
     Raises
     ------
     UserError
-        If the masses are missing or do not fit the floors, no test records every floor, a floor's channel has a
-        direction, or there is no validation test.
+        If the masses are missing or do not fit the floors, no test records every floor, or there is no validation test.
     """
     source = campaign.directory / "campaign.yaml"
-    for item in campaign.recordings:
-        directed = [name for name in item.channels if name.startswith(_FLOORS) and not name[-1].isdigit()]
-        if directed:
-            raise UserError(
-                source, f"channels of test {item.name}",
-                f"{directed[0]} has a direction: effects are traced in frames that move in one direction",
-                "give the channels of one direction as floor_acceleration_1, floor_acceleration_2, ...",
-            )  # fmt: skip
     floors = max((floor for item in campaign.recordings for floor in _floors_of(item)), default=0)
     loops = tuple(
         item

@@ -14,6 +14,7 @@ from mrpipe.effects.contract import Effect
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.structure.directions import directions_of, in_direction
 from mrpipe.tracing.structure.parts import Part, command_part, damper_part, merged
 from mrpipe.tracing.structure.records import FASTEST_HZ, FrameData, frame_data
 from mrpipe.tracing.structure.scores import residual_in_time
@@ -82,19 +83,29 @@ def trace_structure(
         Called with the share done and a text.
     """
     rules = options.rules
-    data, campaign = joined_data(campaigns, options.fit_rate_hz), campaigns[0]
-    findings = [f"test {name} does not record every floor: it is not used for the frame" for name in data.left_out]
-    names = campaign.declared_effects
+    campaign, names = campaigns[0], campaigns[0].declared_effects
     declared = [effects[name] for name in names if name in effects]
-    parts, frame = [], None
-    if any(item.role != "validation" for item in data.records):
-        library = [item for item in effects.values() if item not in declared]
+    library = [item for item in effects.values() if item not in declared]
+    by_direction, findings = _by_direction(campaigns, options.fit_rate_hz)
+    parts: list[Part] = []
+    frames: dict[str, FrameTracing] = {}
+    for axis, data in by_direction.items():
+        findings += [f"test {name} does not record every floor: it is not used for the frame" for name in data.left_out]
+        if all(item.role == "validation" for item in data.records):
+            continue
         frame = trace_frame(
             data, library, declared, options, rules.frame, most=options.most_effects,
             draws=options.bootstrap_draws, rng=rng, jobs=jobs, progress=progress,
         )  # fmt: skip
-        parts.append(Part("frame", frame.summary))
-        findings += [frame.between.finding()] if frame.between.drifts else []
+        frames[axis] = frame
+        parts.append(Part(f"frame {axis}".strip(), frame.summary))
+        findings += [f"direction {axis}: {line}" if axis else line for line in _lines(frame)]
+        if axis and parts[-1].unexplained:
+            findings.append(
+                f"direction {axis} was traced by itself: what couples it with other directions, such as torsion, "
+                "counts as unexplained"
+            )
+    data = next(iter(by_direction.values()))
     found = [
         command_part(data.loops, effects, names, rules.delay, options.most_confidence),
         damper_part(
@@ -109,9 +120,41 @@ def trace_structure(
             "record every floor's acceleration, or damper_force, drive and floor 1",
         )  # fmt: skip
     summary = {"campaign": campaign.name, **merged(parts), "declared_effects": list(names)}
-    if frame is None:
+    if not frames:
         return StructureTracing(summary, findings=findings)
-    return StructureTracing(summary, _histories(frame), _maps(frame), _shown(frame), findings)
+    histories = {
+        f"{axis}/{key}".strip("/"): item for axis, frame in frames.items() for key, item in _histories(frame).items()
+    }
+    # the drawings show the direction that decides the verdict
+    axis = summary["part"].removeprefix("frame").strip()
+    drawn = frames.get(axis, next(iter(frames.values())))
+    return StructureTracing(summary, histories, _maps(drawn), _shown(drawn), findings)
+
+
+def _lines(frame: FrameTracing) -> list[str]:
+    return [frame.between.finding()] if frame.between.drifts else []
+
+
+def _by_direction(campaigns: Sequence[Campaign], rate_hz: float) -> tuple[dict[str, FrameData], list[str]]:
+    """Return the records by axis, with an empty name where the structure moves in one direction, and findings."""
+    axes = sorted({axis for item in campaigns for axis in directions_of(item)})
+    if not axes:
+        return {"": joined_data(campaigns, rate_hz)}, []
+    found, findings = {}, []
+    for axis in axes:
+        own = [part for item in campaigns if (part := in_direction(item, axis)) is not None]
+        if own and any(test.role == "validation" for item in own for test in item.recordings):
+            found[axis] = joined_data(own, rate_hz)
+        else:
+            findings.append(f"direction {axis} is not traced: no validation test has a measured excitation along it")
+    if not found:
+        raise UserError(
+            campaigns[0].directory / "campaign.yaml",
+            "channels",
+            "no validation test has a measured excitation along one of its sensors",
+            f"give {' or '.join(f'ground_acceleration_{axis}' for axis in axes)}",
+        )
+    return found, findings
 
 
 def joined_data(campaigns: Sequence[Campaign], rate_hz: float = FASTEST_HZ) -> FrameData:
