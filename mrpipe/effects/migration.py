@@ -25,6 +25,7 @@ from mrpipe.dampers.plant import (
     change_yield_force,
 )
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape, strength
+from mrpipe.effects.profiles import PATH, RISING, SINCE, free_profile
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -211,6 +212,30 @@ EFFECT = Effect(
             "F_y (1 + s (1 - exp(-(t_rev/tau)^p))) before the damper yields",
             (_TIME, replace(_POWER, starts=(1.0,)), _REVERSAL, _LATE),
             _yield_force("rise_time", "exponent", 1.0),
+        ),
+        free_profile(
+            "profile",
+            "alpha (1 + sum s_k (1 - exp(-slip/L_k)))",
+            PATH,
+            RISING,
+            shape("path_scale", "m", "path that the rises of the profile are multiples of", "stroke", 0.1, 3.0, (0.5,)),
+            _SHARE,
+        ),
+        free_profile(
+            "profile-in-time",
+            "alpha (1 + sum s_k (1 - exp(-t_rev/tau_k)))",
+            SINCE,
+            RISING,
+            shape(
+                "time_scale",
+                "s",
+                "time that the rises of the profile are multiples of",
+                "stroke/speed",
+                0.2,
+                20.0,
+                (1.5,),
+            ),
+            _SHARE,
         ),
     ),
 )

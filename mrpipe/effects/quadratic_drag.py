@@ -9,6 +9,7 @@ from numba import njit
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import CURRENT, FORCE, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
+from mrpipe.effects.profiles import CONVEX, SPEED, free_profile
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -96,6 +97,16 @@ EFFECT = Effect(
             _transition,
             {"drag": 0},
             dissipative=True,
+        ),
+        free_profile(
+            "profile",
+            "F + sum d_k h_k(|v|) sign v, h_k convex",
+            SPEED,
+            CONVEX,
+            shape(
+                "speed_scale", "m/s", "speed that the places of the profile are multiples of", "speed", 0.3, 1.5, (1.0,)
+            ),
+            amplitude("drag", "N*s/m", "rise of the slope", "force/speed", 0.0, 20.0),
         ),
     ),
 )

@@ -21,6 +21,7 @@ from mrpipe.dampers.plant import (
     change_yield_force,
 )
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape, strength
+from mrpipe.effects.profiles import FALLING, SPEED, free_profile
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -134,6 +135,16 @@ EFFECT = Effect(
             "F_y (1 + s exp(-(|v|/vs)^n)) before the damper yields",
             (_SCALE, _POWER, strength("share", "1", "surplus of the yield force at rest", "one", 0.0, 5.0, 0.05)),
             _yield_force,
+        ),
+        free_profile(
+            "profile",
+            "alpha (1 + sum s_k/(1 + (v/v_k)^4))",
+            SPEED,
+            FALLING,
+            shape(
+                "speed_scale", "m/s", "speed that the steps of the profile are multiples of", "speed", 0.1, 3.0, (0.5,)
+            ),
+            _SHARE,
         ),
     ),
 )

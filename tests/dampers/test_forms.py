@@ -34,6 +34,7 @@ NUMBERS: dict[str, dict[str, float]] = {
     },
     "elastic-plastic": {"initial_stiffness": 8e4, "exponent": 6.0},
     "dahl": {"yield_displacement": 8e-4},
+    "duhem": {"yield_displacement": 8e-4, "power": 1.6, "tilt": 0.5, "curvature": -0.3},
     "dahl-stiffness": {"initial_stiffness": 8e4},
     "bingham": {"transition_velocity": 0.01},
     "bingham-spring": {"spring_stiffness": 6e4},
@@ -156,6 +157,15 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
             return [p["elastic_rate"] * (rate - bends - creeps)]
 
         return YIELD * integrated(creep, [0.0], t)[0] + viscous
+    if name == "duhem":
+
+        def loop(time, state):
+            rate = speed(time)
+            y = math.copysign(1.0, rate) * state[0]
+            slope = max(1.0 - y, 0.0) ** p["power"] * math.exp(p["tilt"] * y + p["curvature"] * y * y)
+            return [rate / length * slope]
+
+        return YIELD * integrated(loop, [0.0], t)[0] + viscous
     if name == "viscoplastic":
 
         def flow(time, state):
@@ -207,6 +217,29 @@ def test_a_form_gives_what_its_equations_integrate_to(name: str) -> None:
     truth = expected(name, t)
     error = np.sqrt(np.mean((force - truth) ** 2) / np.mean(truth**2))
     assert error < 0.003
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    ("numbers", "other"),
+    [
+        ({"power": 1.0, "tilt": 0.0, "curvature": 0.0}, ("dahl", {})),
+        ({"power": 1.143, "tilt": 0.962, "curvature": 0.154}, ("bouc-wen", {"gamma_share": 0.5})),
+    ],
+)
+def test_the_general_loop_contains_those_of_dahl_and_nearly_those_of_bouc_and_wen(
+    numbers: dict[str, float], other: tuple[str, dict[str, float]]
+) -> None:
+    t, x, v = motion(1e-3)
+    length = {"yield_displacement": 8e-4}
+    forces = [
+        DamperModel(name, {**LAWS, **length, **values}, drive_limit=2.0, stroke_m=STROKE).force(
+            x, v, np.gradient(v, t), np.full_like(t, DRIVE), 1e-3
+        )
+        for name, values in (("duhem", numbers), other)
+    ]
+    error = np.sqrt(np.mean((forces[0] - forces[1]) ** 2) / np.mean(forces[1] ** 2))
+    assert error < (1e-5 if other[0] == "dahl" else 0.01)
 
 
 @pytest.mark.property

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from mrpipe.artifacts import Progress
-from mrpipe.dampers.library import base_form, forms_named
+from mrpipe.dampers.library import base_form
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit, fit
 from mrpipe.fitting.problem import Term
@@ -20,10 +20,10 @@ from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.drive_again import with_laws_again
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.pairs import with_play
-from mrpipe.tracing.bench.race import Model, Race, alone, on_all_tests, race
+from mrpipe.tracing.bench.race import Model, Race, alone_of, on_all_tests, race
 from mrpipe.tracing.bench.refine import with_richer_forms
 from mrpipe.tracing.bench.select import Candidate, Selection, draft, forward_selection, share_of
-from mrpipe.tracing.bench.weights import NoiseScale, force_deviation, noise_scale
+from mrpipe.tracing.bench.weights import NoiseScale, force_deviation, noise_scale, noise_variances
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
 
@@ -164,13 +164,15 @@ def _raced(
     rules = options.rules.selection_by_force if model_error else options.rules.selection
     least = options.rules.selection.nothing_missing
     nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=least)
-    if not nothing.structured:
+    if not nothing.structured and not _noise_of_motion(baseline):
         return Choice(baseline, nothing), lambda: None
-    forms = {name: form.without_springs() for name, form in forms_named(options.base_forms, options.form_files).items()}
     progress(0.1, "base forms")
-    singles = alone(draft(baseline.fit), forms, jobs=jobs)
+    singles = alone_of(baseline.fit, options, jobs=jobs)
     if not model_error and not weighed:
         baseline, singles = _with_noise_of_best(baseline, singles, options.rules)
+        nothing = replace(nothing, base=baseline.fit, noise=baseline.noise, chosen=baseline.fit)
+    if not nothing.structured:
+        return Choice(baseline, nothing), lambda: None
     base, noise = baseline.fit, baseline.noise
     search = partial(
         forward_selection,
@@ -277,6 +279,17 @@ def _with_noise_of(
     if excess < 1.0:
         scale, noise = replace(scale, force=excess * scale.force, motion=excess * scale.motion), chosen.chi_square
     return replace(baseline, noise=noise, scale=scale), selection.with_floor(noise)
+
+
+def _noise_of_motion(baseline: Baseline) -> bool:
+    """Return whether most of the noise is that of the displacement, passed through the stiffness of the model.
+
+    A stiff base form turns the noise of the displacement into much force. Another form of the same damper may not, so
+    that such noise does not show that nothing is missing.
+    """
+    force, motion = noise_variances(baseline.fit, baseline.fit.problem.recordings)
+    used = baseline.fit.problem.recordings.used
+    return bool(np.sum(baseline.scale.motion * motion[used]) > np.sum(baseline.scale.force * force[used]))
 
 
 def _with_noise_of_best(

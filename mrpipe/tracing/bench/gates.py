@@ -15,6 +15,7 @@ from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, judge, on_validation
+from mrpipe.tracing.bench.race import alone_of, on_all_tests
 from mrpipe.tracing.bench.residual_structure import states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.validation import compare, training_agreements
@@ -48,20 +49,79 @@ def never_yields(found: Fit, rules: ValidationRules) -> bool:
 
 def predicts(
     found: OnValidation,
-    baseline: Baseline,
+    model: Fit,
     training: Recordings,
     options: TracingOptions,
     faults: Mapping[str, Finding],
     jobs: int,
 ) -> bool:
-    """Return whether the base model predicts the comparable part of the validation tests at all."""
+    """Return whether a model predicts the comparable part of the validation tests at all.
+
+    Parameters
+    ----------
+    found
+        The validation tests, with the model as what was chosen.
+    model
+        Base form without effects.
+    training
+        Training tests.
+    options
+        Of the tracing.
+    faults
+        Known faults of validation tests.
+    jobs
+        Processes; the result does not depend on their number.
+    """
     rules = options.rules.validation
-    if found.nrmse(found.before) <= rules.failed:
+    if found.nrmse(found.after) <= rules.failed:
         return True
-    trained = training_agreements(baseline.fit, options.folds, rules, jobs=jobs)
-    compared = compare(found.recordings, found.measured, found.before, found.floor, training, trained, faults, rules)
+    trained = training_agreements(model, options.folds, rules, jobs=jobs)
+    compared = compare(found.recordings, found.measured, found.after, found.floor, training, trained, faults, rules)
     part = compared.comparable
-    return bool(compared.differences and part.any() and found.nrmse(found.before, part) <= rules.failed)
+    return bool(compared.differences and part.any() and found.nrmse(found.after, part) <= rules.failed)
+
+
+def refusal_of(
+    found: OnValidation,
+    first: Baseline,
+    training: Recordings,
+    validation: Recordings,
+    options: TracingOptions,
+    faults: Mapping[str, Finding],
+    jobs: int,
+) -> str:
+    """Return why nothing is traced; empty if the declared base form or another one predicts the validation tests.
+
+    A declared form that fails does not show that the validation tests differ: the damper may have another form. The
+    other form is the one that fits the training tests best.
+
+    Parameters
+    ----------
+    found, first
+        The declared model on the validation tests, and its fit.
+    training, validation
+        Recordings.
+    options
+        Of the tracing.
+    faults
+        Known faults of validation tests.
+    jobs
+        Processes; the result does not depend on their number.
+    """
+    if never_yields(first.fit, options.rules.validation):
+        return "the damper does not yield within the stroke of the training tests"
+    if predicts(found, first.fit, training, options, faults, jobs):
+        return ""
+    refusal = f"the model {options.model} does not predict the validation tests (NRMSE {found.nrmse(found.after):.3g})"
+    best = min(alone_of(first.fit, options, jobs=jobs).values(), key=lambda item: item.chi_square)
+    if best.problem.base.name == first.fit.problem.base.name:
+        return refusal
+    other = on_all_tests(best, first.fit.problem)
+    tried = validated(first.fit, other, first, training, validation, options)
+    if predicts(tried, other, training, options, faults, jobs):
+        return ""
+    error = tried.nrmse(tried.after)
+    return f"{refusal}, nor does {other.problem.base.name}, which fits the training tests best (NRMSE {error:.3g})"
 
 
 def judged(

@@ -16,12 +16,14 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.library import forms_named
 from mrpipe.fitting.engine import Fit, fit, regressors, start_of
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.fitting.start import fit_with_form
 from mrpipe.fitting.weighting import centred, weighting
-from mrpipe.tracing.bench.select import Selection, left_of
+from mrpipe.tracing.bench.select import Selection, draft, left_of
+from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import RaceRules
 
 LEADERS = 3
@@ -299,6 +301,15 @@ def alone(small: Fit, forms: Mapping[str, BaseForm], *, jobs: int = 1) -> dict[s
         # effects scale with the laws of the form that they are added to, not with those of the declared form
         fits = pool.map(lambda name: with_own_laws(fit_with_form(small, forms[name], starts=1, iterations=8)), names)
         return {own: small, **dict(zip(names, fits, strict=True))}
+
+
+def alone_of(found: Fit, options: TracingOptions, *, jobs: int = 1) -> dict[str, Fit]:
+    """Return all base forms that are compared, fitted without effects to the draft of a fit.
+
+    Springs of base forms are left to the effect `accumulator`.
+    """
+    forms = forms_named(options.base_forms, options.form_files)
+    return alone(draft(found), {name: form.without_springs() for name, form in forms.items()}, jobs=jobs)
 
 
 def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, iterations: int = 8, jobs: int = 1) -> list[Fit]:

@@ -16,12 +16,16 @@ from functools import partial
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.plant import CHAIN_LENGTH
 from mrpipe.effects.contract import EffectForm, EffectScales
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.select import Selection, draft
 from mrpipe.tracing.rules import RefinementRules
+
+CONFIRMED = 3
+"""Numerical technique: richer forms of an effect that left-out tests judge, until one of them is confirmed."""
 
 
 def with_richer_forms(
@@ -58,14 +62,15 @@ def with_richer_forms(
     for place in range(declared, min(declared + selection.proven, len(chosen.problem.terms))):
         if chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
             break
-        richer = _richest(chosen, place, jobs)
-        if richer is None or richer.chi_square > (1.0 - rules.least_gain) * chosen.chi_square:
-            continue
-        if unseen is None:
-            unseen = left_out_residual(chosen, folds, jobs=jobs)
-        trial = confirmed(unseen, richer)
-        if trial is not None:
-            chosen, unseen = richer, trial
+        for richer in _richer(chosen, place, CONFIRMED, jobs):
+            if richer.chi_square > (1.0 - rules.least_gain) * chosen.chi_square:
+                continue
+            if unseen is None:
+                unseen = left_out_residual(chosen, folds, jobs=jobs)
+            trial = confirmed(unseen, richer)
+            if trial is not None:
+                chosen, unseen = richer, trial
+                break
     return replace(selection, chosen=chosen)
 
 
@@ -101,6 +106,9 @@ def with_further_terms(
     if [item.effect for item in extension.problem.terms[:count]] != [item.effect for item in chosen.problem.terms]:
         return selection
     problem = replace(chosen.problem, terms=(*chosen.problem.terms, *extension.problem.terms[count:]))
+    further = zip(extension.problem.terms[count:], extension.term_values[count:], strict=True)
+    if len(chosen.steps()) + sum(len(term.form.steps(values)) for term, values in further) >= CHAIN_LENGTH:
+        return selection
     start = start_of(problem, chosen.base_values, [*chosen.term_values, *extension.term_values[count:]])
     longer = fit(problem, start, iterations=15)
     if longer.chi_square > (1.0 - rules.least_gain) * chosen.chi_square:
@@ -144,35 +152,51 @@ def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2, *, jobs:
     for _ in range(rounds):
         before = found
         for place in places:
-            richer = _richest(found, place, jobs)
-            if richer is not None and richer.chi_square < found.chi_square:
-                found = richer
+            found = min([found, *_richer(found, place, 1, jobs)], key=lambda item: item.chi_square)
         if found is before:
             break
     return found
 
 
-def _richest(chosen: Fit, place: int, jobs: int = 1) -> Fit | None:
-    """Return the best fit with another form of one term, on all tests; None where there is none to be had.
+def _richer(chosen: Fit, place: int, count: int, jobs: int = 1) -> Iterator[Fit]:
+    """Yield fits with other forms of one term, on all tests, in the order in which a share of the tests ranks them.
 
     The forms of the search are tried as well as the richer ones: before the other terms and the laws were final,
-    another of them may have looked best.
+    another of them may have looked best. A form whose shape ends at a bound is not yielded.
+
+    Parameters
+    ----------
+    chosen, place
+        The fit, and which of its terms takes other forms.
+    count
+        How many of the forms are fitted to all tests.
+    jobs
+        Threads; the result does not depend on their number.
     """
     term = chosen.problem.terms[place]
     forms = [form for form in (*term.effect.refinements, *term.effect.forms) if form.name != term.form.name]
-    if not forms:
-        return None
     small = draft(chosen)
     starts = [
-        (form, given) for form in forms for given in _starts(form, small.term_values[place], small.problem.scales)
+        (form, given)
+        for form in forms
+        for given in _starts(form, small.term_values[place], small.problem.scales)
+        if _fits_in_chain(chosen, place, form)
     ]
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        trials = list(pool.map(lambda start: _trial(small, place, *start), starts))
-    best = min(trials, key=lambda item: item.cost)
-    problem = replace(chosen.problem, terms=best.problem.terms)
-    found = fit(problem, best.theta, iterations=25)
-    shapes = {item.name for item in best.problem.terms[place].form.parameters if item.role != "amplitude"}
-    return None if shapes & (set(found.at_bound) - set(chosen.at_bound)) else found
+        trials = sorted(pool.map(lambda start: _trial(small, place, *start), starts), key=lambda item: item.cost)
+    best = {trial.problem.terms[place].form.name: trial for trial in reversed(trials)}
+    for trial in sorted(best.values(), key=lambda item: item.cost)[:count]:
+        found = fit(replace(chosen.problem, terms=trial.problem.terms), trial.theta, iterations=25)
+        shapes = {item.name for item in trial.problem.terms[place].form.parameters if item.role != "amplitude"}
+        if not shapes & (set(found.at_bound) - set(chosen.at_bound)):
+            yield found
+
+
+def _fits_in_chain(chosen: Fit, place: int, form: EffectForm) -> bool:
+    """Return whether the damper with another form of one term has no more steps than a chain may have."""
+    others = len(chosen.steps()) - len(chosen.problem.terms[place].form.steps(chosen.term_values[place]))
+    # one more step adds up the parts of the base form
+    return others + len(form.steps(form.without_strength(chosen.problem.scales))) < CHAIN_LENGTH
 
 
 def _starts(form: EffectForm, known: Mapping[str, float], scales: EffectScales) -> Iterator[dict[str, float]]:

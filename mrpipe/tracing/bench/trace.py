@@ -18,7 +18,7 @@ from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.choose import Choice, judged_by_trees
 from mrpipe.tracing.bench.chosen import Bench, begin, choose, recorded
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
-from mrpipe.tracing.bench.gates import judged, never_yields, predicts, validated
+from mrpipe.tracing.bench.gates import judged, refusal_of, validated
 from mrpipe.tracing.bench.needed import without_superfluous
 from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
@@ -72,12 +72,7 @@ def trace_campaign(
     progress(0.05, "baseline")
     training, first = begun.training, begun.first
     found = validated(first.fit, first.fit, first, training, validation, options)
-    refusal = ""
-    if never_yields(first.fit, options.rules.validation):
-        refusal = "the damper does not yield within the stroke of the training tests"
-    elif not predicts(found, first, training, options, ordered.faults, jobs):
-        error = found.nrmse(found.before)
-        refusal = f"the model {options.model} does not predict the validation tests (NRMSE {error:.3g})"
+    refusal = refusal_of(found, first, training, validation, options, ordered.faults, jobs)
     if refusal:
         return _nothing_traced(
             f"{refusal}: nothing is traced", ordered, found, first, training, begun.reasons, declared, options, jobs

@@ -7,14 +7,17 @@ from dataclasses import replace
 import pytest
 
 from mrpipe.effects.library import damper_effects
-from mrpipe.tracing.bench.gates import held, never_yields
+from mrpipe.fitting.recordings import record_tests
+from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
+from mrpipe.tracing.bench.gates import held, never_yields, refusal_of, validated
 from mrpipe.tracing.bench.judgement import Evidence
 from mrpipe.tracing.bench.on_validation import Judgement
 from mrpipe.tracing.bench.verdict import Named
-from mrpipe.tracing.options import NamingRules
+from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Verdict, VerdictClass
 from tests.tracing.bench.fits import plain_fit
+from tests.tracing.bench.rig import campaign
 
 pytestmark = pytest.mark.planted
 
@@ -25,6 +28,29 @@ def test_a_damper_that_stays_elastic_in_all_tests_is_recognised() -> None:
     recordings = found.problem.recordings
     small = replace(recordings, displacement=recordings.displacement / 500.0, velocity=recordings.velocity / 500.0)
     assert never_yields(replace(found, problem=replace(found.problem, recordings=small)), ValidationRules())
+
+
+def test_a_declared_form_that_fails_is_no_reason_to_trace_nothing() -> None:
+    """A damper whose force follows the speed at once left 0.56 under Bouc-Wen, and nothing was traced."""
+    tests = campaign("rounded")
+    training = record_tests([test for test in tests if test.role != "validation"], rate_hz=250.0)
+    validation = record_tests([test for test in tests if test.role == "validation"], rate_hz=250.0)
+    first = fit_baseline(training, declared_base(training, "bouc-wen", 2, 1))
+    options = TracingOptions(base_forms=("bouc-wen", "rounded-yield"))
+    found = validated(first.fit, first.fit, first, training, validation, options)
+    error = found.nrmse(found.after)
+
+    def refusal(failed: float) -> str:
+        rules = options.rules.model_copy(update={"validation": ValidationRules(failed=failed)})
+        asked = options.model_copy(update={"rules": rules})
+        return refusal_of(found, first, training, validation, asked, {}, 1)
+
+    assert refusal(1.1 * error) == ""
+    # the other form predicts the validation tests, so that the declared form is wrong and not the tests
+    assert refusal(0.5 * error) == ""
+    neither = refusal(1e-4 * error)
+    assert "bouc-wen does not predict" in neither
+    assert "nor does rounded-yield" in neither
 
 
 def test_an_effect_that_explains_a_part_is_less_probable() -> None:
