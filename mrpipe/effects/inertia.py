@@ -1,12 +1,13 @@
 """Inertia of rod and fluid beyond the load cell."""
 
+# ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import ACCELERATION, CURRENT, FIRST, FORCE, STEP_SIGNATURE, Phase, Step
+from mrpipe.dampers.plant import ACCELERATION, CURRENT, DISPLACEMENT, FIRST, FORCE, STEP_SIGNATURE, Phase, Step
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape
 
 
@@ -21,6 +22,19 @@ def mass_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
         state[0] += share * (a - state[0])
         a = state[0]
     wire[FORCE] += parameters[0] * a * (wire[CURRENT] if parameters[1] > 0.5 else 1.0)
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def mass_by_place_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: amplitude, power of the displacement."""
+    wire[FORCE] += parameters[0] * wire[DISPLACEMENT] ** parameters[1] * wire[ACCELERATION]
+
+
+def _by_place(values: Values) -> list[Step]:
+    return [
+        Step(name, Phase.FORCE_EFFECT, mass_by_place_step, np.array([values[name], power]))
+        for name, power in (("mass", 0.0), ("mass_slope", 1.0), ("mass_curvature", 2.0))
+    ]
 
 
 def _mass(values: Values) -> list[Step]:
@@ -71,6 +85,19 @@ EFFECT = Effect(
             (shape("lag", "s", "lag of the mass behind the rod", "one", 2e-4, 0.02, (0.002,)), _MASS),
             _late,
             {"mass": 0},
+        ),
+        EffectForm(
+            "mass-by-place",
+            "F + (m + m1 x + m2 x^2) a",
+            (
+                _MASS,
+                amplitude("mass_slope", "kg/m", "its change along the stroke", "force/acceleration/stroke", -5.0, 5.0),
+                amplitude(
+                    "mass_curvature", "kg/m^2", "its rise towards both ends", "force/acceleration/stroke^2", -5.0, 5.0
+                ),
+            ),
+            _by_place,
+            {"mass": 0, "mass_slope": 1, "mass_curvature": 2},
         ),
     ),
 )

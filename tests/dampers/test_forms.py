@@ -219,6 +219,26 @@ def test_a_form_gives_what_its_equations_integrate_to(name: str) -> None:
     assert error < 0.003
 
 
+@pytest.mark.oracle
+def test_a_lower_yield_force_lets_the_viscoplastic_damper_flow_earlier() -> None:
+    """A dip of the yield force about the middle changed the force only after yield: 0.018 were left of a pinching."""
+    p, dip = NUMBERS["viscoplastic"], {"width": 3e-3, "middle": 1e-3, "exponent": 3.0, "depth": 0.4}
+    t, x, v = motion(1e-3)
+    pinching = all_effects()["pinching"].form("yield-force").steps(dip)
+    steps = [polynomial_coefficients([YIELD], [VISCOSITY]), *base_form("viscoplastic").steps(p), *pinching]
+    force = run_chain(build_chain(steps), x, v, np.gradient(v, t), np.full_like(t, DRIVE), 1e-3)[:, FORCE]
+
+    def share(place: float) -> float:
+        return 1.0 - dip["depth"] / (1.0 + (abs(place - dip["middle"]) / dip["width"]) ** dip["exponent"])
+
+    def flow(time, state):
+        over = max(abs(state[0]) / share(position(time)) - 1.0, 0.0)
+        return [p["elastic_rate"] * (speed(time) - p["flow_speed"] * over ** p["exponent"] * np.sign(state[0]))]
+
+    truth = YIELD * integrated(flow, [0.0], t)[0] + VISCOSITY * v
+    assert np.sqrt(np.mean((force - truth) ** 2) / np.mean(truth**2)) < 0.003
+
+
 @pytest.mark.property
 @pytest.mark.parametrize(
     ("numbers", "other"),

@@ -8,14 +8,17 @@ from numba import float64, njit
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
 from mrpipe.dampers.parameters import Values, shape
-from mrpipe.dampers.plant import FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.plant import FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_LOSS, Phase, Step
 from mrpipe.dampers.rosenbrock import damping_factor, parts_of_step
 
+LEAST = 1e-6
+"""Numerical technique: least yield force after effects, as a share of that without them."""
 
-@njit(float64(float64, float64, float64[::1]), cache=True)
-def overstress_rate(z: float, v: float, parameters: FloatArray) -> float:
-    """Return z' [1/s]; parameters as in :func:`viscoplastic_step`."""
-    over = abs(z) - 1.0
+
+@njit(float64(float64, float64, float64, float64[::1]), cache=True)
+def overstress_rate(z: float, v: float, limit: float, parameters: FloatArray) -> float:
+    """Return z' [1/s] where the damper flows beyond `limit`; parameters as in :func:`viscoplastic_step`."""
+    over = abs(z) / limit - 1.0
     if over <= 0.0:
         return parameters[0] * v
     return parameters[0] * (v - parameters[1] * over ** parameters[2] * (1.0 if z > 0.0 else -1.0))
@@ -23,13 +26,18 @@ def overstress_rate(z: float, v: float, parameters: FloatArray) -> float:
 
 @njit(STEP_SIGNATURE, cache=True)
 def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: spring rate [1/m], speed of flow at twice the yield force [m/s], exponent. State: z, last velocity.
+    """Parameters: spring rate [1/m], speed of flow at twice the yield force [m/s], exponent. State: z, last velocity,
+    last limit.
 
-    Integrated by the Rosenbrock method of second order of :mod:`mrpipe.dampers.rosenbrock`.
+    z is the force over the yield force at this drive, without effects. What effects take from the yield force lowers
+    the limit of z beyond which the damper flows: the spring keeps its force while the yield force changes. Integrated
+    by the Rosenbrock method of second order of :mod:`mrpipe.dampers.rosenbrock`.
     """
+    limit = max(1.0 - wire[YIELD_LOSS], LEAST)
     if wire[FIRST] > 0.5:
         state[0] = 0.0
         state[1] = wire[VELOCITY]
+        state[2] = limit
         wire[HYSTERESIS] = 0.0
         return
     rate, flow, power = parameters[0], parameters[1], parameters[2]
@@ -40,20 +48,23 @@ def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
     h, z = dt / parts, state[0]
     for k in range(parts):
         v0, v1 = first + change * k / parts, first + change * (k + 1) / parts
-        over = abs(z) - 1.0
-        slope = -rate * flow * power * over ** (power - 1.0) if over > 0.0 else 0.0
+        before = state[2] + (limit - state[2]) * k / parts
+        after = state[2] + (limit - state[2]) * (k + 1) / parts
+        over = abs(z) / before - 1.0
+        slope = -rate * flow * power * over ** (power - 1.0) / before if over > 0.0 else 0.0
         factor = damping_factor(h, slope)
-        k1 = factor * overstress_rate(z, v0, parameters)
-        k2 = factor * (overstress_rate(z + h * k1, v1, parameters) - 2.0 * k1)
+        k1 = factor * overstress_rate(z, v0, before, parameters)
+        k2 = factor * (overstress_rate(z + h * k1, v1, after, parameters) - 2.0 * k1)
         z += h * (1.5 * k1 + 0.5 * k2)
     state[0] = z
     state[1] = wire[VELOCITY]
-    wire[HYSTERESIS] = z
+    state[2] = limit
+    wire[HYSTERESIS] = z / limit
 
 
 def _steps(values: Values) -> list[Step]:
     numbers = np.array([values["elastic_rate"], values["flow_speed"], values["exponent"]], dtype=np.float64)
-    return [Step("viscoplastic", Phase.HYSTERESIS, viscoplastic_step, numbers, 2)]
+    return [Step("viscoplastic", Phase.HYSTERESIS, viscoplastic_step, numbers, 3)]
 
 
 def _post_yield(values: Values, at: Strength) -> FloatArray:
