@@ -189,7 +189,7 @@ def solve(problem: Problem, theta: FloatArray, w: Weighting) -> Solved:
     # a value that is not finite makes the mean of its test not finite
     if not np.all(np.isfinite(means)):
         wrong = np.full(len(w.at), 1e6)
-        return Solved(wrong, np.zeros(count), np.zeros(len(w.starts)), np.ones(count, bool))
+        return Solved(wrong, np.zeros(count), np.zeros(len(w.sums)), np.ones(count, bool))
     low, high = linear_bounds(problem)
     linear, at_bound = bounded_solution(rows @ rows.T, rows @ w.target, low, high)
     return Solved(w.target - linear @ rows, linear, w.target_means - linear @ means, at_bound)

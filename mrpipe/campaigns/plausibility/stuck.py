@@ -86,6 +86,9 @@ def find_stuck_force(force: FloatArray, displacement: FloatArray, drive: FloatAr
         Shape (n,) each.
     """
     begins, lengths = _stretches(np.abs(np.diff(force)))
+    if not begins.size or np.ptp(displacement) == 0.0:
+        # a displacement that does not change is reported as such: it calls for no other force
+        return None
     state, cycle = _states(displacement, drive)
     long = lengths >= max(SHORTEST, 0.1 * cycle)
     begins, lengths = begins[long], lengths[long]

@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 
 from mrpipe.campaigns.plausibility import Finding, TestArrays, compare_tests
+from mrpipe.errors import UserError
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.rules import ValidationRules
 
 SAME_RECORD = "same-record"
 """Finding for tests that hold the same samples: the second of them is not independent."""
+
+DEAD_CHANNEL = "dead-channel"
+"""Finding for a channel that has the same value in all samples of a test."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +64,15 @@ def sort_tests(tests: Sequence[PreparedTest], rules: ValidationRules | None = No
 
     A harmed validation test stays: its error is reported, and the verdict names it. A validation test that holds the
     samples of another test is left out, because the fit may have seen it.
+
+    Raises
+    ------
+    UserError
+        If a channel is dead in every training test.
     """
     fewest_training = (rules or ValidationRules()).fewest_training
     findings = compare_tests([_arrays(test) for test in tests])
+    _not_all_dead(tests, findings)
     named = {item.test: item for item in reversed(findings) if item.test}
     out = [
         test.name
@@ -77,6 +87,19 @@ def sort_tests(tests: Sequence[PreparedTest], rules: ValidationRules | None = No
             ]
             kept = [test for test in tests if test.name not in out]
     return SortedTests(tuple(kept), findings, tuple(out))
+
+
+def _not_all_dead(tests: Sequence[PreparedTest], findings: Sequence[Finding]) -> None:
+    training = {test.name for test in tests if test.role != "validation"}
+    for channel in ("displacement", "force"):
+        dead = [item for item in findings if item.name == DEAD_CHANNEL and item.channel == channel]
+        if training and training <= {item.test for item in dead}:
+            raise UserError(
+                "campaign",
+                f"channels.{channel}",
+                f"has the same value in all samples of each training test ({len(training)} tests)",
+                "check the sensor, its cable and the column that campaign.yaml names",
+            )
 
 
 def _arrays(test: PreparedTest) -> TestArrays:

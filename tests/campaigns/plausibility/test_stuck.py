@@ -71,3 +71,12 @@ def test_a_stuck_displacement_is_found_and_turning_points_are_not(step: float) -
 def test_a_sound_campaign_with_a_coarse_load_cell_gives_no_finding() -> None:
     tests = [replace(item, force_n=np.round(item.force_n / 5.0) * 5.0) for item in sound_tests(10)]
     assert [item.line for item in compare_tests(tests)] == []
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("drive", [0.0, 1.0])
+def test_a_force_without_any_motion_is_not_stuck(drive: float) -> None:
+    """A test whose displacement and drive are zero ended with a traceback."""
+    force = _friction(1, 0.5, 0.3)[1]
+    force[1000:1700] = force[1000]
+    assert find_stuck_force(force, np.zeros(TIME.size), np.full(TIME.size, drive)) is None

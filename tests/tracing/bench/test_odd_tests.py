@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from mrpipe.errors import UserError
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.odd_tests import SAME_RECORD, sort_tests
 from tests.tracing.bench.rig import campaign
@@ -51,3 +53,14 @@ def test_sound_tests_are_all_used() -> None:
     tests = campaign("")
     found = sort_tests(tests)
     assert (found.left_out, found.sentence, found.faults) == ((), "", {})
+
+
+@pytest.mark.parametrize("channel", ["force", "displacement"])
+def test_a_channel_that_is_dead_in_every_training_test_is_a_mistake_of_the_user(channel: str) -> None:
+    """Every test was kept because none was left without the dead ones; the fit ended with a traceback."""
+    name = {"force": "force_raw_n", "displacement": "displacement_raw_m"}[channel]
+    tests = [replace(test, **{name: np.zeros_like(test.force_raw_n)}) for test in campaign("")]
+    with pytest.raises(UserError, match=f"channels.{channel}.*same value in all samples of each training test"):
+        sort_tests(tests)
+    # one sound training test is enough for the comparison
+    assert sort_tests([*tests[1:], campaign("")[0]]).tests
