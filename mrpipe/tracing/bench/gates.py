@@ -13,6 +13,7 @@ from mrpipe.fitting.kernel import HYSTERESIS_AT, run_recordings
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
+from mrpipe.tracing.bench.nuisances import session_of
 from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, judge, on_validation
 from mrpipe.tracing.bench.race import alone_of, on_all_tests
@@ -137,10 +138,15 @@ def judged(
 ) -> Judgement:
     """Return the verdict on the validation tests by the options of the tracing."""
     taken = selection.ground.problem.base.name if selection.ground is not None else ""
+    rules = options.rules
+    session = session_of(
+        found.recorded, found.measured, found.after, selection.chosen, training, rules.nuisances, rules.validation
+    )
     return judge(
         found, selection.base, selection.chosen, training, options.rules.validation,
         names=[item.effect.name for item in causes], base_taken=taken,
-        structured=missing or bool(causes), reason=reason, faults=ordered.faults, folds=options.folds, jobs=jobs,
+        structured=missing or bool(causes), reason=reason, faults=ordered.faults, folds=options.folds,
+        session=session, jobs=jobs,
     )  # fmt: skip
 
 

@@ -170,6 +170,35 @@ def session_gain(
     return None
 
 
+def session_of(
+    recorded: Recordings,
+    measured: FloatArray,
+    simulated: FloatArray,
+    chosen: Fit,
+    training: Recordings,
+    rules: NuisanceRules,
+    validation: ValidationRules,
+) -> SessionGain | None:
+    """Return the gain that validation records share, compared with the gains of the training tests by the same fit.
+
+    Parameters
+    ----------
+    recorded, measured, simulated
+        Validation tests with all samples, their offset-free force and the simulated one [N], shape (n,).
+    chosen
+        Fit to the training tests.
+    training
+        The training tests.
+    rules, validation
+        Decision thresholds.
+    """
+    root = chosen.problem.root_weight
+    force = training.force - chosen.test_offsets[training.test]
+    residual = np.divide(chosen.residual, root, out=np.zeros_like(root), where=root > 0.0)
+    gains = record_gains(training, force, force - residual)
+    return session_gain(recorded, measured, simulated, gains, mean_drives(training), rules, validation)
+
+
 def mean_drives(recordings: Recordings) -> FloatArray:
     """Return the mean drive of each test, shape (tests,)."""
     counts = np.maximum(np.bincount(recordings.test, minlength=recordings.tests), 1)

@@ -15,9 +15,9 @@ from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import Ceiling, cross_fitted
 from mrpipe.tracing.bench.error_measures import Judged, Score, campaign_offset, judged_part, score
 from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, worst
-from mrpipe.tracing.bench.nuisances import RecordGain, record_gains
+from mrpipe.tracing.bench.nuisances import RecordGain, SessionGain, record_gains
 from mrpipe.tracing.bench.residual_structure import correlation_p_value
-from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, training_agreements
+from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, training_agreements, with_session
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, noise_variances
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Comparable, Verdict
@@ -193,6 +193,7 @@ def judge(
     reason: str,
     faults: Mapping[str, Finding],
     folds: int,
+    session: SessionGain | None = None,
     jobs: int = 1,
 ) -> Judgement:
     """Return the verdict on the validation tests.
@@ -211,6 +212,8 @@ def judge(
         Known faults of validation tests.
     folds
         Of the cross-validation on training tests.
+    session
+        Gain that several validation tests share; None if there is none.
     found
         Both models on the validation tests.
     base
@@ -234,6 +237,7 @@ def judge(
         )
     trained = training_agreements(chosen, folds, rules, jobs=jobs)
     comparison = compare(found.recordings, found.measured, found.after, found.floor, training, trained, faults, rules)
+    comparison = with_session(comparison, session, found.recordings, found.floor_nrmse(), rules)
     if not comparison.differences or comparison.accounted < rules.accounts:
         verdict = Verdict(kind, _sentence(kind, whole, names, base_taken, reason, rules), whole.share)
         return Judgement(verdict, whole, *total, comparison)

@@ -15,7 +15,7 @@ from mrpipe.tracing.bench.baseline import LISTED_FORMS, Baseline, ladder
 from mrpipe.tracing.bench.ceiling import flexible_residual
 from mrpipe.tracing.bench.error_measures import Score, score
 from mrpipe.tracing.bench.judgement import recovered
-from mrpipe.tracing.bench.nuisances import RecordGain, mean_drives, record_gains, session_gain
+from mrpipe.tracing.bench.nuisances import session_of
 from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.offsets import OffsetFinding
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, open_tests
@@ -152,12 +152,12 @@ class Summary:
 
     def _nuisances(self, named: Sequence[Named], window: float, rules: TracingRules) -> dict[str, Any]:
         found, training = self.found, self.training
-        session = session_gain(
+        session = session_of(
             found.recorded,
             found.measured,
             found.after,
-            self._training_gains(),
-            mean_drives(training),
+            self.selection.chosen,
+            training,
             rules.nuisances,
             rules.validation,
         )
@@ -203,13 +203,6 @@ class Summary:
         root = fitted.problem.root_weight
         residual = np.divide(fitted.residual, root, out=np.zeros_like(root), where=root > 0.0)
         return flexible_residual(fitted, self.training, residual, self.found.recordings)
-
-    def _training_gains(self) -> dict[str, RecordGain]:
-        fitted, recordings = self.selection.chosen, self.training
-        root = fitted.problem.root_weight
-        measured = recordings.force - fitted.test_offsets[recordings.test]
-        residual = np.divide(fitted.residual, root, out=np.zeros_like(root), where=root > 0.0)
-        return record_gains(recordings, measured, measured - residual)
 
     def _candidate_errors(self, measured: FloatArray) -> dict[str, float]:
         if not self.selection.rounds:

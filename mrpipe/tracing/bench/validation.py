@@ -12,6 +12,7 @@ from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.crossvalidation import left_out_residual
+from mrpipe.tracing.bench.nuisances import SessionGain
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Difference
 
@@ -229,6 +230,36 @@ def compare(
         odd_squares / whole if whole > 0.0 else 0.0,
         float(np.sqrt(corrected_squares / max(power, 1e-300))) if corrections else None,
     )
+
+
+def with_session(
+    compared: Comparison, session: SessionGain | None, validation: Recordings, floor: float, rules: ValidationRules
+) -> Comparison:
+    """Return a comparison with the gain of a session, if that gain accounts for most of the error beyond noise.
+
+    Each record of a session with another gain can be within what single training tests scatter. Together they are not.
+
+    Parameters
+    ----------
+    compared
+        Comparison of single tests.
+    session
+        Gain that several validation tests share; None if there is none.
+    validation
+        Validation tests.
+    floor
+        NRMSE that noise leaves.
+    rules
+        Decision thresholds.
+    """
+    if session is None:
+        return compared
+    share = (session.without**2 - session.with_it**2) / max(session.without**2 - floor**2, 1e-300)
+    if share < rules.accounts or (compared.differences and compared.accounted >= rules.accounts):
+        return compared
+    odd = np.isin(validation.test, [validation.names.index(name) for name in session.tests])
+    difference = _difference("gain", [(name, session.value) for name in session.tests], validation.tests)
+    return Comparison((difference,), validation.used & ~odd, min(share, 1.0), session.with_it)
 
 
 def _fault(finding: Finding, item: Agreement) -> Difference:
