@@ -68,7 +68,7 @@ def sort_tests(tests: Sequence[PreparedTest], rules: ValidationRules | None = No
     Raises
     ------
     UserError
-        If a channel is dead in every training test.
+        If a channel is dead in every test.
     """
     fewest_training = (rules or ValidationRules()).fewest_training
     findings = compare_tests([_arrays(test) for test in tests])
@@ -90,14 +90,13 @@ def sort_tests(tests: Sequence[PreparedTest], rules: ValidationRules | None = No
 
 
 def _not_all_dead(tests: Sequence[PreparedTest], findings: Sequence[Finding]) -> None:
-    training = {test.name for test in tests if test.role != "validation"}
     for channel in ("displacement", "force"):
-        dead = [item for item in findings if item.name == DEAD_CHANNEL and item.channel == channel]
-        if training and training <= {item.test for item in dead}:
+        dead = {item.test for item in findings if item.name == DEAD_CHANNEL and item.channel == channel}
+        if all(test.name in dead for test in tests):
             raise UserError(
                 "campaign",
                 f"channels.{channel}",
-                f"has the same value in all samples of each training test ({len(training)} tests)",
+                f"has the same value in all samples of each of the {len(tests)} tests",
                 "check the sensor, its cable and the column that campaign.yaml names",
             )
 

@@ -56,11 +56,11 @@ def test_sound_tests_are_all_used() -> None:
 
 
 @pytest.mark.parametrize("channel", ["force", "displacement"])
-def test_a_channel_that_is_dead_in_every_training_test_is_a_mistake_of_the_user(channel: str) -> None:
+def test_a_channel_that_is_dead_in_every_test_is_a_mistake_of_the_user(channel: str) -> None:
     """Every test was kept because none was left without the dead ones; the fit ended with a traceback."""
     name = {"force": "force_raw_n", "displacement": "displacement_raw_m"}[channel]
     tests = [replace(test, **{name: np.zeros_like(test.force_raw_n)}) for test in campaign("")]
-    with pytest.raises(UserError, match=f"channels.{channel}.*same value in all samples of each training test"):
+    with pytest.raises(UserError, match=f"channels.{channel}.*same value in all samples of each of the"):
         sort_tests(tests)
-    # one sound training test is enough for the comparison
+    # one sound test is enough for a verdict
     assert sort_tests([*tests[1:], campaign("")[0]]).tests
