@@ -6,7 +6,7 @@ The chosen model judges them again, and everything is chosen again where another
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from mrpipe.fitting.recordings import MOST_SAMPLES, Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline
 from mrpipe.tracing.bench.choose import Choice, choose_model
-from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff
+from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff, loosest_limit
 from mrpipe.tracing.bench.sampling import better_rate
 from mrpipe.tracing.bench.testability import untestable
 from mrpipe.tracing.options import TracingOptions
@@ -164,12 +164,14 @@ def _training(tests: Sequence[PreparedTest], options: TracingOptions, jobs: int)
     return (automatic if not np.isfinite(highest) else recorded(tests, highest, options)), highest
 
 
-def _limit_of(chosen: Fit, bench: Bench, highest: float, options: TracingOptions) -> float:
+def _limit_of(
+    chosen: Fit, bench: Bench, highest: float, options: TracingOptions, rule: Callable[..., float] = better_limit
+) -> float:
     """Return the limit of the cut-offs [Hz] with which the chosen model leaves clearly less, else the present one."""
     if options.displacement_cutoff_hz > 0.0:
         return highest
     tests = bench.tests
-    return better_limit(
+    return rule(
         chosen,
         tests,
         recorded(tests, np.inf, options),
@@ -178,6 +180,11 @@ def _limit_of(chosen: Fit, bench: Bench, highest: float, options: TracingOptions
         rules=options.rules.nuisances,
         jobs=bench.jobs,
     )
+
+
+def limit_of_validation(bench: Bench, taken: Chosen) -> float:
+    """Return the limit of the cut-offs of the validation tests [Hz]: no lower than the chosen model needs."""
+    return _limit_of(taken.choice.selection.chosen, bench, taken.limit_hz, taken.options, loosest_limit)
 
 
 def _at_better_rate(

@@ -8,7 +8,7 @@ that hides what they lack, so the chosen model judges it again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -116,6 +116,43 @@ def better_limit(
         Threads; the result does not depend on their number.
     """
     rules = rules or NuisanceRules()
+    errors = _errors(found, tests, {highest, np.inf, *_limits(automatic, FINE_RATIO)}, rate_hz, jobs)
+    best = min(errors, key=lambda limit: (errors[limit], -limit))
+    return best if errors[best] < (1.0 - rules.filter_again) * errors[highest] else highest
+
+
+def loosest_limit(
+    found: Fit,
+    tests: Sequence[PreparedTest],
+    automatic: Recordings,
+    highest: float,
+    *,
+    rate_hz: float,
+    rules: NuisanceRules | None = None,
+    jobs: int = 1,
+) -> float:
+    """Return the highest limit [Hz] with which a chosen model leaves no more than with the present one.
+
+    Validation tests may hold faster motion than the training tests. A limit that makes no difference in the training
+    tests, because simple base forms chose it, would take a part of that motion away.
+
+    Parameters
+    ----------
+    found, tests, automatic, highest, rate_hz, rules, jobs
+        See :func:`better_limit`.
+    """
+    if not np.isfinite(highest):
+        return highest
+    rules = rules or NuisanceRules()
+    above = {limit for limit in _limits(automatic, FINE_RATIO) if limit > highest}
+    errors = _errors(found, tests, {highest, np.inf, *above}, rate_hz, jobs)
+    return max(limit for limit, error in errors.items() if error <= (1.0 + rules.filter_again) * errors[highest])
+
+
+def _errors(
+    found: Fit, tests: Sequence[PreparedTest], limits: Collection[float], rate_hz: float, jobs: int
+) -> dict[float, float]:
+    """Return limit [Hz] -> RMS of the residual of a chosen model, as a share of the scale of the force."""
 
     def left(limit: float) -> float:
         recordings = record_tests(tests, rate_hz=rate_hz, highest_cutoff_hz=limit)
@@ -123,11 +160,9 @@ def better_limit(
         problem = replace(found.problem, recordings=recordings, root_weight=weight)
         return float(np.sqrt(fit(problem, found.theta, iterations=FINE_ITERATIONS).chi_square))
 
-    limits = sorted({highest, np.inf, *_limits(automatic, FINE_RATIO)})
+    ordered = sorted(limits)
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        errors = dict(zip(limits, pool.map(left, limits), strict=True))
-    best = min(errors, key=lambda limit: (errors[limit], -limit))
-    return best if errors[best] < (1.0 - rules.filter_again) * errors[highest] else highest
+        return dict(zip(ordered, pool.map(left, ordered), strict=True))
 
 
 def _limits(recordings: Recordings, ratio: float) -> list[float]:

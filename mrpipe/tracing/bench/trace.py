@@ -16,7 +16,7 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.assess import Case, with_likely_names
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.choose import Choice, judged_by_trees
-from mrpipe.tracing.bench.chosen import Bench, begin, choose, recorded
+from mrpipe.tracing.bench.chosen import Bench, begin, choose, limit_of_validation, recorded
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
 from mrpipe.tracing.bench.gates import judged, refusal_of, validated
 from mrpipe.tracing.bench.needed import without_superfluous
@@ -79,7 +79,7 @@ def trace_campaign(
         )
     taken = choose(bench, begun)
     options, training, choice = taken.options, taken.training, taken.choice
-    validation = recorded(unseen, taken.limit_hz, options, most_samples=MOST_JUDGED)
+    validation = recorded(unseen, limit_of_validation(bench, taken), options, most_samples=MOST_JUDGED)
     baseline, selection = choice.baseline, choice.selection
     window = selection.base.problem.window_share
     if not baseline.model_error:

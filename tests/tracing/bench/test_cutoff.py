@@ -13,7 +13,7 @@ from mrpipe.fitting.engine import fit
 from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.fitting.start import base_of, best_fit, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff
+from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff, loosest_limit
 from tests.tracing.bench.rig import hysteresis
 
 RATE = 1000.0
@@ -96,3 +96,17 @@ def test_the_chosen_model_finds_that_a_limit_rounds_the_corners_of_triangles() -
     # without a limit nothing is lost, so none is set
     problem = replace(found.problem, recordings=automatic, root_weight=automatic.used / found.problem.scales.force)
     assert better_limit(fit(problem, found.theta), tests, automatic, np.inf, rate_hz=250.0) == np.inf
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize(("hum_m", "needed"), [(0.0, False), (2e-5, True)])
+def test_validation_tests_are_filtered_no_more_than_the_chosen_model_needs(hum_m: float, needed: bool) -> None:
+    """A limit that slow training tests do not need took away a part of fast validation motion (seed 50184)."""
+    motions = [sine(0.01 * size, speed) for size in (0.5, 1.0) for speed in (0.5, 0.7)]
+    tests = recorded(motions, "velocity", hum_m=hum_m)
+    automatic, low = (record_tests(tests, rate_hz=250.0, highest_cutoff_hz=limit) for limit in (np.inf, 8.0))
+    form = base_form("bingham")
+    found = best_fit(first_problem(low, base_of(low, form, polynomial_laws(form, 3, 2, 1))), starts=1, iterations=6)
+    limit = loosest_limit(found, tests, automatic, 8.0, rate_hz=250.0)
+    assert limit < 50.0 if needed else limit > 50.0
+    assert loosest_limit(found, tests, automatic, np.inf, rate_hz=250.0) == np.inf
