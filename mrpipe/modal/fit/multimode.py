@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.modal.fit.covariance import pole_covariance
 from mrpipe.modal.fit.projected import ProjectedFit
 from mrpipe.modal.fit.rank_one import rank_one
@@ -95,6 +95,11 @@ def fitted_poles(fit: ProjectedFit, guess: FloatArray, passes: int, evaluations:
     return theta
 
 
+def rising(theta: FloatArray) -> IntArray:
+    """Return the places in theta = (ln omega, ln zeta) of the poles in rising order of frequency, shape (r,)."""
+    return np.argsort(theta[: theta.size // 2])
+
+
 def collected(fit: ProjectedFit, spectra: Sequence[RecordSpectrum], theta: FloatArray) -> MultiModeFit:
     """Return the result of a fit with shared residues at theta, modes in rising order."""
     modes = theta.size // 2
@@ -126,7 +131,7 @@ def collected(fit: ProjectedFit, spectra: Sequence[RecordSpectrum], theta: Float
             measured[test][:, columns] = explained[part] + rest[part]
             transients[test][:, columns] = group.target[part] - measured[test][:, columns]
             start = part.stop
-    order = np.argsort(omega)
+    order = rising(theta)
     both = np.concatenate([order, modes + order])
     residues, errors = residues[:, :, order], errors[:, :, order]
     shapes, shape_errors, participations = rank_one(residues, errors)

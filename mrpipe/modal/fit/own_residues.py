@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray
 from mrpipe.modal.fit.covariance import clustered_covariance
-from mrpipe.modal.fit.multimode import collected, fitted_poles
-from mrpipe.modal.fit.projected import ProjectedFit
+from mrpipe.modal.fit.information import information, poles_of_fit, weighted
+from mrpipe.modal.fit.multimode import collected, fitted_poles, rising
 from mrpipe.modal.fit.result import MultiModeFit
 
 _PASSES = 2
@@ -27,7 +26,8 @@ def with_own_residues(fit: MultiModeFit) -> MultiModeFit:
     """Return the fit with poles that give each test separate residues, and the errors of all poles by clusters.
 
     Residues of each test are taken by the Bayesian information criterion. The shapes remain those that the tests share
-    at these poles. Without several tests, or without evidence, the poles stay as they are.
+    at these poles. Without several tests, or without evidence, the poles stay as they are. Poles that are no modes
+    take part, because their response would otherwise be attributed to the modes (:func:`poles_of_fit`).
 
     Parameters
     ----------
@@ -35,28 +35,17 @@ def with_own_residues(fit: MultiModeFit) -> MultiModeFit:
         A fit with shared residues.
     """
     modes = fit.angular_frequencies.size
-    start = np.concatenate([np.log(fit.angular_frequencies), np.log(fit.damping_ratios)])
-    shared, own = (ProjectedFit(fit.spectra, modes, separate) for separate in (False, True))
-    for item in (shared, own):
-        item.renew_weights(start)
-        item.renew_weights(start)
+    start = poles_of_fit(fit, fit.spectra)
+    shared, own = (weighted(fit.spectra, start, separate) for separate in (False, True))
     chosen, theta = shared, start
     if len(fit.spectra) > 1 and information(own, start) < information(shared, start):
         moved = fitted_poles(own, start, _PASSES, _EVALUATIONS)
         if np.abs(moved[:modes] - start[:modes]).max() <= _SAME:
             chosen, theta = own, moved
     covariance, freedom = clustered_covariance(chosen, theta)
-    return replace(collected(shared, fit.spectra, theta), covariance=covariance, freedom=freedom)
-
-
-def information(fit: ProjectedFit, theta: FloatArray) -> float:
-    """Return the Bayesian information criterion of a fit with free noise of each sensor: smaller is better."""
-    found = 0.0
-    for group, state in zip(fit.groups, fit.states(theta), strict=True):
-        rows = 2 * group.problem.total
-        variance = np.mean(state.residual.reshape(rows, -1) ** 2, axis=0) * group.sigma**2
-        # the weights scale the noise of each line
-        found += rows * float(np.sum(np.log(np.maximum(variance, 1e-300))))
-        found -= 4.0 * len(group.sensors) * float(np.sum(np.log(group.weight)))
-        found += state.coefficients.size * float(np.log(rows))
-    return found
+    places = rising(theta)
+    both = np.concatenate([places, places + places.size])
+    whole = replace(
+        collected(shared, fit.spectra, theta), covariance=covariance[np.ix_(both, both)], freedom=freedom[both]
+    )
+    return whole.only(np.flatnonzero(places < modes).tolist())

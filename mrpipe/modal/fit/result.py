@@ -54,6 +54,8 @@ class MultiModeFit:
         One entry a test, shape (m, s): contribution of the ends of the record.
     freedom
         Shape (2r,): degrees of freedom of the standard errors in `covariance`; empty where all come from many lines.
+    other_poles
+        Shape (2, q): angular frequencies [rad/s] and damping ratios of poles that were fitted as well and are no modes.
     """
 
     angular_frequencies: FloatArray
@@ -74,6 +76,7 @@ class MultiModeFit:
     spectra: tuple[RecordSpectrum, ...] = ()
     transients: tuple[ComplexArray, ...] = ()
     freedom: FloatArray = field(default_factory=lambda: np.empty(0))
+    other_poles: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
 
     def mode_coherence(self) -> FloatArray:
         """Coherence at each peak, shape (r,): mean over floors, weighted by the squared shape."""
@@ -81,10 +84,12 @@ class MultiModeFit:
         return np.asarray(np.sum(weight * self.coherence, axis=0) / np.maximum(np.sum(weight, axis=0), 1e-300))
 
     def only(self, modes: Sequence[int]) -> MultiModeFit:
-        """Return the fit with the poles of `modes` alone (the steady response keeps all)."""
+        """Return the fit with the poles of `modes` as modes (the steady response keeps all, `other_poles` the rest)."""
         index = np.asarray(modes, dtype=np.int64)
         count = self.angular_frequencies.size
         both = np.concatenate([index, index + count])
+        rest = np.setdiff1d(np.arange(count), index)
+        left = np.array([self.angular_frequencies[rest], self.damping_ratios[rest]])
         return replace(
             self,
             angular_frequencies=self.angular_frequencies[index],
@@ -96,6 +101,7 @@ class MultiModeFit:
             coherence=self.coherence[:, index],
             participations=self.participations[:, index],
             input_residues=self.input_residues[:, :, index],
+            other_poles=np.hstack([self.other_poles, left]),
         )
 
     def residual(self) -> ComplexArray:

@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrpipe.modal.fit.multimode import fit_modes
+from mrpipe.modal.fit.information import poles_of_fit
+from mrpipe.modal.fit.multimode import fit_modes, rising
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
 from mrpipe.modal.search.forced_modes import ModeSearch, bands_to_try
@@ -122,9 +123,11 @@ def sharpened(search: ModeSearch, tests: Sequence[FrameTest]) -> ModeSearch:
     used = sum(item.omega.size for item in search.fit.spectra)
     if not uncertain or sum(item.omega.size for item in spectra) < 1.3 * used:
         return search
-    fit = fit_modes(
-        spectra, search.fit.angular_frequencies, search.fit.damping_ratios, passes=2, evaluations=8, near=True
-    )
+    start = poles_of_fit(search.fit, spectra)
+    places = rising(start)
+    omega, zeta = np.exp(start.reshape(2, -1))
+    whole = fit_modes(spectra, omega, zeta, passes=2, evaluations=8, near=True)
+    fit = whole.only(np.flatnonzero(places < modes).tolist())
     near = np.abs(fit.angular_frequencies / search.fit.angular_frequencies - 1.0) < _SAME
     return replace(search, fit=fit) if near.all() else search
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from mrpipe.modal.clocks.delays import SensorClock, corrected
+from mrpipe.modal.fit.information import information
 from mrpipe.modal.fit.multimode import fit_modes
-from mrpipe.modal.fit.own_residues import information, with_own_residues
+from mrpipe.modal.fit.own_residues import with_own_residues
 from mrpipe.modal.fit.projected import ProjectedFit
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
