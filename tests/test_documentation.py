@@ -23,6 +23,7 @@ from mrpipe.campaigns.schema import (
     TextEntry,
     quantity_of,
 )
+from mrpipe.config.sections.simulate import SimulateSettings
 from mrpipe.control.laws import law_names
 from mrpipe.stages.registry import all_stages
 from mrpipe.structures.options import StructureSettings
@@ -118,8 +119,12 @@ def test_example_structures_use_settings_that_exist() -> None:
     blocks = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert blocks
     for content in map(yaml.safe_load, blocks):
-        assert list(content) == ["structure"]
-        assert StructureSettings(**content["structure"]).given
+        assert content.keys() <= {"structure", "simulate"}
+        settings = StructureSettings(**content["structure"])
+        # an example with a motion of the ground shows the directions alone, the matrices are those of another example
+        assert settings.given or "simulate" in content
+        if "simulate" in content:
+            SimulateSettings(**content["simulate"])
 
 
 def test_page_on_campaigns_names_every_key() -> None:
