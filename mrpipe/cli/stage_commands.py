@@ -88,7 +88,7 @@ def _require_use(names: Sequence[str], pipeline: Pipeline, campaign: Path) -> No
 
     def collect(name: str) -> None:
         stage = pipeline.stages[name]
-        for item in (*stage.inputs, *stage.optional_inputs):
+        for item in (*stage.inputs, *stage.preferred_inputs, *stage.optional_inputs):
             if item.startswith("campaign:"):
                 used.add(item.partition(":")[2])
             elif item in pipeline.stages and item not in seen:

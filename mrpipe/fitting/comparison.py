@@ -12,8 +12,10 @@ from joblib import Parallel, delayed
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.laws import LawShape
+from mrpipe.dampers.model import DamperModel
+from mrpipe.fitting.damper import damper_model
 from mrpipe.fitting.drive_laws import LawChoice, choose_laws
-from mrpipe.fitting.engine import fit, regressors
+from mrpipe.fitting.engine import Fit, fit, regressors
 from mrpipe.fitting.form_fit import FitMethod, FormFit, fit_form, form_problem, nrmse_of
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
@@ -130,11 +132,14 @@ class Comparison:
         NRMSE of every form on a share of the samples.
     laws
         The choice of the laws of the drive; None if it was not requested.
+    ranked
+        The damper of every form on a share of the samples.
     """
 
     judged: tuple[JudgedFit, ...]
     drafts: Mapping[str, float]
     laws: LawChoice | None
+    ranked: Mapping[str, DamperModel] = field(default_factory=dict)
 
 
 def best_by_folds(judged: Sequence[JudgedFit]) -> JudgedFit:
@@ -212,7 +217,8 @@ def compare_forms(
         training, cycles=options.cycles, maximum_samples=options.maximum_samples, raw_force=options.raw_force
     )
     laws, choice = _laws(forms[0], recordings, options)
-    drafts, starts = _drafts(forms, recordings, laws, options, jobs, progress)
+    ranked = _drafts(forms, recordings, laws, options, jobs, progress)
+    drafts = {name: nrmse_of(found) for name, found in ranked.items()} or {forms[0].name: 0.0}
     least = min(drafts.values())
     near = sorted(
         (form.name for form in forms if drafts[form.name] <= CONTENDER * least), key=lambda name: drafts[name]
@@ -223,7 +229,7 @@ def compare_forms(
         seen = thinned(recordings, COUPLED_SAMPLES) if form.coupled else recordings
         weights = _equal_weights(seen) if options.equal_tests else None
         problem = form_problem(seen, base_of(seen, form, laws), offsets=options.offsets, weights=weights)
-        warm = starts[form.name] if len(forms) > len(keep) + 1 else None
+        warm = ranked[form.name].base_values if len(forms) > len(keep) + 1 else None
         found = _settled_shape(fit_form(problem, options.method, drive_unit=unit, warm=warm), options, unit)
         item = judge(found, tests, raw_force=options.raw_force)
         if folds > 1:
@@ -233,7 +239,10 @@ def compare_forms(
 
     judged = _each(fitted, chosen, jobs, lambda done, text: progress(0.4 + 0.6 * done, f"fit {text}"))
     progress(1.0, "fitted")
-    return Comparison(tuple(judged), drafts, choice)
+    dampers = {
+        name: damper_model(found, unit, assumed_eta=options.method.assumed_eta) for name, found in ranked.items()
+    }
+    return Comparison(tuple(judged), drafts, choice, dampers)
 
 
 def _laws(form: BaseForm, recordings: Recordings, options: FitOptions) -> tuple[tuple[LawShape, ...], LawChoice | None]:
@@ -253,22 +262,19 @@ def _drafts(
     options: FitOptions,
     jobs: int,
     progress: Progress,
-) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
-    """Return the NRMSE of every form on a share of the samples, and where its search ended."""
+) -> dict[str, Fit]:
+    """Return every form fitted to a share of the samples; nothing where there is one form only."""
     if len(forms) == 1:
-        return {forms[0].name: 0.0}, {}
+        return {}
     small = thinned(recordings, DRAFT_SAMPLES)
 
-    def draft(form: BaseForm) -> tuple[float, dict[str, float]]:
+    def draft(form: BaseForm) -> Fit:
         problem = form_problem(small, base_of(small, form, laws), offsets=options.offsets)
         # one start is enough to rank: forms that may win are searched further on all samples
-        found = best_fit(problem, starts=1)
-        return nrmse_of(found), found.base_values
+        return best_fit(problem, starts=1)
 
     found = _each(draft, forms, jobs, lambda done, text: progress(0.4 * done, f"rank {text}"))
-    names = [form.name for form in forms]
-    errors = {name: error for name, (error, _) in zip(names, found, strict=True)}
-    return errors, {name: end for name, (_, end) in zip(names, found, strict=True)}
+    return {form.name: item for form, item in zip(forms, found, strict=True)}
 
 
 def _each(

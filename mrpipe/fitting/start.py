@@ -13,6 +13,7 @@ from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.laws import Law, LawShape, constant_law
 from mrpipe.dampers.library import DEFAULT_FORM, base_form
 from mrpipe.fitting.engine import Fit, fit, solve, start_of
+from mrpipe.fitting.known import Known, known_start
 from mrpipe.fitting.problem import Base, Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.weighting import weighting
@@ -139,8 +140,11 @@ def followed(problem: Problem, points: Sequence[FloatArray], starts: int, iterat
     return sorted(fits, key=lambda item: item.cost)
 
 
-def best_fit(problem: Problem, *, starts: int = 2, iterations: int = 12) -> Fit:
-    """Fit from the starting points that promise most and return the best."""
+def best_fit(problem: Problem, *, starts: int = 2, iterations: int = 12, known: Known | None = None) -> Fit:
+    """Fit from the known fit of the base form, if there is one, else from the starting points that promise most."""
+    begun = known_start(problem, known)
+    if begun is not None:
+        return fit(*begun, iterations=iterations)
     return followed(problem, best_starts(problem, MORE_POINTS * starts), starts, iterations)[0]
 
 
@@ -154,11 +158,28 @@ def with_form(found: Fit, form: BaseForm) -> Problem:
     return replace(problem, base=replace(base, form=form, laws=laws, held=held), reference=reference)
 
 
-def fit_with_form(found: Fit, form: BaseForm, *, starts: int = 2, iterations: int = 12) -> Fit:
-    """Return the fit with another base form, from its own starts; the terms start where they are."""
+def fit_with_form(
+    found: Fit, form: BaseForm, *, starts: int = 2, iterations: int = 12, known: Known | None = None
+) -> Fit:
+    """Return the fit with another base form; the terms start where they are.
+
+    Parameters
+    ----------
+    found
+        Fit with another form.
+    form
+        The form.
+    starts, iterations
+        See :func:`followed`.
+    known
+        Where the search begins: at the known fit of the form, or at the form's own starts if there is none.
+    """
     problem = with_form(found, form)
-    bare = replace(problem, terms=())
     shared = {name: value for name, value in found.base_values.items() if name in ("eta", "eta_fall")}
+    begun = known_start(problem, known, shared, found.term_values)
+    if begun is not None:
+        return fit(*begun, iterations=iterations)
+    bare = replace(problem, terms=())
     points = [
         start_of(problem, {**bare.values(point)[0], **shared}, found.term_values)
         for point in best_starts(bare, MORE_POINTS * starts)

@@ -148,6 +148,9 @@ class Pipeline:
         for item in sorted(stage.inputs, key=self.sources.configured):
             missing = missing or self._provide(item, stage.inputs)
         missing += self._demanded_by_settings(stage) if missing else ""
+        for item in () if missing else stage.preferred_inputs:
+            if self.sources.configured(item):
+                self._provide_preferred(item)
         together = all(self._is_to_be_had(item) for item in stage.optional_inputs)
         for item in stage.optional_inputs:
             if self._wanted(item, together):
@@ -230,6 +233,13 @@ class Pipeline:
             raise StageFailed(f"not built, because {provider} failed")
         return outcome.manifest.skipped
 
+    def _provide_preferred(self, name: str) -> None:
+        """Build an input that the stage can do without; wrong settings of its stage end the run as for any input."""
+        provider = self.sources.provider(name)
+        if provider is not None and provider not in self.outcomes:
+            self.check(provider)
+        self._provide_optional(name)
+
     def _provide_optional(self, name: str) -> None:
         """Build an optional input; if that fails, the stage runs without it."""
         keep_going, self.keep_going = self.keep_going, True
@@ -251,7 +261,7 @@ class Pipeline:
 
     def _inputs_there(self, stage: Stage) -> dict[str, Path]:
         inputs = {}
-        for name in dict.fromkeys((*stage.inputs, *stage.optional_inputs, *stage.known_inputs)):
+        for name in dict.fromkeys(stage.all_inputs):
             path = self.sources.path(name)
             if path is None or not path.exists():
                 if name in stage.inputs and path is not None:
@@ -273,7 +283,7 @@ class Pipeline:
 
     def _key(self, stage: Stage, inputs: Mapping[str, Path]) -> StageKey:
         digests = {name: self.sources.digest(name, path) for name, path in inputs.items()}
-        for name in (*stage.optional_inputs, *stage.known_inputs):
+        for name in stage.all_inputs[len(stage.inputs) :]:
             digests.setdefault(name, ABSENT)
         if stage.public_data:
             digests[PUBLIC_DATA] = self.sources.digest_of_public_data(stage.public_data)
@@ -320,10 +330,11 @@ class Pipeline:
             found.add(name)
             stage = self.stages[name]
             given = [item for item in stage.inputs if self.sources.configured(item)]
+            preferred = [item for item in stage.preferred_inputs if self.sources.configured(item)]
             together = all(self._is_to_be_had(item) for item in stage.optional_inputs)
             wanted = [item for item in stage.optional_inputs if self._wanted(item, together)]
             # a stage that lacks a campaign is skipped: nothing is built for it
-            for item in [*(given if len(given) == len(stage.inputs) else []), *wanted]:
+            for item in [*([*given, *preferred] if len(given) == len(stage.inputs) else []), *wanted]:
                 if (provider := self.sources.provider(item)) is not None:
                     add(provider)
 
@@ -334,8 +345,7 @@ class Pipeline:
     def waits_for(self, name: str) -> set[str]:
         """Return the stages whose results a stage may read."""
         stage = self.stages[name]
-        items = (*stage.inputs, *stage.optional_inputs, *stage.known_inputs)
-        return {provider for item in items if (provider := self.sources.provider(item)) is not None}
+        return {provider for item in stage.all_inputs if (provider := self.sources.provider(item)) is not None}
 
     # --- reporting what is stale --------------------------------------------------------------------------------------
     def status(self, names: Sequence[str]) -> dict[str, list[str]]:
@@ -353,7 +363,7 @@ class Pipeline:
         stage = self.stages[name]
         reasons: list[str] = []
         stale: list[str] = []
-        for item in (*stage.inputs, *stage.optional_inputs):
+        for item in (*stage.inputs, *stage.preferred_inputs, *stage.optional_inputs):
             provider = self.sources.provider(item)
             if provider is None:
                 if item in stage.inputs and self.sources.path(item) is None:

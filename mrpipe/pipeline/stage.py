@@ -111,6 +111,8 @@ class Stage:
         suffix. It raises :class:`~mrpipe.errors.StageSkipped` if it has no data.
     inputs
         Names of stages whose artifact is read, or `campaign:bench`, `campaign:frame`, `campaign:closed-loop`.
+    preferred_inputs
+        The same. They are built like inputs; if one is skipped or fails, the stage runs without it.
     optional_inputs
         The same. They are built if that is possible, and used if they exist.
     known_inputs
@@ -137,6 +139,7 @@ class Stage:
     summary: str
     run: Callable[[StageContext], Mapping[str, Any]]
     inputs: tuple[str, ...] = ()
+    preferred_inputs: tuple[str, ...] = ()
     optional_inputs: tuple[str, ...] = ()
     known_inputs: tuple[str, ...] = ()
     conditional_inputs: tuple[tuple[str, str | None, str], ...] = ()
@@ -146,6 +149,11 @@ class Stage:
     family: str = ""
     public_data: tuple[str, ...] = ()
     check: Callable[[Any], None] | None = None
+
+    @property
+    def all_inputs(self) -> tuple[str, ...]:
+        """All that the stage may read; required inputs come first."""
+        return (*self.inputs, *self.preferred_inputs, *self.optional_inputs, *self.known_inputs)
 
     def for_configuration(self, configuration: Any) -> Stage:
         """Return the stage with the inputs that its settings require in this configuration."""

@@ -50,6 +50,7 @@ def describe(sink: Sink, result: Traced) -> None:
     """Write the section."""
     traced, summary = result.tracing, result.summary
     sink.text(in_plain_words(summary))
+    _identified(sink, summary)
     _effects(sink, summary)
     for name, reason in summary["untestable"].items():
         sink.text(f"Effect {name} is {reason}.")
@@ -58,6 +59,32 @@ def describe(sink: Sink, result: Traced) -> None:
     _before_and_after(sink, traced, summary)
     _loop(sink, summary["closed_loop"])
     _next_steps(sink, summary)
+
+
+def _identified(sink: Sink, summary: Mapping[str, Any]) -> None:
+    """Say which declared damper that is, and how it differs from the one of `identify-damper`."""
+    found = summary["base_form"]["identified"]
+    if found is None:
+        sink.text("There is no fit of identify-damper: every base form began at its own starting points.")
+        return
+    sink.text(
+        f"The damper of identify-damper ({found['form']}) misses the force on the same validation samples by "
+        f"{100 * found['nrmse']:.1f} %, the declared model ({summary['model']}) by "
+        f"{100 * summary['before']['nrmse']:.1f} %. {found['why']}"
+    )
+    rows = [
+        {"number": name.replace("_", " "), "identify-damper": item["value"], "before": item["before"]}
+        | {"unit": item["unit"]}
+        for name, item in found.get("parameters", {}).items()
+    ]
+    for law in found.get("laws", []):
+        for name, key, unit in (("yield force", "yield_force", "n"), ("c0", "c0", "n_s_m")):
+            number = f"{name} at drive {law['drive']:.3g}"
+            row = {"number": number, "identify-damper": law[f"{key}_{unit}"], "before": law[f"{key}_before_{unit}"]}
+            rows.append({**row, "unit": "N" if unit == "n" else "N s/m"})
+    if rows:
+        caption = "The declared form with the numbers of identify-damper, and with those of the error before."
+        sink.table("declared", pd.DataFrame(rows), caption)
 
 
 def _effects(sink: Sink, summary: Mapping[str, Any]) -> None:

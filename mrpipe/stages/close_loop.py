@@ -10,7 +10,9 @@ from mrpipe.errors import MrpipeError
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
+    from mrpipe.dampers.model import DamperModel
     from mrpipe.effects.contract import Effect
+    from mrpipe.fitting.known import Known
     from mrpipe.signals.prepared import PreparedTest
     from mrpipe.tracing.bench.summary import Tracing
 
@@ -29,6 +31,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.effects.library import damper_effects, effects_named
     from mrpipe.reporting import close_loop as section
     from mrpipe.signals.prepared import read_prepared
+    from mrpipe.tracing.bench.identified import compared_with_identified
     from mrpipe.tracing.bench.trace import trace_campaign
     from mrpipe.tracing.options import tracing_options
 
@@ -40,18 +43,46 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for name in campaign.declared_effects:
         if name not in known:
             context.warn(f"the campaign declares {name!r}, which the library does not hold: it is left out")
-    options = tracing_options(settings, tests[0].drive_unit, context.settings.identify_damper.form_files)
+    chosen, fitted = _identified(context)
+    options = tracing_options(
+        settings,
+        tests[0].drive_unit,
+        context.settings.identify_damper.form_files,
+        _declared(context) if chosen is None else chosen.form,
+    )
     library = effects_named(settings.candidates, settings.effect_files)
     traced = trace_campaign(
-        tests, library, declared, options, rng=context.rng, jobs=context.jobs, progress=context.progress
+        tests, library, declared, options, known=fitted, rng=context.rng, jobs=context.jobs, progress=context.progress
     )
     summary = {"campaign": campaign.name, **traced.summary}
+    identified = None if chosen is None else compared_with_identified(chosen, fitted, traced)
+    summary["base_form"] = {**summary["base_form"], "identified": identified}
     summary["closed_loop"] = _closed_loop(context, traced, tests)
     summary["corrections"] = _corrections(context, traced, tests)
     summary["next_tests"] = _next_tests(context, traced, library)
     _write(context, traced, summary)
     section.describe(context.report, section.Traced(traced, summary, settings.named_share, settings.least_share))
     return summary
+
+
+def _identified(context: StageContext) -> tuple[DamperModel | None, Known]:
+    """Return the damper that `identify-damper` chose and all base forms that it fitted; nothing where it has none."""
+    from mrpipe.dampers.model import read_damper
+    from mrpipe.fitting.known import read_known
+
+    if "identify-damper" not in context.inputs:
+        return None, {}
+    artifact = context.artifact("identify-damper")
+    return read_damper(artifact), read_known(artifact)
+
+
+def _declared(context: StageContext) -> str:
+    """Return the form that the settings name for `identify-damper`, or the default where it is to choose."""
+    from mrpipe.dampers.library import DEFAULT_FORM
+    from mrpipe.fitting.settings import BEST
+
+    form: str = context.settings.identify_damper.form
+    return DEFAULT_FORM if form == BEST else form
 
 
 def _closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
@@ -219,12 +250,14 @@ def _check(settings: Any) -> None:
     from mrpipe.dampers.library import forms_named
     from mrpipe.effects.library import effects_named
     from mrpipe.tracing.bench.baseline import form_name
+    from mrpipe.tracing.options import IDENTIFIED
 
     section = settings.close_loop
     if section.candidates or section.effect_files:
         effects_named(section.candidates, section.effect_files)
     if section.form_files:
-        forms_named([form_name(section.model), *section.base_forms], section.form_files)
+        declared = [] if section.model == IDENTIFIED else [form_name(section.model)]
+        forms_named([*declared, *section.base_forms], section.form_files)
 
 
 STAGE = Stage(
@@ -232,10 +265,12 @@ STAGE = Stage(
     summary="Trace the residual to the effect that the model lacks, add it, and report the error before and after.",
     run=_run,
     inputs=("prepare", "campaign:bench"),
+    preferred_inputs=("identify-damper",),
     optional_inputs=("identify-frame", "calibrate", "train-inverse", "campaign:closed-loop"),
     settings=(
         "stages",
         "close_loop",
+        "identify_damper.form",
         "identify_damper.form_files",
         # all of simulate but the damper: a loop with the traced damper needs what this stage finds
         "simulate.controller",

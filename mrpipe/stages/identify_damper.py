@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import StageSkipped
@@ -36,7 +36,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         "displacement": max(float(np.abs(test.displacement_m).max()) for test in training),
         "velocity": max(float(np.abs(test.velocity_m_s).max()) for test in training),
     }
-    _write(context, comparison.judged, chosen, summary, largest)
+    _write(context, comparison, chosen, summary, largest)
     section.describe(context.report, section.IdentifiedDamper(tests, comparison.judged, chosen, summary))
     return summary
 
@@ -78,7 +78,7 @@ def _summary(comparison: Comparison, chosen: JudgedFit, reference: float) -> dic
 
 def _write(
     context: StageContext,
-    judged: Sequence[JudgedFit],
+    comparison: Comparison,
     chosen: JudgedFit,
     summary: Mapping[str, Any],
     largest: Mapping[str, float],
@@ -89,8 +89,10 @@ def _write(
     with context.write("damper.h5") as artifact:
         write_damper(artifact, fit.model)
         write_tested(artifact, largest)
-        for item in judged:
+        for item in comparison.judged:
             write_damper(artifact, item.fit.model, f"forms/{item.fit.form.name}")
+        for name, model in comparison.ranked.items():
+            write_damper(artifact, model, f"ranked/{name}")
         dims = ("parameter", "parameter_of_column")
         artifact.put("covariance", fit.covariance, unit="1", dims=dims, description="units: those of the parameters")
         artifact.put("correlation", fit.correlation, unit="1", dims=dims)

@@ -74,7 +74,7 @@ def in_order(stages: Iterable[Stage]) -> dict[str, Stage]:
 
 def _before(stage: Stage, known: Mapping[str, Stage]) -> set[str]:
     names: set[str] = set()
-    for item in (*stage.inputs, *stage.optional_inputs, *stage.known_inputs):
+    for item in stage.all_inputs:
         name = RECORDERS.get(item, item)
         if name not in known and item not in RECORDERS:
             raise ValueError(f"stage {stage.name} reads {name}, which is not a stage")

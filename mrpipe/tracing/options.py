@@ -9,8 +9,12 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.dampers.forms import form_names
+from mrpipe.dampers.library import DEFAULT_FORM
 from mrpipe.options import Section
 from mrpipe.tracing.rules import TracingRules
+
+IDENTIFIED = "identified"
+"""In place of the name of the declared base form: the one that `identify-damper` chose."""
 
 
 class NamingRules(Section):
@@ -84,9 +88,10 @@ class TracingSettings(NamingRules):
         (), description="Your Python files, each of which defines one more base form as FORM."
     )
     model: str = Field(
-        "bouc-wen",
-        description="Declared base form, any of mrpipe/dampers/forms; rate-dependent-yield stands for yielding-part, "
-        "the form of this family that suits most recordings. Other base forms are compared with it.",
+        IDENTIFIED,
+        description="Declared base form. identified: the one that identify-damper chose. Else any of "
+        "mrpipe/dampers/forms; rate-dependent-yield stands for yielding-part, the form of this family that suits most "
+        "recordings. Other base forms are compared with it.",
     )
     yield_order: int = Field(3, ge=0, le=3, description="Degree of the yield force in the drive.")
     viscosity_order: int = Field(1, ge=0, le=3, description="Degree of the viscosity in the drive.")
@@ -126,19 +131,22 @@ class TracingSettings(NamingRules):
         # a user's own file may define any name: it is looked at when the stage is checked
         if info.data.get("form_files"):
             return value
-        known = (*form_names(), "rate-dependent-yield")
+        known = (*form_names(), "rate-dependent-yield", IDENTIFIED)
         if value not in known:
             raise ValueError(f"no base form {value!r}; {nearest(value, known)}")
         return value
 
 
 class TracingOptions(TracingSettings):
-    """How a campaign is traced: the settings, and the unit of the drive."""
+    """How a campaign is traced: the settings with the declared base form by name, and the unit of the drive."""
 
+    model: str = Field(DEFAULT_FORM, description="Declared base form.")
     drive_unit: str = Field("A", description="Unit of the drive, A or V.")
 
 
-def tracing_options(settings: TracingSettings, drive_unit: str, form_files: Sequence[Path] = ()) -> TracingOptions:
+def tracing_options(
+    settings: TracingSettings, drive_unit: str, form_files: Sequence[Path] = (), identified: str = DEFAULT_FORM
+) -> TracingOptions:
     """Return the options of a tracing, on a bench or of a structure.
 
     Parameters
@@ -149,7 +157,11 @@ def tracing_options(settings: TracingSettings, drive_unit: str, form_files: Sequ
         `A` or `V`; empty for A.
     form_files
         The user's own base forms that the damper was identified with; they compete in the tracing too.
+    identified
+        Base form that `identify-damper` chose.
     """
     values = {name: getattr(settings, name) for name in TracingSettings.model_fields}
     values["form_files"] = tuple(dict.fromkeys([*settings.form_files, *form_files]))
+    if settings.model == IDENTIFIED:
+        values["model"] = identified
     return TracingOptions(**values, drive_unit=drive_unit or "A")

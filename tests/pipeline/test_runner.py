@@ -13,7 +13,7 @@ import pytest
 
 from mrpipe.artifacts import Artifact
 from mrpipe.artifacts.plain import plain, to_json
-from mrpipe.errors import UserError
+from mrpipe.errors import StageSkipped, UserError
 from mrpipe.pipeline.code_version import code_version
 from mrpipe.pipeline.fingerprint import digest_of_artifact
 from mrpipe.pipeline.lock import run_lock
@@ -349,6 +349,42 @@ def test_an_optional_input_that_fails_is_done_without(make_pipeline: MakePipelin
     pipeline = make_pipeline({**stages, "third": replace(STAGES["first"], optional_inputs=("second",))})
     assert pipeline.build("third").what == "built"
     assert pipeline.outcomes["second"].what == "failed"
+
+
+@pytest.mark.property
+def test_a_preferred_input_is_built_and_done_without_where_it_is_skipped_or_fails(make_pipeline: MakePipeline) -> None:
+    # an optional input that lacks spares all optional ones; a preferred one is built all the same
+    lacking = replace(STAGES["third"], name="wants", optional_inputs=("campaign:frame",))
+    stages = {**STAGES, "wants": replace(lacking, preferred_inputs=("second",))}
+    pipeline = make_pipeline(stages)
+    assert pipeline.plan(["wants"]) == ["first", "second", "wants"]
+    assert pipeline.waits_for("wants") == {"second"}
+    assert pipeline.build("wants").what == "built"
+    assert CALLS == ["first", "second", "third"]
+    assert make_pipeline(stages).status(["wants"])["wants"] == []
+    # what it reads is stale, so it is stale, and the reason names the stage
+    changed = make_pipeline(stages, prepare={"cutoff_hz": 80.0}).status(["wants"])
+    assert changed["wants"] == ["second, which it reads, is stale"]
+    alone = replace(stages["wants"], run=STAGES["first"].run, settings=("prepare.cutoff_hz",), outputs=("first.h5",))
+    for broken, cutoff_hz in ((_fails, 60.0), (_skips, 70.0)):
+        without = {**stages, "second": replace(STAGES["second"], run=broken), "wants": alone}
+        pipeline = make_pipeline(without, prepare={"cutoff_hz": cutoff_hz})
+        assert pipeline.build("wants").what == "built"
+        assert pipeline.outcomes["second"].what == ("failed" if broken is _fails else "skipped")
+
+
+def test_wrong_settings_of_a_preferred_input_end_the_command(make_pipeline: MakePipeline) -> None:
+    def check(settings: object) -> None:
+        raise UserError("config.yaml", "form", "is not known", "name another one")
+
+    stages = {**STAGES, "second": replace(STAGES["second"], check=check)}
+    stages["third"] = replace(STAGES["third"], optional_inputs=(), preferred_inputs=("second",))
+    with pytest.raises(UserError, match="is not known"):
+        make_pipeline(stages).build("third")
+
+
+def _skips(context: StageContext) -> Mapping[str, Any]:
+    raise StageSkipped("no training test")
 
 
 def test_a_full_disk_ends_the_run(make_pipeline: MakePipeline) -> None:

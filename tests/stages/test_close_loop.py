@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mrpipe.artifacts import ArtifactWriter, Provenance
-from mrpipe.config.loader import load_config
+from mrpipe.config.loader import LoadedConfig, load_config
 from mrpipe.config.model import config_model
 from mrpipe.control.calibration import CalibrationOptions, calibrate
 from mrpipe.control.laws import law_names
@@ -19,7 +19,9 @@ from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceOptions, train_reference
 from mrpipe.control.storage import write_calibration
 from mrpipe.effects.library import damper_effects
+from mrpipe.fitting.damper import damper_model
 from mrpipe.pipeline.fingerprint import FileHashes, plain_settings
+from mrpipe.pipeline.runner import Pipeline
 from mrpipe.pipeline.settings_view import SettingsView
 from mrpipe.pipeline.stage import StageContext
 from mrpipe.reporting import close_loop as section
@@ -27,12 +29,14 @@ from mrpipe.reporting.headlines import in_brief
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.stages import close_loop
 from mrpipe.stages.close_loop import closed_loop
+from mrpipe.stages.registry import all_stages
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
 from mrpipe.thesis.gains import THESIS_GAINS
+from mrpipe.tracing.bench.identified import compared_with_identified
 from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
-from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.options import TracingOptions, tracing_options
 from tests.tracing.bench.rig import campaign
 
 LAWS = ("vd", "vdns", "fdns", "nnc", "lqg", "bang-bang", "passive-on")
@@ -117,6 +121,56 @@ def test_the_traced_damper_in_a_loop_is_no_reason_to_trace_again(tmp_path: Path)
 
     assert key(damper="traced") == key(damper="identified")
     assert key(plant_rate_hz=4000.0) != key()
+
+
+@pytest.mark.property
+def test_the_damper_that_was_identified_is_an_input_and_what_changes_it_makes_the_tracing_stale(tmp_path: Path) -> None:
+    def fake(context: StageContext) -> dict[str, Any]:
+        with context.write(f"{context.stage}.h5") as artifact:
+            artifact.put("starts", float(context.seed), unit="1")
+        return {}
+
+    stages = {}
+    campaigns = {"bench": str(tmp_path / "campaign.yaml"), "frame": None, "closed_loop": None}
+    (tmp_path / "campaign.yaml").write_text("campaign: c\nrig: damper-bench\nchannels: {}\ntests: []\n")
+    for name in ("prepare", "identify-damper", "close-loop"):
+        real = all_stages()[name]
+        stages[name] = replace(real, run=fake, outputs=(f"{name}.h5",), optional_inputs=(), check=None)
+    assert stages["close-loop"].preferred_inputs == ("identify-damper",)
+
+    def pipeline(**changes: Any) -> Pipeline:
+        config = config_model().model_validate({"campaigns": campaigns, **changes})
+        loaded = LoadedConfig(config, tmp_path / "config.yaml")
+        return Pipeline(loaded, stages, tmp_path / "run", logging.getLogger("test"), quiet=True)
+
+    first = pipeline()
+    assert first.build("close-loop").what == "built"
+    assert first.outcomes["identify-damper"].what == "built"
+    assert pipeline().status(["close-loop"])["close-loop"] == []
+    changed = pipeline(identify_damper={"starts": 3}).status(["close-loop"])
+    assert changed["identify-damper"] == ["setting identify_damper.starts was 2, is 3"]
+    assert changed["close-loop"] == ["identify-damper, which it reads, is stale"]
+
+
+@pytest.mark.property
+def test_the_declared_form_is_the_identified_one_unless_the_settings_name_another() -> None:
+    section = config_model().model_validate({}).close_loop
+    assert tracing_options(section, "A", identified="dahl").model == "dahl"
+    named = config_model().model_validate({"close_loop": {"model": "lugre"}}).close_loop
+    assert tracing_options(named, "A", identified="dahl").model == "lugre"
+
+
+@pytest.mark.planted
+def test_the_report_compares_the_declared_model_with_the_identified_damper(traced: Tracing) -> None:
+    same = damper_model(traced.selection.base, traced.drive_unit)
+    found = compared_with_identified(same, {"bouc-wen": same}, traced)
+    # the same numbers have the same error, on the same samples
+    assert found["nrmse"] == pytest.approx(traced.summary["before"]["nrmse"], rel=1e-3)
+    assert found["parameters"]["yield_displacement"]["value"] == found["parameters"]["yield_displacement"]["before"]
+    assert found["laws"][-1]["yield_force_n"] == found["laws"][-1]["yield_force_before_n"]
+    other = compared_with_identified(replace(same, form="dahl"), {}, traced)
+    assert other["why"].startswith("close_loop.model names bouc-wen, identify-damper chose dahl.")
+    assert "parameters" not in other
 
 
 @pytest.mark.planted

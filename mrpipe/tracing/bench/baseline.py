@@ -13,6 +13,7 @@ from mrpipe.dampers.library import base_form, forms_named
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.drive_laws import adequate_laws
 from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Base, Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.reference import own_laws
@@ -90,6 +91,7 @@ def fit_baseline(
     *,
     model_error_share: float = 0.0,
     rules: NoiseRules | None = None,
+    known: Known | None = None,
 ) -> Baseline:
     """Fit the declared model, weight the samples by the noise of the force, and fit again.
 
@@ -105,10 +107,12 @@ def fit_baseline(
         Expected model error as a share of the RMS force: on real recordings it exceeds the sensors' noise.
     rules
         Thresholds of the noise; their defaults if None.
+    known
+        Base forms as they were fitted to the same tests before: where the search begins.
     """
     rules = rules or NoiseRules()
     problem = first_problem(recordings, base)
-    found = best_fit(problem)
+    found = best_fit(problem, known=known)
     found = _weighted(found, recordings, model_error_share, rules)
     laws = adequate_laws(found)
     if laws != found.problem.base.laws:

@@ -12,6 +12,7 @@ from mrpipe.artifacts import Progress
 from mrpipe.dampers.library import base_form
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit, fit
+from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import fit_with_form
@@ -69,6 +70,7 @@ def choose_model(
     declared: list[Effect],
     options: TracingOptions,
     *,
+    known: Known | None = None,
     rng: np.random.Generator,
     jobs: int,
     progress: Progress,
@@ -87,6 +89,8 @@ def choose_model(
         Effects that belong to the baseline.
     options
         How it is traced.
+    known
+        Base forms as they were fitted to the same tests before: where the search of each begins.
     rng
         Source of randomness.
     jobs
@@ -96,9 +100,9 @@ def choose_model(
     """
     baseline, floor, weighed = first, options.model_error_share, False
     if floor > 0.0:
-        baseline = _without_nuisances(baseline, options)
+        baseline = _without_nuisances(baseline, options, known)
     while True:
-        choice, extension = _raced(baseline, effects, options, floor > 0.0, weighed, jobs, progress)
+        choice, extension = _raced(baseline, effects, options, known, floor > 0.0, weighed, jobs, progress)
         selection = choice.selection
         quieter = None if weighed or floor > 0.0 or choice.race is None else _quieter(choice, options.rules)
         if quieter is not None:
@@ -121,8 +125,10 @@ def choose_model(
         left = chosen.residual[used] / chosen.problem.root_weight[used]
         floor = float(np.sqrt(np.mean(left**2))) / training.force_rms
         base = declared_base(training, options.model, options.yield_order, options.viscosity_order, options.form_files)
-        declared_fit = fit_baseline(training, base, declared, model_error_share=floor, rules=options.rules.noise)
-        baseline = _without_nuisances(_with_scale(declared_fit, choice, options.rules.noise), options)
+        declared_fit = fit_baseline(
+            training, base, declared, model_error_share=floor, rules=options.rules.noise, known=known
+        )
+        baseline = _without_nuisances(_with_scale(declared_fit, choice, options.rules.noise), options, known)
 
 
 def _near_the_noise(
@@ -151,6 +157,7 @@ def _raced(
     baseline: Baseline,
     effects: Mapping[str, Effect],
     options: TracingOptions,
+    known: Known | None,
     model_error: bool,
     weighed: bool,
     jobs: int,
@@ -167,7 +174,7 @@ def _raced(
     if not nothing.structured and not _noise_of_motion(baseline):
         return Choice(baseline, nothing), lambda: None
     progress(0.1, "base forms")
-    singles = alone_of(baseline.fit, options, jobs=jobs)
+    singles = alone_of(baseline.fit, options, known=known, jobs=jobs)
     if not model_error and not weighed:
         baseline, singles = _with_noise_of_best(baseline, singles, options.rules)
         nothing = replace(nothing, base=baseline.fit, noise=baseline.noise, chosen=baseline.fit)
@@ -345,12 +352,12 @@ def _quieter(choice: Choice, rules: TracingRules) -> Baseline | None:
     return _weighed_by(choice.baseline, chosen, scale, rules.noise)
 
 
-def _without_nuisances(baseline: Baseline, options: TracingOptions) -> Baseline:
+def _without_nuisances(baseline: Baseline, options: TracingOptions, known: Known | None) -> Baseline:
     """Return the baseline with a drive lag that falls otherwise than it rises, and with the records' filter, if any."""
     found = with_lag_apart(baseline.fit, options.rules.nuisances)
     if options.observation_filter and bool(np.all(found.problem.recordings.period_s > 0.0)):
         share = observation_window(
-            fit_with_form(found, base_form(ROUNDED_FORM), iterations=8), rules=options.rules.nuisances
+            fit_with_form(found, base_form(ROUNDED_FORM), iterations=8, known=known), rules=options.rules.nuisances
         )[0]
         if share > 0.0:
             found = observation_window(found, (share,))[1]

@@ -7,13 +7,14 @@ The chosen model judges them again, and everything is chosen again where another
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.known import Known
 from mrpipe.fitting.recordings import MOST_SAMPLES, Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline
@@ -40,6 +41,8 @@ class Bench:
         Processes; the result does not depend on their number.
     progress
         Called with the share done and a text.
+    known
+        Base forms as they were fitted to the same tests before: where the search of each begins.
     """
 
     tests: Sequence[PreparedTest]
@@ -48,6 +51,7 @@ class Bench:
     rng: np.random.Generator
     jobs: int = 1
     progress: Progress = no_progress
+    known: Known = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,7 @@ class Chosen(Start):
 
 def begin(bench: Bench, options: TracingOptions) -> Start:
     """Return the training tests, filtered by criterion or as simple base forms prefer, with the declared model."""
-    return _started(bench, options, *_training(bench.tests, options, bench.jobs))
+    return _started(bench, options, *_training(bench, options))
 
 
 def choose(bench: Bench, begun: Start) -> Chosen:
@@ -130,7 +134,7 @@ def _at(bench: Bench, options: TracingOptions, limit: float, samples: int = MOST
 
 def _started(bench: Bench, options: TracingOptions, training: Recordings, limit: float) -> Start:
     able, reasons = untestable(training, bench.effects, options.rules.testability)
-    return Start(options, limit, training, able, reasons, _first_baseline(training, bench.declared, options))
+    return Start(options, limit, training, able, reasons, _first_baseline(training, bench, options))
 
 
 def _choose(bench: Bench, begun: Start) -> Chosen:
@@ -140,6 +144,7 @@ def _choose(bench: Bench, begun: Start) -> Chosen:
         begun.able,
         list(bench.declared),
         begun.options,
+        known=bench.known,
         rng=bench.rng,
         jobs=bench.jobs,
         progress=bench.progress,
@@ -147,8 +152,9 @@ def _choose(bench: Bench, begun: Start) -> Chosen:
     return Chosen(**vars(begun), choice=choice)
 
 
-def _training(tests: Sequence[PreparedTest], options: TracingOptions, jobs: int) -> tuple[Recordings, float]:
+def _training(bench: Bench, options: TracingOptions) -> tuple[Recordings, float]:
     """Return the training tests and the limit of the cut-offs of their displacement [Hz]."""
+    tests = bench.tests
     automatic = recorded(tests, np.inf, options)
     if options.displacement_cutoff_hz > 0.0:
         return automatic, np.inf
@@ -158,8 +164,9 @@ def _training(tests: Sequence[PreparedTest], options: TracingOptions, jobs: int)
         rate_hz=options.fit_rate_hz,
         yield_order=options.yield_order,
         viscosity_order=options.viscosity_order,
+        known=bench.known,
         rules=options.rules.nuisances,
-        jobs=jobs,
+        jobs=bench.jobs,
     )
     return (automatic if not np.isfinite(highest) else recorded(tests, highest, options)), highest
 
@@ -220,8 +227,13 @@ def recorded(
     )
 
 
-def _first_baseline(training: Recordings, declared: Sequence[Effect], options: TracingOptions) -> Baseline:
+def _first_baseline(training: Recordings, bench: Bench, options: TracingOptions) -> Baseline:
     base = declared_base(training, options.model, options.yield_order, options.viscosity_order, options.form_files)
     return fit_baseline(
-        training, base, declared, model_error_share=options.model_error_share, rules=options.rules.noise
+        training,
+        base,
+        bench.declared,
+        model_error_share=options.model_error_share,
+        rules=options.rules.noise,
+        known=bench.known,
     )

@@ -16,6 +16,7 @@ import numpy as np
 
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import Fit, fit
+from mrpipe.fitting.known import Known
 from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
@@ -49,6 +50,7 @@ def highest_cutoff(
     rate_hz: float,
     yield_order: int,
     viscosity_order: int,
+    known: Known | None = None,
     rules: NuisanceRules | None = None,
     jobs: int = 1,
 ) -> float:
@@ -64,6 +66,8 @@ def highest_cutoff(
         Rate at which models are fitted [Hz].
     yield_order, viscosity_order
         Degrees of the laws of the drive.
+    known
+        Base forms as they were fitted to the same tests before: where the search of each begins.
     rules
         Decision thresholds; their defaults if None.
     jobs
@@ -77,7 +81,7 @@ def highest_cutoff(
 
     def left(highest: float) -> float:
         recordings = record_tests(few, rate_hz=rate_hz, highest_cutoff_hz=highest)
-        return min(_left(recordings, name, yield_order, viscosity_order) for name in FORMS)
+        return min(_left(recordings, name, yield_order, viscosity_order, known) for name in FORMS)
 
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         unlimited, *errors = pool.map(left, [np.inf, *limits])
@@ -180,9 +184,10 @@ def _lowest(recordings: Recordings) -> float:
     return HARMONICS / float(np.min(recordings.motion_period_s))
 
 
-def _left(recordings: Recordings, name: str, yield_order: int, viscosity_order: int) -> float:
+def _left(recordings: Recordings, name: str, yield_order: int, viscosity_order: int, known: Known | None) -> float:
     """Return the RMS of the residual of a base form, as a share of the scale of the force."""
     form = base_form(name)
     laws = polynomial_laws(form, distinct_levels(recordings), yield_order, viscosity_order)
-    found = best_fit(first_problem(recordings, base_of(recordings, form, laws)), starts=1, iterations=ITERATIONS)
+    problem = first_problem(recordings, base_of(recordings, form, laws))
+    found = best_fit(problem, starts=1, iterations=ITERATIONS, known=known)
     return float(np.sqrt(found.chi_square))

@@ -10,6 +10,7 @@ import numpy as np
 from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit, chain_of
 from mrpipe.fitting.kernel import HYSTERESIS_AT, run_recordings
+from mrpipe.fitting.known import Known
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
@@ -90,6 +91,7 @@ def refusal_of(
     options: TracingOptions,
     faults: Mapping[str, Finding],
     jobs: int,
+    known: Known | None = None,
 ) -> str:
     """Return why nothing is traced; empty if the declared base form or another one predicts the validation tests.
 
@@ -108,13 +110,15 @@ def refusal_of(
         Known faults of validation tests.
     jobs
         Processes; the result does not depend on their number.
+    known
+        Base forms as they were fitted to the same tests before.
     """
     if never_yields(first.fit, options.rules.validation):
         return "the damper does not yield within the stroke of the training tests"
     if predicts(found, first.fit, training, options, faults, jobs):
         return ""
     refusal = f"the model {options.model} does not predict the validation tests (NRMSE {found.nrmse(found.after):.3g})"
-    best = min(alone_of(first.fit, options, jobs=jobs).values(), key=lambda item: item.chi_square)
+    best = min(alone_of(first.fit, options, known=known, jobs=jobs).values(), key=lambda item: item.chi_square)
     if best.problem.base.name == first.fit.problem.base.name:
         return refusal
     other = on_all_tests(best, first.fit.problem)

@@ -18,6 +18,7 @@ from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.library import forms_named
 from mrpipe.fitting.engine import Fit, fit, regressors, start_of
+from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.fitting.start import fit_with_form
@@ -293,23 +294,39 @@ def _compared(
     return Race(models, problem.base.name, own, searches, counts, noise, coupled, rules)
 
 
-def alone(small: Fit, forms: Mapping[str, BaseForm], *, jobs: int = 1) -> dict[str, Fit]:
-    """Return all base forms fitted to the tests of a draft, the form of the draft as it is."""
+def alone(small: Fit, forms: Mapping[str, BaseForm], *, known: Known | None = None, jobs: int = 1) -> dict[str, Fit]:
+    """Return all base forms fitted to the tests of a draft, the form of the draft as it is.
+
+    Parameters
+    ----------
+    small
+        Fit of the declared form to the draft.
+    forms
+        Base forms by name.
+    known
+        Base forms as they were fitted to the same tests before: where the search of each begins.
+    jobs
+        Threads.
+    """
     own = small.problem.base.name
     names = [name for name in forms if name != own]
-    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+
+    def fitted(name: str) -> Fit:
         # effects scale with the laws of the form that they are added to, not with those of the declared form
-        fits = pool.map(lambda name: with_own_laws(fit_with_form(small, forms[name], starts=1, iterations=8)), names)
+        return with_own_laws(fit_with_form(small, forms[name], starts=1, iterations=8, known=known))
+
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        fits = pool.map(fitted, names)
         return {own: small, **dict(zip(names, fits, strict=True))}
 
 
-def alone_of(found: Fit, options: TracingOptions, *, jobs: int = 1) -> dict[str, Fit]:
-    """Return all base forms that are compared, fitted without effects to the draft of a fit.
+def alone_of(found: Fit, options: TracingOptions, *, known: Known | None = None, jobs: int = 1) -> dict[str, Fit]:
+    """Return all base forms that are compared, fitted without effects to the draft of a fit; `known` as in `alone`.
 
     Springs of base forms are left to the effect `accumulator`.
     """
     forms = forms_named(options.base_forms, options.form_files)
-    return alone(draft(found), {name: form.without_springs() for name, form in forms.items()}, jobs=jobs)
+    return alone(draft(found), {name: form.without_springs() for name, form in forms.items()}, known=known, jobs=jobs)
 
 
 def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, iterations: int = 8, jobs: int = 1) -> list[Fit]:

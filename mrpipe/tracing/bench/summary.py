@@ -231,7 +231,9 @@ class Summary:
             errors[taken] = score(judged, measured, predict(ground, judged)).nrmse
             best = taken
         declared = {"name": options.model, "declared": options.model}
-        return {**declared, "best": best, "taken": taken, "tied_with": list(self.selection.tied_forms), "nrmse": errors}
+        tied = list(self.selection.tied_forms)
+        # the stage knows the damper of identify-damper; a tracing of a structure has none
+        return {**declared, "best": best, "taken": taken, "tied_with": tied, "nrmse": errors, "identified": None}
 
 
 def _score_json(value: Score) -> dict[str, float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.contract import Effect
+from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import MOST_JUDGED, Recordings, enough_tests, spread_tests
 from mrpipe.signals.prepared import PreparedTest
@@ -39,6 +40,7 @@ def trace_campaign(
     declared: Sequence[Effect],
     options: TracingOptions,
     *,
+    known: Known | None = None,
     rng: np.random.Generator,
     jobs: int = 1,
     progress: Progress = no_progress,
@@ -55,6 +57,9 @@ def trace_campaign(
         Effects that the campaign declares: part of the baseline.
     options
         How it is traced.
+    known
+        Base forms as `identify-damper` fitted them to the same tests: where the search of each begins. A form that is
+        not among them begins at its own starts.
     rng
         Source of randomness.
     jobs
@@ -66,13 +71,13 @@ def trace_campaign(
     ordered = sort_tests(tests, rules.validation)
     usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))
     unseen = [t for t in ordered.tests if t.role == "validation"]
-    bench = Bench(usable, effects, declared, rng, jobs, progress)
+    bench = Bench(usable, effects, declared, rng, jobs, progress, known or {})
     begun = begin(bench, options)
     validation = recorded(unseen, begun.limit_hz, options, most_samples=MOST_JUDGED)
     progress(0.05, "baseline")
     training, first = begun.training, begun.first
     found = validated(first.fit, first.fit, first, training, validation, options)
-    refusal = refusal_of(found, first, training, validation, options, ordered.faults, jobs)
+    refusal = refusal_of(found, first, training, validation, options, ordered.faults, jobs, bench.known)
     if refusal:
         return _nothing_traced(
             f"{refusal}: nothing is traced", ordered, found, first, training, begun.reasons, declared, options, jobs
