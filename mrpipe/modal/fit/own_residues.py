@@ -26,7 +26,7 @@ def with_own_residues(fit: MultiModeFit) -> MultiModeFit:
     """Return the fit with poles that give each test separate residues, and the errors of all poles by clusters.
 
     Residues of each test are taken by the Bayesian information criterion. The shapes remain those that the tests share
-    at these poles. Without several tests, or without evidence, the poles stay as they are. Poles that are no modes
+    at these poles. Without several tests, or without evidence, the poles stay as they are. Poles that are not modes
     take part, because their response would otherwise be attributed to the modes (:func:`poles_of_fit`).
 
     Parameters
