@@ -36,7 +36,7 @@ def weighted(spectra: Sequence[RecordSpectrum], theta: FloatArray, separate: boo
 def poles_of_fit(fit: MultiModeFit, spectra: Sequence[RecordSpectrum]) -> FloatArray:
     """Return theta = (ln omega, ln zeta) of the modes, then of those other poles that the spectra support.
 
-    The response of a pole that is not a mode of the structure, for example of its flexible support, has the band in common
+    The response of a pole that is not a mode of the structure, such as that of its support, has the band in common
     with the modes. A fit of the modes alone attributes it to them. The other poles of `fit` therefore take part where
     they lie in the band and the Bayesian information criterion supports each of them.
 

@@ -55,7 +55,7 @@ class MultiModeFit:
     freedom
         Shape (2r,): degrees of freedom of the standard errors in `covariance`; empty where all come from many lines.
     other_poles
-        Shape (2, q): angular frequencies [rad/s] and damping ratios of poles that were fitted as well and are not modes.
+        Shape (2, q): angular frequencies [rad/s] and damping ratios of fitted poles that are not modes.
     """
 
     angular_frequencies: FloatArray
