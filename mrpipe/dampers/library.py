@@ -12,14 +12,12 @@ from pathlib import Path
 import mrpipe.dampers.forms as package
 from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.forms import DEFAULT_FORM
 from mrpipe.dampers.user_file import module_of_file
 from mrpipe.errors import UserError
 
 LOADS_FROM = ("mrpipe.dampers.forms",)
 """Packages that are walked at run time: their modules belong to the code version of a stage."""
-
-DEFAULT_FORM = "bouc-wen"
-"""The thesis' simplified Bouc-Wen model (2.1) to (2.4)."""
 
 
 @cache

@@ -10,8 +10,9 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
+from mrpipe.dampers.forms import DEFAULT_FORM
 from mrpipe.dampers.laws import Law, LawShape, constant_law
-from mrpipe.dampers.library import DEFAULT_FORM, base_form
+from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import Fit, fit, solve, start_of
 from mrpipe.fitting.known import Known, known_start
 from mrpipe.fitting.problem import Base, Problem

@@ -78,7 +78,7 @@ def _identified(context: StageContext) -> tuple[DamperModel | None, Known]:
 
 def _declared(context: StageContext) -> str:
     """Return the form that the settings name for `identify-damper`, or the default where it is to choose."""
-    from mrpipe.dampers.library import DEFAULT_FORM
+    from mrpipe.dampers.forms import DEFAULT_FORM
     from mrpipe.fitting.settings import BEST
 
     form: str = context.settings.identify_damper.form

@@ -8,8 +8,7 @@ from pathlib import Path
 from pydantic import Field, ValidationInfo, field_validator
 
 from mrpipe.artifacts.yaml_source import nearest
-from mrpipe.dampers.forms import form_names
-from mrpipe.dampers.library import DEFAULT_FORM
+from mrpipe.dampers.forms import DEFAULT_FORM, form_names
 from mrpipe.options import Section
 from mrpipe.tracing.rules import TracingRules
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pkgutil
 
+DEFAULT_FORM = "bouc-wen"
+"""The thesis' simplified Bouc-Wen model (2.1) to (2.4)."""
+
 LOADS_FROM: tuple[str, ...] = ()  # only names are read here; mrpipe.dampers.library loads the files
 
 
