@@ -13,7 +13,7 @@ from mrpipe.dampers.plant import CURRENT, FIRST, STEP_SIGNATURE, Phase, Step
 from mrpipe.dampers.second_order import second_order_filter
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
 
-BUFFER = 2048
+BUFFER = 6144
 """Samples of effective drive that the dead time can look back."""
 
 
@@ -110,9 +110,7 @@ EFFECT = Effect(
     source="Koo et al. 2006 on response time of MR dampers; eddy currents as a second pole",
     acts_on="effective drive",
     forms=(
-        EffectForm(
-            "dead-time", "u(t - T)", (strength("delay", "s", "dead time", "one", 0.0, 0.15, 0.002),), _dead_time
-        ),
+        EffectForm("dead-time", "u(t - T)", (strength("delay", "s", "dead time", "one", 0.0, 0.5, 0.002),), _dead_time),
         EffectForm(
             "second-lag",
             "tau w' = u - w",
@@ -132,7 +130,7 @@ EFFECT = Effect(
             "dead-time-and-lag",
             "tau w' = u(t - T + tau) - w, tau = s T",
             (
-                strength("delay", "s", "dead time and time constant", "one", 0.0, 0.15, 0.002),
+                strength("delay", "s", "dead time and time constant", "one", 0.0, 0.5, 0.002),
                 shape("lag_share", "1", "share of the time constant", "one", 0.05, 0.95, (0.4,)),
             ),
             _dead_time_and_lag,
@@ -158,7 +156,7 @@ EFFECT = Effect(
             "dead-time-and-second-order",
             "w'' + 2 zeta omega w' + omega^2 (w - u(t - T + s T)) = 0, s T = 2 zeta/omega",
             (
-                strength("delay", "s", "delay of slow changes", "one", 0.0, 0.15, 0.002),
+                strength("delay", "s", "delay of slow changes", "one", 0.0, 0.5, 0.002),
                 shape("filter_share", "1", "share of the filter", "one", 0.05, 0.98, (0.7,)),
                 shape("damping_ratio", "1", "below 1 it overshoots", "one", 0.25, 3.0, (0.8,)),
             ),

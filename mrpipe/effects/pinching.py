@@ -54,6 +54,29 @@ def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
     change_yield_force(wire, 1.0 - parameters[0] / (1.0 + ratio ** parameters[3]))
 
 
+@njit(STEP_SIGNATURE, cache=True)
+def yield_profile_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Parameters: distance of the places [m], middle [m], share missing at each place from left to right.
+
+    Between the places the share is a quadratic spline (basis splines with uniform knots).
+    """
+    count = parameters.shape[0] - 2
+    position = (wire[DISPLACEMENT] - parameters[1]) / parameters[0] + 0.5 * (count - 1)
+    missing = 0.0
+    for place in range(count):
+        distance = abs(position - place)
+        if distance < 0.5:
+            missing += parameters[2 + place] * (0.75 - distance * distance)
+        elif distance < 1.5:
+            missing += parameters[2 + place] * 0.5 * (1.5 - distance) * (1.5 - distance)
+    change_yield_force(wire, 1.0 - missing)
+
+
+def _yield_profile(values: Values) -> list[Step]:
+    numbers = np.array([values["distance"], values["middle"], *(values[name] for name in _PLACES)])
+    return [Step("pinching", Phase.COEFFICIENT_EFFECT, yield_profile_step, numbers)]
+
+
 def _yield_force(values: Values) -> list[Step]:
     numbers = np.array([values["depth"], values["width"], values["middle"], values["exponent"]])
     return [Step("pinching", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers)]
@@ -89,6 +112,7 @@ def _aside(kind: float) -> Callable[[Values], list[Step]]:
     return steps
 
 
+_PLACES = tuple(f"depth_{number}" for number in range(1, 8))
 _WIDTH = shape("width", "m", "half width of the dip", "stroke", 0.02, 1.0, (0.12, 0.4))
 _MIDDLE = Parameter("middle", "m", "where the dip is deepest", "stroke", -0.8, 0.8, (-0.3, 0.3))
 _NEAR_MIDDLE = replace(_MIDDLE, starts=(0.0,))
@@ -142,6 +166,27 @@ EFFECT = Effect(
                 strength("depth", "1", "share of the yield force that is missing in the middle", "one", 0.0, 1.0, 0.05),
             ),
             _yield_force,
+        ),
+        EffectForm(
+            "yield-force-profile",
+            "F_y (1 - d(x)) before the damper yields, d a free profile",
+            (
+                shape("distance", "m", "distance of the places of the profile", "stroke", 0.05, 0.5, (0.15, 0.3)),
+                _NEAR_MIDDLE,
+                *(
+                    strength(
+                        name,
+                        "1",
+                        f"share of the yield force that is missing at place {name[6:]}",
+                        "one",
+                        0.0,
+                        0.95,
+                        0.05,
+                    )
+                    for name in _PLACES
+                ),
+            ),
+            _yield_profile,
         ),
     ),
 )

@@ -11,6 +11,8 @@ import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.effects.contract import EffectScales
+from mrpipe.signals.channel_noise import DISPLACEMENT_HARMONICS
+from mrpipe.signals.differentiation import spline_derivatives
 from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.prepared import PreparedTest
 
@@ -186,7 +188,8 @@ def record_tests(
         Tests are thinned to at most about this rate after the displacement has been filtered. Forces are picked, never
         filtered. A test whose drive jumps keeps a higher rate.
     cutoff_hz
-        Cut-off of the displacement; 0 chooses it for each test by criterion.
+        Cut-off of the displacement; 0 chooses it for each test by criterion. A displacement from which the noise was
+        removed is not filtered again.
     highest_cutoff_hz
         Upper limit of the cut-offs that are chosen by criterion.
     longest_s
@@ -206,7 +209,7 @@ def record_tests(
         _one_test(
             test,
             max(rate_hz, JUMP_RATE_HZ) if drive_jumps(test, largest) else rate_hz,
-            cutoff_hz or min(test.displacement_cutoff_hz, highest_cutoff_hz),
+            _cutoff(test, cutoff_hz, highest_cutoff_hz),
             shared if one else test.displacement_offset_m,
             longest_s,
         )
@@ -284,9 +287,8 @@ def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[Prepare
 def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, longest_s: float) -> dict[str, Any]:
     rate = test.sampling_rate_hz
     raw = test.displacement_raw_m + (test.displacement_offset_m - offset)
-    smooth = butterworth_lowpass(raw, cutoff, rate, order=FILTER_ORDER)
-    velocity = np.gradient(smooth, 1.0 / rate)
-    acceleration = np.gradient(velocity, 1.0 / rate)
+    smooth = raw if test.motion_band_hz > 0.0 else butterworth_lowpass(raw, cutoff, rate, order=FILTER_ORDER)
+    velocity, acceleration = spline_derivatives(smooth, 1.0 / rate)
     if _acceleration_was_measured(test):
         # an accelerometer is far quieter than a displacement differentiated twice
         acceleration = butterworth_lowpass(
@@ -298,7 +300,8 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(smooth)))])[chosen]
     edge = chosen / rate
     used = (path >= SETTLING_SHARE * np.ptp(smooth)) & (edge > 1.0 / cutoff) & (length / rate - edge > 1.0 / cutoff)
-    band = min(cutoff, test.displacement_noise_band_hz or cutoff)
+    band = test.displacement_noise_band_hz or cutoff
+    band = band if test.motion_band_hz > 0.0 else min(cutoff, band)
     noise = test.displacement_noise_m or test.channel_noise_m * np.sqrt(min(1.0, 2.0 * band / rate))
     periods = np.diff(test.cycles)
     return {
@@ -318,6 +321,13 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
         "cutoff_hz": cutoff,
         "noise_band_hz": band,
     }
+
+
+def _cutoff(test: PreparedTest, cutoff_hz: float, highest_cutoff_hz: float) -> float:
+    """Return the highest frequency of the displacement of a test [Hz]."""
+    if test.motion_band_hz > 0.0:
+        return float(max(test.motion_band_hz, DISPLACEMENT_HARMONICS * test.motion_frequency_hz))
+    return cutoff_hz or min(test.displacement_cutoff_hz, highest_cutoff_hz)
 
 
 def _acceleration_was_measured(test: PreparedTest) -> bool:

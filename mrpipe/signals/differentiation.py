@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import signal
+from scipy import interpolate, signal
 
 from mrpipe.artifacts import FloatArray
 
@@ -18,6 +18,24 @@ def central_difference(values: FloatArray, dt: float) -> FloatArray:
     if values.size < 3:
         return backward_difference(values, dt)
     return np.asarray(np.gradient(values, dt, edge_order=2))
+
+
+def spline_derivatives(values: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+    """Return the first and the second derivative of the cubic spline through all samples, shape (n,) each; no delay.
+
+    A central difference loses (2 pi f dt)^2 / 6 of a sine of frequency f: 1 % at a twenty-fifth of the sampling rate.
+    A spline loses less than a tenth of that.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    dt
+        Sampling interval [s].
+    """
+    spline = interpolate.CubicSpline(dt * np.arange(values.size), values)
+    time = spline.x
+    return np.asarray(spline(time, 1), dtype=np.float64), np.asarray(spline(time, 2), dtype=np.float64)
 
 
 def savitzky_golay(

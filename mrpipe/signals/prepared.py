@@ -37,6 +37,9 @@ class PreparedTest:
     displacement_noise_m, displacement_noise_band_hz
         Standard deviation and band of the displacement's noise where it was put together from several sensors, so that
         the channel itself does not show; 0 if it does. Not written to the artifact.
+    motion_band_hz
+        Highest frequency of the motion if the noise was removed from the displacement (see
+        :mod:`mrpipe.signals.shared_noise`); 0 if it was not. Not written to the artifact.
     time_s
         Clock, shape (n,) [s].
     displacement_m
@@ -70,6 +73,7 @@ class PreparedTest:
     force_offset_n: float = 0.0
     displacement_noise_m: float = 0.0
     displacement_noise_band_hz: float = 0.0
+    motion_band_hz: float = 0.0
 
     @property
     def dt(self) -> float:
@@ -156,6 +160,7 @@ def read_prepared(artifact: Artifact) -> list[PreparedTest]:
                 force_offset_n=float(notes["force_offset_n"]),
                 displacement_noise_m=0.0,
                 displacement_noise_band_hz=0.0,
+                motion_band_hz=0.0,
                 **channels,
             )
         )

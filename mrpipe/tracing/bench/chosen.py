@@ -6,20 +6,20 @@ The chosen model judges them again, and everything is chosen again where another
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.contract import Effect
-from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.known import Known
-from mrpipe.fitting.recordings import MOST_SAMPLES, Recordings, record_tests
+from mrpipe.fitting.recordings import MOST_JUDGED, MOST_SAMPLES, Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline
 from mrpipe.tracing.bench.choose import Choice, choose_model
-from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff, loosest_limit
+from mrpipe.tracing.bench.cutoff import MotionFilter, best_filter, better_filter, loosest_limit, simple_error
 from mrpipe.tracing.bench.sampling import better_rate
 from mrpipe.tracing.bench.testability import untestable
 from mrpipe.tracing.options import TracingOptions
@@ -62,10 +62,10 @@ class Start:
     ----------
     options
         How it is traced, with the rate of the fits.
-    limit_hz
-        Upper limit of the cut-offs of the displacement.
+    filter
+        How the displacement is freed of noise.
     training
-        The tests.
+        The tests, end to end.
     able, reasons
         Effects that these tests can show, and for each other one why they cannot.
     first
@@ -73,7 +73,7 @@ class Start:
     """
 
     options: TracingOptions
-    limit_hz: float
+    filter: MotionFilter
     training: Recordings
     able: Mapping[str, Effect]
     reasons: Mapping[str, str]
@@ -99,8 +99,22 @@ class Chosen(Start):
 
 
 def begin(bench: Bench, options: TracingOptions) -> Start:
-    """Return the training tests, filtered by criterion or as simple base forms prefer, with the declared model."""
-    return _started(bench, options, *_training(bench, options))
+    """Return the training tests with the declared model, and their displacement freed of noise.
+
+    The noise that all tests share is removed, or a low-pass is chosen for each test: simple base forms judge.
+    """
+    way = MotionFilter()
+    if options.displacement_cutoff_hz == 0.0:
+        judging = partial(
+            simple_error,
+            rate_hz=options.fit_rate_hz,
+            yield_order=options.yield_order,
+            viscosity_order=options.viscosity_order,
+            known=bench.known,
+        )
+        automatic = recorded(bench.tests, way, options)
+        way = best_filter(bench.tests, automatic, judging, rules=options.rules.nuisances, jobs=bench.jobs)
+    return _started(bench, options, way, recorded(bench.tests, way, options))
 
 
 def choose(bench: Bench, begun: Start) -> Chosen:
@@ -114,27 +128,26 @@ def choose(bench: Bench, begun: Start) -> Chosen:
         Training tests and declared model.
     """
     found = _choose(bench, begun)
-    options, fit = found.options, found.choice.selection.chosen
-    faster = _at_better_rate(found.choice, bench.tests, found.limit_hz, options)
+    options = found.options
+    faster = _at_better_rate(bench, found)
     if faster is not options:
-        limit = _limit_of(fit, bench, found.limit_hz, faster)
         samples = round(MOST_SAMPLES * faster.fit_rate_hz / options.fit_rate_hz)
-        again = _at(bench, faster, limit, samples)
+        again = _at(bench, faster, _better_filter(bench, found, faster), samples)
         if again.names == found.names:
             return again
         # a higher rate makes a model more accurate; it does not show that an effect is there or missing
-    limit = _limit_of(fit, bench, found.limit_hz, options)
-    return found if limit == found.limit_hz else _at(bench, options, limit)
+    way = _better_filter(bench, found, options)
+    return found if way is found.filter else _at(bench, options, way)
 
 
-def _at(bench: Bench, options: TracingOptions, limit: float, samples: int = MOST_SAMPLES) -> Chosen:
-    training = recorded(bench.tests, limit, options, most_samples=samples)
-    return _choose(bench, _started(bench, options, training, limit))
+def _at(bench: Bench, options: TracingOptions, way: MotionFilter, samples: int = MOST_SAMPLES) -> Chosen:
+    training = recorded(bench.tests, way, options, most_samples=samples)
+    return _choose(bench, _started(bench, options, way, training))
 
 
-def _started(bench: Bench, options: TracingOptions, training: Recordings, limit: float) -> Start:
+def _started(bench: Bench, options: TracingOptions, way: MotionFilter, training: Recordings) -> Start:
     able, reasons = untestable(training, bench.effects, options.rules.testability)
-    return Start(options, limit, training, able, reasons, _first_baseline(training, bench, options))
+    return Start(options, way, training, able, reasons, _first_baseline(training, bench, options))
 
 
 def _choose(bench: Bench, begun: Start) -> Chosen:
@@ -152,52 +165,53 @@ def _choose(bench: Bench, begun: Start) -> Chosen:
     return Chosen(**vars(begun), choice=choice)
 
 
-def _training(bench: Bench, options: TracingOptions) -> tuple[Recordings, float]:
-    """Return the training tests and the limit of the cut-offs of their displacement [Hz]."""
-    tests = bench.tests
-    automatic = recorded(tests, np.inf, options)
+def _better_filter(bench: Bench, found: Chosen, options: TracingOptions) -> MotionFilter:
+    """Return the filter with which the chosen model leaves clearly less, else the present one."""
     if options.displacement_cutoff_hz > 0.0:
-        return automatic, np.inf
-    highest = highest_cutoff(
-        tests,
-        automatic,
-        rate_hz=options.fit_rate_hz,
-        yield_order=options.yield_order,
-        viscosity_order=options.viscosity_order,
-        known=bench.known,
-        rules=options.rules.nuisances,
-        jobs=bench.jobs,
-    )
-    return (automatic if not np.isfinite(highest) else recorded(tests, highest, options)), highest
-
-
-def _limit_of(
-    chosen: Fit, bench: Bench, highest: float, options: TracingOptions, rule: Callable[..., float] = better_limit
-) -> float:
-    """Return the limit of the cut-offs [Hz] with which the chosen model leaves clearly less, else the present one."""
-    if options.displacement_cutoff_hz > 0.0:
-        return highest
-    tests = bench.tests
-    return rule(
-        chosen,
-        tests,
-        recorded(tests, np.inf, options),
-        highest,
+        return found.filter
+    return better_filter(
+        found.choice.selection.chosen,
+        bench.tests,
+        recorded(bench.tests, MotionFilter(), options),
+        found.filter,
         rate_hz=options.fit_rate_hz,
         rules=options.rules.nuisances,
         jobs=bench.jobs,
     )
 
 
-def limit_of_validation(bench: Bench, taken: Chosen) -> float:
-    """Return the limit of the cut-offs of the validation tests [Hz]: no lower than the chosen model needs."""
-    return _limit_of(taken.choice.selection.chosen, bench, taken.limit_hz, taken.options, loosest_limit)
+def validation_of(bench: Bench, begun: Start, unseen: Sequence[PreparedTest]) -> Recordings:
+    """Return the validation tests end to end, their displacement filtered as that of the training tests.
+
+    A low-pass is no lower than the chosen model needs. Noise is removed with the density that the training tests show.
+
+    Parameters
+    ----------
+    bench
+        What the tracing has at hand.
+    begun
+        How the training tests are filtered; with the choice, if it has been made.
+    unseen
+        Validation tests.
+    """
+    way, options = begun.filter, begun.options
+    if isinstance(begun, Chosen) and way.noise is None and options.displacement_cutoff_hz == 0.0:
+        limit = loosest_limit(
+            begun.choice.selection.chosen,
+            bench.tests,
+            recorded(bench.tests, MotionFilter(), options),
+            way.limit_hz,
+            rate_hz=options.fit_rate_hz,
+            rules=options.rules.nuisances,
+            jobs=bench.jobs,
+        )
+        way = MotionFilter(limit)
+    return recorded(unseen, way, options, most_samples=MOST_JUDGED)
 
 
-def _at_better_rate(
-    choice: Choice, tests: Sequence[PreparedTest], highest: float, options: TracingOptions
-) -> TracingOptions:
+def _at_better_rate(bench: Bench, found: Chosen) -> TracingOptions:
     """Return the options with the rate at which the chosen model leaves clearly less, else the options themselves."""
+    choice, options = found.choice, found.options
     chosen, rules = choice.selection.chosen, options.rules
     # where the model's error is the measure, it does not show whether something remains
     near = chosen.chi_square < (1.0 + rules.refinement.worth_a_try) * choice.selection.noise
@@ -205,24 +219,24 @@ def _at_better_rate(
         return options
     rate = better_rate(
         chosen,
-        tests,
+        found.filter.applied(bench.tests),
         rate_hz=options.fit_rate_hz,
         cutoff_hz=options.displacement_cutoff_hz,
-        highest_cutoff_hz=highest,
+        highest_cutoff_hz=found.filter.limit_hz,
         gain=rules.nuisances.rate_gain,
     )
     return options if rate == options.fit_rate_hz else options.model_copy(update={"fit_rate_hz": rate})
 
 
 def recorded(
-    tests: Sequence[PreparedTest], highest: float, options: TracingOptions, *, most_samples: int = MOST_SAMPLES
+    tests: Sequence[PreparedTest], way: MotionFilter, options: TracingOptions, *, most_samples: int = MOST_SAMPLES
 ) -> Recordings:
-    """Return tests end to end, with the displacement filtered by criterion and up to a limit [Hz]."""
+    """Return tests end to end, with the displacement freed of noise in a given way."""
     return record_tests(
-        tests,
+        way.applied(tests),
         rate_hz=options.fit_rate_hz,
         cutoff_hz=options.displacement_cutoff_hz,
-        highest_cutoff_hz=highest,
+        highest_cutoff_hz=way.limit_hz,
         most_samples=most_samples,
     )
 

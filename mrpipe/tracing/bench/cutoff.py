@@ -1,16 +1,18 @@
-"""How far the displacement is filtered: the limit of the cut-offs with which base forms leave least.
+"""How the displacement is freed of noise: the noise that all tests share is removed, or a low-pass is chosen.
 
-A spectrum shows where a displacement sinks into its white noise. It cannot separate motion from hum of the mains, and
-it does not show what the remaining noise does to a force that follows velocity or acceleration. Therefore the limit is
-chosen by the error of models. Before a model is chosen, simple base forms judge the filter. They can prefer a limit
-that hides what they lack, so the chosen model judges it again.
+The tests of a campaign show the noise of the sensor wherever some of them hold no motion
+(:mod:`mrpipe.signals.shared_noise`). Where they do not, a spectrum only shows where a displacement sinks into its white
+noise. It cannot separate motion from hum of the mains, and it does not show what the remaining noise does to a force
+that follows velocity or acceleration. Therefore the error of models decides. Before a model is chosen, simple base
+forms judge. They can prefer a limit that hides what they lack, so the chosen model judges again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from mrpipe.fitting.known import Known
 from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
+from mrpipe.signals.shared_noise import NoiseDensity, quiet_motion, shared_noise
 from mrpipe.tracing.bench.select import draft_tests
 from mrpipe.tracing.rules import NuisanceRules
 
@@ -43,18 +46,78 @@ ITERATIONS = 6
 """Numerical technique: iterations of each fit."""
 
 
-def highest_cutoff(
+@dataclass(frozen=True, eq=False)
+class MotionFilter:
+    """How the displacement of tests is freed of noise.
+
+    Attributes
+    ----------
+    limit_hz
+        Upper limit of the cut-offs of low-passes; infinite where the criterion alone decides.
+    noise
+        Noise of the displacement sensor that is removed from the tests; None if they are low-passed.
+    """
+
+    limit_hz: float = np.inf
+    noise: NoiseDensity | None = None
+
+    @property
+    def kind(self) -> tuple[float, bool]:
+        """What it does: the limit, and whether noise is removed."""
+        return self.limit_hz, self.noise is not None
+
+    def applied(self, tests: Sequence[PreparedTest]) -> Sequence[PreparedTest]:
+        """Return the tests without the noise that is removed from them."""
+        return tests if self.noise is None else quiet_motion(tests, self.noise)
+
+
+class Judging(Protocol):
+    """Error of simple base forms on recordings, as a share of the scale of the force."""
+
+    def __call__(self, tests: Sequence[PreparedTest], highest_cutoff_hz: float) -> float:
+        """Return the error of the best of them with cut-offs up to a limit [Hz]."""
+
+
+def simple_error(
     tests: Sequence[PreparedTest],
-    automatic: Recordings,
+    highest_cutoff_hz: float,
     *,
     rate_hz: float,
     yield_order: int,
     viscosity_order: int,
     known: Known | None = None,
+) -> float:
+    """Return the RMS of what the best of a few simple base forms leaves, as a share of the scale of the force.
+
+    Parameters
+    ----------
+    tests
+        Training tests.
+    highest_cutoff_hz
+        Upper limit of the cut-offs of the displacement [Hz].
+    rate_hz
+        Rate at which models are fitted [Hz].
+    yield_order, viscosity_order
+        Degrees of the laws of the drive.
+    known
+        Base forms as they were fitted to the same tests before: where the search of each begins.
+    """
+    recordings = record_tests(tests, rate_hz=rate_hz, highest_cutoff_hz=highest_cutoff_hz)
+    return min(_left(recordings, name, yield_order, viscosity_order, known) for name in FORMS)
+
+
+def best_filter(
+    tests: Sequence[PreparedTest],
+    automatic: Recordings,
+    judging: Judging,
+    *,
     rules: NuisanceRules | None = None,
     jobs: int = 1,
-) -> float:
-    """Return the upper limit of the cut-offs of the displacement [Hz]; infinite where the criterion is the best choice.
+) -> MotionFilter:
+    """Return how the displacement is freed of noise before a model is chosen.
+
+    Removing the noise that all tests share is preferred, unless a low-pass leaves much less, as where all tests hold
+    the same random motion, which then looks like noise.
 
     Parameters
     ----------
@@ -62,47 +125,41 @@ def highest_cutoff(
         Training tests.
     automatic
         The same tests with cut-offs by criterion.
-    rate_hz
-        Rate at which models are fitted [Hz].
-    yield_order, viscosity_order
-        Degrees of the laws of the drive.
-    known
-        Base forms as they were fitted to the same tests before: where the search of each begins.
+    judging
+        Error of simple models on filtered tests.
     rules
         Decision thresholds; their defaults if None.
     jobs
         Threads; the result does not depend on their number.
     """
     rules = rules or NuisanceRules()
-    limits = _limits(automatic, RATIO)
-    if not limits:
-        return np.inf
     few = [tests[place] for place in draft_tests(automatic)]
-
-    def left(highest: float) -> float:
-        recordings = record_tests(few, rate_hz=rate_hz, highest_cutoff_hz=highest)
-        return min(_left(recordings, name, yield_order, viscosity_order, known) for name in FORMS)
-
+    low_passes = [MotionFilter(limit) for limit in [np.inf, *_limits(automatic, RATIO)]]
+    removals = _removals(tests)
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        unlimited, *errors = pool.map(left, [np.inf, *limits])
-    best, least = np.inf, (1.0 - rules.filter_gain) * unlimited
-    for item, error in zip(limits, errors, strict=True):
-        if error < least:
-            best, least = item, error
+        ways = [*low_passes, *removals]
+        errors = dict(zip(ways, pool.map(lambda way: judging(way.applied(few), way.limit_hz), ways), strict=True))
+    best = low_passes[0]
+    lower = min(low_passes, key=errors.__getitem__)
+    if errors[lower] < (1.0 - rules.filter_gain) * errors[best]:
+        best = lower
+    for removal in removals:
+        if errors[removal] <= (1.0 + rules.filter_doubt) * errors[best]:
+            return removal
     return best
 
 
-def better_limit(
+def better_filter(
     found: Fit,
     tests: Sequence[PreparedTest],
     automatic: Recordings,
-    highest: float,
+    present: MotionFilter,
     *,
     rate_hz: float,
     rules: NuisanceRules | None = None,
     jobs: int = 1,
-) -> float:
-    """Return the limit [Hz] with which a chosen model leaves clearly less than with the present one; else that one.
+) -> MotionFilter:
+    """Return the filter with which a chosen model leaves clearly less than with the present one; else that one.
 
     Parameters
     ----------
@@ -110,8 +167,8 @@ def better_limit(
         Chosen model, fitted to the training tests.
     tests, automatic
         Training tests, and the same with cut-offs by criterion.
-    highest
-        Present limit [Hz].
+    present
+        Present filter.
     rate_hz
         Rate at which models are fitted [Hz].
     rules
@@ -120,9 +177,12 @@ def better_limit(
         Threads; the result does not depend on their number.
     """
     rules = rules or NuisanceRules()
-    errors = _errors(found, tests, {highest, np.inf, *_limits(automatic, FINE_RATIO)}, rate_hz, jobs)
-    best = min(errors, key=lambda limit: (errors[limit], -limit))
-    return best if errors[best] < (1.0 - rules.filter_again) * errors[highest] else highest
+    limits = sorted({np.inf, *_limits(automatic, FINE_RATIO)}, reverse=True)
+    others = [MotionFilter(limit) for limit in limits] + _removals(tests)
+    ways = [present, *(way for way in others if way.kind != present.kind)]
+    errors = _errors(found, tests, ways, rate_hz, jobs)
+    best = min(ways, key=errors.__getitem__)
+    return best if errors[best] < (1.0 - rules.filter_again) * errors[present] else present
 
 
 def loosest_limit(
@@ -143,30 +203,37 @@ def loosest_limit(
     Parameters
     ----------
     found, tests, automatic, highest, rate_hz, rules, jobs
-        See :func:`better_limit`.
+        See :func:`better_filter`; the present limit [Hz] is `highest`.
     """
     if not np.isfinite(highest):
         return highest
     rules = rules or NuisanceRules()
     above = {limit for limit in _limits(automatic, FINE_RATIO) if limit > highest}
-    errors = _errors(found, tests, {highest, np.inf, *above}, rate_hz, jobs)
-    return max(limit for limit, error in errors.items() if error <= (1.0 + rules.filter_again) * errors[highest])
+    ways = [MotionFilter(limit) for limit in sorted({highest, np.inf, *above})]
+    errors = _errors(found, tests, ways, rate_hz, jobs)
+    most = (1.0 + rules.filter_again) * errors[ways[0]]
+    return max(way.limit_hz for way, error in errors.items() if error <= most)
 
 
 def _errors(
-    found: Fit, tests: Sequence[PreparedTest], limits: Collection[float], rate_hz: float, jobs: int
-) -> dict[float, float]:
-    """Return limit [Hz] -> RMS of the residual of a chosen model, as a share of the scale of the force."""
+    found: Fit, tests: Sequence[PreparedTest], ways: Sequence[MotionFilter], rate_hz: float, jobs: int
+) -> dict[MotionFilter, float]:
+    """Return filter -> RMS of the residual of a chosen model, as a share of the scale of the force."""
 
-    def left(limit: float) -> float:
-        recordings = record_tests(tests, rate_hz=rate_hz, highest_cutoff_hz=limit)
+    def left(way: MotionFilter) -> float:
+        recordings = record_tests(way.applied(tests), rate_hz=rate_hz, highest_cutoff_hz=way.limit_hz)
         weight = recordings.used / found.problem.scales.force
         problem = replace(found.problem, recordings=recordings, root_weight=weight)
         return float(np.sqrt(fit(problem, found.theta, iterations=FINE_ITERATIONS).chi_square))
 
-    ordered = sorted(limits)
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        return dict(zip(ordered, pool.map(left, ordered), strict=True))
+        return dict(zip(ways, pool.map(left, ways), strict=True))
+
+
+def _removals(tests: Sequence[PreparedTest]) -> list[MotionFilter]:
+    """Return the filter that removes the noise which all tests share, where such noise can be seen."""
+    noise = shared_noise(tests)
+    return [] if noise is None else [MotionFilter(np.inf, noise)]
 
 
 def _limits(recordings: Recordings, ratio: float) -> list[float]:

@@ -35,6 +35,7 @@ def with_richer_forms(
     folds: int,
     draws: int,
     rng: np.random.Generator,
+    model_error: bool = False,
     jobs: int = 1,
     rules: RefinementRules | None = None,
 ) -> Selection:
@@ -50,6 +51,8 @@ def with_richer_forms(
         Named effects with their fit.
     rng
         Source of randomness.
+    model_error
+        Whether residuals are weighed by an expected error of the model.
     jobs
         Threads; the result does not depend on their number.
     rules
@@ -60,7 +63,8 @@ def with_richer_forms(
     confirmed = partial(_confirmed, folds=folds, draws=draws, rng=rng, jobs=jobs, rules=rules)
     unseen: FloatArray | None = None
     for place in range(declared, min(declared + selection.proven, len(chosen.problem.terms))):
-        if chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
+        # where the model's error is the measure, it does not show whether something remains
+        if not model_error and chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
             break
         for richer in _richer(chosen, place, CONFIRMED, jobs):
             if richer.chi_square > (1.0 - rules.least_gain) * chosen.chi_square:
@@ -187,7 +191,12 @@ def _richer(chosen: Fit, place: int, count: int, jobs: int = 1) -> Iterator[Fit]
     best = {trial.problem.terms[place].form.name: trial for trial in reversed(trials)}
     for trial in sorted(best.values(), key=lambda item: item.cost)[:count]:
         found = fit(replace(chosen.problem, terms=trial.problem.terms), trial.theta, iterations=25)
-        shapes = {item.name for item in trial.problem.terms[place].form.parameters if item.role != "amplitude"}
+        # a strength of zero leaves a part of a profile out
+        shapes = {
+            item.name
+            for item in trial.problem.terms[place].form.parameters
+            if item.role != "amplitude" and not (item.role == "strength" and found.term_values[place][item.name] == 0.0)
+        }
         if not shapes & (set(found.at_bound) - set(chosen.at_bound)):
             yield found
 

@@ -12,12 +12,12 @@ from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Term
-from mrpipe.fitting.recordings import MOST_JUDGED, Recordings, enough_tests, spread_tests
+from mrpipe.fitting.recordings import Recordings, enough_tests, spread_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.assess import Case, with_likely_names
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.choose import Choice, judged_by_trees
-from mrpipe.tracing.bench.chosen import Bench, begin, choose, limit_of_validation, recorded
+from mrpipe.tracing.bench.chosen import Bench, begin, choose, validation_of
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
 from mrpipe.tracing.bench.gates import judged, refusal_of, validated
 from mrpipe.tracing.bench.needed import without_superfluous
@@ -73,7 +73,7 @@ def trace_campaign(
     unseen = [t for t in ordered.tests if t.role == "validation"]
     bench = Bench(usable, effects, declared, rng, jobs, progress, known or {})
     begun = begin(bench, options)
-    validation = recorded(unseen, begun.limit_hz, options, most_samples=MOST_JUDGED)
+    validation = validation_of(bench, begun, unseen)
     progress(0.05, "baseline")
     training, first = begun.training, begun.first
     found = validated(first.fit, first.fit, first, training, validation, options)
@@ -84,7 +84,7 @@ def trace_campaign(
         )
     taken = choose(bench, begun)
     options, training, choice = taken.options, taken.training, taken.choice
-    validation = recorded(unseen, limit_of_validation(bench, taken), options, most_samples=MOST_JUDGED)
+    validation = validation_of(bench, taken, unseen)
     baseline, selection = choice.baseline, choice.selection
     window = selection.base.problem.window_share
     if not baseline.model_error:
@@ -95,7 +95,7 @@ def trace_campaign(
     if reason:
         selection = replace(selection, chosen=selection.without_effects)
     else:
-        selection = _refined(selection, len(declared), options, rng, jobs)
+        selection = _refined(selection, len(declared), baseline.model_error, options, rng, jobs)
     selection = with_further_terms(
         selection,
         folds=options.folds,
@@ -178,7 +178,12 @@ def _needed(
 
 
 def _refined(
-    selection: Selection, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
+    selection: Selection,
+    declared: int,
+    model_error: bool,
+    options: TracingOptions,
+    rng: np.random.Generator,
+    jobs: int,
 ) -> Selection:
     return with_richer_forms(
         selection,
@@ -186,6 +191,7 @@ def _refined(
         folds=options.folds,
         draws=options.bootstrap_draws,
         rng=rng,
+        model_error=model_error,
         jobs=jobs,
         rules=options.rules.refinement,
     )

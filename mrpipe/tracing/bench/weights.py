@@ -13,6 +13,7 @@ from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.kernel import FORCE_AT, run_recordings
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.signals.filters import butterworth_lowpass
+from mrpipe.tracing.bench.hum import hum_variance
 from mrpipe.tracing.rules import NoiseRules
 
 MOST_SHIFT = 3.0
@@ -124,7 +125,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     residuals. Squared differences are regressed on the two variances, and on one that grows with the speed; no factor
     is negative. The noise of a channel does not depend on the speed, so that the third part is not noise: it is a force
     that motion and drive do not determine, such as a disturbance that is not in step with the motion, or a damper that
-    changes from cycle to cycle.
+    changes from cycle to cycle. Hum of the mains is estimated separately, because repeats can repeat it.
     """
     rules = rules or NoiseRules()
     problem = found.problem
@@ -146,9 +147,12 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         steps.append(12.0 * recordings.force_rounding[recordings.test[a]] ** 2)
         targets.append(np.square(residual[a] - (1.0 - part) * residual[b] - part * residual[c]))
     used = root > 0.0
+    # the white noise of the channel and its hum are less than all noise
+    hum = hum_variance(residual, recordings, rules) / max(float(np.mean(force[used])), 1e-300)
+    least = 1.0 + hum if hum <= rules.most_hum else 1.0
     if not rows or sum(map(len, targets)) < rules.least_samples:
-        limit = _limit(residual[used], force[used] + motion[used])
-        return NoiseScale(limit, limit)
+        limit = _limit(residual[used], least * force[used] + motion[used])
+        return NoiseScale(limit * least, limit)
     columns, target = np.concatenate(rows), np.concatenate(targets)
     factors, without, disturbed = _parts_of_differences(columns, target, np.concatenate(steps), rules)
     # a difference holds the events of both repeats
@@ -164,6 +168,8 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     # repeated motion repeats the rounding of the force too, so their difference does not show it
     rounding = recordings.force_rounding[recordings.test] ** 2
     force_factor = max(force_factor, float(np.sum(rounding)) / max(float(np.sum(force)), 1e-300))
+    if least > 1.0:
+        force_factor = max(force_factor, least)
     limit = _limit(residual[used], (force_factor * force + motion_factor * motion)[used])
     return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events, disturbance)
 

@@ -49,6 +49,25 @@ class NoiseRules(Section):
         "squared sum grows with the speed; the noise of a channel does not depend on the speed, and on rigs with known "
         "noise at most 5 percent seem to.",
     )
+    hum_line: float = Field(
+        4.0,
+        gt=1.0,
+        description="Hum of the mains is a line with at least this multiple of the mean power of the frequencies "
+        "around it.",
+    )
+    hum_tests: float = Field(
+        0.75,
+        gt=0.0,
+        le=1.0,
+        description="Share of the tests that must show the line, because harmonics of a motion lie at other "
+        "frequencies in other tests.",
+    )
+    most_hum: float = Field(
+        10.0,
+        gt=0.0,
+        description="Hum counts as noise up to this multiple of the variance of the white noise of the force. More of "
+        "it is a fault of the channel, which a verdict must not call noise.",
+    )
     least_factor: float = Field(
         0.25,
         gt=0.0,

@@ -55,6 +55,12 @@ class NuisanceRules(Section):
         description="The displacement is filtered below the cut-off that its spectrum suggests if a base form then "
         "leaves an error that is smaller by this share.",
     )
+    filter_doubt: float = Field(
+        0.25,
+        ge=0.0,
+        description="The noise that all tests share is removed from the displacement unless simple base forms leave "
+        "less by this share behind a low-pass.",
+    )
     filter_again: float = Field(
         0.05,
         ge=0.0,

@@ -29,7 +29,8 @@ def _options(rate_hz: float) -> TracingOptions:
     )
 
 
-def _twice(_choice: Any, _tests: Any, _limit: float, options: TracingOptions) -> TracingOptions:
+def _twice(_bench: Bench, found: Any) -> TracingOptions:
+    options: TracingOptions = found.options
     return options.model_copy(update={"fit_rate_hz": 2.0 * options.fit_rate_hz})
 
 
@@ -55,7 +56,7 @@ def test_a_rate_that_changes_the_names_is_not_kept(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(module, "_choose", choose_once)
     monkeypatch.setattr(module, "_at_better_rate", _twice)
-    monkeypatch.setattr(module, "better_limit", lambda *args, **_: args[3])
+    monkeypatch.setattr(module, "better_filter", lambda *args, **_: args[3])
     found = choose(bench, begin(bench, _options(62.5)))
     assert len(calls) == 2
     assert found.options.fit_rate_hz == 62.5

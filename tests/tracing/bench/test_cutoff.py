@@ -1,8 +1,9 @@
-"""The displacement is filtered as far as models predict better, and no further."""
+"""The displacement is freed of noise as far as models predict better, and no further."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,10 +11,10 @@ from scipy import signal
 
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import fit
-from mrpipe.fitting.recordings import Recordings, record_tests
+from mrpipe.fitting.recordings import record_tests
 from mrpipe.fitting.start import base_of, best_fit, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.cutoff import better_limit, highest_cutoff, loosest_limit
+from mrpipe.tracing.bench.cutoff import MotionFilter, best_filter, better_filter, loosest_limit, simple_error
 from tests.tracing.bench.rig import hysteresis
 
 RATE = 1000.0
@@ -54,26 +55,42 @@ def recorded(motions: list[np.ndarray], law: str, hum_m: float = 0.0) -> list[Pr
     return tests
 
 
-def limit_of(tests: list[PreparedTest]) -> tuple[float, Recordings]:
+def filter_of(tests: list[PreparedTest]) -> MotionFilter:
     automatic = record_tests(tests, rate_hz=250.0)
-    return highest_cutoff(tests, automatic, rate_hz=250.0, yield_order=2, viscosity_order=1), automatic
+    return best_filter(tests, automatic, partial(simple_error, rate_hz=250.0, yield_order=2, viscosity_order=1))
 
 
 @pytest.mark.planted
-def test_hum_that_stands_out_of_the_noise_is_filtered_as_the_motion_does_not_need_it() -> None:
-    # a spectrum cannot separate the lines of the mains from motion; the force by velocity shows that they are none
+def test_hum_that_all_tests_share_is_removed() -> None:
     motions = [sine(0.01 * size, speed) for size in (0.5, 1.0) for speed in (0.5, 1.0, 1.5)]
-    limit, automatic = limit_of(recorded(motions, "velocity", hum_m=1e-6))
-    assert np.max(automatic.cutoff_hz) > 150.0
-    assert limit < 50.0
+    tests = recorded(motions, "velocity", hum_m=1e-6)
+    found = filter_of(tests)
+    assert np.max(record_tests(tests, rate_hz=250.0).cutoff_hz) > 150.0
+    assert found.noise is not None
+    for test in found.applied(tests):
+        assert np.std((test.displacement_raw_m - test.displacement_m)[500:-500]) < 3e-7
 
 
 @pytest.mark.planted
-def test_the_filter_keeps_motion_that_the_hysteresis_follows() -> None:
-    motions = [random_motion(0.002, highest, seed) for seed, highest in enumerate((60.0, 60.0, 30.0, 15.0))]
-    limit, automatic = limit_of(recorded(motions, "hysteresis"))
-    assert limit > 60.0
-    assert np.max(automatic.cutoff_hz) > 60.0
+def test_hum_is_filtered_where_the_noise_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    # a spectrum cannot separate the lines of the mains from motion; the force by velocity shows that they are none
+    monkeypatch.setattr("mrpipe.tracing.bench.cutoff.shared_noise", lambda _: None)
+    motions = [sine(0.01 * size, speed) for size in (0.5, 1.0) for speed in (0.5, 1.0, 1.5)]
+    found = filter_of(recorded(motions, "velocity", hum_m=1e-6))
+    assert found.noise is None
+    assert found.limit_hz < 50.0
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("bands_hz", [(60.0, 60.0, 30.0, 15.0), (40.0, 40.0, 40.0, 40.0)])
+def test_motion_that_the_hysteresis_follows_is_kept(bands_hz: tuple[float, ...]) -> None:
+    """Where all tests hold the same random motion, that motion looks like noise of the sensor."""
+    tests = recorded([random_motion(0.002, highest, seed) for seed, highest in enumerate(bands_hz)], "hysteresis")
+    found = filter_of(tests)
+    recordings = record_tests(found.applied(tests), rate_hz=1000.0, highest_cutoff_hz=found.limit_hz)
+    moved = np.concatenate([test.displacement_m for test in tests])
+    error = (recordings.displacement - moved)[recordings.used]
+    assert np.sqrt(np.mean(error**2)) < 2e-6
 
 
 @pytest.mark.property
@@ -91,11 +108,12 @@ def test_the_chosen_model_finds_that_a_limit_rounds_the_corners_of_triangles() -
     automatic, low = (record_tests(tests, rate_hz=250.0, highest_cutoff_hz=limit) for limit in (np.inf, 6.0))
     form = base_form("bouc-wen")
     found = best_fit(first_problem(low, base_of(low, form, polynomial_laws(form, 3, 2, 1))), starts=1, iterations=6)
-    better = better_limit(found, tests, automatic, 6.0, rate_hz=250.0)
-    assert better > 20.0
-    # without a limit nothing is lost, so none is set
+    better = better_filter(found, tests, automatic, MotionFilter(6.0), rate_hz=250.0)
+    assert better.noise is not None or better.limit_hz > 20.0
+    # where nothing is lost, the filter is kept
+    present = MotionFilter()
     problem = replace(found.problem, recordings=automatic, root_weight=automatic.used / found.problem.scales.force)
-    assert better_limit(fit(problem, found.theta), tests, automatic, np.inf, rate_hz=250.0) == np.inf
+    assert better_filter(fit(problem, found.theta), tests, automatic, present, rate_hz=250.0) is present
 
 
 @pytest.mark.planted
