@@ -51,6 +51,12 @@ GAP = 2.0
 MOST_LEVEL = 4.0
 """Most power of the noise of one test, in units of the shared one. Jumps of a channel that was stuck look like more."""
 
+FEWEST = 9
+"""Numerical technique: fewest samples from which the curvature at an end of a record is estimated."""
+
+PARABOLA_FITS = 1.5
+"""Numerical technique: a parabola fits if it leaves at most this multiple of the noise."""
+
 
 @dataclass(frozen=True)
 class NoiseDensity:
@@ -131,12 +137,12 @@ def _quiet(test: PreparedTest, noise: NoiseDensity) -> PreparedTest:
     if np.ptp(values) == 0.0:
         return test
     count = len(values)
-    trend = _ends(values, rate, test.motion_frequency_hz)
-    # a series of sines is the odd continuation at both ends: without value and curvature there it has no jump
-    lines = fft.dst(values[1:-1] - trend[1:-1], type=1) / (count - 1)
     step = rate / (2.0 * (count - 1))
     frequency = step * np.arange(1, count - 1)
     expected = noise.at(np.asarray(frequency)) * _level(test, noise)
+    trend = _ends(values, rate, test.motion_frequency_hz, float(np.sqrt(np.sum(expected) * step)))
+    # a series of sines is the odd continuation at both ends: without value and curvature there it has no jump
+    lines = fft.dst(values[1:-1] - trend[1:-1], type=1) / (count - 1)
     power = lines**2 / (2.0 * step)
     passed = _passed(power, expected, step)
     motion = trend.copy()
@@ -156,18 +162,42 @@ def _quiet(test: PreparedTest, noise: NoiseDensity) -> PreparedTest:
     )
 
 
-def _ends(values: FloatArray, rate_hz: float, motion_hz: float) -> FloatArray:
-    """Return the cubic polynomial with the value and the curvature that a record has at its ends, shape (n,)."""
+def _ends(values: FloatArray, rate_hz: float, motion_hz: float, deviation: float) -> FloatArray:
+    """Return the cubic polynomial with the value and the curvature that a record has at its ends, shape (n,).
+
+    Parameters
+    ----------
+    values
+        Record [m], shape (n,).
+    rate_hz, motion_hz
+        Sampling rate, and frequency of the motion.
+    deviation
+        Standard deviation of its noise [m].
+    """
     count = len(values)
-    few = int(np.clip(rate_hz / (16.0 * max(motion_hz, 1e-3)), 5, count // 4))
-    index = np.arange(few)
-    first, last = (np.polyfit(index, piece[:few], 2) for piece in (values, values[::-1]))
+    longest = int(np.clip(rate_hz / (16.0 * max(motion_hz, 1e-3)), FEWEST, max(FEWEST, count // 4)))
+    first, last = (_parabola(piece, longest, deviation) for piece in (values, values[::-1]))
     place = np.arange(count) / (count - 1)
     span = float(count - 1) ** 2
     a, b = 2.0 * first[0] * span, 2.0 * last[0] * span
     line = first[2] + (last[2] - first[2]) * place
     bend = a * (place**2 / 2.0 - place**3 / 6.0 - place / 3.0) + b * (place**3 - place) / 6.0
     return np.asarray(line + bend, dtype=np.float64)
+
+
+def _parabola(values: FloatArray, longest: int, deviation: float) -> FloatArray:
+    """Return the parabola at the beginning of a record, over as many samples as it fits within the noise; shape (3,).
+
+    A corner of a triangle near the end would feign a curvature.
+    """
+    few = longest
+    while True:
+        index = np.arange(few)
+        found = np.polyfit(index, values[:few], 2)
+        left = float(np.std(values[:few] - np.polyval(found, index)))
+        if few <= FEWEST or left < PARABOLA_FITS * deviation:
+            return np.asarray(found, dtype=np.float64)
+        few = max(FEWEST, few // 2)
 
 
 def _level(test: PreparedTest, noise: NoiseDensity) -> float:
