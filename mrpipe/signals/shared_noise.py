@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft, ndimage, signal, stats
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.signals.prepared import PreparedTest
 
 SEGMENT_S = 2.0
@@ -30,8 +30,11 @@ HARMONICS = 4.0
 SMOOTHED_BINS = 31
 """Numerical technique: over so many frequencies the density of the noise is smoothed."""
 
+MAINS_HZ = (50.0, 60.0)
+"""Frequencies of the mains, at whose multiples all tests may hold hum."""
+
 LINE = 4.0
-"""A frequency at which the quietest tests exceed the smoothed density this many times is a line, such as hum."""
+"""Hum exceeds the smoothed density this many times in the quietest tests."""
 
 TAPS = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
 """Numerical technique: weights by which neighbouring frequencies of one test are averaged."""
@@ -85,24 +88,26 @@ def shared_noise(tests: Sequence[PreparedTest]) -> NoiseDensity | None:
         Prepared tests of one sensor, with unequal motion. Where all of them hold the same random motion, the motion
         looks like noise: whether the estimate is of use shows in the error of models.
     """
-    spectra = [_density(test) for test in tests if np.ptp(test.displacement_raw_m) > 0.0]
-    moving = [test.motion_frequency_hz for test in tests if test.motion_frequency_hz > 0.0]
-    if not spectra or not moving:
+    moving = [test for test in tests if np.ptp(test.displacement_raw_m) > 0.0 and test.motion_frequency_hz > 0.0]
+    if not moving:
         return None
+    spectra = [_density(test) for test in moving]
     step = max(frequency[1] for frequency, _ in spectra)
     top = min(frequency[-1] for frequency, _ in spectra)
     frequency = np.arange(step, 0.95 * top, step)
-    lowest = int(np.searchsorted(frequency, max(HARMONICS * float(np.median(moving)), 6.0 * step)))
+    typical_hz = float(np.median([test.motion_frequency_hz for test in moving]))
+    lowest = int(np.searchsorted(frequency, max(HARMONICS * typical_hz, 6.0 * step)))
     if lowest + SMOOTHED_BINS > len(frequency):
         return None
-    densities = np.array([np.interp(frequency, *spectrum) for spectrum in spectra])
-    quiet = np.quantile(densities, QUIETEST, axis=0)
+    valleys = np.array([np.interp(frequency, *_between_lines(test)) for test in moving])
+    quiet = np.quantile(valleys, QUIETEST, axis=0)
     quiet[:lowest] = np.median(quiet[lowest : lowest + SMOOTHED_BINS])
     smooth = ndimage.median_filter(quiet, SMOOTHED_BINS, mode="nearest")
-    density = np.where(quiet > LINE * smooth, quiet, smooth)
     # a quantile is low: it is scaled to the typical test where no test holds motion
     upper = frequency > 0.5 * top
-    density *= float(np.median(np.mean(densities[:, upper] / np.maximum(density[upper], 1e-300), axis=1)))
+    smooth *= float(np.median(np.mean(valleys[:, upper] / np.maximum(smooth[upper], 1e-300), axis=1)))
+    lines = np.quantile([np.interp(frequency, *spectrum) for spectrum in spectra], QUIETEST, axis=0)
+    density = np.where(_near_mains(frequency, step) & (lines > LINE * smooth), lines, smooth)
     return NoiseDensity(frequency, density) if np.all(density > 0.0) else None
 
 
@@ -122,14 +127,32 @@ def quiet_motion(tests: Sequence[PreparedTest], noise: NoiseDensity) -> list[Pre
     return [_quiet(test, noise) for test in tests]
 
 
-def _density(test: PreparedTest) -> tuple[FloatArray, FloatArray]:
+def _density(test: PreparedTest, segment_s: float = SEGMENT_S) -> tuple[FloatArray, FloatArray]:
     """Return frequencies [Hz] and density [m^2/Hz] of a displacement; the window leaks 92 dB less than its peak."""
     values, rate = test.displacement_raw_m, test.sampling_rate_hz
-    length = int(min(SEGMENT_S * rate, len(values) // 2))
+    length = int(min(segment_s * rate, len(values) // 2))
     frequency, density = signal.welch(
         values, fs=rate, nperseg=length, window="blackmanharris", detrend="linear", average="median"
     )
     return np.asarray(frequency), np.asarray(density)
+
+
+def _between_lines(test: PreparedTest) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies [Hz] and the density of a displacement between the harmonics of its motion [m^2/Hz].
+
+    A machine distorts every sine in the same way, so that harmonics are in all tests and look like noise.
+    """
+    frequency, density = _density(test, np.inf)
+    width = max(2 * SMOOTHED_BINS // 3, round(3.0 * test.motion_frequency_hz / frequency[1]))
+    low = ndimage.percentile_filter(density, 100.0 * QUIETEST, size=width, mode="nearest")
+    upper = (frequency > 0.5 * frequency[-1]) & (frequency < 0.95 * frequency[-1])
+    return frequency, np.asarray(low * np.mean(density[upper]) / max(float(np.mean(low[upper])), 1e-300))
+
+
+def _near_mains(frequency_hz: FloatArray, step_hz: float) -> BoolArray:
+    """Return which frequencies are within the main lobe of a line of the mains, shape (m,)."""
+    distance = np.min([np.abs(frequency_hz - mains * np.round(frequency_hz / mains)) for mains in MAINS_HZ], axis=0)
+    return np.asarray((distance <= 4.0 * step_hz) & (frequency_hz > 0.5 * min(MAINS_HZ)))
 
 
 def _quiet(test: PreparedTest, noise: NoiseDensity) -> PreparedTest:
