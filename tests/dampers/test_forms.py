@@ -43,6 +43,10 @@ NUMBERS: dict[str, dict[str, float]] = {
         "yield_velocity": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.1, "rest_share": 0.4,
         "bend": 1.0, "largest_drive": 2.0,
     },
+    "biviscous-viscosity": {"preyield_viscosity": 4500.0},
+    "hysteretic-biviscous-viscosity": {
+        "preyield_viscosity": 4500.0, "hysteresis_velocity": 0.008, "acceleration_scale": 0.1,
+    },
     "hyperbolic-tangent": {"velocity_scale": 0.015, "shift": 0.6, "displacement_scale": 1e-3, "stiffness": 900.0},
     "hysteretic-sigmoid": {"velocity_scale": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.02},
     "algebraic": {"velocity_scale": 0.015, "frequency": 1.5, "sharpness": 3.0},
@@ -177,7 +181,10 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
     rest, width = p.get("rest_share", 1.0), p.get("yield_velocity", math.inf)
     if rest < 1.0:
         width *= rest + (1.0 - rest) * (DRIVE / p["largest_drive"]) ** p["bend"]
+    before = p.get("preyield_viscosity", 0.0)
     static = {
+        "biviscous-viscosity": lambda: np.clip(before * v / YIELD, -1, 1),
+        "hysteretic-biviscous-viscosity": lambda: np.clip((before * v - (before + VISCOSITY) * late) / YIELD, -1, 1),
         "bingham": lambda: np.tanh(v / p["transition_velocity"]),
         "biviscous": lambda: np.clip(v / width, -1, 1),
         "hysteretic-biviscous": lambda: np.clip((v - late) / width, -1, 1),
