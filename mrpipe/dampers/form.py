@@ -73,6 +73,8 @@ class BaseForm:
         The steps read yield force or viscosity, so z depends on the laws of the drive.
     known
         A step adds a force to `EXTRA_FORCE` that no linear coefficient scales, such as that of an inner spring.
+    begins_with
+        Form whose fitted laws a coupled form reads first; empty for a simple hysteresis.
     family
         Physical family where several forms are variants of one, else the form's own name.
     hysteresis
@@ -97,6 +99,7 @@ class BaseForm:
     coupled: bool = False
     known: bool = False
     family: str = ""
+    begins_with: str = ""
     hysteresis: Callable[[Values], tuple[float, float, float]] | None = None
     dissipative: bool = True
     springs: tuple[str, ...] = ()

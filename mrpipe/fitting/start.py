@@ -97,14 +97,18 @@ def first_reference(base: Base, recordings: Recordings) -> tuple[Law, ...]:
 def first_problem(recordings: Recordings, base: Base) -> Problem:
     """Return the unweighted problem with no effect.
 
-    The laws that a coupled form reads are those of a simple hysteresis: its post-yield force is much the same.
+    The laws that a coupled form reads are those of a simple hysteresis, because its post-yield force is much the same,
+    or those of the form that it names (`begins_with`), fitted to the same tests.
     """
     scales = recordings.scales()
     weight = recordings.used / scales.force
     problem = Problem(recordings, base, (), weight, scales, first_reference(base, recordings))
     if not base.form.coupled:
         return problem
-    plain = first_problem(recordings, replace(base, form=base_form(DEFAULT_FORM), laws=base.laws[:2], held={}))
+    other = base_form(base.form.begins_with or DEFAULT_FORM)
+    plain = first_problem(recordings, base_of(recordings, other, base.laws[:2]))
+    if base.form.begins_with:
+        return replace(problem, reference=best_fit(plain, starts=1, iterations=BEGUN_STEPS).laws)
     found = solve(plain, start_of(plain, {}, []), weighting(plain))
     laws = plain.base.laws_of(found.linear, plain.values(start_of(plain, {}, []))[0], scales.drive)
     return replace(problem, reference=laws)

@@ -48,4 +48,5 @@ FORM = BaseForm(
     post_yield=_post_yield,
     coupled=True,
     family="biviscous",
+    begins_with="biviscous",
 )

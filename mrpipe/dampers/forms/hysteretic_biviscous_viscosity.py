@@ -70,4 +70,5 @@ FORM = BaseForm(
     post_yield=_post_yield,
     coupled=True,
     family="biviscous",
+    begins_with="hysteretic-biviscous",
 )
