@@ -48,8 +48,12 @@ BROAD_HZ = 2.0
 BROAD_RATIO = 3.0
 """A band whose median exceeds the noise this many times holds motion."""
 
-GAP = 2.0
-"""Above the first gap in which nothing passes up to this multiple of a frequency, nothing is taken for motion."""
+GAP = 3.5
+"""Above the first gap in which nothing passes up to this multiple of a frequency, nothing is taken for motion. A triangle
+has gaps from its first to its third harmonic."""
+
+LOST = 2.0
+"""Motion that does not pass is looked for up to this multiple of the highest frequency that passes."""
 
 MOST_LEVEL = 4.0
 """Most power of the noise of one test, in units of the shared one. Jumps of a channel that was stuck look like more."""
@@ -172,7 +176,7 @@ def _quiet(test: PreparedTest, noise: NoiseDensity) -> PreparedTest:
     motion[1:-1] += 0.5 * fft.dst(passed * lines, type=1)
     held = np.flatnonzero(passed > 0.5)
     # what does not pass holds motion as far as its power exceeds that of the noise, up to the power of the noise
-    near = (passed == 0.0) & (np.arange(len(passed)) < GAP * (held[-1] + 1 if len(held) else 0))
+    near = (passed == 0.0) & (np.arange(len(passed)) < LOST * (held[-1] + 1 if len(held) else 0))
     lost = np.clip(np.sum((power - expected)[near]) / max(float(np.sum(expected[near])), 1e-300), 0.0, 1.0)
     error = np.where(near, lost, passed) * expected * step
     remains, speed = (np.sqrt(np.sum(weight * error)) for weight in (1.0, (2.0 * np.pi * frequency) ** 2))

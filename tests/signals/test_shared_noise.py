@@ -139,6 +139,13 @@ def test_the_noise_that_remains_is_stated() -> None:
         assert test.motion_band_hz < 25.0
 
 
+def test_the_harmonics_of_triangles_pass() -> None:
+    tests = recorded(white, [*map(sine, (0.5, 1.0, 1.5, 2.0)), *map(triangle, (0.5, 0.7, 1.0, 1.3))])
+    for test in quiet_motion(tests, density_of(tests))[4:]:
+        assert test.motion_band_hz > 30.0
+        assert np.std((test.displacement_raw_m - test.displacement_m)[300:-300]) < 0.8 * NOISE_M
+
+
 def test_motion_without_noise_is_kept() -> None:
     tests = recorded(lambda _: np.zeros(len(TIME)), MOTIONS)
     noise = density_of(recorded(white, MOTIONS))
