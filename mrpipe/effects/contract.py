@@ -142,6 +142,8 @@ class Effect(Described):
         `damper` or `frame`.
     separated_by
         Other effect -> test that separates the two.
+    law_of_drive
+        It bends the drive, so that a law of the drive that levels off does much the same.
     refinements
         Richer forms of the same physics, too supple to name it by: once it is named, one of them takes the form's place
         where it is better on tests left out.
@@ -154,6 +156,7 @@ class Effect(Described):
     rig: Literal["damper", "frame"] = "damper"
     separated_by: Mapping[str, Separation] = field(default_factory=dict)
     refinements: tuple[EffectForm, ...] = ()
+    law_of_drive: bool = False
 
     def form(self, name: str) -> EffectForm:
         """Return one form by name."""

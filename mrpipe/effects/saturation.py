@@ -133,6 +133,7 @@ EFFECT = Effect(
     "dependence on the drive's past.",
     source="B-H curve of the flux path",
     acts_on="effective drive",
+    law_of_drive=True,
     forms=(
         EffectForm("sharp", "min(u, us)", (_INVERSE,), _sharp),
         EffectForm("smooth", "u/(1 + (u/us)^6)^(1/6)", (_INVERSE,), _smooth),

@@ -49,8 +49,8 @@ BROAD_RATIO = 3.0
 """A band whose median exceeds the noise this many times holds motion."""
 
 GAP = 3.5
-"""Above the first gap in which nothing passes up to this multiple of a frequency, nothing is taken for motion. A triangle
-has gaps from its first to its third harmonic."""
+"""Above the first gap in which nothing passes up to this multiple of a frequency, nothing is taken for motion. A
+triangle has gaps from its first to its third harmonic."""
 
 LOST = 2.0
 """Motion that does not pass is looked for up to this multiple of the highest frequency that passes."""

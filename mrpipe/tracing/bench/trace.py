@@ -20,6 +20,7 @@ from mrpipe.tracing.bench.choose import Choice, judged_by_trees
 from mrpipe.tracing.bench.chosen import Bench, begin, choose, validation_of
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
 from mrpipe.tracing.bench.gates import judged, refusal_of, validated
+from mrpipe.tracing.bench.law_rival import without_laws_of_drive
 from mrpipe.tracing.bench.needed import without_superfluous
 from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
@@ -96,6 +97,8 @@ def trace_campaign(
         selection = replace(selection, chosen=selection.without_effects)
     else:
         selection = _refined(selection, len(declared), baseline.model_error, options, rng, jobs)
+        compared = Unseen(options.folds, options.bootstrap_draws, rng)
+        selection, gains, reason = without_laws_of_drive(selection, gains, len(declared), compared, jobs)
     selection = with_further_terms(
         selection,
         folds=options.folds,

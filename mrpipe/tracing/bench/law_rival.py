@@ -1,0 +1,96 @@
+"""Laws of the drive that compete with an effect which bends the drive.
+
+A yield force that levels off with the drive is a law of the base form, as every magnetic circuit has. A driver or a
+core that saturates bends the drive itself, so that the viscosity levels off too. While something is missing, the laws
+are polynomials, and an effect that bends the drive takes the place of a law that they cannot follow. Therefore the
+effect is proven only if it predicts tests that were left out better than a law that saturates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from mrpipe.dampers.laws import LawShape
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.reference import with_own_laws
+from mrpipe.tracing.bench.crossvalidation import Gain
+from mrpipe.tracing.bench.rivals import ITERATIONS, Unseen
+from mrpipe.tracing.bench.select import Selection
+
+LAWS = (LawShape("tanh"), LawShape("langevin"), LawShape("froehlich"))
+"""Numerical technique: laws of the yield force that saturate, each with two coefficients and a scale."""
+
+
+def without_laws_of_drive(
+    selection: Selection, gains: Sequence[Gain | None], declared: int, unseen: Unseen, jobs: int = 1
+) -> tuple[Selection, list[Gain | None], str]:
+    """Return the selection, its gains, and why an effect is not named where a law of the drive predicts as well.
+
+    The law then takes the place of the effect. The reason is empty where effects remain or none had to go.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit, without further terms.
+    gains
+        Of the named effects on tests that were left out.
+    declared
+        How many terms the campaign declares: they are part of every model.
+    unseen
+        Comparison on tests that were left out.
+    jobs
+        Threads.
+    """
+    kept = list(gains)
+    chosen = selection.chosen
+    last = min(declared + selection.proven, len(chosen.problem.terms))
+    places = [place for place in range(declared, last) if chosen.problem.terms[place].effect.law_of_drive]
+    if not places:
+        return selection, kept, ""
+    place = places[0]
+    rival = best_law(chosen, place)
+    if unseen.better(rival, chosen, jobs):
+        return selection, kept, ""
+    name = chosen.problem.terms[place].effect.name
+    number = place - declared
+    rest = tuple(item for k, item in enumerate(selection.rounds) if k != number)
+    found = replace(
+        selection,
+        chosen=rival,
+        ground=rival if last - declared == 1 else selection.ground,
+        proven=last - declared - 1,
+        rounds=rest or selection.rounds[:1],
+    )
+    kept = [gain for k, gain in enumerate(kept) if k != number]
+    if last - declared > 1:
+        return found, kept, ""
+    return (
+        found,
+        kept,
+        (
+            f"no effect is named: {name} lowers the error, but a yield force that levels off with the drive "
+            f"({rival.problem.base.laws[0].kind} law) predicts tests that were left out as well"
+        ),
+    )
+
+
+def best_law(found: Fit, place: int) -> Fit:
+    """Return the fit without one of its terms, with the law of the yield force that saturates and fits best.
+
+    Parameters
+    ----------
+    found
+        Fit with effects.
+    place
+        Which of its terms is left out.
+    """
+    problem = found.problem
+    terms = tuple(item for k, item in enumerate(problem.terms) if k != place)
+    values = [item for k, item in enumerate(found.term_values) if k != place]
+    fits = []
+    for law in LAWS:
+        base = replace(problem.base, laws=(law, *problem.base.laws[1:]))
+        trial = replace(problem, base=base, terms=terms)
+        fits.append(with_own_laws(fit(trial, start_of(trial, found.base_values, values), iterations=ITERATIONS)))
+    return min(fits, key=lambda item: item.chi_square)
