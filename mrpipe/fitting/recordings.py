@@ -70,6 +70,8 @@ class Recordings:
         Cut-off of the displacement, shape (tests,).
     noise_band_hz
         Band of the displacement's noise, shape (tests,): up to the cut-off where no other is known.
+    noise_repeats
+        Share of the variance of the displacement's noise that repeats where the motion repeats, shape (tests,).
     """
 
     displacement: FloatArray
@@ -90,6 +92,7 @@ class Recordings:
     period_s: FloatArray
     cutoff_hz: FloatArray
     noise_band_hz: FloatArray
+    noise_repeats: FloatArray
 
     @property
     def tests(self) -> int:
@@ -152,6 +155,7 @@ class Recordings:
             period_s=self.period_s[chosen],
             cutoff_hz=self.cutoff_hz[chosen],
             noise_band_hz=self.noise_band_hz[chosen],
+            noise_repeats=self.noise_repeats[chosen],
         )
 
     def scales(self) -> EffectScales:
@@ -242,6 +246,7 @@ def record_tests(
         period_s=numbers("period_s"),
         cutoff_hz=numbers("cutoff_hz"),
         noise_band_hz=numbers("noise_band_hz"),
+        noise_repeats=numbers("noise_repeats"),
     )
 
 
@@ -320,6 +325,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
         "period_s": float(np.median(periods)) / rate if len(periods) else 0.0,
         "cutoff_hz": cutoff,
         "noise_band_hz": band,
+        "noise_repeats": test.displacement_noise_repeats if test.motion_band_hz > 0.0 else test.rounding_share,
     }
 
 

@@ -86,6 +86,7 @@ def bench_recordings(
         period_s=zeros,
         cutoff_hz=zeros,
         noise_band_hz=zeros,
+        noise_repeats=zeros,
     )
 
 

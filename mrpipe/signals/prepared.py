@@ -37,6 +37,9 @@ class PreparedTest:
     displacement_noise_m, displacement_noise_band_hz
         Standard deviation and band of the displacement's noise where it was put together from several sensors, so that
         the channel itself does not show; 0 if it does. Not written to the artifact.
+    displacement_noise_repeats
+        Share of the variance of that noise which repeats where the motion repeats: rounding, and motion that a filter
+        took away. Not written to the artifact.
     motion_band_hz
         Highest frequency of the motion if the noise was removed from the displacement (see
         :mod:`mrpipe.signals.shared_noise`); 0 if it was not. Not written to the artifact.
@@ -73,6 +76,7 @@ class PreparedTest:
     force_offset_n: float = 0.0
     displacement_noise_m: float = 0.0
     displacement_noise_band_hz: float = 0.0
+    displacement_noise_repeats: float = 0.0
     motion_band_hz: float = 0.0
 
     @property
@@ -96,6 +100,12 @@ class PreparedTest:
     def channel_noise_m(self) -> float:
         """Standard deviation of the noise of the unfiltered displacement over its whole band [m]."""
         return steady_noise(self.displacement_raw_m, self.sampling_rate_hz)
+
+    @cached_property
+    def rounding_share(self) -> float:
+        """Share of the variance of the displacement's noise that is rounding; 0 if it is not quantised."""
+        rounding = resolution(self.displacement_raw_m) / np.sqrt(12.0)
+        return float(min(1.0, (rounding / max(self.channel_noise_m, 1e-300)) ** 2))
 
     @cached_property
     def motion_frequency_hz(self) -> float:
@@ -160,6 +170,7 @@ def read_prepared(artifact: Artifact) -> list[PreparedTest]:
                 force_offset_n=float(notes["force_offset_n"]),
                 displacement_noise_m=0.0,
                 displacement_noise_band_hz=0.0,
+                displacement_noise_repeats=0.0,
                 motion_band_hz=0.0,
                 **channels,
             )

@@ -119,7 +119,8 @@ def quiet_motion(tests: Sequence[PreparedTest], noise: NoiseDensity) -> list[Pre
     """Return the tests with their unfiltered displacement replaced by the estimated motion.
 
     `displacement_noise_m` and `displacement_noise_band_hz` then describe the error that remains: noise that passes, and
-    motion that does not. `motion_band_hz` is the highest frequency that passes.
+    motion that does not. `displacement_noise_repeats` is the share of it that repeats where the motion repeats, and
+    `motion_band_hz` the highest frequency that passes.
 
     Parameters
     ----------
@@ -179,12 +180,14 @@ def _quiet(test: PreparedTest, noise: NoiseDensity) -> PreparedTest:
     near = (passed == 0.0) & (np.arange(len(passed)) < LOST * (held[-1] + 1 if len(held) else 0))
     lost = np.clip(np.sum((power - expected)[near]) / max(float(np.sum(expected[near])), 1e-300), 0.0, 1.0)
     error = np.where(near, lost, passed) * expected * step
+    lasting = float(np.sum(error[near]) + test.rounding_share * np.sum(error[~near]))
     remains, speed = (np.sqrt(np.sum(weight * error)) for weight in (1.0, (2.0 * np.pi * frequency) ** 2))
     return replace(
         test,
         displacement_raw_m=motion,
         displacement_noise_m=float(remains),
         displacement_noise_band_hz=float(np.sqrt(3.0) * speed / (2.0 * np.pi * max(remains, 1e-300))),
+        displacement_noise_repeats=lasting / max(float(np.sum(error)), 1e-300),
         motion_band_hz=float(frequency[held[-1]]) if len(held) else float(frequency[0]),
     )
 

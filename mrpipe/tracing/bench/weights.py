@@ -165,7 +165,9 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     force_factor, motion_factor = (
         max(min(float(factor), limit), rules.least_factor) for factor, limit in zip(factors, largest, strict=True)
     )
-    # repeated motion repeats the rounding of the force too, so their difference does not show it
+    # repeated motion repeats rounding, and what the filter took away, so that their difference does not show it
+    lasting = recordings.noise_repeats[recordings.test] * motion
+    motion_factor = max(motion_factor, float(np.sum(lasting[used])) / max(float(np.sum(motion[used])), 1e-300))
     rounding = recordings.force_rounding[recordings.test] ** 2
     force_factor = max(force_factor, float(np.sum(rounding)) / max(float(np.sum(force)), 1e-300))
     if least > 1.0:
