@@ -131,7 +131,11 @@ def assess(
         alone = validated(selection.base, proven.chosen, baseline, case.training, case.validation, options, differ)
     judgement = judged(alone, proven, case.training, options, causes, missing, reason, case.ordered, case.jobs)
     several = several or len(named) > 1
-    likely = tuple(held(item, judgement, options, several=several, chosen=item in named) for item in causes)
+    evidence = judgement.evidence
+    beyond = evidence.structured and evidence.after > options.rules.validation.noise_floors * evidence.floor
+    likely = tuple(
+        held(item, judgement, options, several=several, beyond=beyond, chosen=item in named) for item in causes
+    )
     return Assessment(named, likely, further, missing, found, alone, judgement)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -13,6 +13,9 @@ from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.faults import KnownFaults
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.summary import Tracing
+
+GRID = 50
+"""Numerical technique: points at which a line or a parabola is fitted to a law."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,11 @@ def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Correction
                 found = replace(found, displacement_late_s=late)
         elif term.form.name == "drift":
             found = replace(found, force_drift_n_s=float(values["rate"]))
+        elif term.form.name == "warming":
+            found = replace(found, force_drift_n_s=_line_of(values, chosen.problem.scales.time))
+        elif term.form.name == "with-drive-power":
+            linear, square = _parabola_of(values, chosen.problem.scales.drive)
+            found = replace(found, force_per_drive_n=linear, force_per_drive_squared_n=square)
         elif term.effect.name == "offset":
             found = replace(
                 found,
@@ -88,6 +96,23 @@ def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Correction
     if any(item.effect.name == "offset" and item.form == "per-test" for item in traced.named):
         found = replace(found, force_offset_n=_offsets(traced, tests))
     return found
+
+
+def _line_of(values: Mapping[str, float], longest_s: float) -> float:
+    """Return the slope of the line nearest to a zero that warms up [N/s]: prepare removes lines.
+
+    The constant part is an offset of each test, which prepare finds by itself.
+    """
+    time = np.linspace(0.0, longest_s, GRID)
+    return float(np.polyfit(time, values["rise"] * (1.0 - np.exp(-time / values["warming_time"])), 1)[0])
+
+
+def _parabola_of(values: Mapping[str, float], largest_drive: float) -> tuple[float, float]:
+    """Return the coefficients of drive and squared drive nearest to a power of the drive: prepare removes these."""
+    drive = np.linspace(0.0, largest_drive, GRID)
+    columns = np.stack([drive, drive**2], axis=1)
+    linear, square = np.linalg.lstsq(columns, values["rate"] * drive ** values["power"], rcond=None)[0]
+    return float(linear), float(square)
 
 
 def _offsets(traced: Tracing, tests: Sequence[PreparedTest]) -> dict[str, float]:

@@ -170,7 +170,15 @@ def structured(
     return learnt or structure_p_value(base.residual, states_of(base, training)) < options.rules.validation.whiteness
 
 
-def held(item: Named, judgement: Judgement, rules: NamingRules, *, several: bool, chosen: bool = True) -> Named:
+def held(
+    item: Named,
+    judgement: Judgement,
+    rules: NamingRules,
+    *,
+    several: bool,
+    beyond: bool = False,
+    chosen: bool = True,
+) -> Named:
     """Return an effect with its confidence as a probability.
 
     Parameters
@@ -183,16 +191,19 @@ def held(item: Named, judgement: Judgement, rules: NamingRules, *, several: bool
         They hold the probabilities.
     several
         Whether the effect is named together with others.
+    beyond
+        Whether a structured residual far above the noise remains, although no flexible model learns it.
     chosen
         Whether it was chosen among the effects of the library; offsets of tests are measured, not chosen.
 
     Notes
     -----
     The evidence is lowered by the share that is not recovered on the validation tests. An effect that explains only
-    part of what is missing may stand for one that the library lacks, so that its probability is another one.
+    part of what is missing, or leaves a structured residual far above the noise, may stand for one that the library
+    lacks, so that its probability is another one.
     """
     kind = judgement.verdict.kind
     evidence = item.confidence * (1.0 if kind == "explained" else judgement.evidence.share)
-    partly = chosen and kind == "partly explained"
+    partly = chosen and (beyond or kind == "partly explained")
     probability = calibrated(evidence, rules, several=several and chosen, partly=partly)
     return replace(item, confidence=probability)

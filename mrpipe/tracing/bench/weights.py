@@ -8,9 +8,7 @@ import numpy as np
 from scipy import ndimage, optimize, stats
 
 from mrpipe.artifacts import FloatArray, IntArray
-from mrpipe.dampers.plant import build_chain
-from mrpipe.fitting.engine import Fit
-from mrpipe.fitting.kernel import FORCE_AT, run_recordings
+from mrpipe.fitting.engine import Fit, predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.tracing.bench.hum import hum_variance
@@ -100,14 +98,11 @@ def noise_variances(
     recordings
         Tests laid end to end.
     """
-    chain = build_chain(found.problem.base.steps(found.base_values, *found.laws))
     rng = np.random.default_rng(seed)
-    calm = run_recordings(chain, recordings)[FORCE_AT]
+    calm = predict(found, recordings)
     spread = np.zeros(len(calm))
     for _ in range(draws):
-        displacement, velocity = _noisy_motion(recordings, rng)
-        noisy = run_recordings(chain, replace(recordings, displacement=displacement, velocity=velocity))[FORCE_AT]
-        spread += np.square(noisy - calm)
+        spread += np.square(predict(found, _noisy_motion(recordings, rng)) - calm)
     averaged = _locally_averaged(spread / draws, recordings)
     return np.asarray(recordings.force_noise[recordings.test] ** 2), averaged
 
@@ -294,8 +289,9 @@ def _cycles(recordings: Recordings, rules: NoiseRules) -> list[tuple[IntArray, I
     return found
 
 
-def _noisy_motion(recordings: Recordings, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _noisy_motion(recordings: Recordings, rng: np.random.Generator) -> Recordings:
     displacement, velocity = recordings.displacement.copy(), recordings.velocity.copy()
+    acceleration = recordings.acceleration.copy()
     for test in range(recordings.tests):
         piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
         dt = recordings.dt[test]
@@ -304,7 +300,8 @@ def _noisy_motion(recordings: Recordings, rng: np.random.Generator) -> tuple[Flo
         noise = recordings.displacement_noise[test] * filtered / max(float(np.std(filtered)), 1e-12)
         displacement[piece] += noise
         velocity[piece] += np.gradient(noise, dt)
-    return displacement, velocity
+        acceleration[piece] += np.gradient(np.gradient(noise, dt), dt)
+    return replace(recordings, displacement=displacement, velocity=velocity, acceleration=acceleration)
 
 
 def _locally_averaged(values: FloatArray, recordings: Recordings) -> FloatArray:
