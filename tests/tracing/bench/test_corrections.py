@@ -37,9 +37,8 @@ _OFFSET = damper_effects()["offset"]
 @pytest.mark.parametrize("form", [item.name for item in (*_OFFSET.forms, *_OFFSET.refinements)])
 def test_every_form_of_an_offset_has_a_correction(form: str) -> None:
     """Seed 50293: a load cell that warms up stopped `close-loop` with a traceback."""
-    values = {
-        "rate": 3.0, "square": 0.5, "power": 1.4, "rise": 6.0, "warming_time": 2.0,
-    }  # fmt: skip
+    numbers = {"rate": 3.0, "square": 0.5, "power": 1.4, "rise": 6.0, "warming_time": 2.0}
+    values = {item.name: numbers[item.name] for item in _OFFSET.form(form).parameters}
     scales = Scales(stroke=0.01, speed=0.1, acceleration=1.0, drive=2.0, force=100.0, time=4.0)
     problem = SimpleNamespace(terms=(Term(_OFFSET, _OFFSET.form(form)),), scales=scales)
     chosen = SimpleNamespace(problem=problem, term_values=[values], base_values={"eta": 50.0})
