@@ -178,7 +178,7 @@ def better_filter(
     """
     rules = rules or NuisanceRules()
     limits = sorted({np.inf, *_limits(automatic, FINE_RATIO)}, reverse=True)
-    others = [MotionFilter(limit) for limit in limits] + _removals(tests)
+    others = [MotionFilter(limit) for limit in limits] + ([] if present.noise is not None else _removals(tests))
     ways = [present, *(way for way in others if way.kind != present.kind)]
     errors = _errors(found, tests, ways, rate_hz, jobs)
     best = min(ways, key=errors.__getitem__)

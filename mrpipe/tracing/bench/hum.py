@@ -11,10 +11,8 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.signals.shared_noise import MAINS_HZ
 from mrpipe.tracing.rules import NoiseRules
-
-MAINS_HZ = (50.0, 60.0)
-"""Numerical technique: frequencies of the mains that are looked for."""
 
 HARMONICS = (1, 2, 3)
 """Numerical technique: multiples of them that are looked for."""

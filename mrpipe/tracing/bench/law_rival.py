@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from mrpipe.dampers.laws import LawShape
+from mrpipe.fitting.drive_laws import YIELD_LAWS
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.crossvalidation import Gain
 from mrpipe.tracing.bench.rivals import ITERATIONS, Unseen
 from mrpipe.tracing.bench.select import Selection
 
-LAWS = (LawShape("tanh"), LawShape("langevin"), LawShape("froehlich"))
+LAWS = tuple(law for law in YIELD_LAWS if law.saturates)
 """Numerical technique: laws of the yield force that saturate, each with two coefficients and a scale."""
 
 

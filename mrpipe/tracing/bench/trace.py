@@ -92,12 +92,12 @@ def trace_campaign(
         window, selection = _with_window(selection, baseline.noise, training, taken.able, options, jobs)
     selection = _needed(selection, choice, len(declared), options, rng, jobs)
     gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
+    compared = Unseen(options.folds, options.bootstrap_draws, rng)
     reason = unnamed_reason(selection, options)
     if reason:
         selection = replace(selection, chosen=selection.without_effects)
     else:
         selection = _refined(selection, len(declared), baseline.model_error, options, rng, jobs)
-        compared = Unseen(options.folds, options.bootstrap_draws, rng)
         selection, gains, reason = without_laws_of_drive(selection, gains, len(declared), compared, jobs)
     selection = with_further_terms(
         selection,
@@ -116,7 +116,6 @@ def trace_campaign(
     )
     case = Case(choice, training, validation, options, ordered, len(declared), offsets, jobs)
     if not reason:
-        compared = Unseen(options.folds, options.bootstrap_draws, rng)
         selection, gains, reason = without_beaten_names(selection, gains, len(declared), compared, jobs)
     selection, assessed = with_likely_names(selection, case, gains, reason, rng)
     causes, further, found, judgement = assessed.causes, assessed.further, assessed.found, assessed.judgement
