@@ -10,6 +10,7 @@ known: the scale of M, C and K then comes from given masses or from added masses
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,6 +42,8 @@ _LARGEST_SPREAD = 4.0
 _SEGMENT_PERIODS = 40.0
 _LEAST_COMMON = 0.25
 _MARGIN = 1.15
+_USABLE_BAND = 0.45
+"""Part of the sampling rate below which a filter against aliasing leaves the responses unchanged."""
 _COPY_RANGE = 0.1
 _COPY_ASSURANCE = 0.7
 
@@ -89,7 +92,7 @@ def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz:
     first = _lowest_peak_hz(tests, low_hz)
     # the highest mode of a uniform chain lies (4 n + 2)/pi above the lowest; real ones spread more
     spread = _LARGEST_SPREAD * (4.0 * layout.floors + 2.0) / np.pi
-    high = high_hz or min(spread * first, 0.45 * rate, _common_motion_ends_hz(tests[0], first))
+    high = high_hz or min(spread * first, _USABLE_BAND * rate, _common_motion_ends_hz(tests[0], first))
     factor = max(1, int(rate / (2.6 * high)))
     sections = signal.butter(4, max(0.5 * low_hz, 0.2 * first), btype="highpass", fs=rate, output="sos")
     per_test = max(2, round(_BLOCKS / len(tests)))
@@ -251,9 +254,30 @@ def find_ambient_modes(
     groups: dict[object, list[FrameTest]] = {}
     for test in tests:
         groups.setdefault((test.sensors, test.sampling_rate_hz), []).append(test)
+    parts = tuple(tuple(group) for group in groups.values())
+    found = _search(parts, layout, (low_hz, high_hz), source, ESTIMATORS[method])
+    if len(found.numbers) < layout.floors and not high_hz:
+        # a soft storey or a light top spreads the modes over more than a chain of like floors does
+        wide = max(_common_motion_ends_hz(group[0], _lowest_peak_hz(group, low_hz)) for group in parts)
+        wide = min(wide, _USABLE_BAND * min(group[0].sampling_rate_hz for group in parts))
+        if wide > found.band_hz[1]:
+            with contextlib.suppress(UserError):  # no mode in the wider band: those of the first search remain
+                wider = _search(parts, layout, (low_hz, wide), source, ESTIMATORS[method])
+                found = wider if len(wider.numbers) > len(found.numbers) else found
+    return found
+
+
+def _search(
+    groups: Sequence[Sequence[FrameTest]],
+    layout: Layout,
+    band_hz: tuple[float, float],
+    source: Path,
+    estimator: Estimator,
+) -> ModeSearch:
+    """Return the modes of set-ups in a band."""
     set_ups, candidates, tops = [], [], []
-    for group in groups.values():
-        set_up, found, top = _set_up(group, layout, (low_hz, high_hz), source, ESTIMATORS[method])
+    for group in groups:
+        set_up, found, top = _set_up(group, layout, band_hz, source, estimator)
         set_ups.append(set_up)
         candidates += found
         tops.append(top)
@@ -271,7 +295,7 @@ def find_ambient_modes(
             (positions, refine_by_spectra(item.fit.only(own), item.tests))
             for item, positions, own in merged.parts(modes)
         ])  # fmt: skip
-    return ModeSearch(refined, (low_hz, max(tops)), tuple(numbered.values()), tuple(candidates))
+    return ModeSearch(refined, (band_hz[0], max(tops)), tuple(numbered.values()), tuple(candidates))
 
 
 def _set_up(

@@ -29,6 +29,8 @@ _LINES_PER_WIDTH = 12.0
 _REACH_FREQUENCY = 0.03
 _DAMPING_RANGE = (5e-4, 0.15)
 _LEAST_LINES = 24
+_EXPONENT_SPREAD = 2.0
+"""Standard deviation of the power of the frequency before the data are seen: forces of wind fall by up to f^-4."""
 
 
 @dataclass(frozen=True)
@@ -87,37 +89,43 @@ def _resonance(omega: FloatArray, pole: float, zeta: float) -> tuple[FloatArray,
 class _Peak:
     """Negative log likelihood of one modal coordinate: its own peak, remains of the neighbours, and white noise.
 
-    Parameters are logarithms: frequency, damping, own density, noise, densities of the neighbours.
+    The spectrum of wind or traffic falls with frequency. A flat force would attribute this slope to the mode and move
+    its frequency. The density of the force on the mode is therefore a power of the frequency near the peak.
+
+    Parameters: logarithms of frequency, damping, own density and noise, the power of the frequency, logarithms of the
+    densities of the neighbours.
     """
 
-    def __init__(self, spectrum: _Spectrum, others: Sequence[tuple[float, float]]) -> None:
+    def __init__(self, spectrum: _Spectrum, pole: float, others: Sequence[tuple[float, float]]) -> None:
         self.spectrum = spectrum
+        self.distance = np.log(spectrum.omega / pole)
         columns = [_resonance(spectrum.omega, *pole)[0] for pole in others]
         self.others = np.array([item / item.max() for item in columns]).reshape(len(columns), spectrum.omega.size)
 
-    def __call__(self, theta: FloatArray) -> tuple[float, FloatArray]:
+    def _terms(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the density at each line, shape (m,), and its derivatives by the parameters, shape (p, m)."""
         value, by_pole, by_zeta = _resonance(self.spectrum.omega, float(np.exp(theta[0])), float(np.exp(theta[1])))
-        own, noise, rest = np.exp(theta[2]), np.exp(theta[3]), np.exp(theta[4:])
+        own = np.exp(theta[2] + theta[4] * self.distance)
+        noise, rest = np.exp(theta[3]), np.exp(theta[5:])
         density = own * value + noise + rest @ self.others
+        rows = [own * by_pole, own * by_zeta, own * value, np.full(density.size, noise), own * value * self.distance]
+        return density, np.array([*rows, *(rest[:, None] * self.others)])
+
+    def __call__(self, theta: FloatArray) -> tuple[float, FloatArray]:
+        density, rows = self._terms(theta)
         ratio = self.spectrum.power / density
-        slope = self.spectrum.count * (1.0 - ratio) / density
-        gradient = [
-            slope @ (own * by_pole),
-            slope @ (own * by_zeta),
-            slope @ (own * value),
-            noise * slope.sum(),
-            *(rest * (self.others @ slope)),
-        ]
-        return float(self.spectrum.count * np.sum(np.log(density) + ratio)), np.array(gradient)
+        gradient = rows @ (self.spectrum.count * (1.0 - ratio) / density)
+        gradient[4] += theta[4] / _EXPONENT_SPREAD**2
+        prior = 0.5 * (theta[4] / _EXPONENT_SPREAD) ** 2
+        return float(self.spectrum.count * np.sum(np.log(density) + ratio) + prior), gradient
 
     def information(self, theta: FloatArray) -> FloatArray:
         """Return the Fisher information of all parameters."""
-        value, by_pole, by_zeta = _resonance(self.spectrum.omega, float(np.exp(theta[0])), float(np.exp(theta[1])))
-        own, noise, rest = np.exp(theta[2]), np.exp(theta[3]), np.exp(theta[4:])
-        density = own * value + noise + rest @ self.others
-        rows = [own * by_pole, own * by_zeta, own * value, np.full(density.size, noise), *(rest[:, None] * self.others)]
-        scaled = np.array(rows) / density
-        return np.asarray(self.spectrum.count * scaled @ scaled.T)
+        density, rows = self._terms(theta)
+        scaled = rows / density
+        information = self.spectrum.count * scaled @ scaled.T
+        information[4, 4] += 1.0 / _EXPONENT_SPREAD**2
+        return np.asarray(information)
 
 
 def _refined(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, float, FloatArray] | None:
@@ -127,9 +135,9 @@ def _refined(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, 
     best = None
     for zeta in starts:
         top = float(np.log(max(np.quantile(power, 0.95), 1e-300) * 4.0 * zeta**2))
-        theta = np.concatenate([[np.log(pole), np.log(zeta), top, floor], np.full(len(peak.others), floor)])
+        theta = np.concatenate([[np.log(pole), np.log(zeta), top, floor, 0.0], np.full(len(peak.others), floor)])
         reach = [(theta[0] - _REACH_FREQUENCY, theta[0] + _REACH_FREQUENCY), tuple(np.log(_DAMPING_RANGE))]
-        reach += [(None, None)] + [(floor - 12.0, None)] * (theta.size - 3)
+        reach += [(None, None), (floor - 12.0, None), (None, None)] + [(floor - 12.0, None)] * len(peak.others)
         found = minimize(peak, theta, jac=True, method="L-BFGS-B", bounds=reach, options={"maxiter": 200})
         if best is None or found.fun < best.fun:
             best = found
@@ -164,7 +172,7 @@ def refine_by_spectra(fit: MultiModeFit, tests: Sequence[FrameTest]) -> MultiMod
             if spectrum is None:
                 continue
             others = [item for i, item in enumerate(before) if i != mode and abs(item[0] - pole) < 2.0 * half]
-            found = _refined(_Peak(spectrum, others), pole, (damping, _USUAL_DAMPING))
+            found = _refined(_Peak(spectrum, pole, others), pole, (damping, _USUAL_DAMPING))
             if found is None or not _DAMPING_RANGE[0] * 1.01 < found[1] < _DAMPING_RANGE[1] * 0.99:
                 continue
             omega[mode], zeta[mode] = found[0], found[1]

@@ -15,7 +15,7 @@ from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests, Place
 from mrpipe.modal.storage import summary, write_identification
 from mrpipe.structures import read_frame
-from tests.modal.towers import Sensors, ambient_test, random_tower
+from tests.modal.towers import Sensors, Tower, ambient_test, random_tower
 
 HERE = Path("planted")
 
@@ -86,3 +86,17 @@ def test_a_missing_library_is_named(tower_and_test, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyoma2", None)
     with pytest.raises(UserError, match=r"pip install 'mrpipe\[ambient\]'"):
         identify_frame(FrameTests((), (), tower.mass, HERE, (test,)))
+
+
+@pytest.mark.planted
+def test_a_soft_storey_does_not_put_the_highest_mode_outside_the_band():
+    """On soft bearings the second mode lies at 18 times the first one, beyond the spread of a chain of like floors."""
+    pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
+    mass, bearings, storey = 1e4, 2e4 * (2 * np.pi * 1.0) ** 2, 5e3 * (2 * np.pi * 18.0) ** 2
+    stiffness = np.array([[bearings + storey, -storey], [-storey, storey]])
+    tower = Tower(np.full(2, mass), stiffness, np.array([0.02, 0.01]))
+    seen = ambient_test(tower, np.random.default_rng(3), Sensors(noise=0.01), duration_s=900.0)
+    wind = FrameTest("wind", "ambient", 50.0, None, seen, (False,) * 2, places=(Place(1), Place(2)))
+    result = identify_frame(FrameTests((), (), tower.mass, HERE, (wind,)))
+    found = [item.value / (2 * np.pi) for item in result.frequencies]
+    assert found == pytest.approx(tower.frequencies_hz, rel=0.01)
