@@ -111,21 +111,37 @@ def _assurance(first: ComplexArray, second: ComplexArray) -> float:
     return float(np.abs(np.vdot(first, second)) ** 2)
 
 
+def _distance(pole: Pole, group: Sequence[Pole]) -> float:
+    """Return how far a pole is from a cluster, relative to the frequency; infinite where it cannot belong to it."""
+    omega = float(np.median([item.angular_frequency for item in group]))
+    zeta = float(np.median([item.damping_ratio for item in group]))
+    assurance = _assurance(pole.shape, group[0].shape)
+    gap = abs(pole.angular_frequency / omega - 1.0)
+    if gap >= _FREQUENCY_TOLERANCE or assurance <= _LEAST_ASSURANCE:
+        return np.inf
+    return float(np.hypot(gap, pole.damping_ratio - zeta)) + 1.0 - assurance
+
+
 def _clusters(poles: Sequence[Pole]) -> list[_Cluster]:
-    """Group poles of neighbouring frequency and equal shape, at most one of each order in a group."""
+    """Group poles of neighbouring frequency and equal shape, at most one of each order in a group.
+
+    Of each order the pole nearest to a group is taken first. High orders split a mode into a pole that stays and one
+    that wanders; in another sequence the second could take the place of the first.
+    """
     groups: list[list[Pole]] = []
-    for pole in sorted(poles, key=lambda item: item.order, reverse=True):
-        best: list[Pole] | None = None
-        for group in groups:
-            centre = float(np.median([item.angular_frequency for item in group]))
-            near = abs(pole.angular_frequency - centre) < _FREQUENCY_TOLERANCE * centre
-            if near and _assurance(pole.shape, group[0].shape) > _LEAST_ASSURANCE:
-                best = group
-                break
-        if best is None:
-            groups.append([pole])
-        elif all(item.order != pole.order for item in best):
-            best.append(pole)
+    for order in sorted({pole.order for pole in poles}, reverse=True):
+        own = [pole for pole in poles if pole.order == order]
+        known = len(groups)
+        pairs = sorted((_distance(pole, groups[j]), i, j) for i, pole in enumerate(own) for j in range(known))
+        taken: dict[int, int] = {}
+        for distance, i, j in pairs:
+            if np.isfinite(distance) and i not in taken and j not in taken.values():
+                taken[i] = j
+        for i, pole in enumerate(own):
+            if i in taken:
+                groups[taken[i]].append(pole)
+            else:
+                groups.append([pole])
     return [_summary(group) for group in groups]
 
 
