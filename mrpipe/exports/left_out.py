@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mrpipe.artifacts import Artifact
 from mrpipe.artifacts.plain import plain
+from mrpipe.structures.options import DamperSettings
 from mrpipe.structures.over_amplitude import depends_on_amplitude
 
 KEPT = ("name", "form", "place", "parameters", "confidence", "physics", "source")
@@ -61,3 +62,23 @@ def frame_left_out(frame: Artifact, amplitude_m: float, tracing: Mapping[str, An
             "simulate.frame_amplitude_m to the amplitude that you expect"
         )
     return found
+
+
+def dampers_left_out(dampers: Sequence[DamperSettings]) -> list[str]:
+    """Return a sentence that names the dampers of `structure.dampers`, which a linear frame does not contain.
+
+    Parameters
+    ----------
+    dampers
+        Section `structure.dampers`.
+    """
+    if not dampers:
+        return []
+    listed = ", ".join(
+        f"{item.name or f'damper {place}'} ({item.between[0]} to {item.between[1]}, law {item.law})"
+        for place, item in enumerate(dampers, start=1)
+    )
+    return [
+        f"structure.dampers are not in this export, which is the structure without dampers: {listed}; "
+        "a controlled damper is not a linear element"
+    ]

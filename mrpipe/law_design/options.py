@@ -10,7 +10,11 @@ from mrpipe.options import Section
 class MotionSettings(Section):
     """A recorded base motion that the design must withstand."""
 
-    file: str = Field(..., description="Text or CSV of two columns: time [s] and acceleration.")
+    file: str = Field(
+        ...,
+        description="Text or CSV of time [s] and acceleration, or a record as downloaded. Two components act in both "
+        "directions of a structure with `influence_y`; else the first one acts.",
+    )
     unit: str = Field("m/s^2", description="Unit of the acceleration.")
     scale: float = Field(1.0, gt=0.0, description="Factor on the record.")
 

@@ -21,11 +21,13 @@ from mrpipe.law_design.search import SearchOptions
 from mrpipe.law_design.study import COARSE, Loops, design_all, pareto_front, reference_evaluation
 from mrpipe.law_design.uncertainty import DamperUncertainty, Draw, FrameUncertainty, Ranking, draw, rank
 from mrpipe.simulation.excitation import recorded
-from mrpipe.simulation.ground_record import read_ground_record
+from mrpipe.simulation.ground_record import HORIZONTAL, read_histories
+from mrpipe.simulation.inputs import in_two_directions
 from mrpipe.simulation.response_curve import ResponseCurve
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.steady_state import CurveOptions, steady_values
 from mrpipe.simulation.windows import QUANTITIES
+from mrpipe.structures import Frame
 
 AROUND = (0.97, 1.0, 1.03)
 """Frequencies over the resonance at which a drawn loop is run: a draw moves the resonance by a few percent."""
@@ -134,8 +136,12 @@ class Result:
     untraced: Untraced | None = None
 
 
-def load_of(settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[float, float]) -> Load:
+def load_of(
+    settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[float, float], frame: Frame | None = None
+) -> Load:
     """Return what the structure is exposed to.
+
+    Motions with two components act in both directions of `frame` where it has two; else their first component acts.
 
     Raises
     ------
@@ -155,10 +161,14 @@ def load_of(settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[f
     motions = []
     for number, item in enumerate(settings.motions):
         setting = f"design.motions[{number}]"
-        time_s, acceleration = read_ground_record(
+        time_s, histories = read_histories(
             Path(item.file), item.unit, file_setting=f"{setting}.file", unit_setting=f"{setting}.unit"
         )
-        motions.append(Motion(Path(item.file).stem, recorded(time_s, acceleration, scale=item.scale)))
+        both = frame is not None and frame.influence_y is not None and histories.shape[1] == HORIZONTAL
+        excitation = recorded(time_s, histories if both else histories[:, 0], scale=item.scale)
+        if frame is not None and both:
+            excitation = in_two_directions(excitation, frame, f"{setting}.file")
+        motions.append(Motion(Path(item.file).stem, excitation))
     amplitudes = tuple(factor * amplitude_m_s2 for factor in sorted(settings.amplitude_factors))
     return Load(band_rad_s, amplitudes, tuple(motions))
 

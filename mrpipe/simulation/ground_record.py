@@ -18,21 +18,6 @@ HORIZONTAL = 2
 """Channels of a strong-motion record that are used where none is named: the first ones that are horizontal."""
 
 
-def read_ground_record(
-    path: Path,
-    unit: str,
-    *,
-    file_setting: str = "simulate.excitation.file",
-    unit_setting: str = "simulate.excitation.file_unit",
-) -> tuple[FloatArray, FloatArray]:
-    """Return time [s] and acceleration [m/s^2] of the first history of a record, shape (m,) each.
-
-    Parameters and errors are those of :func:`read_histories`.
-    """
-    time, histories = read_histories(path, unit, file_setting=file_setting, unit_setting=unit_setting)
-    return time, histories[:, 0]
-
-
 def read_histories(
     path: Path,
     unit: str,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -121,3 +122,32 @@ def in_two_directions(excitation: Excitation, frame: Frame, where: str) -> Excit
             "give structure.influence_y, or name one channel in simulate.excitation.file_channels",
         )
     return replace(excitation, places=(Place("ground y", frame.influence_y, False),))
+
+
+def ground_amplitude(details: Mapping[str, Any], purpose: str) -> float:
+    """Return the amplitude of the base acceleration [m/s^2] that a response over frequency is measured at.
+
+    Parameters
+    ----------
+    details
+        Of the excitation.
+    purpose
+        For the message: what needs the amplitude.
+
+    Raises
+    ------
+    UserError
+        If the excitation is a force, or its kind has no amplitude.
+    """
+    if "base_amplitude_m_s2" in details:
+        return float(details["base_amplitude_m_s2"])
+    if any(key.startswith("force_") or key == "peak_n" for key in details):
+        raise UserError(
+            "simulate.excitation",
+            "force_at",
+            f"{purpose} is measured under motion of the ground, but the settings give a force",
+            "leave force_at out, or study the force with simulate --law",
+        )
+    raise UserError(
+        "simulate.excitation", "kind", f"{details.get('kind')} has no amplitude", f"set kind: harmonic for {purpose}"
+    )

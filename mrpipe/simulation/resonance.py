@@ -14,6 +14,7 @@ from mrpipe.artifacts import Artifact, Progress
 from mrpipe.control.controller import Controller
 from mrpipe.errors import UserError
 from mrpipe.simulation.excitation import Excitation
+from mrpipe.simulation.inputs import ground_amplitude
 from mrpipe.simulation.loop import Response
 from mrpipe.simulation.response_curve import ResponseCurve, response_curve
 from mrpipe.simulation.rig import Rig
@@ -142,14 +143,7 @@ def measure_resonance(
             f"is {band_rad_s[0]:g} to {band_rad_s[1]:g}",
             "give a positive rising band, the lowest frequency first",
         )
-    amplitude = excitation.details.get("base_amplitude_m_s2")
-    if amplitude is None:
-        raise UserError(
-            "simulate.excitation",
-            "kind",
-            f"{excitation.details.get('kind')} has no amplitude",
-            "set kind: harmonic for a response over frequency",
-        )
+    amplitude = ground_amplitude(excitation.details, "a response over frequency")
     run = runner(rig, rig.controller(law), rng)
     options = curve_options(settings, absolute=absolute)
     curves = []
@@ -157,7 +151,7 @@ def measure_resonance(
         progress(number / len(settings.amplitude_factors), f"response over frequency at {factor:g} times the amplitude")
         # the linear algebra of a run is so small that a second thread only takes time from other programs
         with threadpool_limits(1):
-            curves.append(response_curve(run, factor * float(amplitude), band_rad_s, options, jobs=jobs))
+            curves.append(response_curve(run, factor * amplitude, band_rad_s, options, jobs=jobs))
     warnings = _warnings(curves, band_rad_s, settings.standard_error)
     return Curves(settings.amplitude_factors, tuple(curves), tuple(warnings))
 

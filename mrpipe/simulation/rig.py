@@ -222,6 +222,13 @@ def known_amplitude(settings: ExcitationSettings) -> float | None:
         If the amplitude of a force is not given, because only that of a base acceleration can be found.
     """
     if not settings.force_at:
+        if settings.force_amplitude_n is not None:
+            raise UserError(
+                "simulate.excitation",
+                "force_amplitude_n",
+                "is given, but no degree of freedom on which the force acts",
+                "name it in simulate.excitation.force_at",
+            )
         return settings.base_amplitude_m_s2
     if settings.force_amplitude_n is None and settings.kind in ADJUSTED:
         raise UserError(
@@ -238,6 +245,10 @@ def acting(excitation: Excitation, settings: ExcitationSettings, frame: Frame) -
     UserError
         If a place does not exist, or the structure has no second direction.
     """
+    if settings.direction_deg:
+        # who reads the response needs the direction, because first floor and top are those that move along it
+        details = {**excitation.details, "direction_deg": settings.direction_deg}
+        excitation = replace(excitation, details=details)
     if settings.kind == "free-decay":
         return excitation
     if settings.force_at:

@@ -24,6 +24,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.law_design.results import design_as_json, write_design
     from mrpipe.law_design.run import load_of, run_design
     from mrpipe.reporting import design as report
+    from mrpipe.simulation.inputs import ground_amplitude
     from mrpipe.simulation.resonance import default_band
     from mrpipe.simulation.rig import excitation_of, read_rig
 
@@ -35,9 +36,9 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         read_rig(simulate.changed(damper="identified"), context.artifact) if simulate.damper == "traced" else None
     )
     excitation, _ = excitation_of(rig, simulate.excitation)
-    amplitude = _amplitude(excitation.details)
+    amplitude = ground_amplitude(excitation.details, "a design")
     band = settings.band_rad_s or context.settings.resonance.band_rad_s or default_band(context.artifact("calibrate"))
-    load = load_of(settings, amplitude, band)
+    load = load_of(settings, amplitude, band, rig.frame)
     plant = plant_of(rig.frame, rig.position, CalibrationOptions(mode=context.settings.calibrate.target_mode))
     result = run_design(
         rig,
@@ -68,16 +69,6 @@ def _problem(context: StageContext) -> str:
 
     provenance = context.provenance
     return f"{sorted(provenance.inputs.items())}|{provenance.config}|{provenance.seed}|{__version__}"
-
-
-def _amplitude(details: Mapping[str, Any]) -> float:
-    from mrpipe.errors import UserError
-
-    if "base_amplitude_m_s2" not in details:
-        raise UserError(
-            "simulate.excitation", "kind", f"{details.get('kind')} has no amplitude", "set kind: harmonic for a design"
-        )
-    return float(details["base_amplitude_m_s2"])
 
 
 def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, DamperUncertainty]:

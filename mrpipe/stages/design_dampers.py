@@ -18,22 +18,19 @@ if TYPE_CHECKING:
 def _run(context: StageContext) -> Mapping[str, Any]:
     import time
 
-    from mrpipe.errors import UserError
     from mrpipe.law_design.run import load_of
     from mrpipe.law_design.several import design_as_json, design_dampers
     from mrpipe.reporting import several_dampers as report
+    from mrpipe.simulation.inputs import ground_amplitude
     from mrpipe.simulation.several_rig import dampers_band, dampers_excitation, read_dampers_rig
 
     began = time.perf_counter()
     settings, simulate = context.settings.design, context.settings.simulate
     rig = read_dampers_rig(simulate, context.settings.structure, context.settings.calibrate.damper, context.artifact)
     details = dampers_excitation(rig, simulate.excitation).details
-    if "base_amplitude_m_s2" not in details:
-        raise UserError(
-            "simulate.excitation", "kind", f"{details.get('kind')} has no amplitude", "set kind: harmonic for a design"
-        )
+    amplitude = ground_amplitude(details, "a design")
     band = settings.band_rad_s or context.settings.resonance.band_rad_s or dampers_band(rig)
-    load = load_of(settings, float(details["base_amplitude_m_s2"]), band)
+    load = load_of(settings, amplitude, band, rig.frame)
     found = design_dampers(
         rig, settings, load, absolute=simulate.accelerations == "absolute", seed=int(context.rng.integers(2**32))
     )

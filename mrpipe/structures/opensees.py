@@ -50,7 +50,7 @@ class ViscousDevice:
     brace_n_m: float = math.inf
 
 
-def opensees_script(frame: Frame, devices: Sequence[ViscousDevice] = ()) -> str:
+def opensees_script(frame: Frame, devices: Sequence[ViscousDevice] = (), notes: Sequence[str] = ()) -> str:
     """Return an openseespy script that builds the structure.
 
     The script has `build()`, which makes the model, and `shake(acceleration, interval, substeps)`, which returns the
@@ -63,6 +63,8 @@ def opensees_script(frame: Frame, devices: Sequence[ViscousDevice] = ()) -> str:
         The structure.
     devices
         Linear dampers.
+    notes
+        Sentences on what the model lacks; they become comments of the script.
 
     Raises
     ------
@@ -72,6 +74,8 @@ def opensees_script(frame: Frame, devices: Sequence[ViscousDevice] = ()) -> str:
     lines = [
         f'"""OpenSees model of the structure {frame.name}, written by mrpipe (SI units)."""',
         "",
+        *(f"# {note}" for note in notes),
+        *([""] if notes else []),
         "import openseespy.opensees as ops",
         "",
         f"NAMES = {list(frame.names)!r}",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from mrpipe.control.lqg import Weights
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
-from mrpipe.law_design.options import DesignSettings
+from mrpipe.law_design.options import DesignSettings, MotionSettings
 from mrpipe.law_design.problem import LoopOf, laws_in_the_race, scaled_force
 from mrpipe.law_design.results import design_as_json
 from mrpipe.law_design.run import Result, load_of, run_design
@@ -156,3 +157,18 @@ def test_mistakes_are_named(rig: Rig, plant: Plant) -> None:
         load_of(DesignSettings(weights={"rms_x9_m": 1.0}), 0.79, (7.0, 9.0))
     with pytest.raises(UserError, match="band"):
         load_of(DesignSettings(), 0.79, (9.0, 7.0))
+
+
+@pytest.mark.property
+def test_a_motion_of_two_components_acts_in_both_directions(tmp_path: Path, plant: Plant) -> None:
+    record = tmp_path / "both.csv"
+    np.savetxt(record, [[0.0, 1.0, 2.0], [0.1, 3.0, 4.0]], delimiter=",")
+    settings = DesignSettings(motions=(MotionSettings(file=str(record)),))
+    second = np.array([0.0, 1.0, 0.0, 0.0, 0.0])
+    two = replace(plant.frame, influence_y=second)
+    excitation = load_of(settings, 0.79, (7.0, 9.0), two).motions[0].excitation
+    np.testing.assert_array_equal(excitation.at(np.array([0.1])), [[3.0, 4.0]])
+    np.testing.assert_array_equal(excitation.places[0].shape, second)
+    one = load_of(settings, 0.79, (7.0, 9.0), plant.frame).motions[0].excitation
+    assert not one.places
+    np.testing.assert_array_equal(one.at(np.array([0.1])), [3.0])

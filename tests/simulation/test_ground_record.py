@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from mrpipe.errors import UserError
-from mrpipe.simulation.ground_record import read_ground_record
+from mrpipe.simulation.ground_record import read_histories
 
 
 @pytest.mark.golden
 def test_headers_separators_and_units(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("time, a\n0.0, 0.0\n0.02; 0.5\n0.04\t-0.25\n")
-    time, acceleration = read_ground_record(path, "g")
+    time, histories = read_histories(path, "g")
+    acceleration = histories[:, 0]
     np.testing.assert_allclose(time, [0.0, 0.02, 0.04])
     np.testing.assert_allclose(acceleration, np.array([0.0, 0.5, -0.25]) * 9.80665)
 
@@ -35,30 +36,31 @@ def test_faults(tmp_path, text, unit, words):
     path = tmp_path / "record.txt"
     path.write_text(text)
     with pytest.raises(UserError, match=words) as caught:
-        read_ground_record(path, unit)
+        read_histories(path, unit)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.golden
 def test_missing_file(tmp_path):
     with pytest.raises(UserError, match="no such file"):
-        read_ground_record(tmp_path / "none.txt", "g")
+        read_histories(tmp_path / "none.txt", "g")
 
 
 @pytest.mark.golden
 def test_the_setting_at_fault_is_named(tmp_path):
     with pytest.raises(UserError, match=r"^simulate.excitation.file: is empty; name a text file"):
-        read_ground_record(Path(), "g")
+        read_histories(Path(), "g")
     with pytest.raises(UserError, match=r"^design.motions\[0\].file: .*none.txt: there is no such file"):
-        read_ground_record(tmp_path / "none.txt", "g", file_setting="design.motions[0].file")
+        read_histories(tmp_path / "none.txt", "g", file_setting="design.motions[0].file")
     path = tmp_path / "record.txt"
     path.write_text("0 1\n1 2\n")
     with pytest.raises(UserError, match=r"design.motions\[0\].unit"):
-        read_ground_record(path, "mm", unit_setting="design.motions[0].unit")
+        read_histories(path, "mm", unit_setting="design.motions[0].unit")
 
 
 @pytest.mark.real
 def test_el_centro(public_data):
     path = public_data / "ground_motions" / "elcentro_NS.dat"
-    _, acceleration = read_ground_record(path, "g")
+    _, histories = read_histories(path, "g")
+    acceleration = histories[:, 0]
     assert np.max(np.abs(acceleration)) == pytest.approx(0.349 * 9.80665, rel=1e-2)

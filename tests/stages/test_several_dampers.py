@@ -112,6 +112,29 @@ def test_exports_of_one_damper_are_refused(tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.property
+def test_the_opensees_script_says_that_the_dampers_are_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = two_storeys(tmp_path, [{"name": "base", "between": [1, "ground"], "law": "vd"}])
+    found = result_of(["export", "opensees", "--config", str(path), "--run", str(tmp_path / "run")], capsys)
+    (sentence,) = found["left_out"]
+    assert "base (1 to ground, law vd)" in sentence
+    assert f"# {sentence}\n" in Path(found["file"]).read_text(encoding="utf-8")
+
+
+@pytest.mark.property
+def test_a_design_under_a_force_says_that_it_needs_ground_motion(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shaker = {"kind": "harmonic", "force_at": {"floor 2": 1.0}, "force_amplitude_n": 30.0}
+    path = two_storeys(tmp_path, [{"between": [1, "ground"], "law": "vd"}], simulate={"excitation": shaker})
+    common = ["--config", str(path), "--run", str(tmp_path / "run")]
+    assert "force_at: a design is measured under motion of the ground" in error_of(["design", *common], capsys)
+    path = two_storeys(tmp_path, [{"between": [1, "ground"]}], simulate={"excitation": {"force_amplitude_n": 30.0}})
+    assert "but no degree of freedom on which the force acts" in error_of(["simulate", *common], capsys)
+
+
+@pytest.mark.property
 def test_design_of_two_dampers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """With linear devices the calibrated peak is that of the frequency response."""
     path = two_storeys(
@@ -135,6 +158,9 @@ def test_design_of_two_dampers(tmp_path: Path, capsys: pytest.CaptureFixture[str
     amplitude = result_of(["simulate", *common], capsys)["excitation"]["base_amplitude_m_s2"]
     x = np.linalg.solve(K + 1j * omega * C - omega**2 * M, -M @ np.ones(2))
     assert response["peak_rms_x_top_m"] == pytest.approx(amplitude * abs(x[1]) / np.sqrt(2.0), rel=0.01)
+    result_of(["report", *common], capsys)
+    report = (tmp_path / "run" / "report.md").read_text(encoding="utf-8")
+    assert "The gains of damper 1 (vd) and damper 2 (vd) were searched together" in report
 
 
 @pytest.mark.property

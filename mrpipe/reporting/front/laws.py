@@ -12,7 +12,7 @@ from mrpipe.artifacts import Artifact, BoolArray, FloatArray
 from mrpipe.control.laws import law_named, law_names
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.words import listed, number, percent
-from mrpipe.structures import read_frame
+from mrpipe.structures import Frame, read_frame
 from mrpipe.structures.response import linear_response
 
 UNCONTROLLED = "no damper"
@@ -73,7 +73,8 @@ def comparison(facts: RunFacts) -> list[LawRun]:
         ground = artifact.array("ground_acceleration")
         window = _window(time, ground, summary)
         accelerations = artifact.array("absolute_acceleration")[window]
-        first, top = _ends(facts, accelerations.shape[1])
+        frame = _frame(facts, summary, accelerations.shape[1])
+        first, top = (frame.moved_by_ground[0], frame.top) if frame else (0, accelerations.shape[1] - 1)
         runs.append(
             LawRun(
                 law,
@@ -86,18 +87,20 @@ def comparison(facts: RunFacts) -> list[LawRun]:
                 _outside(summary),
             )
         )
-        bare = bare or _bare(facts, time, ground, window)
+        bare = bare or _bare(facts, summary, time, ground, window)
     runs.sort(key=lambda run: run.rms_top_m)
     return [*runs, bare] if bare else runs
 
 
-def _ends(facts: RunFacts, count: int) -> tuple[int, int]:
-    """Return the columns of the first floor and of the top; of `count` columns, where the frame is not known."""
+def _frame(facts: RunFacts, summary: Mapping[str, Any], count: int | None = None) -> Frame | None:
+    """Return the structure, turned as in the simulation; None where it is not there or has not `count` columns."""
     artifact = facts.artifact("frame.h5")
     if artifact is None:
-        return 0, count - 1
+        return None
     frame = read_frame(artifact)
-    return (frame.moved_by_ground[0], frame.top) if frame.floors == count else (0, count - 1)
+    if count not in (None, frame.floors):
+        return None
+    return frame.turned((summary.get("excitation") or {}).get("direction_deg", 0.0))
 
 
 def _window(time: FloatArray, ground: FloatArray, summary: Mapping[str, Any]) -> BoolArray:
@@ -110,14 +113,18 @@ def _window(time: FloatArray, ground: FloatArray, summary: Mapping[str, Any]) ->
     return np.asarray((time >= 0.5 * last) & (time <= last))
 
 
-def _bare(facts: RunFacts, time: FloatArray, ground: FloatArray, window: BoolArray) -> LawRun | None:
-    """Return the linear structure without a damper under the same ground motion."""
-    artifact = facts.artifact("frame.h5")
-    if artifact is None or not np.any(ground) or len(time) < 2:
+def _bare(
+    facts: RunFacts, summary: Mapping[str, Any], time: FloatArray, ground: FloatArray, window: BoolArray
+) -> LawRun | None:
+    """Return the linear structure without a damper under the same ground motion.
+
+    None under forces or motion in two directions, because the artifact holds the histories of one direction only.
+    """
+    frame = _frame(facts, summary)
+    if frame is None or "degrees_of_freedom" in summary or not np.any(ground) or len(time) < 2:
         return None
     step = float(np.median(np.diff(time)))
     even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
-    frame = read_frame(artifact)
     response = linear_response(frame, np.interp(even, time, ground), step)
     first, top = frame.moved_by_ground[0], frame.top
     inside = np.interp(even, time, window.astype(np.float64)) > 0.5
@@ -140,7 +147,7 @@ def _of_first_mode(frame: Mapping[str, Any]) -> float | None:
     return float(ratios[int(np.argmin(frequencies))]) if len(frequencies) == len(ratios) > 0 else None
 
 
-def last_cycles(artifact: Artifact, summary: Mapping[str, Any], cycles: float = 3.0) -> History:
+def last_cycles(facts: RunFacts, artifact: Artifact, summary: Mapping[str, Any], cycles: float = 3.0) -> History:
     """Return the last cycles of the steady response (a tenth of it where the excitation has no single frequency)."""
     time, ground = artifact.array("time"), artifact.array("ground_acceleration")
     window = _window(time, ground, summary)
@@ -149,9 +156,11 @@ def last_cycles(artifact: Artifact, summary: Mapping[str, Any], cycles: float = 
     span = cycles * 2.0 * np.pi / omega if omega else 0.1 * (last - float(time[window][0]))
     kept = np.flatnonzero(window & (time > last - span))
     kept = kept[:: max(1, len(kept) // 800)]
+    displacement = artifact.array("displacement")
+    frame = _frame(facts, summary, displacement.shape[1])
     return History(
         time[kept] - time[kept[0]],
-        artifact.array("displacement")[kept, -1],
+        displacement[kept, frame.top if frame else -1],
         artifact.array("damper_displacement")[kept],
         artifact.array("damper_velocity")[kept],
         artifact.array("force")[kept],
@@ -169,7 +178,7 @@ def answer(facts: RunFacts) -> str:
     """Return which law is best for this structure, and by how much."""
     design = facts.summary("design")
     if design.get("best"):
-        return _designed(design)
+        return _designed(design) if "laws" in design else _designed_together(design)
     runs = comparison(facts)
     laws = [run for run in runs if run.law != UNCONTROLLED]
     if not laws:
@@ -181,7 +190,9 @@ def answer(facts: RunFacts) -> str:
     damps = [run for run in laws if not damping[run.law] < 0.5 * off]
     best = (damps or laws)[0]
     omega = (next(iter(facts.laws.values())).get("excitation") or {}).get("frequency_rad_s")
-    motion = f"under harmonic base motion at {number(omega)} rad/s" if omega else "under this excitation"
+    force = "force_amplitude_n" in (next(iter(facts.laws.values())).get("excitation") or {})
+    kind = "a harmonic force" if force else "harmonic base motion"
+    motion = f"under {kind} at {number(omega)} rad/s" if omega else "under this excitation"
     over_band = _over_band(facts)
     if over_band and omega:
         motion = f"at the single frequency {number(omega)} rad/s"
@@ -255,6 +266,16 @@ def _designed(design: Mapping[str, Any]) -> str:
     if entry.get("probability_best") is not None:
         text += f" The probability that it is the best is {percent(entry['probability_best'])}."
     return text
+
+
+def _designed_together(design: Mapping[str, Any]) -> str:
+    """Return what the design of several dampers found; their gains are searched together, and no law is chosen."""
+    best, calibrated = (design[key]["peak_rms_x_top_m"] for key in ("best", "calibrated"))
+    named = listed([f"{name} ({item['law']})" for name, item in design["dampers"].items()])
+    return (
+        f"The gains of {named} were searched together: the peak of the RMS top displacement over frequency is "
+        f"{_millimetres(best)}, and {_millimetres(calibrated)} at the calibrated gains."
+    )
 
 
 def doubts(facts: RunFacts) -> list[str]:

@@ -279,7 +279,7 @@ def control(facts: RunFacts) -> Section:
         for run in runs:
             artifact = facts.artifact(f"response-{run.law}.h5")
             if artifact is not None and len(histories) < 6:
-                histories[run.law] = law_facts.last_cycles(artifact, facts.laws[run.law])
+                histories[run.law] = law_facts.last_cycles(facts, artifact, facts.laws[run.law])
         section.figure("cycles", figures.last_cycles(histories), _caption_of_cycles(len(histories), len(facts.laws)))
     measured = [item for item in loop.get("laws", []) if item.get("measured")]
     if "over_band" in loop:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.reporting.front import laws
 from mrpipe.reporting.front.statements import statements
+from mrpipe.structures import read_frame, write_frame
 from tests.reporting.front.run import EFFECT, run_in, tracing
 
 pytestmark = pytest.mark.property
@@ -182,3 +186,20 @@ def test_without_a_structure_the_way_to_a_law_is_said(tmp_path: Path) -> None:
 def test_two_fits_of_one_form_are_explained(tmp_path: Path) -> None:
     assert "fits bouc-wen again" in answers(tmp_path, before={"nrmse": 0.05})["Models"]
     assert "again" not in answers(tmp_path)["Models"]
+
+
+def test_the_structure_without_a_damper_moves_in_the_direction_of_the_simulation(tmp_path: Path) -> None:
+    facts = run_in(tmp_path)
+    frame = read_frame(Artifact(tmp_path / "frame.h5"))
+    with ArtifactWriter.create(tmp_path / "frame.h5", Provenance("identify-frame")) as artifact:
+        write_frame(artifact, replace(frame, influence_y=2.0 * np.ones(3)))
+
+    def without_damper(**summary: object) -> list[float]:
+        stages = [replace(stage, summary={**stage.summary, **summary}) for stage in facts.stages]
+        return [run.rms_top_m for run in laws.comparison(replace(facts, stages=stages)) if run.law == laws.UNCONTROLLED]
+
+    (along,) = without_damper()
+    excitation = facts.laws[next(iter(facts.laws))]["excitation"]
+    assert without_damper(excitation={**excitation, "direction_deg": 90.0}) == pytest.approx([2.0 * along])
+    # the history of the second direction is not in the artifact
+    assert without_damper(degrees_of_freedom=[]) == []
