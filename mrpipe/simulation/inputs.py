@@ -139,6 +139,13 @@ def ground_amplitude(details: Mapping[str, Any], purpose: str) -> float:
     UserError
         If the excitation is a force, or its kind has no amplitude.
     """
+    if "also" in details:
+        raise UserError(
+            "simulate.excitation",
+            "also",
+            f"{purpose} is measured under motion of the ground alone",
+            "leave also out, or study everything together with simulate",
+        )
     if "base_amplitude_m_s2" in details:
         return float(details["base_amplitude_m_s2"])
     if any(key.startswith("force_") or key == "peak_n" for key in details):

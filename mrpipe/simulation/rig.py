@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -20,12 +19,9 @@ from mrpipe.control.storage import read_calibrated_with
 from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import Chain
 from mrpipe.effects.damper import damper_named
-from mrpipe.errors import UserError
-from mrpipe.simulation import excitation as kinds
+from mrpipe.simulation.acting import ADJUSTED, acting_together, harmonic_excitation, known_amplitude
 from mrpipe.simulation.adjustment import SETTLED, adjusted_amplitude
 from mrpipe.simulation.excitation import Excitation
-from mrpipe.simulation.ground_record import HORIZONTAL, read_histories
-from mrpipe.simulation.inputs import acting_as_forces, in_two_directions
 from mrpipe.simulation.loop import RECORD_RATE_HZ, LoopOptions, Response, simulate_law
 from mrpipe.simulation.sensors import MISSING, STUCK, ZERO, SensorFault, SensorNoise
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
@@ -35,12 +31,6 @@ from mrpipe.structures.over_amplitude import read_frame_at
 
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
 """Dampers of a run by name, and the stage whose artifact holds each."""
-
-SWEEP = (0.4, 2.4)
-"""First and last frequency of a sweep over the free frequency, where the settings give none."""
-
-ADJUSTED = ("harmonic", "sweep", "random")
-"""Kinds of motion whose amplitude is found where the settings give none."""
 
 LARGEST_PLAUSIBLE_M_S2 = 9.81
 """Amplitude of the base acceleration above which a computed one is reported: strong-motion records seldom have a peak
@@ -209,129 +199,8 @@ def excitation_of(
     amplitude, viscous = known_amplitude(settings), None
     if amplitude is None and settings.kind in ADJUSTED:
         amplitude, viscous = _adjusted(rig, settings, lambda tried: harmonic_excitation(settings, free, tried), warn)
-        viscous = viscous if settings.factor == 1.0 and settings.kind == "harmonic" else None
-    return acting(excitation_at(settings, free, amplitude or 0.0), settings, rig.frame), viscous
-
-
-def known_amplitude(settings: ExcitationSettings) -> float | None:
-    """Return the amplitude of the motion [m/s^2] or force [N] that the settings give; None where it is to be found.
-
-    Raises
-    ------
-    UserError
-        If the amplitude of a force is not given, because only that of a base acceleration can be found.
-    """
-    if not settings.force_at:
-        if settings.force_amplitude_n is not None:
-            raise UserError(
-                "simulate.excitation",
-                "force_amplitude_n",
-                "is given, but no degree of freedom on which the force acts",
-                "name it in simulate.excitation.force_at",
-            )
-        return settings.base_amplitude_m_s2
-    if settings.force_amplitude_n is None and settings.kind in ADJUSTED:
-        raise UserError(
-            "simulate.excitation", "force_amplitude_n", "is not given", "give the amplitude of the force [N]"
-        )
-    return settings.force_amplitude_n
-
-
-def acting(excitation: Excitation, settings: ExcitationSettings, frame: Frame) -> Excitation:
-    """Return the excitation with the places at which its histories act.
-
-    Raises
-    ------
-    UserError
-        If a place does not exist, or the structure has no second direction.
-    """
-    if settings.direction_deg:
-        # who reads the response needs the direction, because first floor and top are those that move along it
-        details = {**excitation.details, "direction_deg": settings.direction_deg}
-        excitation = replace(excitation, details=details)
-    if settings.kind == "free-decay":
-        return excitation
-    if settings.force_at:
-        return acting_as_forces(excitation, frame, settings.force_at, "simulate.excitation.force_at")
-    histories = int(excitation.at(np.zeros(1))[0].size)
-    if histories == 1:
-        return excitation
-    if histories != HORIZONTAL:
-        raise UserError(
-            settings.file,
-            "",
-            f"holds {histories} histories",
-            "name one or two of them in simulate.excitation.file_channels",
-        )
-    return in_two_directions(excitation, frame, settings.file)
-
-
-def excitation_at(settings: ExcitationSettings, free_rad_s: float, amplitude_m_s2: float) -> Excitation:
-    """Return the excitation for a known amplitude of harmonic motion or sweep.
-
-    Parameters
-    ----------
-    settings
-        What shakes the base.
-    free_rad_s
-        Free frequency of the target mode.
-    amplitude_m_s2
-        Of the base acceleration, before `settings.factor`; not used by other kinds of motion.
-
-    Raises
-    ------
-    UserError
-        If a recorded motion cannot be read.
-    """
-    factor = settings.factor
-    if settings.kind == "recorded":
-        return kinds.recorded(*_record(settings), scale=factor)
-    if settings.kind == "free-decay":
-        return kinds.at_rest(settings.decay_s)
-    if settings.kind == "sweep":
-        first = settings.sweep_first_hz or SWEEP[0] * free_rad_s / (2.0 * np.pi)
-        last = settings.sweep_last_hz or SWEEP[1] * free_rad_s / (2.0 * np.pi)
-        return kinds.sweep(factor * amplitude_m_s2, first, last, settings.sweep_s)
-    if settings.kind == "random":
-        omega = settings.frequency_rad_s or free_rad_s
-        period = 2.0 * np.pi / omega
-        return kinds.narrow_band(
-            factor * amplitude_m_s2 / math.sqrt(2.0),
-            omega,
-            settings.random_bandwidth,
-            np.random.default_rng(settings.random_seed),
-            duration_s=settings.random_s,
-            settling_s=min(settings.settling_cycles * period, 0.5 * settings.random_s),
-            ramp_s=settings.ramp_cycles * period,
-        )
-    return harmonic_excitation(settings, free_rad_s, factor * amplitude_m_s2)
-
-
-def _record(settings: ExcitationSettings) -> tuple[FloatArray, FloatArray]:
-    """Return time and histories, (m,) where there is one and (m, k) where there are several."""
-    quantity = "force" if settings.force_at else "acceleration"
-    time_s, histories = read_histories(
-        Path(settings.file), settings.file_unit, channels=settings.file_channels, quantity=quantity
-    )
-    if settings.file_y:
-        second = "simulate.excitation.file_y"
-        other_s, other = read_histories(Path(settings.file_y), settings.file_unit, file_setting=second)
-        # on the clock of the first; a record that ends earlier is at rest after its end
-        second_history = np.interp(time_s, other_s - other_s[0] + time_s[0], other[:, 0], right=0.0)
-        histories = np.column_stack([histories[:, 0], second_history])
-    return time_s, histories[:, 0] if histories.shape[1] == 1 else histories
-
-
-def harmonic_excitation(settings: ExcitationSettings, free_rad_s: float, amplitude_m_s2: float) -> Excitation:
-    """Return harmonic base motion of this amplitude; arguments as in :func:`excitation_at`."""
-    return kinds.harmonic(
-        amplitude_m_s2,
-        settings.frequency_rad_s or free_rad_s,
-        cycles=settings.cycles,
-        settling_cycles=min(settings.settling_cycles, settings.cycles - 1),
-        ramp_cycles=settings.ramp_cycles,
-        decay_s=settings.decay_s,
-    )
+        viscous = viscous if settings.factor == 1.0 and settings.kind == "harmonic" and not settings.also else None
+    return acting_together(settings, rig.frame, free, amplitude or 0.0), viscous
 
 
 def expected_top(rig: Rig) -> float:

@@ -10,8 +10,8 @@ from mrpipe.control.settings import ControllerSettings
 from mrpipe.options import Section
 
 
-class ExcitationSettings(Section):
-    """What shakes the base."""
+class SingleExcitationSettings(Section):
+    """One excitation."""
 
     kind: Literal["harmonic", "sweep", "random", "recorded", "free-decay"] = Field(
         "harmonic",
@@ -93,6 +93,16 @@ class ExcitationSettings(Section):
     )
     force_amplitude_n: float | None = Field(
         None, gt=0.0, description="With `force_at`: amplitude of a harmonic force or sweep; random forces have its RMS."
+    )
+
+
+class ExcitationSettings(SingleExcitationSettings):
+    """What acts on the structure."""
+
+    also: tuple[SingleExcitationSettings, ...] = Field(
+        (),
+        description="What acts at the same time, each like `simulate.excitation` with its own amplitude, such as wind "
+        "(`force_at`) during motion of the ground. The duration is that of `simulate.excitation`.",
     )
 
 

@@ -19,10 +19,11 @@ from mrpipe.control.together import LinearDevice, ground_response, linear_device
 from mrpipe.dampers.model import DamperModel
 from mrpipe.effects.damper import damper_named
 from mrpipe.errors import UserError
+from mrpipe.simulation.acting import ADJUSTED, acting_together, known_amplitude
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.loop import LoopOptions
 from mrpipe.simulation.resonance import BAND
-from mrpipe.simulation.rig import ADJUSTED, acting, excitation_at, known_amplitude, loop_options
+from mrpipe.simulation.rig import loop_options
 from mrpipe.simulation.settings import ExcitationSettings, SimulateSettings
 from mrpipe.simulation.several import DampersResponse, LoopDamper, simulate_dampers
 from mrpipe.structures import Frame, natural_modes, read_frame
@@ -245,7 +246,7 @@ def dampers_excitation(rig: DampersRig, settings: ExcitationSettings) -> Excitat
     amplitude = known_amplitude(settings)
     if amplitude is None and settings.kind in ADJUSTED:
         amplitude = _amplitude(rig, settings.frequency_rad_s or free)
-    return acting(excitation_at(settings, free, amplitude or 0.0), settings, rig.frame)
+    return acting_together(settings, rig.frame, free, amplitude or 0.0)
 
 
 def _amplitude(rig: DampersRig, omega: float) -> float:

@@ -12,10 +12,10 @@ from scipy.signal import StateSpace, lsim
 from mrpipe.control.controller import ControllerOptions, build_controller
 from mrpipe.control.gains import Gains
 from mrpipe.errors import UserError
+from mrpipe.simulation.acting import acting, acting_together, excitation_at
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.inputs import acting_as_forces, in_two_directions
 from mrpipe.simulation.loop import LoopOptions, Response
-from mrpipe.simulation.rig import acting, excitation_at
 from mrpipe.simulation.settings import ExcitationSettings
 from mrpipe.simulation.several import LoopDamper, simulate_dampers
 from mrpipe.structures import Frame
@@ -120,3 +120,40 @@ def test_settings_and_what_can_be_wrong(tmp_path: Path) -> None:
         acting(excitation_at(both, 5.0, 0.0), both, replace(frame, influence_y=None))
     with pytest.raises(UserError, match="no second direction"):
         replace(frame, influence_y=None).turned(30.0)
+
+
+@pytest.mark.property
+def test_a_force_and_ground_motion_act_together(tmp_path: Path) -> None:
+    """The response of a linear loop is the sum of the responses to each; each is zero after its end."""
+    frame, files = bridge(), []
+    for place, length in enumerate((400, 250)):
+        files.append(tmp_path / f"{place}.csv")
+        np.savetxt(files[-1], np.column_stack([TIME, HISTORIES[:, place]])[:length], delimiter=",")
+    quake = {"kind": "recorded", "file": str(files[0])}
+    wind = {"kind": "recorded", "file": str(files[1]), "file_unit": "kN", "force_at": {"deck y": 1.0}}
+    alone = [run(frame, acting_together(ExcitationSettings(**item), frame, 1.0, 0.0)) for item in (quake, wind)]
+    both = run(frame, acting_together(ExcitationSettings(**quake, also=[wind]), frame, 1.0, 0.0))
+    for name in ("displacement", "absolute_acceleration", "base_shear"):
+        parts = [getattr(item, name)[: len(alone[1].time_s)] for item in alone]
+        found = getattr(both, name)[: len(alone[1].time_s) - 1]
+        np.testing.assert_allclose(found, sum(parts)[:-1], rtol=0.0, atol=1e-9 * np.abs(found).max())
+    assert len(both.time_s) == len(alone[0].time_s)
+    assert both.energy_balance_error < 1e-3
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    ("further", "words"),
+    [
+        ({"kind": "free-decay"}, r"also\[0\]: kind: is free-decay"),
+        ({"kind": "harmonic"}, r"also\[0\]: base_amplitude_m_s2: is not given"),
+        ({"kind": "harmonic", "force_at": {"deck y": 1.0}}, r"also\[0\]: force_amplitude_n: is not given"),
+        ({"base_amplitude_m_s2": 1.0, "direction_deg": 3.0}, r"also\[0\]: direction_deg"),
+        ({"kind": "recorded", "file": "none.csv"}, r"also\[0\].file: none.csv: there is no such file"),
+        ({"force_amplitude_n": 1.0, "force_at": {"roof": 1.0}}, r"also\[0\].force_at: roof"),
+    ],
+)
+def test_mistakes_in_what_acts_in_addition(further: dict, words: str) -> None:
+    settings = ExcitationSettings(base_amplitude_m_s2=1.0, also=[further])
+    with pytest.raises(UserError, match=words):
+        acting_together(settings, bridge(), 10.0, 1.0)

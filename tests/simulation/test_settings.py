@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mrpipe.simulation.rig import excitation_at, loop_options
+from mrpipe.simulation.acting import excitation_at
+from mrpipe.simulation.rig import loop_options
 from mrpipe.simulation.settings import ExcitationSettings, SensorFaultSettings, SimulateSettings
 
 pytestmark = pytest.mark.property
