@@ -90,7 +90,7 @@ def superposed(first: Excitation, others: Sequence[Excitation]) -> Excitation:
     details = {**first.details, "also": [item.details for item in others]}
     # without places the inputs are a single history, as everywhere
     single = (lambda times: at(times)[:, 0]) if not places else at
-    # with something else that acts, the motion after the stop of a harmonic is no free decay
+    # with something else that acts, a harmonic that stops leaves a motion that is still driven
     return replace(first, at=single, places=places, shakes_ground=True, details=details, decay_from_s=math.nan)
 
 
