@@ -184,3 +184,18 @@ def test_peer_records_as_a_file_of_a_campaign_and_in_their_zip(tmp_path: Path) -
     (tmp_path / "a.VT2").write_text("")
     with pytest.raises(UserError, match=r"is a record of velocity; give the \.AT2 file"):
         read_motion(tmp_path / "a.VT2")
+
+
+@pytest.mark.golden
+def test_csmip_volume_1_in_units_of_g(tmp_path: Path) -> None:
+    """The line before the samples and their columns are those of a volume 1 file of CSMIP from 2012."""
+    path = tmp_path / "CE89146.V1"
+    path.write_text(
+        "Uncorrected Accelerogram Data             Processed: 02/13/12, CGS  146be002    \n"
+        "Chan  1: 360 Deg                                                                \n"
+        "     4 Accelerogram points at 200 pts/sec in units of g .      Format: (8f9.6)  \n"
+        "  .000010  .000010 -.000007-1.000002\n"
+    )
+    (found,) = read_strong_motion(path)
+    np.testing.assert_allclose(found.acceleration_m_s2, 9.80665 * np.array([1e-5, 1e-5, -7e-6, -1.000002]))
+    assert (found.name, found.interval_s, found.vertical) == ("1: 360 Deg", 0.005, False)

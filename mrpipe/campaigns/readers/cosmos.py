@@ -20,13 +20,16 @@ _DATA = re.compile(
     re.IGNORECASE,
 )
 _STEP = re.compile(r"spaced\s+at\s+([\d.]+)\s*sec", re.IGNORECASE)
+_POINTS_RATE = re.compile(r"\bat\s+([\d.]+)\s*(?:pts|points|samples)\s*/\s*sec", re.IGNORECASE)
 _SECONDS = re.compile(r"approx\.?\s+([\d.]+)\s*sec", re.IGNORECASE)
 _RATE = re.compile(r"([\d.]+)\s*samples/sec", re.IGNORECASE)
 _REAL_VALUES = re.compile(r"^\s*(\d+)\s+real-header\s+values\b[^\n]*$", re.IGNORECASE | re.MULTILINE)
 _INTEGER_VALUES = re.compile(r"^\s*(\d+)\s+integer-header\s+values\b[^\n]*$", re.IGNORECASE | re.MULTILINE)
 _FORMAT = re.compile(r"\(\s*(?:\d+p,?\s*)?\d*\s*[fegdi]\s*(\d+)(?:\.\d+)?\s*(?:e\d*)?\s*\)", re.IGNORECASE)
 """Fortran format of the samples; some programs write the E of the exponent behind the width."""
-_UNIT = re.compile(r"(?:units?\s*=\s*|\bin\s+)([a-z]+(?:\s*[/^*.]\s*[a-z0-9]+)*)", re.IGNORECASE)
+_UNIT = re.compile(
+    r"(?:units?\s*=\s*|\bin\s+(?:units?\s+of\s+)?)([a-z]+(?:\s*[/^*]\s*[a-z0-9]+|\.[a-z0-9]+)*)", re.IGNORECASE
+)
 _TENTH_OF_G = "g/10"
 _CHANNEL = re.compile(
     r"\bchan(?:nel)?\.?\s*#?\s*(\d+)\b(?:\s*[:,]\s*([^\n]*?))?(?:\s{3,}|$)", re.IGNORECASE | re.MULTILINE
@@ -70,9 +73,10 @@ class StrongMotion:
 
 
 def cosmos_channels(path: Path, text: str) -> Iterator[StrongMotion]:
-    """Return the accelerations of all channels of a V2 file.
+    """Return the accelerations of all channels of a V1 or V2 file.
 
-    Formats: CSMIP volume 2 (`... points of accel data equally spaced at .005 sec, in cm/sec2`) and COSMOS V1.20
+    Formats: CSMIP volume 2 (`... points of accel data equally spaced at .005 sec, in cm/sec2`), CSMIP volume 1
+    (`... Accelerogram points at 200 pts/sec in units of g . Format: (8f9.6)`) and COSMOS V1.20
     (`... acceleration pts, approx 36 secs, units=cm/sec2 (04),Format=(8f10.3)`). Velocities and displacements are left
     out.
 
@@ -167,6 +171,9 @@ def _interval(path: Path, said: str, header: str, count: int) -> float:
     step = _STEP.search(said)
     if step:
         return float(step[1])
+    rate = _POINTS_RATE.search(said)
+    if rate and float(rate[1]) > 0.0:
+        return 1.0 / float(rate[1])
     length = _SECONDS.search(said)
     if not length:
         raise UserError(path, "header", "states no sampling interval", "give a V2 file with `spaced at` or `approx`")
