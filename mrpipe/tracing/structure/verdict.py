@@ -30,6 +30,13 @@ class History:
     dims: tuple[str, ...]
 
 
+UNCOUPLED = (
+    "each direction is traced by itself: forces that couple the directions, such as torsion, are not modelled; they "
+    "count as unexplained, and an effect may imitate them"
+)
+"""What the result says about structures whose sensors measure in directions."""
+
+
 @dataclass(frozen=True)
 class StructureTracing:
     """Result of tracing a structure's campaign.
@@ -101,10 +108,7 @@ def trace_structure(
         parts.append(Part(f"frame {axis}".strip(), frame.summary))
         findings += [f"direction {axis}: {line}" if axis else line for line in _lines(frame)]
         if axis and parts[-1].unexplained:
-            findings.append(
-                f"direction {axis} was traced by itself: what couples it with other directions, such as torsion, "
-                "counts as unexplained"
-            )
+            findings.append(f"direction {axis} has an unexplained part, which coupling with other directions may cause")
     data = next(iter(by_direction.values()))
     found = [
         command_part(data.loops, effects, names, rules.delay, options.most_confidence),
@@ -120,6 +124,11 @@ def trace_structure(
             "record every floor's acceleration, or damper_force, drive and floor 1",
         )  # fmt: skip
     summary = {"campaign": campaign.name, **merged(parts), "declared_effects": list(names)}
+    if directions := [axis for axis in frames if axis]:
+        summary["directions"] = {"traced": directions, "coupling_modelled": False, "statement": UNCOUPLED}
+        findings.append(UNCOUPLED)
+        if any("damper_force" in test.channels for item in campaigns for test in item.recordings):
+            findings.append("the damper is not traced, because the sensors of the structure measure in directions")
     if not frames:
         return StructureTracing(summary, findings=findings)
     histories = {

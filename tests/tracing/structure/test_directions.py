@@ -36,12 +36,18 @@ def two_directions(along: Campaign, across: Campaign) -> Campaign:
 @pytest.mark.planted
 def test_an_effect_in_one_direction_is_named_there() -> None:
     campaign = two_directions(frame_campaign("clean"), frame_campaign("cubic-stiffness", 3))
+    first, *others = campaign.recordings
+    measured = replace(first, channels={**first.channels, "damper_force": np.zeros(first.time_s.size)})
+    campaign = replace(campaign, recordings=(measured, *others))
     assert directions_of(campaign) == ["x", "y"]
     options = TracingOptions(most_effects=1, bootstrap_draws=50)
     effects = {name: all_structural_effects()[name] for name in ("cubic-stiffness", "joint-friction")}
     found = trace_structure([campaign], effects, {}, options, rng=np.random.default_rng(1))
     assert [item["name"] for item in found.summary["effects"]] == ["cubic-stiffness"]
     assert found.summary["part"] == "frame y"
+    assert found.summary["directions"]["coupling_modelled"] is False
+    assert any(line.startswith("the damper is not traced") for line in found.findings)
+    assert sum("forces that couple the directions" in line for line in found.findings) == 1
     assert found.summary["parts"]["frame x"]["effects"] == []
     assert {name.partition("/")[0] for name in found.histories} == {"x", "y"}
 
