@@ -206,7 +206,12 @@ def excitation_of(
 def expected_top(rig: Rig) -> float:
     """Return the top displacement in the free mode at which the damper moves with the expected amplitude [m]."""
     known = rig.controllers.calibrated
-    return known.amplitude_m * abs(known.top_0 / known.u_0)
+    if rig.frame.influence_y is None:
+        return known.amplitude_m * abs(known.top_0 / known.u_0)
+    # the calibration does not know in which direction the ground moves, and so which degree of freedom is the top
+    modes = natural_modes(rig.frame)
+    shape = modes.mode_shapes[:, int(np.argmin(np.abs(modes.angular_frequencies - known.omega_0)))]
+    return known.amplitude_m * abs(float(shape[rig.frame.top] / (rig.position @ shape)))
 
 
 def _adjusted(

@@ -83,11 +83,18 @@ class Frame:
         """Indices of the degrees of freedom that move with the ground, in their order.
 
         Results call the first of them the first floor and the last one the top. In a frame with torsion these are the
-        translations in the direction of the ground motion, so that no rotation is given in metres. Modal coordinates
-        are left out, because they do not belong to a place.
+        translations in the direction of the ground motion, so that no rotation is given in metres. With a second
+        direction, a degree of freedom belongs to the first one if it is turned from it by less than 45 degrees (at
+        45 degrees to one of the two, so that drifts are never taken between directions). Modal coordinates are left
+        out, because they do not belong to a place.
         """
-        size = np.abs(self.ground_influence)[: self.floors - self.modal_coordinates]
-        found = np.flatnonzero(size > 1e-6 * float(np.max(size, initial=0.0)))
+        places = self.floors - self.modal_coordinates
+        along = self.ground_influence[:places]
+        across = np.zeros(places) if self.influence_y is None else self.influence_y[:places]
+        size, rounding = np.abs(along), 1e-9 * float(np.max(np.abs(along), initial=0.0))
+        nearer = size - np.abs(across) > rounding
+        between = np.abs(size - np.abs(across)) <= rounding
+        found = np.flatnonzero((size > 1e3 * rounding) & (nearer | (between & (along * across <= 0.0))))
         return tuple(int(index) for index in found) or tuple(range(self.floors))
 
     @property

@@ -157,3 +157,10 @@ def test_mistakes_in_what_acts_in_addition(further: dict, words: str) -> None:
     settings = ExcitationSettings(base_amplitude_m_s2=1.0, also=[further])
     with pytest.raises(UserError, match=words):
         acting_together(settings, bridge(), 10.0, 1.0)
+
+
+@pytest.mark.property
+def test_first_floor_and_top_lie_in_the_direction_of_the_ground_motion() -> None:
+    frame = bridge()
+    found = {degrees: frame.turned(degrees).moved_by_ground for degrees in (0.0, 30.0, 60.0, 90.0, 45.0)}
+    assert found == {0.0: (0, 2), 30.0: (0, 2), 60.0: (1, 3), 90.0: (1, 3), 45.0: (0, 2)}

@@ -203,3 +203,35 @@ def test_calibrate_runs_on_a_given_structure(tmp_path: Path, capsys: pytest.Capt
     shown = capsys.readouterr()
     assert status == 0, shown.err
     assert json.loads(shown.out)["laws"]
+
+
+@pytest.mark.property
+def test_the_amplitude_along_a_direction_is_that_of_its_own_top(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Equal structures in x and y, coupled by nothing: motion along y with the damper in y is motion along x."""
+    storeys = [[2.0, -1.0], [-1.0, 1.0]]
+    np.savetxt(tmp_path / "M.csv", 25.0 * np.eye(4), delimiter=",")
+    np.savetxt(tmp_path / "K.csv", 3e4 * np.kron(np.diag([1.0, 1.1]), storeys), delimiter=",")
+    content = {
+        "campaigns": {"bench": None, "frame": None, "closed_loop": None},
+        "structure": {
+            "mass": {"file": "M.csv", "name": ""},
+            "stiffness": {"file": "K.csv", "name": ""},
+            "influence": [1, 1, 0, 0],
+            "influence_y": [0, 0, 1, 1],
+        },
+        "calibrate": {"damper": "set-c", "expected_amplitude_m": 0.01, "damper_floor": 3, "target_mode": 2},
+        "simulate": {
+            "damper": "set-c",
+            "controller": {"inverse": "model"},
+            "excitation": {"direction_deg": 90.0, "cycles": 20, "settling_cycles": 10, "decay_s": 0.0},
+        },
+    }
+    (tmp_path / "rig.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    common = ["--config", str(tmp_path / "rig.yaml"), "--run", str(tmp_path / "run"), "--json", "--quiet"]
+    assert run(["simulate", "--law", "vd", *common]) == 0
+    found = json.loads(capsys.readouterr().out)
+    shape = np.linalg.eigh(np.array(storeys))[1][:, 0]
+    assert found["rms_x_top_m"] == pytest.approx(0.01 * shape[1] / shape[0] / np.sqrt(2.0), rel=0.01)
+    assert found["excitation"]["direction_deg"] == 90.0
