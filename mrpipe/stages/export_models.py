@@ -107,9 +107,13 @@ STAGES = (
     _stage(
         "damper",
         _damper,
-        ("identify-damper",),
+        (),
         ("simulate.damper",),
-        (("simulate.damper", "traced", "close-loop"),),
+        (
+            ("simulate.damper", "identified", "identify-damper"),
+            ("simulate.damper", "traced", "identify-damper"),
+            ("simulate.damper", "traced", "close-loop"),
+        ),
         ("close-loop",),
     ),
     _stage(

@@ -235,3 +235,13 @@ def test_the_amplitude_along_a_direction_is_that_of_its_own_top(
     shape = np.linalg.eigh(np.array(storeys))[1][:, 0]
     assert found["rms_x_top_m"] == pytest.approx(0.01 * shape[1] / shape[0] / np.sqrt(2.0), rel=0.01)
     assert found["excitation"]["direction_deg"] == 90.0
+
+
+def test_a_damper_of_a_parameter_set_is_exported_without_a_bench_campaign(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["--config", str(configured(tmp_path, storeys=STOREYS)), "--run", str(tmp_path / "run")]
+    given = ["--set", "simulate.damper=set-c", "--format", "json", "--json", "--quiet"]
+    assert run(["export", "damper", *common, *given]) == 0
+    capsys.readouterr()
+    assert (tmp_path / "run" / "export" / "damper" / "damper.json").is_file()
