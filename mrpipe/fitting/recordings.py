@@ -72,6 +72,11 @@ class Recordings:
         Band of the displacement's noise, shape (tests,): up to the cut-off where no other is known.
     noise_repeats
         Share of the variance of the displacement's noise that repeats where the motion repeats, shape (tests,).
+    displacement_rounding, displacement_dither
+        Step of a quantised displacement and the noise that was added before rounding, shape (tests,) [m]; the step is 0
+        where the displacement is not quantised.
+    recorded_dt
+        Sampling interval of the record that the samples are taken from, shape (tests,) [s].
     """
 
     displacement: FloatArray
@@ -93,6 +98,9 @@ class Recordings:
     cutoff_hz: FloatArray
     noise_band_hz: FloatArray
     noise_repeats: FloatArray
+    displacement_rounding: FloatArray
+    displacement_dither: FloatArray
+    recorded_dt: FloatArray
 
     @property
     def tests(self) -> int:
@@ -156,6 +164,9 @@ class Recordings:
             cutoff_hz=self.cutoff_hz[chosen],
             noise_band_hz=self.noise_band_hz[chosen],
             noise_repeats=self.noise_repeats[chosen],
+            displacement_rounding=self.displacement_rounding[chosen],
+            displacement_dither=self.displacement_dither[chosen],
+            recorded_dt=self.recorded_dt[chosen],
         )
 
     def scales(self) -> EffectScales:
@@ -247,6 +258,9 @@ def record_tests(
         cutoff_hz=numbers("cutoff_hz"),
         noise_band_hz=numbers("noise_band_hz"),
         noise_repeats=numbers("noise_repeats"),
+        displacement_rounding=numbers("displacement_rounding"),
+        displacement_dither=numbers("displacement_dither"),
+        recorded_dt=numbers("recorded_dt"),
     )
 
 
@@ -326,6 +340,9 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
         "cutoff_hz": cutoff,
         "noise_band_hz": band,
         "noise_repeats": test.displacement_noise_repeats if test.motion_band_hz > 0.0 else test.rounding_share,
+        "displacement_rounding": test.displacement_step_m,
+        "displacement_dither": test.displacement_dither_m,
+        "recorded_dt": 1.0 / rate,
     }
 
 

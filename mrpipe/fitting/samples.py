@@ -87,6 +87,9 @@ def bench_recordings(
         cutoff_hz=zeros,
         noise_band_hz=zeros,
         noise_repeats=zeros,
+        displacement_rounding=zeros,
+        displacement_dither=zeros,
+        recorded_dt=np.array([test.dt for test in tests], dtype=np.float64),
     )
 
 

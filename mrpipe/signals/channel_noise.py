@@ -13,6 +13,12 @@ CUTOFF_MARGIN = 1.5
 QUANTISED_SHARE = 0.5
 """A channel with fewer different values than this share of its samples is quantised."""
 
+FLOATING_POINT = 1e-9
+"""Numerical technique: values closer than this share of their range are equal."""
+
+OFF_STEP = 0.01
+"""Numerical technique: a value at most this share of a step from a whole multiple of it is on the multiple."""
+
 DISPLACEMENT_HARMONICS = 8.0
 """Least cut-off of a displacement, in multiples of the frequency of the motion."""
 
@@ -29,14 +35,22 @@ def steady_noise(values: FloatArray, rate_hz: float) -> float:
 
 
 def resolution(values: FloatArray) -> float:
-    """Return the step of a quantised channel, in its unit; 0 if all samples differ.
+    """Return the step of a quantised channel, in its unit; 0 if it is not quantised.
 
-    Rounding to steps of q adds noise of q / sqrt(12) (Widrow and Kollar, Quantization Noise, 2008).
+    Rounding to steps of q adds noise of q / sqrt(12) (Widrow and Kollar, Quantization Noise, 2008). A converter with
+    fine steps gives nearly as many values as samples, but all of them are whole multiples of the step from each other.
     """
     levels = np.unique(values)
-    if len(levels) < 3 or len(levels) > QUANTISED_SHARE * len(values):
+    if len(levels) < 3:
         return 0.0
-    return float(np.median(np.diff(levels)))
+    steps = np.diff(levels)
+    # a change of the unit separates equal values by an error of floating point
+    steps = steps[steps > FLOATING_POINT * np.ptp(levels)]
+    step = float(np.ptp(levels) / np.rint(np.ptp(levels) / np.min(steps)))
+    multiples = (levels - levels[0]) / step
+    if np.max(np.abs(multiples - np.rint(multiples))) < OFF_STEP:
+        return step
+    return float(np.median(steps)) if len(levels) <= QUANTISED_SHARE * len(values) else 0.0
 
 
 def displacement_cutoff(displacement: FloatArray, rate_hz: float, motion_hz: float) -> float:

@@ -43,6 +43,9 @@ class PreparedTest:
     motion_band_hz
         Highest frequency of the motion if the noise was removed from the displacement (see
         :mod:`mrpipe.signals.shared_noise`); 0 if it was not. Not written to the artifact.
+    recorded_step_m, recorded_dither_m
+        Step of the displacement as recorded, and its noise before rounding, if the noise was removed since; 0 if it was
+        not. Not written to the artifact.
     time_s
         Clock, shape (n,) [s].
     displacement_m
@@ -78,6 +81,8 @@ class PreparedTest:
     displacement_noise_band_hz: float = 0.0
     displacement_noise_repeats: float = 0.0
     motion_band_hz: float = 0.0
+    recorded_step_m: float = 0.0
+    recorded_dither_m: float = 0.0
 
     @property
     def dt(self) -> float:
@@ -106,6 +111,18 @@ class PreparedTest:
         """Share of the variance of the displacement's noise that is rounding; 0 if it is not quantised."""
         rounding = resolution(self.displacement_raw_m) / np.sqrt(12.0)
         return float(min(1.0, (rounding / max(self.channel_noise_m, 1e-300)) ** 2))
+
+    @cached_property
+    def displacement_step_m(self) -> float:
+        """Step of a quantised displacement [m]; 0 if it is not quantised."""
+        return self.recorded_step_m or resolution(self.displacement_raw_m)
+
+    @cached_property
+    def displacement_dither_m(self) -> float:
+        """Standard deviation of the noise in a quantised displacement before it was rounded [m]."""
+        if self.recorded_step_m > 0.0:
+            return self.recorded_dither_m
+        return float(np.sqrt(max(self.channel_noise_m**2 - self.displacement_step_m**2 / 12.0, 0.0)))
 
     @cached_property
     def motion_frequency_hz(self) -> float:
@@ -171,6 +188,8 @@ def read_prepared(artifact: Artifact) -> list[PreparedTest]:
                 displacement_noise_m=0.0,
                 displacement_noise_band_hz=0.0,
                 displacement_noise_repeats=0.0,
+                recorded_step_m=0.0,
+                recorded_dither_m=0.0,
                 motion_band_hz=0.0,
                 **channels,
             )

@@ -185,6 +185,8 @@ def _quiet(test: PreparedTest, noise: NoiseDensity) -> PreparedTest:
     return replace(
         test,
         displacement_raw_m=motion,
+        recorded_step_m=test.displacement_step_m,
+        recorded_dither_m=test.displacement_dither_m,
         displacement_noise_m=float(remains),
         displacement_noise_band_hz=float(np.sqrt(3.0) * speed / (2.0 * np.pi * max(remains, 1e-300))),
         displacement_noise_repeats=lasting / max(float(np.sum(error)), 1e-300),

@@ -32,3 +32,16 @@ def test_the_cut_off_lies_between_the_motion_and_the_noise() -> None:
     frequency = motion_frequency(motion, np.gradient(motion, 1.0 / RATE))
     assert frequency == pytest.approx(2.0, rel=1e-3)
     assert 8.0 * frequency <= displacement_cutoff(motion + noise, RATE, frequency) < 0.25 * RATE
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("levels", [50, 5000])
+def test_fine_steps_of_a_converter_are_found(levels: int) -> None:
+    """Of 5000 levels nearly every one of 1500 samples has its own; third differences of a ramp are often zero."""
+    time = np.arange(1500) / 500.0
+    step = 2.0 / levels
+    exact = np.interp(np.mod(time, 0.6973), [0.0, 0.34865, 0.6973], [-1.0, 1.0, -1.0])
+    recorded = np.round(exact / step) * step * 1e3 / 1e3 + 0.0137
+    assert resolution(recorded) == pytest.approx(step, rel=1e-6)
+    assert steady_noise(recorded, 500.0) >= 0.99 * step / np.sqrt(12.0)
+    assert resolution(exact + 1e-4 * np.random.default_rng(0).standard_normal(1500)) == 0.0
