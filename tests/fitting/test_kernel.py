@@ -30,7 +30,7 @@ def _recordings() -> Recordings:
     each, nothing = np.zeros(len(x)), np.zeros(2)
     return Recordings(
         x, v, a, drive, each, np.array([0, *np.cumsum(lengths)]), np.array(DT), ("a", "b"), np.repeat([0, 1], lengths),
-        each == 0.0, *([nothing] * 9),
+        each == 0.0, *([nothing] * 11), np.array(DT),
     )  # fmt: skip
 
 

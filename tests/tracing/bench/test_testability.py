@@ -33,7 +33,8 @@ def recordings(*tests: tuple[str, float, float, float, bool]) -> Recordings:
         x, v, a, drive, 100.0 * np.sign(v), np.cumsum([0, *lengths]), np.full(count, 1.0 / RATE),
         tuple(f"t{k}" for k in range(count)), np.repeat(np.arange(count), lengths), np.ones(n, dtype=bool),
         noise, noise, noise, np.zeros(count), np.zeros(count), np.array([1.0 / test[2] for test in tests]),
-        np.full(count, 40.0), np.full(count, 40.0), np.zeros(count),
+        np.full(count, 40.0), np.full(count, 40.0), np.zeros(count), np.zeros(count), np.zeros(count),
+        np.full(count, 1.0 / RATE),
     )  # fmt: skip
 
 
