@@ -164,10 +164,11 @@ def load_of(
         time_s, histories = read_histories(
             Path(item.file), item.unit, file_setting=f"{setting}.file", unit_setting=f"{setting}.unit"
         )
-        both = frame is not None and frame.influence_y is not None and histories.shape[1] == HORIZONTAL
-        excitation = recorded(time_s, histories if both else histories[:, 0], scale=item.scale)
-        if frame is not None and both:
-            excitation = in_two_directions(excitation, frame, f"{setting}.file")
+        if frame is not None and frame.influence_y is not None and histories.shape[1] == HORIZONTAL:
+            both = recorded(time_s, histories, scale=item.scale)
+            excitation = in_two_directions(both, frame, f"{setting}.file")
+        else:
+            excitation = recorded(time_s, histories[:, 0], scale=item.scale)
         motions.append(Motion(Path(item.file).stem, excitation))
     amplitudes = tuple(factor * amplitude_m_s2 for factor in sorted(settings.amplitude_factors))
     return Load(band_rad_s, amplitudes, tuple(motions))

@@ -109,7 +109,7 @@ class PreparedTest:
     @cached_property
     def rounding_share(self) -> float:
         """Share of the variance of the displacement's noise that is rounding; 0 if it is not quantised."""
-        rounding = resolution(self.displacement_raw_m) / np.sqrt(12.0)
+        rounding = self.displacement_step_m / np.sqrt(12.0)
         return float(min(1.0, (rounding / max(self.channel_noise_m, 1e-300)) ** 2))
 
     @cached_property
