@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
+from mrpipe.modal.ambient.clocks import synchronised
 from mrpipe.modal.ambient.modes import find_ambient_modes
 from mrpipe.modal.amplitude.law_fit import amplitude_finding, find_amplitude_dependence
 from mrpipe.modal.clocks.delays import SensorClock, corrected, expected_clocks
@@ -164,9 +165,10 @@ def _identify(
     clocks: tuple[SensorClock, ...] = ()
     if not forced:
         band = (options.band_low_hz, options.band_high_hz)
-        search = find_ambient_modes(tests.ambient, layout, *band, tests.source, options.ambient_method)
+        ambient, clocks = synchronised(tests.ambient, band, options)
+        search = find_ambient_modes(ambient, layout, *band, tests.source, options.ambient_method)
         chosen = ChosenTests(search, ())
-        findings = _ambient_findings(tests)
+        findings = _ambient_findings(tests) + _clock_findings(clocks)
     else:
         chosen, findings = choose_tests(forced, tests, layout, options)
     if tests.ambient and forced:

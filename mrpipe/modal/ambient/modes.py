@@ -20,9 +20,10 @@ from scipy import signal
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError, install_extra
+from mrpipe.modal.ambient.band import USABLE_BAND, common_motion_ends_hz, lowest_peak_hz
 from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Pole, Records
 from mrpipe.modal.ambient.refine import refine_by_spectra
-from mrpipe.modal.ambient.setups import SetUp, merge_set_ups, pooled_poles
+from mrpipe.modal.ambient.setups import SetUp, confirmed, merge_set_ups, pooled_poles
 from mrpipe.modal.fit.lscf import PoleCandidate
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
@@ -39,11 +40,6 @@ _FREQUENCY_TOLERANCE = 0.01
 _LEAST_ASSURANCE = 0.9
 _LEAST_COLLINEARITY = 0.5
 _LARGEST_SPREAD = 4.0
-_SEGMENT_PERIODS = 40.0
-_LEAST_COMMON = 0.25
-_MARGIN = 1.15
-_USABLE_BAND = 0.45
-"""Part of the sampling rate below which a filter against aliasing leaves the responses unchanged."""
 _COPY_RANGE = 0.1
 _COPY_ASSURANCE = 0.7
 
@@ -59,40 +55,13 @@ class _Cluster:
     orders: int
 
 
-def _lowest_peak_hz(tests: Sequence[FrameTest], low_hz: float) -> float:
-    test = tests[0]
-    length = int(min(test.responses.shape[0], max(256, 40.0 / low_hz * test.sampling_rate_hz)))
-    frequency, power = signal.welch(test.responses, fs=test.sampling_rate_hz, nperseg=length, axis=0)
-    total = np.sum(power / power.sum(axis=0), axis=1)
-    total[frequency < low_hz] = 0.0
-    peaks = signal.find_peaks(total, height=0.05 * total.max())[0]
-    return float(frequency[peaks[0] if peaks.size else int(np.argmax(total))])
-
-
-def _common_motion_ends_hz(test: FrameTest, first_hz: float) -> float:
-    """Return the frequency above which the sensors have no motion in common [Hz].
-
-    At a resonance all sensors move together, so that the largest eigenvalue of their coherence matrix is near the
-    number of sensors; noise of the sensors and local forces leave it near 1.
-    """
-    rate, (samples, sensors) = test.sampling_rate_hz, test.responses.shape
-    length = int(min(samples / 16, _SEGMENT_PERIODS / first_hz * rate))
-    values = test.responses - test.responses.mean(axis=0)
-    frequency, _, segments = signal.stft(values, fs=rate, nperseg=max(length, 16), axis=0, boundary=None)
-    cross = np.einsum("fit,fjt->fij", segments, segments.conj())
-    size = np.sqrt(np.maximum(np.real(np.einsum("fii->fi", cross)), 1e-300))
-    largest = np.linalg.eigvalsh(cross / (size[:, :, None] * size[:, None, :]))[:, -1]
-    common = np.flatnonzero(largest >= 1.0 + _LEAST_COMMON * (sensors - 1))
-    return _MARGIN * max(float(frequency[common[-1]]) if common.size else 0.0, 2.0 * first_hz)
-
-
 def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> Records:
     """Filter, decimate and cut the responses; a record spans the modes that a chain of floors can have."""
     rate = tests[0].sampling_rate_hz
-    first = _lowest_peak_hz(tests, low_hz)
+    first = lowest_peak_hz(tests, low_hz)
     # the highest mode of a uniform chain lies (4 n + 2)/pi above the lowest; real ones spread more
     spread = _LARGEST_SPREAD * (4.0 * layout.floors + 2.0) / np.pi
-    high = high_hz or min(spread * first, _USABLE_BAND * rate, _common_motion_ends_hz(tests[0], first))
+    high = high_hz or min(spread * first, USABLE_BAND * rate, common_motion_ends_hz(tests[0], first))
     factor = max(1, int(rate / (2.6 * high)))
     sections = signal.butter(4, max(0.5 * low_hz, 0.2 * first), btype="highpass", fs=rate, output="sos")
     per_test = max(2, round(_BLOCKS / len(tests)))
@@ -160,14 +129,22 @@ def _summary(group: Sequence[Pole]) -> _Cluster:
     )
 
 
-def _without_copies(clusters: Sequence[_Cluster]) -> list[_Cluster]:
-    """Return the clusters without those that repeat the shape of a more stable one nearby: high orders split a pole."""
+def _without_copies(clusters: Sequence[_Cluster]) -> tuple[list[_Cluster], list[bool]]:
+    """Return the clusters without those that repeat the shape of a more stable one: high orders split a pole.
+
+    A pole repeats another one where their half-power bands overlap. Farther away, up to a tenth of the frequency, it
+    may also be a mode that the sensors see alike. The second result says of which poles this holds.
+    """
     kept: list[_Cluster] = []
+    doubtful: list[bool] = []
     for item in sorted(clusters, key=lambda cluster: (-cluster.orders, -cluster.collinearity)):
-        near = [known for known in kept if abs(known.angular_frequency / item.angular_frequency - 1.0) < _COPY_RANGE]
-        if all((known.shape @ item.shape) ** 2 < _COPY_ASSURANCE for known in near):
+        alike = [known for known in kept if (known.shape @ item.shape) ** 2 >= _COPY_ASSURANCE]
+        gaps = [abs(known.angular_frequency - item.angular_frequency) for known in alike]
+        widths = [sum(pole.damping_ratio * pole.angular_frequency for pole in (known, item)) for known in alike]
+        if all(gap >= width for gap, width in zip(gaps, widths, strict=True)):
             kept.append(item)
-    return kept
+            doubtful.append(any(gap < _COPY_RANGE * item.angular_frequency for gap in gaps))
+    return kept, doubtful
 
 
 def _matched(clusters: Sequence[_Cluster], pole: _Cluster) -> _Cluster | None:
@@ -274,8 +251,8 @@ def find_ambient_modes(
     found = _search(parts, layout, (low_hz, high_hz), source, ESTIMATORS[method])
     if len(found.numbers) < layout.floors and not high_hz:
         # a soft storey or a light top spreads the modes over more than a chain of like floors does
-        wide = max(_common_motion_ends_hz(group[0], _lowest_peak_hz(group, low_hz)) for group in parts)
-        wide = min(wide, _USABLE_BAND * min(group[0].sampling_rate_hz for group in parts))
+        wide = max(common_motion_ends_hz(group[0], lowest_peak_hz(group, low_hz)) for group in parts)
+        wide = min(wide, USABLE_BAND * min(group[0].sampling_rate_hz for group in parts))
         if wide > found.band_hz[1]:
             with contextlib.suppress(UserError):  # no mode in the wider band: those of the first search remain
                 wider = _search(parts, layout, (low_hz, wide), source, ESTIMATORS[method])
@@ -297,6 +274,7 @@ def _search(
         set_ups.append(set_up)
         candidates += found
         tops.append(top)
+    set_ups = confirmed(set_ups)
     merged = merge_set_ups(set_ups, source) if len(set_ups) > 1 else None
     fit = set_ups[0].fit if merged is None else merged.fit
     chosen = complete_set(fit, layout)
@@ -325,14 +303,15 @@ def _set_up(
     clusters = [item for item in _clusters(poles) if item.angular_frequency > 2.0 * np.pi * band_hz[0]]
     most = max((item.orders for item in clusters), default=0)
     firm = [item for item in clusters if item.orders >= 0.5 * most and item.collinearity > _LEAST_COLLINEARITY]
-    firm = _without_copies(firm)
+    firm, doubtful = _without_copies(firm)
     if not firm:
         remedy = "record longer, or set identify_frame.band_high_hz"
         raise UserError(source, f"tests.{tests[0].name}", "no stable pole in an ambient test", remedy)
     covariance, errors = _jackknife(statistics, records, estimator, orders, firm)
     fit = _as_fit(tests[0], firm, covariance, errors, _response_at(tests, firm))
     found = [PoleCandidate(item.angular_frequency, item.damping_ratio, item.orders) for item in clusters]
-    return SetUp(tuple(tests), fit), found, records.high_hz
+    rising = np.argsort([item.angular_frequency for item in firm])
+    return SetUp(tuple(tests), fit, tuple(doubtful[i] for i in rising)), found, records.high_hz
 
 
 def _response_at(tests: Sequence[FrameTest], firm: Sequence[_Cluster]) -> FloatArray:

@@ -23,12 +23,16 @@ from mrpipe.modal.records import FrameTest
 
 _ROUNDS = 2
 _LEAST_HALF_WIDTH = 0.08
+_LARGEST_HALF_WIDTH = 0.4
+"""Part of the frequency of a mode up to which the density of the force is taken as one power of the frequency."""
 _WIDTHS = 8.0
 _USUAL_DAMPING = 0.01
 _LINES_PER_WIDTH = 12.0
 _REACH_FREQUENCY = 0.03
 _DAMPING_RANGE = (5e-4, 0.15)
 _LEAST_LINES = 24
+_RANGE_OF_LEVELS = 20.0
+"""Logarithm by which noise and neighbours may differ from the lowest power in the band."""
 _EXPONENT_SPREAD = 2.0
 """Standard deviation of the power of the frequency before the data are seen: forces of wind fall by up to f^-4."""
 
@@ -136,8 +140,9 @@ def _refined(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, 
     for zeta in starts:
         top = float(np.log(max(np.quantile(power, 0.95), 1e-300) * 4.0 * zeta**2))
         theta = np.concatenate([[np.log(pole), np.log(zeta), top, floor, 0.0], np.full(len(peak.others), floor)])
+        noise = (floor - _RANGE_OF_LEVELS, floor + _RANGE_OF_LEVELS)
         reach = [(theta[0] - _REACH_FREQUENCY, theta[0] + _REACH_FREQUENCY), tuple(np.log(_DAMPING_RANGE))]
-        reach += [(None, None), (floor - 12.0, None), (None, None)] + [(floor - 12.0, None)] * len(peak.others)
+        reach += [(None, None), noise, (None, None)] + [noise] * len(peak.others)
         found = minimize(peak, theta, jac=True, method="L-BFGS-B", bounds=reach, options={"maxiter": 200})
         if best is None or found.fun < best.fun:
             best = found
@@ -145,6 +150,18 @@ def _refined(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, 
         return None
     covariance = np.asarray(np.linalg.pinv(peak.information(best.x))[:2, :2], dtype=np.float64)
     return float(np.exp(best.x[0])), float(np.exp(best.x[1])), covariance
+
+
+def _half_width(mode: int, modes: Sequence[tuple[float, float]]) -> float:
+    """Return half the width of the band about a mode in which its spectrum is fitted [rad/s].
+
+    The flanks of a peak separate its damping from noise and from the level of the force. The band therefore reaches
+    half way to the next mode, as far as a power of the frequency can describe the force.
+    """
+    pole, damping = modes[mode]
+    gap = min((abs(other - pole) for i, (other, _) in enumerate(modes) if i != mode), default=np.inf)
+    least = max(_WIDTHS * max(damping, _USUAL_DAMPING), _LEAST_HALF_WIDTH)
+    return max(least * pole, min(0.5 * gap, _LARGEST_HALF_WIDTH * pole))
 
 
 def refine_by_spectra(fit: MultiModeFit, tests: Sequence[FrameTest]) -> MultiModeFit:
@@ -166,7 +183,7 @@ def refine_by_spectra(fit: MultiModeFit, tests: Sequence[FrameTest]) -> MultiMod
     for _ in range(_ROUNDS):
         before = list(zip(omega.copy(), zeta.copy(), strict=True))
         for mode, (pole, damping) in enumerate(before):
-            half = max(_WIDTHS * max(damping, _USUAL_DAMPING), _LEAST_HALF_WIDTH) * pole
+            half = _half_width(mode, before)
             width = 2.0 * min(damping, _USUAL_DAMPING) * pole
             spectrum = _near(periodograms, mode, pole - half, pole + half, width)
             if spectrum is None:

@@ -30,10 +30,19 @@ _ALIKE = 0.7
 
 @dataclass(frozen=True)
 class SetUp:
-    """Tests with the same sensors, and the stable poles that they show."""
+    """Tests with the same sensors, and the stable poles that they show.
+
+    Attributes
+    ----------
+    tests, fit
+        The tests, and their poles.
+    doubtful
+        Which poles may repeat another pole of the same set-up, because the sensors see both alike; empty: none.
+    """
 
     tests: tuple[FrameTest, ...]
     fit: MultiModeFit
+    doubtful: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,6 +101,40 @@ def merge_set_ups(set_ups: Sequence[SetUp], source: Path) -> Merged:
         known |= set(own.fit.sensors)
         waiting.remove(index)
     return _collect(set_ups, base, shapes)
+
+
+def confirmed(set_ups: Sequence[SetUp]) -> list[SetUp]:
+    """Return set-ups without the doubtful poles that no other set-up shows.
+
+    A mode of the structure has the same frequency in all set-ups. A pole that an estimator splits from a mode appears
+    at another place in each. Poles of two set-ups are paired one to one, so that the copy of a mode does not count as
+    confirmed by the mode itself.
+    """
+    kept = []
+    for index, own in enumerate(set_ups):
+        others = [item for place, item in enumerate(set_ups) if place != index]
+        seen = {pole for other in others for pole in _paired(own, other)}
+        poles = [i for i in range(own.fit.angular_frequencies.size) if i in seen or not any(own.doubtful[i : i + 1])]
+        kept.append(SetUp(own.tests, own.fit.only(poles)))
+    return kept
+
+
+def _paired(one: SetUp, other: SetUp) -> set[int]:
+    """Return the poles of a set-up that belong to a pole of another one, the nearest frequencies first."""
+    shared = [sensor for sensor in one.fit.sensors if sensor in other.fit.sensors]
+    rows, columns = ([item.fit.sensors.index(sensor) for sensor in shared] for item in (one, other))
+    first, second = one.fit.angular_frequencies, other.fit.angular_frequencies
+    gaps = sorted(
+        (abs(second[j] / first[i] - 1.0), i, j)
+        for i in range(first.size)
+        for j in range(second.size)
+        if _assurance(one.fit.residues[rows, i].real, other.fit.residues[columns, j].real) > _ALIKE
+    )
+    pairs: dict[int, int] = {}
+    for gap, i, j in gaps:
+        if gap < _NEAR and i not in pairs and j not in pairs.values():
+            pairs[i] = j
+    return set(pairs)
 
 
 def _shapes_of(fit: MultiModeFit, index: int) -> list[_Shape]:

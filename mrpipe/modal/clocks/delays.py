@@ -31,7 +31,7 @@ _SCAN_STEPS = 16
 _STEP_ITERATIONS = 1
 _STEP_PLACES = 15
 _SMOOTHED_LINES = 41
-_LEAST_PHASE = 0.02
+LEAST_PHASE = 0.02
 """Delays below this phase [rad] at the highest mode are left: filters and damping cause as much."""
 
 
@@ -198,7 +198,7 @@ def _sensor_clock(fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highe
         changes = changes or (proven and not best.step_s)
     if changes:
         best = SensorClock(name, sensor, float(value[0]), float(spread[0]), float(value[1]))
-    if float(np.abs(best.delay(time)).max()) * highest < _LEAST_PHASE:
+    if float(np.abs(best.delay(time)).max()) * highest < LEAST_PHASE:
         return SensorClock(name, sensor, 0.0, best.offset_error_s)
     return best
 

@@ -110,7 +110,8 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
         scale_error=0.05 if modes.scale_errors is None else np.maximum(0.5 * modes.scale_errors, 0.005),
     )
     updated = fit_partial(masses, data, modes.possible_numbers)
-    findings = _findings(updated, modes, layout, unknown_rows)
+    open_rows = [row for row in unknown_rows if _is_open(updated, row)]
+    findings = _findings(updated, modes, layout, unknown_rows, open_rows)
     mass = np.diag(updated.masses)
     model = natural_modes(Frame(mass, np.zeros_like(mass), updated.stiffness)).mode_shapes
     index = np.asarray(updated.numbers) - 1
@@ -126,9 +127,11 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
     else:
         damping = modal_damping_matrix(mass, updated.stiffness, zeta)
         frame = Frame(mass, damping, updated.stiffness, "identified, storey model")
+    shapes = normalise_to_largest(shapes)
+    shapes[open_rows] = np.nan
     return Assembly(
         frame=frame,
-        shapes=normalise_to_largest(shapes),
+        shapes=shapes,
         numbers=updated.numbers,
         storeys=storeys,
         masses=updated.masses,
@@ -152,7 +155,17 @@ def _modes_only(modes: PartialModes, masses: FloatArray, layout: Layout, unknown
     return Assembly(None, shapes, numbers, None, masses, np.column_stack([masses, masses]), tuple(findings))
 
 
-def _findings(updated: UpdatedModel, modes: PartialModes, layout: Layout, unknown_rows: list[int]) -> list[str]:
+def _is_open(updated: UpdatedModel, row: int) -> bool:
+    """Return whether the mass of a floor (from 0), or the storey below or above it, is not determined.
+
+    The shape of a floor without a sensor follows from them alone, so that it would be a guess.
+    """
+    return not {f"mass {row + 1}", f"storey {row + 1}", f"storey {row + 2}"}.isdisjoint(updated.undetermined)
+
+
+def _findings(
+    updated: UpdatedModel, modes: PartialModes, layout: Layout, unknown_rows: list[int], open_rows: list[int]
+) -> list[str]:
     findings = []
     missing = sorted(set(range(1, layout.floors + 1)) - set(updated.numbers))
     if missing:
@@ -161,8 +174,15 @@ def _findings(updated: UpdatedModel, modes: PartialModes, layout: Layout, unknow
             f"{len(updated.numbers)} of {layout.floors} modes were found; modes {names} are not determined by the "
             "data: K is that of a storey model, and their damping is the mean of the others"
         )
-    if unknown_rows:
-        floors = ", ".join(str(row + 1) for row in unknown_rows)
+    expanded = [row for row in unknown_rows if row not in open_rows]
+    if open_rows:
+        floors = ", ".join(str(row + 1) for row in open_rows)
+        findings.append(
+            f"floors without a sensor ({floors}): their mode shapes are not determined, because the data leave open "
+            "the mass of the floor or the stiffness of a storey next to it"
+        )
+    if expanded:
+        floors = ", ".join(str(row + 1) for row in expanded)
         findings.append(
             f"floors without a sensor ({floors}): their mode shapes are "
             + ("expanded by orthogonality to the mass" if not missing else "those of the storey model")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.ambient.clocks import synchronised
 from mrpipe.modal.ambient.modes import find_ambient_modes
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.matrices.added_mass import modal_scale
@@ -96,7 +97,8 @@ def _modes(own: list[FrameTest], tests: FrameTests, layout: Layout, options: Ide
     forced = tuple(test for test in own if test.kind != "ambient")
     if not forced:
         band = (options.band_low_hz, options.band_high_hz)
-        return find_ambient_modes(own, state, *band, tests.source, options.ambient_method).fit
+        moved, _ = synchronised(own, band, options)
+        return find_ambient_modes(moved, state, *band, tests.source, options.ambient_method).fit
     alone = FrameTests(forced, (), np.full(layout.floors, np.nan), tests.source)
     chosen, _ = choose_tests(forced, alone, state, options)
     if options.clock_correction:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mrpipe.errors import UserError
-from mrpipe.modal.ambient.setups import SetUp, merge_set_ups
+from mrpipe.modal.ambient.setups import SetUp, confirmed, merge_set_ups
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.records import FrameTest, FrameTests, Place, Sensor
@@ -46,6 +46,17 @@ def test_two_set_ups_give_all_modes_at_all_floors(roving):
 
 
 @pytest.mark.planted
+def test_modes_that_two_sensors_see_alike_are_kept():
+    """Two sensors can see neighbouring modes with the same ratio: the second was taken for a copy of the first."""
+    pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
+    rng = np.random.default_rng(28)
+    tower = random_tower(rng, floors=5)
+    tests = [record(tower, rng, (floor, 5), f"floor {floor}") for floor in (1, 2, 3, 4)]
+    result = identify_frame(FrameTests((), (), tower.mass, HERE, tuple(tests)))
+    assert_modes(result, tower)
+
+
+@pytest.mark.planted
 def test_set_ups_without_a_common_sensor_are_refused_in_one_line(roving):
     pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
     tower, (first, second) = roving
@@ -59,10 +70,25 @@ def fit_of(sensors, shapes, omega, error=0.01):
     modes = len(omega)
     values = np.array(shapes, dtype=complex)
     empty = ()
-    return MultiModeFit(
+    fit = MultiModeFit(
         np.array(omega), np.full(modes, 0.01), np.eye(2 * modes) * 1e-6, values, np.full(values.shape, error),
         np.ones(values.shape), empty, empty, (), empty, np.ones(len(sensors)), sensors,
     )  # fmt: skip
+    inputs = np.full((len(sensors), 1, modes), np.nan, dtype=complex)
+    return replace(fit, participations=np.ones((1, modes), dtype=complex), input_residues=inputs)
+
+
+@pytest.mark.property
+def test_a_doubtful_pole_is_kept_where_another_set_up_shows_it():
+    top, low, high = (Sensor(floor, "", False) for floor in (5, 1, 2))
+    responses = np.random.default_rng(1).standard_normal((500, 2))
+    tests = (FrameTest("a", "ambient", 50.0, None, responses, (False,) * 2),)
+    shapes = [[0.5, 0.6, 0.6], [1.0, 1.0, 1.0]]
+    # the second pole is a mode that the two sensors see as they see the third; the first is split from the second
+    one = SetUp(tests, fit_of((low, top), shapes, [38.0, 40.0, 43.0]), (True, True, False))
+    other = SetUp(tests, fit_of((high, top), [row[1:] for row in shapes], [40.1, 43.1]), (True, False))
+    kept = [item.fit.angular_frequencies.tolist() for item in confirmed((one, other))]
+    assert kept == [[40.0, 43.0], [40.1, 43.1]]
 
 
 @pytest.mark.property

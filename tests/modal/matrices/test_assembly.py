@@ -74,6 +74,16 @@ def test_without_a_mass_and_a_force_only_the_modes_are_left() -> None:
     assert "no mass is known and no force" in found.findings[0]
 
 
+def test_a_shape_that_open_masses_leave_open_is_not_given() -> None:
+    """With all masses unknown, two sensors and a scale, the shape of the other floors had been given as if known."""
+    found = _assembled(_modes(count=2, measured=(1, 3), driven=3), np.full(4, np.nan))
+    assert np.isnan(found.shapes[[0, 2]]).all() and np.isfinite(found.shapes[[1, 3]]).all()
+    assert any(
+        line.startswith("floors without a sensor (1, 3): their mode shapes are not determined, because the data leave")
+        for line in found.findings
+    )
+
+
 def test_sensors_in_several_directions_give_no_chain() -> None:
     found = _assembled(_modes(), MASSES, chain=False)
     assert found.frame is None and "several directions" in found.findings[0]
