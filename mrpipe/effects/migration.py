@@ -138,8 +138,8 @@ _TIME = shape("rise_time", "s", "time over which the force comes back", "stroke/
 _POWER = shape("exponent", "1", "below 1 a steep rise and a long tail", "one", 0.3, 2.0, (0.6,))
 _RATIONAL = shape("power", "1", "1: rational, large: exponential", "one", 0.2, 20.0, (1.0, 4.0))
 _REVERSAL = shape("reversal_speed", "m/s", "speed from which a reversal counts", "speed", 1e-4, 0.1, (0.01,))
-_LATE = strength("share", "1", "share of the yield force that comes late", "one", 0.0, 3.0, 0.05)
-_SHARE = amplitude("share", "1", "share of the yield force that comes late", "one", 0.0, 3.0)
+_LATE = strength("share", "1", "share of the yield force that comes late", "one", 0.0, 30.0, 0.05)
+_SHARE = amplitude("share", "1", "share of the yield force that comes late", "one", 0.0, 30.0)
 
 EFFECT = Effect(
     name="migration",
