@@ -7,13 +7,14 @@ The chosen model judges them again, and everything is chosen again where another
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.contract import Effect
+from mrpipe.fitting.engine import fit
 from mrpipe.fitting.known import Known
 from mrpipe.fitting.recordings import MOST_JUDGED, MOST_SAMPLES, Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
@@ -23,6 +24,10 @@ from mrpipe.tracing.bench.cutoff import MotionFilter, best_filter, better_filter
 from mrpipe.tracing.bench.sampling import better_rate
 from mrpipe.tracing.bench.testability import untestable
 from mrpipe.tracing.options import TracingOptions
+
+
+ITERATIONS = 15
+"""Numerical technique: most steps of a fit at a higher rate of what was chosen at a lower one."""
 
 
 @dataclass(frozen=True)
@@ -133,9 +138,11 @@ def choose(bench: Bench, begun: Start) -> Chosen:
     if faster is not options:
         samples = round(MOST_SAMPLES * faster.fit_rate_hz / options.fit_rate_hz)
         again = _at(bench, faster, _better_filter(bench, found, faster), samples)
-        if again.names == found.names:
+        # a higher rate makes a model more accurate; it does not show that one more effect is there or one is missing
+        if again.names == found.names or (
+            len(again.names) == len(found.names) and _leaves_less(again, found, options.rules.nuisances.rate_gain)
+        ):
             return again
-        # a higher rate makes a model more accurate; it does not show that an effect is there or missing
     way = _better_filter(bench, found, options)
     return found if way is found.filter else _at(bench, options, way)
 
@@ -226,6 +233,24 @@ def _at_better_rate(bench: Bench, found: Chosen) -> TracingOptions:
         gain=rules.nuisances.rate_gain,
     )
     return options if rate == options.fit_rate_hz else options.model_copy(update={"fit_rate_hz": rate})
+
+
+def _leaves_less(again: Chosen, found: Chosen, gain: float) -> bool:
+    """Return whether what was chosen at a higher rate leaves clearly less there than what was chosen before.
+
+    A reversal that takes a few samples of the lower rate can look like a delay between the channels.
+
+    Parameters
+    ----------
+    again, found
+        Chosen at the higher and at the lower rate.
+    gain
+        Share by which the RMS of the residual must be lower.
+    """
+    chosen, before = (item.choice.selection.chosen for item in (again, found))
+    problem = replace(before.problem, recordings=again.training, root_weight=chosen.problem.root_weight)
+    present = fit(problem, before.theta, iterations=ITERATIONS)
+    return bool(np.sqrt(chosen.chi_square) < (1.0 - gain) * np.sqrt(present.chi_square))
 
 
 def recorded(
