@@ -6,7 +6,7 @@ The chosen model judges them again, and everything is chosen again where another
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -24,7 +24,6 @@ from mrpipe.tracing.bench.cutoff import MotionFilter, best_filter, better_filter
 from mrpipe.tracing.bench.sampling import better_rate
 from mrpipe.tracing.bench.testability import untestable
 from mrpipe.tracing.options import TracingOptions
-
 
 ITERATIONS = 15
 """Numerical technique: most steps of a fit at a higher rate of what was chosen at a lower one."""
@@ -143,13 +142,27 @@ def choose(bench: Bench, begun: Start) -> Chosen:
             len(again.names) == len(found.names) and _leaves_less(again, found, options.rules.nuisances.rate_gain)
         ):
             return again
+        if found.names and again.names > found.names:
+            again = _at(bench, faster, again.filter, samples, found.names)
+            if again.names == found.names:
+                return again
     way = _better_filter(bench, found, options)
     return found if way is found.filter else _at(bench, options, way)
 
 
-def _at(bench: Bench, options: TracingOptions, way: MotionFilter, samples: int = MOST_SAMPLES) -> Chosen:
+def _at(
+    bench: Bench,
+    options: TracingOptions,
+    way: MotionFilter,
+    samples: int = MOST_SAMPLES,
+    names: Set[str] | None = None,
+) -> Chosen:
+    """Return what is chosen with a rate and a filter; `names` limits the effects that are tried."""
     training = recorded(bench.tests, way, options, most_samples=samples)
-    return _choose(bench, _started(bench, options, way, training))
+    begun = _started(bench, options, way, training)
+    if names is not None:
+        begun = replace(begun, able={name: effect for name, effect in begun.able.items() if name in names})
+    return _choose(bench, begun)
 
 
 def _started(bench: Bench, options: TracingOptions, way: MotionFilter, training: Recordings) -> Start:

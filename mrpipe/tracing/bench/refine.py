@@ -16,6 +16,7 @@ from functools import partial
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.parameters import Parameter
 from mrpipe.dampers.plant import CHAIN_LENGTH
 from mrpipe.effects.contract import EffectForm, EffectScales
 from mrpipe.fitting.engine import Fit, fit, start_of
@@ -23,6 +24,9 @@ from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.select import Selection, draft
 from mrpipe.tracing.rules import RefinementRules
+
+NO_STRENGTH = 1e-3
+"""Numerical technique: share of its upper bound up to which a strength at its bound counts as zero."""
 
 CONFIRMED = 3
 """Numerical technique: richer forms of an effect that left-out tests judge, until one of them is confirmed."""
@@ -191,14 +195,19 @@ def _richer(chosen: Fit, place: int, count: int, jobs: int = 1) -> Iterator[Fit]
     best = {trial.problem.terms[place].form.name: trial for trial in reversed(trials)}
     for trial in sorted(best.values(), key=lambda item: item.cost)[:count]:
         found = fit(replace(chosen.problem, terms=trial.problem.terms), trial.theta, iterations=25)
-        # a strength of zero leaves a part of a profile out
         shapes = {
             item.name
             for item in trial.problem.terms[place].form.parameters
-            if item.role != "amplitude" and not (item.role == "strength" and found.term_values[place][item.name] == 0.0)
+            if item.role != "amplitude" and not _is_absent(item, found, place)
         }
         if not shapes & (set(found.at_bound) - set(chosen.at_bound)):
             yield found
+
+
+def _is_absent(item: Parameter, found: Fit, place: int) -> bool:
+    """Return whether a strength leaves its part of a profile out; a search within bounds ends just above zero."""
+    largest = item.bounds(found.problem.scales)[1]
+    return item.role == "strength" and abs(found.term_values[place][item.name]) <= NO_STRENGTH * largest
 
 
 def _fits_in_chain(chosen: Fit, place: int, form: EffectForm) -> bool:

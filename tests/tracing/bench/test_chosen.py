@@ -63,6 +63,45 @@ def test_a_rate_that_changes_the_names_is_not_kept(monkeypatch: pytest.MonkeyPat
     assert found.names == {"backlash"}
 
 
+class _Named:
+    """What was chosen, by its names alone."""
+
+    def __init__(self, begun: Any, names: set[str]) -> None:
+        self.names, self.options, self.filter, self.training = names, begun.options, begun.filter, begun.training
+
+
+def test_one_more_name_at_a_higher_rate_is_not_taken_but_the_rate_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same effect was kept at the low rate, where its numbers are biased, because the high rate added another."""
+    bench = _bench("wide-backlash", "backlash", "stribeck")
+    able: list[set[str]] = []
+
+    def choose_once(_bench: Bench, begun: Any) -> Any:
+        able.append(set(begun.able))
+        return _Named(begun, {"backlash"} if len(able) == 1 else set(begun.able))
+
+    monkeypatch.setattr(module, "_choose", choose_once)
+    monkeypatch.setattr(module, "_at_better_rate", _twice)
+    monkeypatch.setattr(module, "_better_filter", lambda _bench, found, _options: found.filter)
+    found = choose(bench, begin(bench, _options(62.5)))
+    assert found.options.fit_rate_hz == 125.0 and found.names == {"backlash"}
+    assert able[1] > able[2] == {"backlash"}
+
+
+@pytest.mark.parametrize("leaves_less", [True, False])
+def test_another_name_at_a_higher_rate_counts_where_it_leaves_less(
+    monkeypatch: pytest.MonkeyPatch, leaves_less: bool
+) -> None:
+    """A free play that one sample of the low rate spans had looked like a delay between the channels."""
+    bench = _bench("wide-backlash", "backlash", "channel-skew")
+    names = iter([{"channel-skew"}, {"backlash"}])
+    monkeypatch.setattr(module, "_choose", lambda _bench, begun: _Named(begun, next(names)))
+    monkeypatch.setattr(module, "_at_better_rate", _twice)
+    monkeypatch.setattr(module, "_better_filter", lambda _bench, found, _options: found.filter)
+    monkeypatch.setattr(module, "_leaves_less", lambda *_: leaves_less)
+    found = choose(bench, begin(bench, _options(62.5)))
+    assert found.names == ({"backlash"} if leaves_less else {"channel-skew"})
+
+
 def _nothing(choice: Any) -> Any:
     return replace(choice, selection=replace(choice.selection, chosen=choice.selection.without_effects))
 
