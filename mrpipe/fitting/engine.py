@@ -307,9 +307,14 @@ def jacobian_of(
         if width == 0.0:
             width = max(2e-5, 2e-3 * abs(theta[k]))
         width = -width if theta[k] + width > high[k] else width
-        moved = theta.copy()
-        moved[k] += width
-        rows[k] = (solve(problem, moved, w).residual - residual) / width
+        rows[k] = 0.0  # where the damper is unstable on both sides of a value, the value stays
+        for side in (width, -width):
+            moved = theta.copy()
+            moved[k] += side
+            row = (solve(problem, moved, w).residual - residual) / side
+            if np.isfinite(row @ row) and low[k] <= moved[k]:
+                rows[k] = row
+                break
     return rows
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from mrpipe.dampers.laws import LawShape, bernstein, bernstein_to_power
 from mrpipe.dampers.library import base_form
 from mrpipe.dampers.model import DamperModel, thesis_parameters
+from mrpipe.fitting import engine
 from mrpipe.fitting.engine import bounded_solution, predict
 from mrpipe.fitting.form_fit import FitMethod, fit_form, form_problem
 from mrpipe.fitting.samples import bench_recordings, blocks_of, fit_window, smooth_motion, thinned
@@ -66,6 +67,27 @@ def test_set_c_comes_back_within_three_percent(fitted):
     thesis = thesis_parameters(fitted.model, SET_C["A"])
     assert thesis["gamma"] == pytest.approx(SET_C["gamma"], rel=0.03)
     assert thesis["beta"] == pytest.approx(SET_C["beta"], rel=0.03)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("unstable", ["above", "on both sides"])
+def test_a_value_beside_which_the_damper_is_unstable_does_not_end_the_fit(campaign, monkeypatch, unstable):
+    """A run that overflows had made the Jacobian infinite, and the fit ended with an error of linear algebra."""
+    problem = problem_of(campaign[:2], orders=(1, 0))
+    start = engine.start_of(problem, {}, [])
+    real = engine.solve
+
+    def solve(problem, theta, w):
+        found = real(problem, theta, w)
+        outside = theta[0] > start[0] if unstable == "above" else theta[0] != start[0]
+        return replace(found, residual=np.full_like(found.residual, np.inf)) if outside else found
+
+    monkeypatch.setattr(engine, "solve", solve)
+    w = engine.weighting(problem)
+    low, high = problem.bounds()
+    rows = engine.jacobian_of(problem, start, real(problem, start, w).residual, w, low, high)
+    assert np.isfinite(rows).all() and np.any(rows[1] != 0.0)
+    assert np.any(rows[0] != 0.0) == (unstable == "above")
 
 
 @pytest.mark.planted
