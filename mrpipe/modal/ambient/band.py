@@ -8,6 +8,7 @@ import numpy as np
 from scipy import signal
 
 from mrpipe.modal.records import FrameTest
+from mrpipe.modal.spectra import ComplexArray
 
 USABLE_BAND = 0.45
 """Part of the sampling rate below which a filter against aliasing leaves the responses unchanged."""
@@ -27,6 +28,16 @@ def lowest_peak_hz(tests: Sequence[FrameTest], low_hz: float) -> float:
     return float(frequency[peaks[0] if peaks.size else int(np.argmax(total))])
 
 
+def coherency(segments: ComplexArray) -> ComplexArray:
+    """Return the complex coherency of sensors at each frequency, shape (m, s, s), of spectra of shape (m, s, t).
+
+    It is the cross-spectrum, averaged over t segments, over the root of the two power spectra; its diagonal is one.
+    """
+    cross = np.einsum("fit,fjt->fij", segments, segments.conj())
+    size = np.sqrt(np.maximum(np.real(np.einsum("fii->fi", cross)), 1e-300))
+    return np.asarray(cross / (size[:, :, None] * size[:, None, :]))
+
+
 def common_motion_ends_hz(test: FrameTest, first_hz: float) -> float:
     """Return the frequency above which the sensors have no motion in common [Hz].
 
@@ -37,8 +48,6 @@ def common_motion_ends_hz(test: FrameTest, first_hz: float) -> float:
     length = int(min(samples / 16, _SEGMENT_PERIODS / first_hz * rate))
     values = test.responses - test.responses.mean(axis=0)
     frequency, _, segments = signal.stft(values, fs=rate, nperseg=max(length, 16), axis=0, boundary=None)
-    cross = np.einsum("fit,fjt->fij", segments, segments.conj())
-    size = np.sqrt(np.maximum(np.real(np.einsum("fii->fi", cross)), 1e-300))
-    largest = np.linalg.eigvalsh(cross / (size[:, :, None] * size[:, None, :]))[:, -1]
+    largest = np.linalg.eigvalsh(coherency(segments))[:, -1]
     common = np.flatnonzero(largest >= 1.0 + _LEAST_COMMON * (sensors - 1))
     return _MARGIN * max(float(frequency[common[-1]]) if common.size else 0.0, 2.0 * first_hz)

@@ -17,7 +17,7 @@ from scipy import signal, stats
 from scipy.optimize import minimize
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.ambient.band import USABLE_BAND, common_motion_ends_hz, lowest_peak_hz
+from mrpipe.modal.ambient.band import USABLE_BAND, coherency, common_motion_ends_hz, lowest_peak_hz
 from mrpipe.modal.clocks.delays import LEAST_PHASE, SensorClock, corrected
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest
@@ -81,9 +81,7 @@ def _coherency(test: FrameTest, low_hz: float, high_hz: float) -> _Coherency:
             values - values.mean(axis=0), fs=rate, nperseg=max(16, length // _SEGMENTS), axis=0, boundary=None
         )
         inside = (frequency >= low_hz) & (frequency <= high_hz)
-        cross = np.einsum("fit,fjt->fij", parts[inside], parts[inside].conj())
-        size = np.sqrt(np.maximum(np.real(np.einsum("fii->fi", cross)), 1e-300))
-        squared.append(((cross / (size[:, :, None] * size[:, None, :]))[:, first, second] ** 2).T)
+        squared.append((coherency(parts[inside])[:, first, second] ** 2).T)
     time = (np.arange(_CHUNKS) + 0.5) * length / rate - 0.5 * samples / rate
     return _Coherency(2.0 * np.pi * frequency[inside], np.array(squared), first, second, time)
 

@@ -133,7 +133,8 @@ def _without_copies(clusters: Sequence[_Cluster]) -> tuple[list[_Cluster], list[
     """Return the clusters without those that repeat the shape of a more stable one: high orders split a pole.
 
     A pole repeats another one where their half-power bands overlap. Farther away, up to a tenth of the frequency, it
-    may also be a mode that the sensors see alike. The second result says of which poles this holds.
+    may also be a mode that the sensors see alike. The second result says of which poles this holds. Both rise with
+    frequency.
     """
     kept: list[_Cluster] = []
     doubtful: list[bool] = []
@@ -144,7 +145,8 @@ def _without_copies(clusters: Sequence[_Cluster]) -> tuple[list[_Cluster], list[
         if all(gap >= width for gap, width in zip(gaps, widths, strict=True)):
             kept.append(item)
             doubtful.append(any(gap < _COPY_RANGE * item.angular_frequency for gap in gaps))
-    return kept, doubtful
+    rising = np.argsort([item.angular_frequency for item in kept])
+    return [kept[i] for i in rising], [doubtful[i] for i in rising]
 
 
 def _matched(clusters: Sequence[_Cluster], pole: _Cluster) -> _Cluster | None:
@@ -186,20 +188,17 @@ def _jackknife(
 def _as_fit(
     test: FrameTest, firm: Sequence[_Cluster], covariance: FloatArray, errors: FloatArray, density: FloatArray
 ) -> MultiModeFit:
-    """Return clusters in the form of a fit; shapes are scaled by the response at their frequency."""
-    order = np.argsort([item.angular_frequency for item in firm])
-    both = np.concatenate([order, order + len(firm)])
-    size = density[order]
-    zeta = np.array([item.damping_ratio for item in firm])[order]
-    residues = np.column_stack([firm[i].shape for i in order]) * size * 2.0 * zeta
+    """Return clusters of rising frequency as a fit; shapes are scaled by the response at their frequency."""
+    zeta = np.array([item.damping_ratio for item in firm])
+    residues = np.column_stack([item.shape for item in firm]) * density * 2.0 * zeta
     empty: tuple[ComplexArray, ...] = ()
     return MultiModeFit(
-        angular_frequencies=np.array([item.angular_frequency for item in firm])[order],
+        angular_frequencies=np.array([item.angular_frequency for item in firm]),
         damping_ratios=zeta,
-        covariance=covariance[np.ix_(both, both)],
+        covariance=covariance,
         residues=residues.astype(np.complex128),
-        residue_errors=errors[:, order] * size * 2.0 * zeta,
-        coherence=np.tile(np.array([item.collinearity for item in firm])[order], (residues.shape[0], 1)),
+        residue_errors=errors * density * 2.0 * zeta,
+        coherence=np.tile(np.array([item.collinearity for item in firm]), (residues.shape[0], 1)),
         steady=empty,
         measured=empty,
         omega=(),
@@ -310,8 +309,7 @@ def _set_up(
     covariance, errors = _jackknife(statistics, records, estimator, orders, firm)
     fit = _as_fit(tests[0], firm, covariance, errors, _response_at(tests, firm))
     found = [PoleCandidate(item.angular_frequency, item.damping_ratio, item.orders) for item in clusters]
-    rising = np.argsort([item.angular_frequency for item in firm])
-    return SetUp(tuple(tests), fit, tuple(doubtful[i] for i in rising)), found, records.high_hz
+    return SetUp(tuple(tests), fit, tuple(doubtful)), found, records.high_hz
 
 
 def _response_at(tests: Sequence[FrameTest], firm: Sequence[_Cluster]) -> FloatArray:

@@ -261,8 +261,7 @@ def _leaves_less(again: Chosen, found: Chosen, gain: float) -> bool:
         Share by which the RMS of the residual must be lower.
     """
     chosen, before = (item.choice.selection.chosen for item in (again, found))
-    problem = replace(before.problem, recordings=again.training, root_weight=chosen.problem.root_weight)
-    present = fit(problem, before.theta, iterations=ITERATIONS)
+    present = fit(before.problem.on_samples_of(chosen.problem), before.theta, iterations=ITERATIONS)
     return bool(np.sqrt(chosen.chi_square) < (1.0 - gain) * np.sqrt(present.chi_square))
 
 
