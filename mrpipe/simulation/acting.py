@@ -100,7 +100,8 @@ def known_amplitude(settings: SingleExcitationSettings, where: str = "simulate.e
     Raises
     ------
     UserError
-        If the amplitude of a force is not given, because only that of a base acceleration can be found.
+        If the amplitude of a force is not given, because only that of a base acceleration can be found, or if the
+        amplitude given is that of the other kind of excitation.
     """
     if not settings.force_at:
         if settings.force_amplitude_n is not None:
@@ -111,6 +112,13 @@ def known_amplitude(settings: SingleExcitationSettings, where: str = "simulate.e
                 f"name it in {where}.force_at",
             )
         return settings.base_amplitude_m_s2
+    if settings.base_amplitude_m_s2 is not None:
+        raise UserError(
+            where,
+            "base_amplitude_m_s2",
+            f"is given, but {where}.force_at puts a force in the place of motion of the ground",
+            "give force_amplitude_n [N], or give motion and force as two excitations (simulate.excitation.also)",
+        )
     if settings.force_amplitude_n is None and settings.kind in ADJUSTED:
         raise UserError(where, "force_amplitude_n", "is not given", "give the amplitude of the force [N]")
     return settings.force_amplitude_n

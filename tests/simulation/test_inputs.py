@@ -148,6 +148,10 @@ def test_a_force_and_ground_motion_act_together(tmp_path: Path) -> None:
         ({"kind": "free-decay"}, r"also\[0\]: kind: is free-decay"),
         ({"kind": "harmonic"}, r"also\[0\]: base_amplitude_m_s2: is not given"),
         ({"kind": "harmonic", "force_at": {"deck y": 1.0}}, r"also\[0\]: force_amplitude_n: is not given"),
+        (
+            {"force_amplitude_n": 1.0, "force_at": {"deck y": 1.0}, "base_amplitude_m_s2": 2.0},
+            r"also\[0\]: base_amplitude_m_s2: is given, but simulate.excitation.also\[0\].force_at puts a force",
+        ),
         ({"base_amplitude_m_s2": 1.0, "direction_deg": 3.0}, r"also\[0\]: direction_deg"),
         ({"kind": "recorded", "file": "none.csv"}, r"also\[0\].file: none.csv: there is no such file"),
         ({"force_amplitude_n": 1.0, "force_at": {"roof": 1.0}}, r"also\[0\].force_at: roof"),

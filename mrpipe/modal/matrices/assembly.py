@@ -111,7 +111,8 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
     )
     updated = fit_partial(masses, data, modes.possible_numbers)
     open_rows = [row for row in unknown_rows if _is_open(updated, row)]
-    findings = _findings(updated, modes, layout, unknown_rows, open_rows)
+    orthogonal = len(updated.numbers) == layout.floors and bool(np.isfinite(masses).all())
+    findings = _findings(updated, modes, layout, unknown_rows, open_rows, orthogonal)
     mass = np.diag(updated.masses)
     model = natural_modes(Frame(mass, np.zeros_like(mass), updated.stiffness)).mode_shapes
     index = np.asarray(updated.numbers) - 1
@@ -120,10 +121,12 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
     zeta[index] = modes.damping_ratios
     storeys = storeys_of(updated)
     if len(index) == layout.floors:
-        shapes = completed_shapes(shapes, modes.errors, modes.measured, updated.masses, modes.angular_frequencies)
+        whole = completed_shapes(shapes, modes.errors, modes.measured, updated.masses, modes.angular_frequencies)
         frame = frame_from_modes(
-            shapes, modes.angular_frequencies, zeta, updated.masses, name="identified", source=source
+            whole, modes.angular_frequencies, zeta, updated.masses, name="identified", source=source
         )
+        # orthogonality to masses that are estimates would change measured shapes, which are better known
+        shapes = whole if orthogonal else shapes
     else:
         damping = modal_damping_matrix(mass, updated.stiffness, zeta)
         frame = Frame(mass, damping, updated.stiffness, "identified, storey model")
@@ -164,7 +167,12 @@ def _is_open(updated: UpdatedModel, row: int) -> bool:
 
 
 def _findings(
-    updated: UpdatedModel, modes: PartialModes, layout: Layout, unknown_rows: list[int], open_rows: list[int]
+    updated: UpdatedModel,
+    modes: PartialModes,
+    layout: Layout,
+    unknown_rows: list[int],
+    open_rows: list[int],
+    orthogonal: bool,
 ) -> list[str]:
     findings = []
     missing = sorted(set(range(1, layout.floors + 1)) - set(updated.numbers))
@@ -185,7 +193,7 @@ def _findings(
         floors = ", ".join(str(row + 1) for row in expanded)
         findings.append(
             f"floors without a sensor ({floors}): their mode shapes are "
-            + ("expanded by orthogonality to the mass" if not missing else "those of the storey model")
+            + ("expanded by orthogonality to the mass" if orthogonal else "those of the storey model")
         )
     if updated.undetermined:
         findings.append(f"the data do not determine {', '.join(updated.undetermined)} (interval wider than half)")

@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from scipy.optimize import lsq_linear
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.modal.matrices.updating import MeasuredModes, UpdatedModel, storey_model, update_model
+from mrpipe.modal.matrices.updating import MeasuredModes, UpdatedModel, storey_model, update_model, with_jackknife
 from mrpipe.structures import shear_stiffness
 
 _MOST_ASSIGNMENTS = 80
@@ -150,7 +150,10 @@ def fit_partial(
             best = found
     if best is None:
         raise ValueError("no assignment of mode numbers is possible")
-    return best
+    if known.size == masses.size:
+        return best
+    # unknown masses take up what the storeys cannot describe
+    return with_jackknife(storey_model(floors), masses, modes, best)
 
 
 def _typical_mass(modes: MeasuredModes) -> float:

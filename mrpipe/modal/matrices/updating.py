@@ -3,12 +3,17 @@
 K(p) = K0 + p_1 K_1 + p_2 K_2 + ... with positive parameters p: storeys, connection springs, or any matrices a user
 gives. The modes may be fewer than the degrees of freedom, and some degrees of freedom may have no sensor. Masses that
 are not known are parameters as well where the modes are scaled, that is, where a measured force excited them.
+
+The intervals of a least-squares fit hold where the model is right and the errors are independent. A structure has
+stiffness that the model lacks, and sensors pick up other directions: such errors are alike in all rows of a mode. The
+fits without one mode each (jackknife; Efron and Tibshirani 1993, An Introduction to the Bootstrap, chapter 11) show
+what they cause.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh
@@ -21,6 +26,8 @@ _UNDETERMINED = 0.5
 """Half width of an interval, in logarithms, from which a parameter counts as not determined by the data."""
 _RANGE = 8.0
 """Parameters may differ from their start by this factor in logarithms."""
+_FEWEST_MODES = 3
+"""Fewer modes do not determine a model without one of them."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +96,20 @@ class MeasuredModes:
     frequency_error: float = 1e-3
     shape_error: float = 2e-2
     scale_error: float | FloatArray = 0.05
+
+    def without(self, mode: int) -> MeasuredModes:
+        """Return the data without one mode, by its place (from 0)."""
+        kept = [place for place in range(self.angular_frequencies.size) if place != mode]
+        scale = self.scaled_residues
+        error = np.broadcast_to(self.scale_error, self.angular_frequencies.shape)[kept]
+        return replace(
+            self,
+            angular_frequencies=self.angular_frequencies[kept],
+            shapes=self.shapes[:, kept],
+            numbers=tuple(self.numbers[place] for place in kept) if self.numbers else (),
+            scaled_residues=None if scale is None else scale[kept],
+            scale_error=error,
+        )
 
 
 @dataclass(frozen=True)
@@ -174,7 +195,7 @@ def update_model(
     modes: MeasuredModes,
     start: FloatArray,
     *,
-    start_mass: float = 1.0,
+    start_mass: float | FloatArray = 1.0,
     bounds: tuple[float, float] | None = None,
 ) -> UpdatedModel:
     """Fit the parameters of a stiffness matrix to measured modes by least squares.
@@ -190,12 +211,12 @@ def update_model(
     start
         First guess of the parameters, shape (p,).
     start_mass
-        First guess of unknown masses [kg].
+        First guess of unknown masses, one for all or shape (n,) [kg].
     bounds
         Of each parameter; a wide range around the start if left out.
     """
     problem = _Problem(model, masses, modes, modes.numbers)
-    theta = np.concatenate([np.log(start), np.full(problem.unknown.size, np.log(start_mass))])
+    theta = np.concatenate([np.log(start), np.log(np.broadcast_to(start_mass, masses.shape)[problem.unknown])])
     low, high = theta - _RANGE, theta + _RANGE
     if bounds is not None:
         low[: start.size], high[: start.size] = np.log(bounds[0]), np.log(bounds[1])
@@ -203,6 +224,49 @@ def update_model(
     first = np.clip(theta, low + margin, high - margin)
     result = least_squares(problem.residual, first, bounds=(low, high), x_scale="jac")
     return _collect(problem, np.asarray(result.x), np.asarray(result.jac), float(2.0 * result.cost))
+
+
+def with_jackknife(
+    model: StiffnessModel, masses: FloatArray, modes: MeasuredModes, found: UpdatedModel
+) -> UpdatedModel:
+    """Return an updated model whose intervals hold the errors that its modes have in common with no other mode.
+
+    Parameters
+    ----------
+    model, masses, modes
+        As for :func:`update_model`.
+    found
+        Its result; its intervals are kept where they are wider. Fewer than three modes leave it as it is.
+    """
+    count = modes.angular_frequencies.size
+    if count < _FEWEST_MODES:
+        return found
+    numbered = replace(modes, numbers=found.numbers)
+    fits = [
+        update_model(model, masses, numbered.without(mode), found.parameters, start_mass=found.masses)
+        for mode in range(count)
+    ]
+    spread = _jackknife([item.parameters for item in fits])
+    mass_spread = _jackknife([item.masses for item in fits])
+    names = [*model.names, *(f"mass {row + 1}" for row in range(masses.size))]
+    wide = np.concatenate([spread, mass_spread]) > _UNDETERMINED
+    return replace(
+        found,
+        low=np.minimum(found.low, found.parameters * np.exp(-spread)),
+        high=np.maximum(found.high, found.parameters * np.exp(spread)),
+        mass_low=np.minimum(found.mass_low, found.masses * np.exp(-mass_spread)),
+        mass_high=np.maximum(found.mass_high, found.masses * np.exp(mass_spread)),
+        undetermined=tuple(
+            name for name, open_ in zip(names, wide, strict=True) if open_ or name in found.undetermined
+        ),
+    )
+
+
+def _jackknife(values: Sequence[FloatArray]) -> FloatArray:
+    """Return the half widths of 95 % intervals of logarithms from fits that each leave one mode out."""
+    logs = np.log(np.stack(values))
+    squares = np.sum((logs - logs.mean(axis=0)) ** 2, axis=0)
+    return np.minimum(_NORMAL_95 * np.sqrt((len(logs) - 1) / len(logs) * squares), _RANGE)
 
 
 def _collect(problem: _Problem, theta: FloatArray, jacobian: FloatArray, cost: float) -> UpdatedModel:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import replace
 
-from mrpipe.fitting.drive_laws import adequate_laws
+import numpy as np
+
+from mrpipe.dampers.laws import LARGEST_ORDER
+from mrpipe.fitting.drive_cells import Cells, cells_of
+from mrpipe.fitting.drive_laws import VISCOSITY_LAWS, YIELD_LAWS, adequate_laws, fit_laws, judge
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Base
 from mrpipe.fitting.reference import with_own_laws
@@ -58,3 +64,75 @@ def with_adequate_laws(found: Fit, yield_order: int, viscosity_order: int) -> Fi
 def _with_laws(found: Fit, base: Base) -> Fit:
     problem = replace(found.problem, base=base)
     return with_own_laws(fit(problem, start_of(problem, found.base_values, found.term_values), iterations=12))
+
+
+def with_final_laws(selection: Selection) -> Selection:
+    """Return the selection whose chosen fit has the laws of the drive that predict best, whatever their kind.
+
+    While effects are searched, the laws are polynomials of low degree, because a flexible law, or one that saturates,
+    would hide what bends the drive. Once the names are final, this reason is gone. Laws take the place of the present
+    ones where the fit improves by a material share of the noise, and where they predict inner levels of the drive that
+    their fit has not seen at least as well.
+
+    Parameters
+    ----------
+    selection
+        Chosen model with its final names.
+    """
+    chosen = selection.chosen
+    least = selection.nothing_missing * selection.noise
+    if chosen.chi_square <= selection.noise + least:
+        return selection
+    rich, cells = _richest(chosen)
+    fits = [rich, *_with_best_laws(rich, cells, selection.noise)]
+    best = min(fits, key=lambda item: _information(item, selection.noise))
+    if best.chi_square > chosen.chi_square - least or not _predicts_levels(cells, best, chosen):
+        return selection
+    if chosen is selection.without_effects:
+        return replace(selection, chosen=best, ground=best)
+    return replace(selection, chosen=best)
+
+
+def _predicts_levels(cells: Cells, found: Fit, other: Fit) -> bool:
+    """Return whether the laws of a fit predict inner levels left out at least as well as those of another fit."""
+    own, rival = (judge(cells, (item.problem.base.laws[0], item.problem.base.laws[1])) for item in (found, other))
+    if not len(own.left_out):
+        return False
+    return not len(rival.left_out) or float(np.mean(own.left_out)) <= float(np.mean(rival.left_out))
+
+
+def _richest(found: Fit) -> tuple[Fit, Cells]:
+    """Return the fit with the polynomials of highest degree that the levels determine, and its sums over the levels."""
+    base = found.problem.base
+    levels = distinct_levels(found.problem.recordings)
+    viscosity_order = max(law.order for law in VISCOSITY_LAWS)
+    rich = _with_laws(found, replace(base, laws=polynomial_laws(base.form, levels, LARGEST_ORDER, viscosity_order)))
+    return rich, cells_of(rich)
+
+
+def _with_best_laws(rich: Fit, cells: Cells, noise: float) -> Iterator[Fit]:
+    """Yield the fit with the laws of least information criterion by the sums over the levels, if any can be judged."""
+    base = rich.problem.base
+    bends = any(term.effect.law_of_drive for term in rich.problem.terms)
+    pairs = [
+        pair
+        for pair in itertools.product(YIELD_LAWS, VISCOSITY_LAWS)
+        if max(law.numbers for law in pair) < cells.levels and not (bends and any(law.saturates for law in pair))
+    ]
+    if pairs:
+        cost = _price(rich, noise)
+        laws = min(
+            pairs, key=lambda pair: float(np.sum(fit_laws(cells, pair)[0])) + cost * sum(law.numbers for law in pair)
+        )
+        yield _with_laws(rich, replace(base, laws=(*laws, *[laws[0]] * (len(base.laws) - 2))))
+
+
+def _information(found: Fit, noise: float) -> float:
+    """Return the weighted squares of a fit, raised by what the numbers of its laws cost."""
+    samples = np.count_nonzero(found.problem.root_weight)
+    return found.chi_square * samples + _price(found, noise) * sum(law.numbers for law in found.problem.base.laws)
+
+
+def _price(found: Fit, noise: float) -> float:
+    """Return what one number costs by the Bayesian information criterion, in units of the weighted squares."""
+    return noise * float(np.log(max(int(np.count_nonzero(found.problem.root_weight)), 2)))

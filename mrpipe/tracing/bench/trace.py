@@ -19,6 +19,7 @@ from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.choose import Choice, judged_by_trees
 from mrpipe.tracing.bench.chosen import Bench, begin, choose, validation_of
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
+from mrpipe.tracing.bench.drive_again import with_final_laws
 from mrpipe.tracing.bench.gates import judged, refusal_of, validated
 from mrpipe.tracing.bench.law_rival import without_laws_of_drive
 from mrpipe.tracing.bench.needed import without_superfluous
@@ -99,6 +100,7 @@ def trace_campaign(
     else:
         selection = _refined(selection, len(declared), baseline.model_error, options, rng, jobs)
         selection, gains, reason = without_laws_of_drive(selection, gains, len(declared), compared, jobs)
+    selection = with_final_laws(selection)
     selection = with_further_terms(
         selection,
         folds=options.folds,

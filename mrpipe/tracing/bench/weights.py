@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage, optimize, stats
+from scipy import ndimage
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.fitting.engine import Fit, predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.hum import hum_variance
 from mrpipe.tracing.bench.motion_noise import noisy_motion
+from mrpipe.tracing.bench.repeat_factors import Differences, parts_of_differences
 from mrpipe.tracing.rules import NoiseRules
 
 MOST_SHIFT = 3.0
@@ -25,21 +26,6 @@ AVERAGED = 0.03
 
 TOP = 0.9
 """Numerical technique: quantile above which a part of the noise counts as large."""
-
-LEAST_EXPECTED = 0.05
-"""Numerical technique: least expected variance in the regression of the factors, as a share of the first guess."""
-
-WEIGHTED = 3
-"""Numerical technique: passes of the regression with weights from the pass before."""
-
-MOST_DEVIATIONS = 2.0
-"""Numerical technique: deviations beyond this multiple of the expected one are limited to it."""
-
-UNLIMITED = 0.9205
-"""Numerical technique: mean square of a normal variable limited to +-2, by which limited squares are corrected."""
-
-NOISE_PASSES = 8
-"""Numerical technique: passes of the robust regression; each may raise a part fourfold."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +115,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     residual = np.divide(found.residual, root, out=np.zeros_like(root), where=root > 0.0)
     force, motion = noise_variances(found, recordings)
     growing = force * _relative_speed(recordings)
-    rows, targets, steps = [], [], []
+    rows, differences, steps = [], [], []
     for first, second in (*repeats, *cycles):
         begin, part = _aligned(recordings, first, second)
         end = np.minimum(begin + 1, len(root) - 1)
@@ -140,16 +126,17 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
             np.stack([values[a] + left * values[b] + right * values[c] for values in (force, motion, growing)], axis=1)
         )
         steps.append(12.0 * recordings.force_rounding[recordings.test[a]] ** 2)
-        targets.append(np.square(residual[a] - (1.0 - part) * residual[b] - part * residual[c]))
+        differences.append(residual[a] - (1.0 - part) * residual[b] - part * residual[c])
     used = root > 0.0
     # the white noise of the channel and its hum are less than all noise
     hum = hum_variance(residual, recordings, rules) / max(float(np.mean(force[used])), 1e-300)
     least = 1.0 + hum if hum <= rules.most_hum else 1.0
-    if not rows or sum(map(len, targets)) < rules.least_samples:
+    if not rows or sum(map(len, differences)) < rules.least_samples:
         limit = _limit(residual[used], least * force[used] + motion[used])
         return NoiseScale(limit * least, limit)
-    columns, target = np.concatenate(rows), np.concatenate(targets)
-    factors, without, disturbed = _parts_of_differences(columns, target, np.concatenate(steps), rules)
+    found_in = Differences(tuple(differences), np.concatenate(rows), np.concatenate(steps))
+    columns, target = found_in.columns, found_in.squares
+    factors, without, disturbed = parts_of_differences(found_in, rules)
     # a difference holds the events of both repeats
     events, disturbance = (float(np.sqrt(0.5 * np.mean(part))) for part in (target - without, disturbed))
     target = without - disturbed
@@ -171,76 +158,11 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events, disturbance)
 
 
-def _parts_of_differences(
-    columns: FloatArray, target: FloatArray, step_squared: FloatArray, rules: NoiseRules
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the factors of force and motion noise, the differences without events, and the disturbance in them.
-
-    Parameters
-    ----------
-    columns
-        Variances of the difference due to force noise, motion noise, and a force that grows with the speed, shape
-        (n, 3).
-    target
-        Squared differences, shape (n,).
-    step_squared
-        Square of what rounding alone can change, shape (n,).
-    rules
-        From which share on events and a disturbance are separated from the noise.
-    """
-    with_growing = _factors(columns, target, 1.0)
-    # each squared difference is divided in proportion to what is expected of it
-    expected = columns * with_growing
-    growing = target * expected[:, 2] / np.maximum(expected.sum(axis=1), 1e-300)
-    if float(np.sum(growing)) >= rules.disturbance * float(np.sum(target)):
-        return with_growing[:2], target, growing
-    noise, nothing = columns[:, :2], np.zeros(len(target))
-    robust, limited = _robust_factors(noise, target, step_squared)
-    if float(np.sum(target - limited)) > rules.events * float(np.sum(target)):
-        return robust, limited, nothing
-    return _factors(noise, target, 1.0), target, nothing
-
-
 def _relative_speed(recordings: Recordings) -> FloatArray:
     """Return the speed in units of the RMS speed of its test, shape (n,)."""
     power = np.bincount(recordings.test, weights=recordings.velocity**2, minlength=recordings.tests)
     rms = np.sqrt(power / np.maximum(np.bincount(recordings.test, minlength=recordings.tests), 1))
     return np.asarray(np.abs(recordings.velocity) / np.maximum(rms, 1e-300)[recordings.test])
-
-
-def _factors(columns: FloatArray, target: FloatArray, start: float) -> FloatArray:
-    """Return the factors of the columns that explain squared differences; the search starts at one factor for all.
-
-    The scatter of squared differences is proportional to their mean, so they are weighted by their mean.
-    """
-    together = columns[:, :2].sum(axis=1)
-    expected, factors = start * together, np.ones(columns.shape[1])
-    for _ in range(WEIGHTED):
-        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
-        factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
-        expected = np.maximum(columns @ factors, LEAST_EXPECTED * together)
-    return np.asarray(factors)
-
-
-def _robust_factors(columns: FloatArray, target: FloatArray, step_squared: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the factors without single events, and the squared differences without them.
-
-    Noise is spread over all samples. What exceeds its expected deviation several times in a few samples only is an
-    event that does not repeat, such as sticking, and not noise: it is limited to that multiple (proposal 2 of Huber
-    1964, Ann. Math. Statist. 35, 73-101). Rounding, too, makes few differences, of one step each. One step is not an
-    event.
-    """
-    together = columns.sum(axis=1)
-    # half of all samples decide where the search starts, so that rare events cannot
-    middle = float(np.median(target / np.maximum(together, 1e-12 * float(np.max(together)))))
-    start = max(middle / float(stats.chi2.median(1)), 1e-300)
-    factors, limited, expected = np.full(2, start), target, start * together
-    for _ in range(NOISE_PASSES):
-        limited = np.minimum(target, MOST_DEVIATIONS**2 * np.maximum(expected, step_squared))
-        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
-        factors = optimize.nnls(columns * weights[:, None], limited * weights / UNLIMITED)[0]
-        expected = np.maximum(columns @ factors, LEAST_EXPECTED * start * together)
-    return factors, limited
 
 
 def _limit(residual: FloatArray, variance: FloatArray) -> float:

@@ -84,6 +84,17 @@ def test_a_shape_that_open_masses_leave_open_is_not_given() -> None:
     )
 
 
+def test_unknown_masses_leave_measured_shapes_as_they_are() -> None:
+    """Shapes made orthogonal to wrong masses had a modal assurance of 0.9 at the very floors with a sensor."""
+    modes = _modes(measured=(0, 1, 3), driven=3)
+    rng = np.random.default_rng(4)
+    modes.shapes[[0, 1, 3]] *= 1.0 + 0.03 * rng.standard_normal((3, 4))
+    for masses, kept in ((np.full(4, np.nan), True), (MASSES, False)):
+        shapes = _assembled(modes, masses).shapes[[0, 1, 3]]
+        ratio = shapes / modes.shapes[[0, 1, 3]]
+        assert bool(np.allclose(ratio, ratio[0])) == kept
+
+
 def test_sensors_in_several_directions_give_no_chain() -> None:
     found = _assembled(_modes(), MASSES, chain=False)
     assert found.frame is None and "several directions" in found.findings[0]

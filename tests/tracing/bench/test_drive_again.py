@@ -8,9 +8,10 @@ import pytest
 
 from mrpipe.dampers.laws import LawShape
 from mrpipe.fitting.engine import fit, start_of
-from mrpipe.tracing.bench.drive_again import with_laws_again
+from mrpipe.tracing.bench.drive_again import with_final_laws, with_laws_again
 from mrpipe.tracing.bench.select import Selection
 from tests.tracing.bench.fits import plain_fit
+from tests.tracing.bench.test_law_rival import selected
 
 pytestmark = pytest.mark.planted
 
@@ -29,3 +30,24 @@ def test_laws_that_suffice_are_kept() -> None:
     base = plain_fit("")
     selection = Selection(base, 1.0, (), base)
     assert with_laws_again(selection, 2, 1) is selection
+
+
+def test_the_final_laws_may_saturate_where_levels_left_out_are_predicted_better() -> None:
+    """While names are searched the laws are low polynomials; the yield force of this damper follows a tanh law."""
+    chosen = selected(driver=False).without_effects
+    poor = fit(chosen.problem, chosen.theta, iterations=2)
+    selection = Selection(poor, 1e-6, (), poor, ground=poor)
+    found = with_final_laws(selection)
+    assert found.chosen.problem.base.laws[0] not in poor.problem.base.laws
+    assert found.chosen.chi_square < 0.8 * poor.chi_square
+    assert found.without_effects is found.chosen and found.base is poor
+    # nothing is left to explain beyond the noise
+    calm = replace(selection, noise=poor.chi_square)
+    assert with_final_laws(calm) is calm
+
+
+def test_the_final_laws_do_not_saturate_beside_an_effect_that_bends_the_drive() -> None:
+    selection = selected(driver=True)
+    found = with_final_laws(selection)
+    assert not any(law.saturates for law in found.chosen.problem.base.laws)
+    assert found.chosen.problem.terms == selection.chosen.problem.terms

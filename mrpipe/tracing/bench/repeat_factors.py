@@ -1,0 +1,188 @@
+"""How differences of repeated motion are divided between the noise of the channels and what is not noise.
+
+White noise of a channel shows in every sample, so that the variances of the channels are the first guess of what
+repeats differ by. Few repeats cannot separate noise in the band of the motion, noise of the displacement and a
+disturbance that grows with the speed: a factor that differs from the first guess is taken only where the differences
+require it, by the Bayesian information criterion (Schwarz 1978, Ann. Statist. 6, 461-464).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, stats
+
+from mrpipe.artifacts import BoolArray, FloatArray
+from mrpipe.tracing.rules import NoiseRules
+
+LEAST_EXPECTED = 0.05
+"""Numerical technique: least expected variance in the regression of the factors, as a share of the first guess."""
+
+WEIGHTED = 3
+"""Numerical technique: passes of the regression with weights from the pass before."""
+
+MOST_DEVIATIONS = 2.0
+"""Numerical technique: deviations beyond this multiple of the expected one are limited to it."""
+
+UNLIMITED = 0.9205
+"""Numerical technique: mean square of a normal variable limited to +-2, by which limited squares are corrected."""
+
+NOISE_PASSES = 8
+"""Numerical technique: passes of the robust regression; each may raise a part fourfold."""
+
+MOST_LAGS = 50
+"""Numerical technique: samples over which the correlation of neighbouring differences is summed."""
+
+FREE = ((False, False), (True, False), (False, True), (True, True))
+"""Numerical technique: which factors of force and motion noise are free in the models that are compared."""
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Differences of the residual between repeats.
+
+    Attributes
+    ----------
+    pieces
+        Differences [N] of each pair of repeats, shape (m,) each.
+    columns
+        Variances of the differences due to force noise, motion noise, and a force that grows with the speed, shape
+        (n, 3), the pieces end to end.
+    step_squared
+        Square of what rounding alone can change [N^2], shape (n,).
+    """
+
+    pieces: tuple[FloatArray, ...]
+    columns: FloatArray
+    step_squared: FloatArray
+
+    @property
+    def squares(self) -> FloatArray:
+        """Squared differences [N^2], shape (n,)."""
+        return np.square(np.concatenate(self.pieces))
+
+    def independent(self, expected: FloatArray) -> float:
+        """Return the number of independent squared differences, for their expected values, shape (n,).
+
+        The squares of a normal process with correlation rho have correlation rho^2, which widens the variance of their
+        mean by 1 + 2 (sum of rho^2).
+        """
+        ends = np.cumsum([len(piece) for piece in self.pieces])
+        inflation = 1.0
+        lags = np.zeros(MOST_LAGS + 1)
+        for piece, variance in zip(self.pieces, np.split(expected, ends[:-1]), strict=True):
+            values = piece / np.sqrt(np.maximum(variance, 1e-300))
+            for lag in range(min(MOST_LAGS + 1, len(values))):
+                lags[lag] += float(values[: len(values) - lag] @ values[lag:])
+        count = int(ends[-1])
+        correlation = lags[1:] / max(lags[0], 1e-300)
+        # what chance alone leaves, 1 / n, is subtracted
+        inflation += 2.0 * float(np.sum(np.maximum(correlation**2 - 1.0 / max(count, 1), 0.0)))
+        return count / inflation
+
+
+def parts_of_differences(found: Differences, rules: NoiseRules) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the factors of force and motion noise, the differences without events, and the disturbance in them.
+
+    Parameters
+    ----------
+    found
+        Differences of repeated motion.
+    rules
+        From which share on events and a disturbance are separated from the noise.
+    """
+    columns, target = found.columns, found.squares
+    noise, nothing = columns[:, :2], np.zeros(len(target))
+    with_growing = _factors(columns, target, 1.0)
+    count = found.independent(_expected(columns, with_growing))
+    calm, cost = _required_factors(found, noise, count)
+    # each squared difference is divided in proportion to what is expected of it
+    expected = columns * with_growing
+    growing = target * expected[:, 2] / np.maximum(expected.sum(axis=1), 1e-300)
+    large = float(np.sum(growing)) >= rules.disturbance * float(np.sum(target))
+    if large and _cost(target, _expected(columns, with_growing), 3, count) < cost:
+        return with_growing[:2], target, growing
+    robust, limited = _robust_factors(noise, target, found.step_squared)
+    if float(np.sum(target - limited)) > rules.events * float(np.sum(target)):
+        return robust, limited, nothing
+    return calm, target, nothing
+
+
+def _required_factors(found: Differences, noise: FloatArray, count: float) -> tuple[FloatArray, float]:
+    """Return the factors that differ from 1 only where the differences require it, and the criterion they reach."""
+    target, best = found.squares, (np.ones(2), np.inf)
+    for free in FREE:
+        chosen = np.array(free)
+        factors = _factors_of(noise, target, chosen)
+        cost = _cost(target, _expected(noise, factors), int(np.count_nonzero(chosen)), count)
+        best = min(best, (factors, cost), key=lambda item: item[1])
+    return best
+
+
+def _factors_of(noise: FloatArray, target: FloatArray, free: BoolArray) -> FloatArray:
+    """Return the factors of the columns; those that are not free are 1."""
+    factors = np.ones(noise.shape[1])
+    for _ in range(WEIGHTED if free.any() else 0):
+        weights = 1.0 / _expected(noise, factors)
+        rest = (target - noise[:, ~free].sum(axis=1)) * weights
+        factors[free] = optimize.nnls(noise[:, free] * weights[:, None], rest)[0]
+    return factors
+
+
+def _expected(columns: FloatArray, factors: FloatArray) -> FloatArray:
+    """Return the expected squares, no less than a share of those by the channels alone."""
+    together = columns[:, :2].sum(axis=1)
+    least = max(LEAST_EXPECTED * float(np.min(together)), 1e-300)
+    return np.asarray(np.maximum(np.maximum(columns @ factors, LEAST_EXPECTED * together), least))
+
+
+def _cost(target: FloatArray, expected: FloatArray, fitted: int, count: float) -> float:
+    """Return the information criterion of normal differences with these variances.
+
+    Parameters
+    ----------
+    target, expected
+        Squared differences, and their expected values, shape (n,).
+    fitted
+        Number of factors that were fitted.
+    count
+        Number of independent differences.
+    """
+    mean = float(np.mean(np.log(expected) + target / expected))
+    return count * mean + fitted * float(np.log(max(count, 2.0)))
+
+
+def _factors(columns: FloatArray, target: FloatArray, start: float) -> FloatArray:
+    """Return the factors of the columns that explain squared differences; the search starts at one factor for all.
+
+    The scatter of squared differences is proportional to their mean, so they are weighted by their mean.
+    """
+    together = columns[:, :2].sum(axis=1)
+    expected, factors = start * together, np.ones(columns.shape[1])
+    for _ in range(WEIGHTED):
+        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
+        factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
+        expected = np.maximum(columns @ factors, LEAST_EXPECTED * together)
+    return np.asarray(factors)
+
+
+def _robust_factors(columns: FloatArray, target: FloatArray, step_squared: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the factors without single events, and the squared differences without them.
+
+    Noise is spread over all samples. What exceeds its expected deviation several times in a few samples only is an
+    event that does not repeat, such as sticking, and not noise: it is limited to that multiple (proposal 2 of Huber
+    1964, Ann. Math. Statist. 35, 73-101). Rounding, too, makes few differences, of one step each. One step is not an
+    event.
+    """
+    together = columns.sum(axis=1)
+    # half of all samples decide where the search starts, so that rare events cannot
+    middle = float(np.median(target / np.maximum(together, 1e-12 * float(np.max(together)))))
+    start = max(middle / float(stats.chi2.median(1)), 1e-300)
+    factors, limited, expected = np.full(2, start), target, start * together
+    for _ in range(NOISE_PASSES):
+        limited = np.minimum(target, MOST_DEVIATIONS**2 * np.maximum(expected, step_squared))
+        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
+        factors = optimize.nnls(columns * weights[:, None], limited * weights / UNLIMITED)[0]
+        expected = np.maximum(columns @ factors, LEAST_EXPECTED * start * together)
+    return factors, limited
