@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,7 +25,9 @@ _ONE_DAMPER = frozenset({"controller", "damper", "frame"})
 _RIGS = ("bench", "frame", "closed-loop")
 
 
-def build_and_print(names: list[str], options: CommonOptions, together: tuple[str, ...] = ()) -> None:
+def build_and_print(
+    names: list[str], options: CommonOptions, together: tuple[str, ...] = (), *, where_possible: bool = False
+) -> None:
     """Bring stages up to date and print the summary of each.
 
     Parameters
@@ -36,6 +39,8 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
     together
         Kinds of stages, such as `simulate` and `resonance`, whose results for one law are printed as one document under
         the name of the first kind.
+    where_possible
+        Whether stages without data are left out with a message while others can run.
 
     Raises
     ------
@@ -52,14 +57,7 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
         if options.force:
             pipeline.force = frozenset(names)
         outcomes = [pipeline.build(name) for name in names]
-    for outcome in outcomes:
-        if outcome.what == "skipped":
-            raise UserError(
-                outcome.stage,
-                "",
-                f"cannot run: {outcome.manifest.skipped}",
-                "change the data or the setting that the reason names",
-            )
+    outcomes = _with_data(outcomes, where_possible)
     if options.json:
         # a caller that reads standard output alone sees them too
         summaries = {
@@ -78,6 +76,23 @@ def build_and_print(names: list[str], options: CommonOptions, together: tuple[st
             print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
     print(f"in {pipeline.run_directory}; next: mrpipe report {pipeline.run_directory}")
     _raise_failures(outcomes, pipeline)
+
+
+def _with_data(outcomes: Sequence[Outcome], where_possible: bool) -> list[Outcome]:
+    """Return the outcomes of stages that had data; the others are an error, or named on standard error."""
+    built = [outcome for outcome in outcomes if outcome.what != "skipped"]
+    for outcome in outcomes:
+        if outcome.what != "skipped":
+            continue
+        if not (where_possible and built):
+            raise UserError(
+                outcome.stage,
+                "",
+                f"cannot run: {outcome.manifest.skipped}",
+                "change the data or the setting that the reason names",
+            )
+        print(f"{outcome.stage} is left out: {outcome.manifest.skipped}", file=sys.stderr)
+    return built
 
 
 def _require_use(names: Sequence[str], pipeline: Pipeline, campaign: Path) -> None:
@@ -296,7 +311,8 @@ def export(
     stages = {name: f"export-{name}" for name in _EXPORTS}
     if law is not None:
         stages["controller"] += f"-{law}"
-    build_and_print([stages[name] for name in (_EXPORTS if what == "all" else (what,))], chosen)
+    wanted = [stages[name] for name in (_EXPORTS if what == "all" else (what,))]
+    build_and_print(wanted, chosen, where_possible=what == "all")
 
 
 _FAMILIES: dict[str, Callable[..., None]] = {"record": record, "simulate": simulate, "export": export}

@@ -58,7 +58,8 @@ class Parameter:
     scale
         Product of :class:`Scales` that `lower`, `upper` and `starts` are multiples of, such as `force/stroke`.
     lower, upper, starts
-        Bounds and starts; a strength starts at the first.
+        Bounds and starts. A strength starts at the first, a small value. Its other starts are for effects whose error
+        rises before it falls: a gap that is too small delays every reversal and explains none.
     role
         `shape` (searched), `strength` (searched; the effect vanishes at 0), `level` (searched; the effect acts only
         beyond it, and vanishes at 0), `amplitude` (a force proportional to it; the fit solves for it exactly; vanishes
@@ -95,9 +96,21 @@ def shape(
     return Parameter(name, unit, meaning, scale, lower, upper, starts, "shape", True)
 
 
-def strength(name: str, unit: str, meaning: str, scale: str, lower: float, upper: float, start: float) -> Parameter:
-    """Return a strength at which the effect vanishes for 0; `start` is the small value that screening uses."""
-    return Parameter(name, unit, meaning, scale, lower, upper, (start,), "strength")
+def strength(
+    name: str, unit: str, meaning: str, scale: str, lower: float, upper: float, start: float, *distant: float
+) -> Parameter:
+    """Return a strength at which the effect vanishes for 0.
+
+    Parameters
+    ----------
+    name, unit, meaning, scale, lower, upper
+        See :class:`Parameter`.
+    start
+        The small value that screening uses.
+    distant
+        Larger values from which the search begins as well.
+    """
+    return Parameter(name, unit, meaning, scale, lower, upper, (start, *distant), "strength")
 
 
 def amplitude(name: str, unit: str, meaning: str, scale: str, lower: float = 0.0, upper: float = 50.0) -> Parameter:

@@ -76,13 +76,6 @@ EFFECT = Effect(
             _gas,
             {"stiffness": 0},
         ),
-    ),
-    separated_by={
-        "migration": Separation("dwell at several positions", ("positions",)),
-        "inertia": Separation("the same stroke at several frequencies", ("frequencies",)),
-        "end-stop": Separation("the same motion at a smaller amplitude", ("amplitudes",)),
-    },
-    refinements=(
         EffectForm(
             "hardening",
             "F + k x + k2 x^2 + k3 x^3",
@@ -95,4 +88,9 @@ EFFECT = Effect(
             {"stiffness": 0, "curvature": 1, "hardening": 2},
         ),
     ),
+    separated_by={
+        "migration": Separation("dwell at several positions", ("positions",)),
+        "inertia": Separation("the same stroke at several frequencies", ("frequencies",)),
+        "end-stop": Separation("the same motion at a smaller amplitude", ("amplitudes",)),
+    },
 )

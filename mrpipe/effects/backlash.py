@@ -164,7 +164,7 @@ def _graded(values: Values) -> list[Step]:
     return [Step("graded-play", Phase.MOTION, graded_play_step, numbers, _PLAYS + 2)]
 
 
-_GAP = strength("gap", "m", "distance between the flanks", "stroke", 0.0, 0.5, 0.004)
+_GAP = strength("gap", "m", "distance between the flanks", "stroke", 0.0, 0.5, 0.004, 0.016, 0.05, 0.15)
 
 EFFECT = Effect(
     name="backlash",

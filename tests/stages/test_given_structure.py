@@ -245,3 +245,15 @@ def test_a_damper_of_a_parameter_set_is_exported_without_a_bench_campaign(
     assert run(["export", "damper", *common, *given]) == 0
     capsys.readouterr()
     assert (tmp_path / "run" / "export" / "damper" / "damper.json").is_file()
+
+
+def test_everything_is_exported_for_which_there_are_data(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a bench campaign there are no networks; the command had ended with an error after writing the rest."""
+    common = ["--config", str(configured(tmp_path, storeys=STOREYS)), "--run", str(tmp_path / "run")]
+    given = ["--set", "simulate.damper=set-c", "--set", "simulate.controller.inverse=model", "--format", "json"]
+    assert run(["export", "all", *common, *given, "--json", "--quiet"]) == 0
+    printed = capsys.readouterr()
+    assert {"export-damper", "export-frame", "export-controller"} <= set(json.loads(printed.out))
+    assert "export-forward is left out: " in printed.err and "export-inverse is left out: " in printed.err
+    assert run(["export", "forward", *common, *given, "--quiet"]) == 2
+    assert "export-forward: cannot run: " in capsys.readouterr().err

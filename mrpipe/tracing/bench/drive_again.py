@@ -66,7 +66,7 @@ def _with_laws(found: Fit, base: Base) -> Fit:
     return with_own_laws(fit(problem, start_of(problem, found.base_values, found.term_values), iterations=12))
 
 
-def with_final_laws(selection: Selection) -> Selection:
+def with_final_laws(selection: Selection, least_gain: float) -> Selection:
     """Return the selection whose chosen fit has the laws of the drive that predict best, whatever their kind.
 
     While effects are searched, the laws are polynomials of low degree, because a flexible law, or one that saturates,
@@ -78,11 +78,14 @@ def with_final_laws(selection: Selection) -> Selection:
     ----------
     selection
         Chosen model with its final names.
+    least_gain
+        Least share of the squared residual by which other laws must lower it.
     """
     chosen = selection.chosen
     least = selection.nothing_missing * selection.noise
     if chosen.chi_square <= selection.noise + least:
         return selection
+    least = max(least, least_gain * chosen.chi_square)
     rich, cells = _richest(chosen)
     fits = [rich, *_with_best_laws(rich, cells, selection.noise)]
     best = min(fits, key=lambda item: _information(item, selection.noise))

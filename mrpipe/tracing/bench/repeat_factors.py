@@ -101,7 +101,8 @@ def parts_of_differences(found: Differences, rules: NoiseRules) -> tuple[FloatAr
     expected = columns * with_growing
     growing = target * expected[:, 2] / np.maximum(expected.sum(axis=1), 1e-300)
     large = float(np.sum(growing)) >= rules.disturbance * float(np.sum(target))
-    if large and _cost(target, _expected(columns, with_growing), 3, count) < cost:
+    growing_cost = _cost(target, _expected(columns, with_growing), columns.shape[1], count)
+    if large and growing_cost < cost:
         return with_growing[:2], target, growing
     robust, limited = _robust_factors(noise, target, found.step_squared)
     if float(np.sum(target - limited)) > rules.events * float(np.sum(target)):

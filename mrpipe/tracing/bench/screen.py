@@ -84,7 +84,9 @@ def tangent_of(found: Fit) -> Tangent:
 def grid(term: Term, problem: Problem) -> Iterable[dict[str, float]]:
     """Yield start values of a form: every combination of the starts of its shapes, strengths small."""
     names = [item.name for item in term.form.searched]
-    choices = [item.start_values(problem.scales) for item in term.form.searched]
+    choices = [
+        item.start_values(problem.scales)[: 1 if item.role == "strength" else None] for item in term.form.searched
+    ]
     for combination in itertools.product(*choices):
         yield dict(zip(names, combination, strict=True))
 

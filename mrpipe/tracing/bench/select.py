@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -30,6 +30,9 @@ BEGUN_STEPS = 3
 
 CONTINUED = 8
 """Numerical technique: ... and number of forms that are then fitted further."""
+
+DISTANT_STEPS = 6
+"""Numerical technique: iterations of a refit from a distant start of a strength, before which it cannot be judged."""
 
 _Item = TypeVar("_Item")
 
@@ -155,11 +158,22 @@ def draft(found: Fit) -> Fit:
 
 
 def refit(before: Fit, screened: Screened, *, iterations: int = 7) -> Fit:
-    """Fit the terms of `before` and a screened one jointly."""
+    """Fit the terms of `before` and a screened one jointly, from the best of the starts of its strengths."""
     problem = replace(before.problem, terms=(*before.problem.terms, screened.term))
-    start = start_of(problem, before.base_values, [*before.term_values, screened.values])
-    start[: len(before.theta)] = before.theta
-    return fit(problem, start, iterations=iterations, tolerance=2e-3)
+
+    def begun(values: Mapping[str, float], most: int) -> Fit:
+        start = start_of(problem, before.base_values, [*before.term_values, values])
+        start[: len(before.theta)] = before.theta
+        return fit(problem, start, iterations=most, tolerance=2e-3)
+
+    near = begun(screened.values, iterations)
+    distant = [
+        begun({**screened.values, item.name: value}, max(iterations, DISTANT_STEPS))
+        for item in screened.term.form.searched
+        if item.role == "strength"
+        for value in item.start_values(problem.scales)[1:]
+    ]
+    return min([near, *distant], key=lambda item: item.chi_square)
 
 
 def on_all(before: Fit, drafted: Fit, *, iterations: int) -> Fit:

@@ -100,7 +100,7 @@ def trace_campaign(
     else:
         selection = _refined(selection, len(declared), baseline.model_error, options, rng, jobs)
         selection, gains, reason = without_laws_of_drive(selection, gains, len(declared), compared, jobs)
-    selection = with_final_laws(selection)
+    selection = with_final_laws(selection, rules.refinement.least_gain)
     selection = with_further_terms(
         selection,
         folds=options.folds,

@@ -37,17 +37,17 @@ def test_the_final_laws_may_saturate_where_levels_left_out_are_predicted_better(
     chosen = selected(driver=False).without_effects
     poor = fit(chosen.problem, chosen.theta, iterations=2)
     selection = Selection(poor, 1e-6, (), poor, ground=poor)
-    found = with_final_laws(selection)
+    found = with_final_laws(selection, 0.05)
     assert found.chosen.problem.base.laws[0] not in poor.problem.base.laws
     assert found.chosen.chi_square < 0.8 * poor.chi_square
     assert found.without_effects is found.chosen and found.base is poor
     # nothing is left to explain beyond the noise
     calm = replace(selection, noise=poor.chi_square)
-    assert with_final_laws(calm) is calm
+    assert with_final_laws(calm, 0.05) is calm
 
 
 def test_the_final_laws_do_not_saturate_beside_an_effect_that_bends_the_drive() -> None:
     selection = selected(driver=True)
-    found = with_final_laws(selection)
+    found = with_final_laws(selection, 0.05)
     assert not any(law.saturates for law in found.chosen.problem.base.laws)
     assert found.chosen.problem.terms == selection.chosen.problem.terms

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from mrpipe.effects.contract import EffectScales
 from mrpipe.effects.library import damper_effects
-from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.engine import Fit, fit, predict, start_of
 from mrpipe.fitting.problem import Term
-from mrpipe.tracing.bench.select import Candidate, Selection, admissible
+from mrpipe.tracing.bench.screen import Screened
+from mrpipe.tracing.bench.select import Candidate, Selection, admissible, refit
 from mrpipe.tracing.bench.verdict import unnamed_reason
 from mrpipe.tracing.options import NamingRules
+from tests.tracing.bench.fits import plain_fit
 
 SCALES = EffectScales(stroke=0.01, speed=0.12, acceleration=1.5, drive=4.0, force=120.0, time=5.0)
 
@@ -49,3 +53,24 @@ def test_an_effect_must_recover_half_of_what_the_base_form_leaves(ground: float)
     # what another base form recovers is not counted for the effect
     assert unnamed_reason(selected(0.45, ground), NamingRules()) != ""
     assert unnamed_reason(selected(0.55, ground), NamingRules()) == ""
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("share", [0.02, 0.05, 0.1, 0.2])
+def test_a_large_gap_is_found_although_a_small_one_raises_the_error(share: float) -> None:
+    """From a gap of 0.4 % of the stroke alone, 0.2 was never found: the search returned to a gap of zero."""
+    plain = plain_fit("")
+    effect = damper_effects()["backlash"]
+    form = next(form for form in effect.forms if form.name == "held")
+    gap = share * plain.problem.scales.of("stroke")
+    problem = replace(plain.problem, terms=(Term(effect, form),))
+    true = fit(problem, start_of(problem, plain.base_values, [{"gap": gap}]), iterations=0)
+    recordings = plain.problem.recordings
+    noise = np.std(plain.residual[recordings.used] / plain.problem.root_weight[recordings.used])
+    force = predict(true, recordings) + noise * np.random.default_rng(1).standard_normal(len(recordings.force))
+    alone = fit(replace(plain.problem, recordings=replace(recordings, force=force)), plain.theta, iterations=10)
+    small = {"gap": form.parameters[0].start_values(plain.problem.scales)[0]}
+    found = refit(alone, Screened(Term(effect, form), 0.0, small))
+    found = fit(found.problem, found.theta, iterations=30)
+    assert found.term_values[0]["gap"] == pytest.approx(gap, rel=0.02)
+    assert found.chi_square < 1.05
