@@ -139,6 +139,12 @@ EFFECT = Effect(
         EffectForm("smooth", "u/(1 + (u/us)^6)^(1/6)", (_INVERSE,), _smooth),
         EffectForm("tanh", "us tanh(u/us)", (_SOFT,), _tanh),
         EffectForm("driver", "min(command, us), before the lag", (_INVERSE,), _command),
+        EffectForm(
+            "soft-driver",
+            "command/(1 + (command/us)^n)^(1/n), before the lag",
+            (_INVERSE, _SHARPNESS),
+            _soft_driver,
+        ),
     ),
     separated_by={
         "remanence": Separation("current steps up and down", ("steps",)),
@@ -150,12 +156,6 @@ EFFECT = Effect(
             "u/(1 + (u/us)^n)^(1/n)",
             (_INVERSE, _SHARPNESS),
             _knee,
-        ),
-        EffectForm(
-            "soft-driver",
-            "command/(1 + (command/us)^n)^(1/n), before the lag",
-            (_INVERSE, _SHARPNESS),
-            _soft_driver,
         ),
         EffectForm(
             "slewing-driver",

@@ -131,6 +131,28 @@ def best_starts(problem: Problem, count: int) -> list[FloatArray]:
     return [points[place] for place in np.argsort(costs, kind="stable")[:count]]
 
 
+def shared_values(found: Fit) -> dict[str, float]:
+    """Return the numbers of a base form that every base form has: those of the lag of the drive."""
+    return {name: value for name, value in found.base_values.items() if name.startswith("eta")}
+
+
+def own_start(problem: Problem, found: Fit) -> FloatArray:
+    """Return the start that leaves least among the base form's own ones, with the terms and the lag of a fit.
+
+    Parameters
+    ----------
+    problem
+        Problem of a base form with the terms of `found`.
+    found
+        Fit with another base form.
+    """
+    bare = replace(problem, terms=())
+    shared = shared_values(found)
+    points = [start_of(problem, bare.values(point)[0] | shared, found.term_values) for point in start_points(bare)]
+    w = weighting(problem)
+    return min(points, key=lambda point: solve(problem, point, w).cost)
+
+
 def followed(problem: Problem, points: Sequence[FloatArray], starts: int, iterations: int) -> list[Fit]:
     """Return fits from the points that promise most after a few steps, the best first.
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
-from mrpipe.fitting.start import best_starts
+from mrpipe.fitting.start import best_starts, shared_values
 
 GAPS = (0.01, 0.03, 0.08)
 """Numerical technique: starts of the gap, as shares of the stroke."""
@@ -40,7 +40,7 @@ def with_play(found: Fit, effects: Mapping[str, Effect]) -> list[Fit]:
     if play is None or any(term.effect.name == play.name for term in problem.terms):
         return []
     bare = replace(problem, terms=())
-    shared = {name: value for name, value in found.base_values.items() if name.startswith("eta")}
+    shared = shared_values(found)
     points = [bare.values(point)[0] | shared for point in best_starts(bare, FORM_STARTS)]
     forms = [form for form in play.forms if form.name in ("held", "free")]
     trials = []

@@ -21,7 +21,7 @@ from mrpipe.fitting.engine import Fit, fit, regressors, start_of
 from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.reference import with_own_laws
-from mrpipe.fitting.start import fit_with_form
+from mrpipe.fitting.start import fit_with_form, own_start
 from mrpipe.fitting.weighting import centred, weighting
 from mrpipe.tracing.bench.select import Selection, draft, left_of
 from mrpipe.tracing.options import TracingOptions
@@ -333,12 +333,16 @@ def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, iterations: int = 8,
     """Return base forms that were fitted alone, each with the effects of a fit, on the same tests.
 
     The laws of the drive that the steps read are found again, because those of the base form alone contain the effect.
+    For the same reason a form also begins at its own starts: alone, its numbers imitate the effect that is missing.
     """
 
     def one(drafted: Fit) -> Fit:
         problem = replace(drafted.problem, terms=chosen.problem.terms)
-        start = start_of(problem, drafted.base_values, chosen.term_values)
-        found = fit(problem, start, iterations=iterations, tolerance=1e-3)
+        starts = [start_of(problem, drafted.base_values, chosen.term_values)]
+        if not problem.base.form.coupled:
+            starts.append(own_start(problem, chosen))
+        fits = [fit(problem, start, iterations=iterations, tolerance=1e-3) for start in starts]
+        found = min(fits, key=lambda item: item.chi_square)
         return with_own_laws(found, iterations=iterations // 2)
 
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:

@@ -115,3 +115,25 @@ def test_a_form_that_reads_its_yield_force_finds_it_again_with_the_effects() -> 
     largest = np.max(np.abs(found.laws[0](drive)))
     assert np.max(np.abs(found.laws[0](drive) - found.problem.reference[0](drive))) < 0.02 * largest
     assert np.max(np.abs(found.laws[0](drive) - single.problem.reference[0](drive))) > 0.02 * largest
+
+
+@pytest.mark.planted
+def test_numbers_of_a_form_that_imitate_the_missing_effect_are_not_kept() -> None:
+    """Alone, a form may end in a minimum that the effect cannot leave; it begins at its own starts as well."""
+    plain = plain_fit("accumulator")
+    effect = damper_effects()["accumulator"]
+    problem = replace(plain.problem, terms=(Term(effect, effect.form("linear")),))
+    chosen = fit(problem, start_of(problem, plain.base_values, [{}]), iterations=6)
+    single = alone(plain, {"viscoplastic": base_form("viscoplastic")})["viscoplastic"]
+    low, high = single.problem.bounds()
+    names = [parameter.name for _, parameter in single.problem.searched]
+    theta = single.theta.copy()
+    theta[names.index("flow_speed")] = high[names.index("flow_speed")]
+    theta[names.index("exponent")] = low[names.index("exponent")]
+    (found,) = with_effects_of(chosen, [fit(single.problem, theta, iterations=0)])
+    (best,) = with_effects_of(chosen, [single])
+    assert found.chi_square < 1.05 * best.chi_square
+    problem = replace(single.problem, terms=chosen.problem.terms)
+    values = single.problem.values(theta)[0]
+    from_there = fit(problem, start_of(problem, values, chosen.term_values), iterations=8)
+    assert found.chi_square < 0.9 * from_there.chi_square
