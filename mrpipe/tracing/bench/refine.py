@@ -218,16 +218,19 @@ def _fits_in_chain(chosen: Fit, place: int, form: EffectForm) -> bool:
 
 
 def _starts(form: EffectForm, known: Mapping[str, float], scales: EffectScales) -> Iterator[dict[str, float]]:
-    """Yield starts: what the plain form has found where a parameter has the same name, else those of the form.
+    """Yield starts: what the plain form found where a parameter of the same name can take it, else those of the form.
 
     A strength with distant starts takes these as well, because a plain form may have ended in another minimum.
     """
-    own = {p.name: p.start_values(scales) for p in form.searched}
-    choices = [
-        (known[p.name], *(own[p.name][1:] if p.role == "strength" else ())) if p.name in known else own[p.name]
-        for p in form.searched
-    ]
-    for values in itertools.product(*choices):
+
+    def choices(item: Parameter) -> tuple[float, ...]:
+        own = item.start_values(scales)
+        low, high = item.bounds(scales)
+        if not low <= known.get(item.name, np.nan) <= high:
+            return own
+        return known[item.name], *(own[1:] if item.role == "strength" else ())
+
+    for values in itertools.product(*(choices(item) for item in form.searched)):
         yield dict(zip((p.name for p in form.searched), values, strict=True))
 
 

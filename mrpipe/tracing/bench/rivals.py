@@ -22,7 +22,7 @@ from mrpipe.tracing.bench.race import Model, Race, on_all_tests
 from mrpipe.tracing.bench.refine import with_best_forms
 from mrpipe.tracing.bench.select import Selection, draft
 
-RIVALS = 5
+RIVALS = 3
 """Numerical technique: base forms, in addition to the chosen one, that are compared again."""
 
 HOPELESS = 5.0
