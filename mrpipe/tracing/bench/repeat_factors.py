@@ -101,8 +101,11 @@ def parts_of_differences(found: Differences, rules: NoiseRules) -> tuple[FloatAr
     expected = columns * with_growing
     growing = target * expected[:, 2] / np.maximum(expected.sum(axis=1), 1e-300)
     large = float(np.sum(growing)) >= rules.disturbance * float(np.sum(target))
+    # where the noise that the channels show suffices, a disturbance must be required, too; where more is needed in any
+    # case, its dependence on the speed decides
+    suffices = calm[0] <= 1.0
     growing_cost = _cost(target, _expected(columns, with_growing), columns.shape[1], count)
-    if large and growing_cost < cost:
+    if large and (growing_cost < cost or not suffices):
         return with_growing[:2], target, growing
     robust, limited = _robust_factors(noise, target, found.step_squared)
     if float(np.sum(target - limited)) > rules.events * float(np.sum(target)):

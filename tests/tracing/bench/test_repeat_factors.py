@@ -96,3 +96,15 @@ def test_correlated_differences_count_for_less() -> None:
     expected = white.columns[:, :2].sum(axis=1)
     assert white.independent(expected) == pytest.approx(4800.0, rel=0.1)
     assert coloured.independent(expected) == pytest.approx(4800.0 / 9.5, rel=0.3)
+
+
+@pytest.mark.property
+def test_a_slow_disturbance_in_few_cycles_is_no_noise() -> None:
+    """It has few independent samples, so that no criterion requires its growth; but no channel is so noisy."""
+    rng = np.random.default_rng(5)
+    found = repeats(rng, 14, corner=0.97)
+    growing = np.sqrt(found.columns[:120, 2] / np.mean(found.columns[:120, 2]))
+    loud = Differences(tuple(60.0 * growing * piece for piece in found.pieces), found.columns, found.step_squared)
+    factors, _, disturbed = parts_of_differences(loud, NoiseRules())
+    assert np.mean(disturbed) > 0.5 * np.mean(loud.squares)
+    assert factors[0] < 0.5 * np.mean(loud.squares) / np.mean(found.columns[:, 0])
