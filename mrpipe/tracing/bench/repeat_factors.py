@@ -69,7 +69,6 @@ class Differences:
         mean by 1 + 2 (sum of rho^2).
         """
         ends = np.cumsum([len(piece) for piece in self.pieces])
-        inflation = 1.0
         lags = np.zeros(MOST_LAGS + 1)
         for piece, variance in zip(self.pieces, np.split(expected, ends[:-1]), strict=True):
             values = piece / np.sqrt(np.maximum(variance, 1e-300))
@@ -78,7 +77,7 @@ class Differences:
         count = int(ends[-1])
         correlation = lags[1:] / max(lags[0], 1e-300)
         # what chance alone leaves, 1 / n, is subtracted
-        inflation += 2.0 * float(np.sum(np.maximum(correlation**2 - 1.0 / max(count, 1), 0.0)))
+        inflation = 1.0 + 2.0 * float(np.sum(np.maximum(correlation**2 - 1.0 / max(count, 1), 0.0)))
         return count / inflation
 
 
@@ -136,9 +135,8 @@ def _factors_of(noise: FloatArray, target: FloatArray, free: BoolArray) -> Float
 
 def _expected(columns: FloatArray, factors: FloatArray) -> FloatArray:
     """Return the expected squares, no less than a share of those by the channels alone."""
-    together = columns[:, :2].sum(axis=1)
-    least = max(LEAST_EXPECTED * float(np.min(together)), 1e-300)
-    return np.asarray(np.maximum(np.maximum(columns @ factors, LEAST_EXPECTED * together), least))
+    least = np.maximum(LEAST_EXPECTED * columns[:, :2].sum(axis=1), 1e-300)
+    return np.asarray(np.maximum(columns @ factors, least))
 
 
 def _cost(target: FloatArray, expected: FloatArray, fitted: int, count: float) -> float:

@@ -46,8 +46,9 @@ class NoiseRules(Section):
         gt=0.0,
         lt=1.0,
         description="Differences of repeated motion hold a disturbance that is not noise, if this share of their "
-        "squared sum grows with the speed; the noise of a channel does not depend on the speed, and on rigs with known "
-        "noise at most 5 percent seem to.",
+        "squared sum grows with the speed, because the noise of a channel does not depend on the speed. In few "
+        "repeats a quarter may seem to by chance, so that it must be required where the noise of the channels "
+        "suffices.",
     )
     hum_line: float = Field(
         4.0,
