@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -213,3 +213,8 @@ def law_unit(block_unit: str, suffix: str, drive_unit: str) -> str:
         return block_unit
     power = LETTERS.index(suffix)
     return f"{block_unit}/{drive_unit}" + ("" if power == 1 else f"^{power}")
+
+
+def for_blocks(laws: Sequence[LawShape], count: int) -> tuple[LawShape, ...]:
+    """Return one law for each of `count` blocks of a base form; the first law serves those beyond the laws given."""
+    return (*laws[:count], *[laws[0]] * (count - len(laws)))

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.laws import Law, LawShape
+from mrpipe.dampers.laws import Law, LawShape, for_blocks
 from mrpipe.fitting.drive_cells import Cells, cells_of
 from mrpipe.fitting.engine import Fit, bounded_solution
 
@@ -305,7 +305,7 @@ def adequate_laws(found: Fit) -> tuple[LawShape, ...]:
     fewest = min(pair[0].numbers + pair[1].numbers for pair in able)
     simple = [judge(cells, pair) for pair in able if pair[0].numbers + pair[1].numbers == fewest]
     best = min(simple, key=lambda item: (float(np.mean(_risk(item))), item.laws[0].kind == "polynomial"))
-    return (*best.laws, *[best.laws[0]] * (len(base.laws) - 2))
+    return for_blocks(best.laws, len(base.laws))
 
 
 def law_values(choice: LawChoice, laws: Sequence[Law]) -> list[dict[str, float]]:

@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.forms import DEFAULT_FORM
-from mrpipe.dampers.laws import Law, LawShape, constant_law
+from mrpipe.dampers.laws import Law, LawShape, constant_law, for_blocks
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import Fit, fit, solve, start_of
 from mrpipe.fitting.known import Known, known_start
@@ -82,9 +82,9 @@ def base_of(
     form
         Form of the damper.
     """
-    shapes = [*laws[: len(form.blocks)], *[laws[0]] * (len(form.blocks) - len(laws))]
+    shapes = for_blocks(laws, len(form.blocks))
     fixed = {**form.constants(recordings.scales()), **(held or {})}
-    return Base(form, tuple(shapes), lag_known=drive_varies(recordings), held=fixed)
+    return Base(form, shapes, lag_known=drive_varies(recordings), held=fixed)
 
 
 def first_reference(base: Base, recordings: Recordings) -> tuple[Law, ...]:
@@ -149,6 +149,8 @@ def own_start(problem: Problem, found: Fit) -> FloatArray:
     bare = replace(problem, terms=())
     shared = shared_values(found)
     points = [start_of(problem, bare.values(point)[0] | shared, found.term_values) for point in start_points(bare)]
+    # starts that differ in the lag alone are one start here
+    points = list({tuple(point): point for point in points}.values())
     w = weighting(problem)
     return min(points, key=lambda point: solve(problem, point, w).cost)
 

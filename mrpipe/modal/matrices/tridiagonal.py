@@ -137,15 +137,14 @@ def fit_partial(
     known = masses[np.isfinite(masses)]
     typical = float(known.mean()) if known.size else _typical_mass(modes)
     assignments = [modes.numbers] if modes.numbers else _assignments(possible_numbers, floors)
+    model = storey_model(floors)
     best: UpdatedModel | None = None
     for numbers in assignments:
         # a uniform chain with the mean mass and the lowest measured frequency
         uniform = eigh(shear_stiffness(np.ones(floors)), eigvals_only=True)
         scales = modes.angular_frequencies**2 * typical / uniform[np.asarray(numbers) - 1]
         start = np.full(floors, float(np.exp(np.mean(np.log(scales)))))
-        found = update_model(
-            storey_model(floors), masses, replace(modes, numbers=tuple(numbers)), start, start_mass=typical
-        )
+        found = update_model(model, masses, replace(modes, numbers=tuple(numbers)), start, start_mass=typical)
         if best is None or found.cost < best.cost:
             best = found
     if best is None:
@@ -153,7 +152,7 @@ def fit_partial(
     if known.size == masses.size:
         return best
     # unknown masses take up what the storeys cannot describe
-    return with_jackknife(storey_model(floors), masses, modes, best)
+    return with_jackknife(model, masses, modes, best)
 
 
 def _typical_mass(modes: MeasuredModes) -> float:

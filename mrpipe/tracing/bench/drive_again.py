@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrpipe.dampers.laws import LARGEST_ORDER
+from mrpipe.dampers.laws import LARGEST_ORDER, for_blocks
 from mrpipe.fitting.drive_cells import Cells, cells_of
 from mrpipe.fitting.drive_laws import VISCOSITY_LAWS, YIELD_LAWS, adequate_laws, fit_laws, judge
 from mrpipe.fitting.engine import Fit, fit, start_of
@@ -38,9 +38,7 @@ def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int
     found = with_adequate_laws(chosen, yield_order, viscosity_order)
     if found.chi_square >= chosen.chi_square - selection.nothing_missing * selection.noise:
         return selection
-    if chosen is selection.ground:
-        return replace(selection, chosen=found, ground=found)
-    return replace(selection, chosen=found)
+    return _with_chosen(selection, found)
 
 
 def with_adequate_laws(found: Fit, yield_order: int, viscosity_order: int) -> Fit:
@@ -53,12 +51,17 @@ def with_adequate_laws(found: Fit, yield_order: int, viscosity_order: int) -> Fi
     yield_order, viscosity_order
         Largest degrees of the polynomials that are tried.
     """
-    base = found.problem.base
-    richest = polynomial_laws(base.form, distinct_levels(found.problem.recordings), yield_order, viscosity_order)
-    if base.laws == richest:
+    richest = _with_polynomials(found, yield_order, viscosity_order)
+    if found.problem.base.laws == richest.laws:
         return found
-    rich = _with_laws(found, replace(base, laws=richest))
-    return _with_laws(rich, replace(base, laws=adequate_laws(rich)))
+    rich = _with_laws(found, richest)
+    return _with_laws(rich, replace(richest, laws=adequate_laws(rich)))
+
+
+def _with_polynomials(found: Fit, yield_order: int, viscosity_order: int) -> Base:
+    """Return the base of a fit with polynomials of these degrees, lowered to what the levels of drive determine."""
+    base, levels = found.problem.base, distinct_levels(found.problem.recordings)
+    return replace(base, laws=polynomial_laws(base.form, levels, yield_order, viscosity_order))
 
 
 def _with_laws(found: Fit, base: Base) -> Fit:
@@ -91,9 +94,14 @@ def with_final_laws(selection: Selection, least_gain: float) -> Selection:
     best = min(fits, key=lambda item: _information(item, selection.noise))
     if best.chi_square > chosen.chi_square - least or not _predicts_levels(cells, best, chosen):
         return selection
-    if chosen is selection.without_effects:
-        return replace(selection, chosen=best, ground=best)
-    return replace(selection, chosen=best)
+    return _with_chosen(selection, best)
+
+
+def _with_chosen(selection: Selection, found: Fit) -> Selection:
+    """Return the selection with a fit in place of the chosen one, also where this is the one without effects."""
+    if selection.chosen is selection.without_effects:
+        return replace(selection, chosen=found, ground=found)
+    return replace(selection, chosen=found)
 
 
 def _predicts_levels(cells: Cells, found: Fit, other: Fit) -> bool:
@@ -106,10 +114,7 @@ def _predicts_levels(cells: Cells, found: Fit, other: Fit) -> bool:
 
 def _richest(found: Fit) -> tuple[Fit, Cells]:
     """Return the fit with the polynomials of highest degree that the levels determine, and its sums over the levels."""
-    base = found.problem.base
-    levels = distinct_levels(found.problem.recordings)
-    viscosity_order = max(law.order for law in VISCOSITY_LAWS)
-    rich = _with_laws(found, replace(base, laws=polynomial_laws(base.form, levels, LARGEST_ORDER, viscosity_order)))
+    rich = _with_laws(found, _with_polynomials(found, LARGEST_ORDER, max(law.order for law in VISCOSITY_LAWS)))
     return rich, cells_of(rich)
 
 
@@ -127,7 +132,7 @@ def _with_best_laws(rich: Fit, cells: Cells, noise: float) -> Iterator[Fit]:
         laws = min(
             pairs, key=lambda pair: float(np.sum(fit_laws(cells, pair)[0])) + cost * sum(law.numbers for law in pair)
         )
-        yield _with_laws(rich, replace(base, laws=(*laws, *[laws[0]] * (len(base.laws) - 2))))
+        yield _with_laws(rich, replace(base, laws=for_blocks(laws, len(base.laws))))
 
 
 def _information(found: Fit, noise: float) -> float:

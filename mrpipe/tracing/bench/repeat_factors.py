@@ -8,12 +8,13 @@ require it, by the Bayesian information criterion (Schwarz 1978, Ann. Statist. 6
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize, stats
 
-from mrpipe.artifacts import BoolArray, FloatArray
+from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import NoiseRules
 
 LEAST_EXPECTED = 0.05
@@ -93,9 +94,9 @@ def parts_of_differences(found: Differences, rules: NoiseRules) -> tuple[FloatAr
     """
     columns, target = found.columns, found.squares
     noise, nothing = columns[:, :2], np.zeros(len(target))
-    with_growing = _factors(columns, target, 1.0)
+    with_growing = _factors(columns, target)
     count = found.independent(_expected(columns, with_growing))
-    calm, cost = _required_factors(found, noise, count)
+    calm, cost = _required_factors(noise, target, count)
     # each squared difference is divided in proportion to what is expected of it
     expected = columns * with_growing
     growing = target * expected[:, 2] / np.maximum(expected.sum(axis=1), 1e-300)
@@ -112,30 +113,37 @@ def parts_of_differences(found: Differences, rules: NoiseRules) -> tuple[FloatAr
     return calm, target, nothing
 
 
-def _required_factors(found: Differences, noise: FloatArray, count: float) -> tuple[FloatArray, float]:
+def _required_factors(noise: FloatArray, target: FloatArray, count: float) -> tuple[FloatArray, float]:
     """Return the factors that differ from 1 only where the differences require it, and the criterion they reach."""
-    target, best = found.squares, (np.ones(2), np.inf)
+    best = (np.ones(2), np.inf)
     for free in FREE:
-        chosen = np.array(free)
-        factors = _factors_of(noise, target, chosen)
-        cost = _cost(target, _expected(noise, factors), int(np.count_nonzero(chosen)), count)
+        factors = _factors(noise, target, free)
+        cost = _cost(target, _expected(noise, factors), sum(free), count)
         best = min(best, (factors, cost), key=lambda item: item[1])
     return best
 
 
-def _factors_of(noise: FloatArray, target: FloatArray, free: BoolArray) -> FloatArray:
-    """Return the factors of the columns; those that are not free are 1."""
-    factors = np.ones(noise.shape[1])
-    for _ in range(WEIGHTED if free.any() else 0):
-        weights = 1.0 / _expected(noise, factors)
-        rest = (target - noise[:, ~free].sum(axis=1)) * weights
-        factors[free] = optimize.nnls(noise[:, free] * weights[:, None], rest)[0]
+def _factors(columns: FloatArray, target: FloatArray, free: Sequence[bool] = ()) -> FloatArray:
+    """Return the factors of the columns that explain squared differences; those that are not free are 1.
+
+    The scatter of squared differences is proportional to their mean, so they are weighted by their mean. The search
+    starts at what the channels show. All factors are free where `free` is left out.
+    """
+    searched = np.array(free) if free else np.ones(columns.shape[1], dtype=bool)
+    factors = np.ones(columns.shape[1])
+    factors[2:] = 0.0
+    fixed = columns[:, ~searched].sum(axis=1)
+    for _ in range(WEIGHTED if searched.any() else 0):
+        weights = 1.0 / _expected(columns, factors)
+        factors[searched] = optimize.nnls(columns[:, searched] * weights[:, None], (target - fixed) * weights)[0]
     return factors
 
 
 def _expected(columns: FloatArray, factors: FloatArray) -> FloatArray:
     """Return the expected squares, no less than a share of those by the channels alone."""
-    least = np.maximum(LEAST_EXPECTED * columns[:, :2].sum(axis=1), 1e-300)
+    together = columns[:, :2].sum(axis=1)
+    # a channel without noise would have infinite weight
+    least = np.maximum(LEAST_EXPECTED * together, max(1e-12 * float(np.max(together)), 1e-300))
     return np.asarray(np.maximum(columns @ factors, least))
 
 
@@ -153,20 +161,6 @@ def _cost(target: FloatArray, expected: FloatArray, fitted: int, count: float) -
     """
     mean = float(np.mean(np.log(expected) + target / expected))
     return count * mean + fitted * float(np.log(max(count, 2.0)))
-
-
-def _factors(columns: FloatArray, target: FloatArray, start: float) -> FloatArray:
-    """Return the factors of the columns that explain squared differences; the search starts at one factor for all.
-
-    The scatter of squared differences is proportional to their mean, so they are weighted by their mean.
-    """
-    together = columns[:, :2].sum(axis=1)
-    expected, factors = start * together, np.ones(columns.shape[1])
-    for _ in range(WEIGHTED):
-        weights = 1.0 / np.maximum(expected, 1e-12 * float(np.max(expected)))
-        factors = optimize.nnls(columns * weights[:, None], target * weights)[0]
-        expected = np.maximum(columns @ factors, LEAST_EXPECTED * together)
-    return np.asarray(factors)
 
 
 def _robust_factors(columns: FloatArray, target: FloatArray, step_squared: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -23,7 +23,7 @@ def test_events_that_do_not_repeat_are_no_noise(events: float) -> None:
     # with a tenth of events the limited mean settles 1.65 times above that of the noise
     assert factors == pytest.approx(np.array([3.0, 5.0]) * (1.0 if events == 0.0 else 1.65), rel=0.15)
     if events == 0.0:
-        assert _factors(columns, difference**2, 1.0) == pytest.approx([3.0, 5.0], rel=0.1)
+        assert _factors(columns, difference**2) == pytest.approx([3.0, 5.0], rel=0.1)
 
 
 @pytest.mark.property
@@ -73,7 +73,7 @@ def test_few_repeats_of_white_noise_leave_what_the_channels_show(count: int) -> 
         factors, without, disturbed = parts_of_differences(found, NoiseRules())
         assert not disturbed.any() and np.array_equal(without, found.squares)
         kept += bool(np.all(factors == 1.0))
-        free = _factors(found.columns, found.squares, 1.0)
+        free = _factors(found.columns, found.squares)
         assert np.any(free != 1.0)
     assert kept >= 36
 
