@@ -320,7 +320,7 @@ def forward_selection(
     if excess <= rules.nothing_missing * noise or most == 0:
         return Selection(base, noise, (), base, nothing_missing=rules.nothing_missing)
     while len(rounds) < most:
-        little = chosen.chi_square - noise < min(rules.further * excess, noise)
+        little = chosen.chi_square - noise < min(rules.further * excess, (rules.near_floors**2 - 1.0) * noise)
         if rounds and little and _nothing_more(chosen, terms, rules.gain * excess, jobs):
             break
         found = candidates_after(
