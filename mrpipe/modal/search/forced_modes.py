@@ -51,12 +51,15 @@ class ModeSearch:
         Mode number (from 1) of each pole of the fit; 1, 2, ... n where the set is complete.
     candidates
         The stabilisation chart: poles that appear at several model orders.
+    notes
+        What the user should know of the modes, one line each.
     """
 
     fit: MultiModeFit
     band_hz: tuple[float, float]
     numbers: tuple[int, ...]
     candidates: tuple[PoleCandidate, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
