@@ -1,12 +1,12 @@
 """Scale of set-ups by the orthogonality of the modes, where the reference sensors stand at a node.
 
-The sensors that two set-ups share give the ratio of their shapes. At a node of a mode they say nothing. A shape is then
-known in parts: the rows of each set-up have a factor of their own. The modes of one structure are orthogonal to the
-mass, so that the factors d_s of a mode obey
+The sensors that two set-ups share give the ratio of their shapes. At a node of a mode they do not show it. The rows
+that each set-up shows then have a factor d_s of their own. The modes of one structure are orthogonal to the mass, so
+that the factors of a mode obey
 
     sum_s d_s (phi_q' M a_s) = 0    for each other mode q,
 
-with the part a_s of set-up s. What the shared sensors say, d_s a_s(i) = d_t a_t(i), is one more equation for each of
+with the rows a_s of set-up s. What the shared sensors say, d_s a_s(i) = d_t a_t(i), is one more equation for each of
 them. All equations are weighted by their errors. The vector of factors is the right singular vector of the smallest
 singular value, because only the common factor of all parts stays free. The misfit of the equations beyond the
 unknowns widens the errors (Birge 1932, Physical Review 40, 207).

@@ -189,7 +189,9 @@ def part_of(set_up: SetUp, pole: int, omega: float) -> tuple[FloatArray, FloatAr
     set_up
         Tests and poles.
     pole
-        Index of the mode among its poles; -1: no stable pole, so that the spectral densities at `omega` [rad/s] count.
+        Index of the mode among its poles; -1: no stable pole, so that the spectral densities count.
+    omega
+        Angular frequency of the mode [rad/s].
     """
     if pole < 0:
         return _singular_vector(set_up.tests, omega)

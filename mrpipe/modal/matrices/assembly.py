@@ -194,7 +194,7 @@ def _findings(
         findings.append(
             f"floors without a sensor ({floors}): their mode shapes are not determined, because the data leave open "
             + (
-                "how to part their motion among them"
+                "how their motion is divided among them"
                 if orthogonal
                 else "the mass of the floor or the stiffness of a storey next to it"
             )

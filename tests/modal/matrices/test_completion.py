@@ -50,7 +50,7 @@ def test_a_weak_mode_follows_from_the_others(seed: int, missing: tuple[int, ...]
 
 @pytest.mark.property
 def test_the_rotation_is_exact_with_one_floor_and_open_in_the_middle_of_four() -> None:
-    """Of four floors that follow one another the outer storeys alone tell how to part the motion among them."""
+    """Of four floors that follow one another the outer storeys alone show how the motion is divided among them."""
     errors = []
     for missing in ((2,), (1, 4), (1, 2, 3, 4)):
         tower, seen, error, measured = _seen(1, missing)
