@@ -1,7 +1,7 @@
 """Scale of set-ups by the orthogonality of the modes, where the reference sensors stand at a node.
 
 The sensors that two set-ups share give the ratio of their shapes. At a node of a mode they do not show it. The rows
-that each set-up shows then have a factor d_s of their own. The modes of one structure are orthogonal to the mass, so
+that each set-up shows then have a separate factor d_s. The modes of one structure are orthogonal to the mass, so
 that the factors of a mode obey
 
     sum_s d_s (phi_q' M a_s) = 0    for each other mode q,
@@ -28,7 +28,7 @@ _ROUNDS = 4
 _OPEN = 0.2
 """Error of a shape over its norm from which the signs of its parts stay open: twice as much is a part of the shape."""
 _CONTRADICTION = 9.0
-"""Squared misfit over its degrees of freedom beyond which the parts are no mode of this structure."""
+"""Squared misfit over its degrees of freedom from which the parts contradict the other modes."""
 
 
 def scaled_by_orthogonality(merged: Merged, modes: Sequence[int], layout: Layout) -> MultiModeFit:
