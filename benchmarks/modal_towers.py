@@ -88,7 +88,8 @@ def judge(tower, tests):
                 (
                     100 * abs(value / tower.frequencies_hz[mode] - 1),
                     100 * abs(damping[index] / tower.damping_ratios[mode] - 1),
-                    shape,
+                    # a shape that is withheld at a floor is not a found one
+                    shape if known.all() else 0.0,
                 )
             )
     worst = np.array(errors) if errors else np.full((1, 3), np.nan)

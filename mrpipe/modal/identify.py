@@ -168,7 +168,7 @@ def _identify(
         ambient, clocks = synchronised(tests.ambient, band, options)
         search = find_ambient_modes(ambient, layout, *band, tests.source, options.ambient_method)
         chosen = ChosenTests(search, ())
-        findings = _ambient_findings(tests) + _clock_findings(clocks)
+        findings = _ambient_findings(tests) + _clock_findings(clocks) + list(search.notes)
     else:
         chosen, findings = choose_tests(forced, tests, layout, options)
     if tests.ambient and forced:

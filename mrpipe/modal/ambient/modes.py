@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from mrpipe.errors import UserError, install_extra
 from mrpipe.modal.ambient.band import USABLE_BAND, common_motion_ends_hz, lowest_peak_hz
 from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Pole, Records
 from mrpipe.modal.ambient.refine import refine_by_spectra
+from mrpipe.modal.ambient.setup_scales import scaled_by_orthogonality, scaling_notes
 from mrpipe.modal.ambient.setups import SetUp, confirmed, merge_set_ups, pooled_poles
 from mrpipe.modal.fit.lscf import PoleCandidate
 from mrpipe.modal.fit.result import MultiModeFit
@@ -42,6 +43,7 @@ _LEAST_COLLINEARITY = 0.5
 _LARGEST_SPREAD = 4.0
 _COPY_RANGE = 0.1
 _COPY_ASSURANCE = 0.7
+_SCALINGS = 2
 
 
 @dataclass(frozen=True)
@@ -276,8 +278,13 @@ def _search(
     set_ups = confirmed(set_ups)
     merged = merge_set_ups(set_ups, source) if len(set_ups) > 1 else None
     fit = set_ups[0].fit if merged is None else merged.fit
-    chosen = complete_set(fit, layout)
-    numbered = dict(zip(chosen, range(1, len(chosen) + 1), strict=True)) if chosen else largest_set(fit, layout)
+    numbered = _numbered(fit, layout)
+    notes: tuple[str, ...] = ()
+    if merged is not None:
+        for _ in range(_SCALINGS):  # a mode that is found by it scales the others
+            merged = replace(merged, fit=scaled_by_orthogonality(merged, list(numbered), layout))
+            numbered = max(_numbered(merged.fit, layout), numbered, key=len)
+        notes = scaling_notes(fit, merged.fit, list(numbered))
     if not numbered:
         raise UserError(source, "ambient tests", "no mode found", "record longer, or set identify_frame.band_high_hz")
     modes = list(numbered)
@@ -288,7 +295,13 @@ def _search(
             (positions, refine_by_spectra(item.fit.only(own), item.tests))
             for item, positions, own in merged.parts(modes)
         ])  # fmt: skip
-    return ModeSearch(refined, (band_hz[0], max(tops)), tuple(numbered.values()), tuple(candidates))
+    return ModeSearch(refined, (band_hz[0], max(tops)), tuple(numbered.values()), tuple(candidates), notes)
+
+
+def _numbered(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
+    """Return pole -> mode number (from 1): a complete set where there is one, else the largest."""
+    chosen = complete_set(fit, layout)
+    return dict(zip(chosen, range(1, len(chosen) + 1), strict=True)) if chosen else largest_set(fit, layout)
 
 
 def _set_up(

@@ -27,6 +27,9 @@ _NEAR = 0.03
 _ALIKE = 0.7
 """Modal assurance at the shared sensors from which two shapes may belong to one mode."""
 
+PICKED_UP = 0.01
+"""Least error of a sensor over the mean motion of the mode: sensors pick up other floors, and gains differ."""
+
 
 @dataclass(frozen=True)
 class SetUp:
@@ -161,14 +164,13 @@ def _add(shape: _Shape, index: int, own: SetUp, shared: Sequence[Sensor]) -> Non
         # one shared sensor makes all shapes alike: then the nearest frequency decides
         gaps = np.abs(fit.angular_frequencies - shape.omega)
         best = max(alike, key=lambda item: (round(item[0], 2), -float(gaps[item[1]])))[1]
-        values, errors = fit.residues[:, best].real, fit.residue_errors[:, best]
         shape.places[index] = best
-    else:
-        values, errors = _singular_vector(own.tests, shape.omega)
+    values, errors = part_of(own, shape.places.get(index, -1), shape.omega)
     scale = float(values[rows] @ reference) / max(float(values[rows] @ values[rows]), 1e-300)
     reference_error = np.array([shape.errors[sensor] for sensor in shared])
-    # error of the scale from the noise of both set-ups at the shared sensors
-    noise = np.sqrt(reference_error**2 + (scale * errors[rows]) ** 2)
+    # error of the scale from noise and other motion in both set-ups at the shared sensors
+    other = PICKED_UP * float(np.sqrt(np.mean(np.square(list(shape.values.values())))))
+    noise = np.sqrt(reference_error**2 + (scale * errors[rows]) ** 2 + other**2)
     relative = float(np.linalg.norm(noise)) / max(float(np.linalg.norm(reference)), 1e-300)
     for row, sensor in enumerate(fit.sensors):
         value, error = scale * float(values[row]), abs(scale) * float(np.hypot(errors[row], relative * values[row]))
@@ -177,6 +179,23 @@ def _add(shape: _Shape, index: int, own: SetUp, shared: Sequence[Sensor]) -> Non
             value = (first * shape.values[sensor] + second * value) / (first + second)
             error = float(1.0 / np.sqrt(first + second))
         shape.values[sensor], shape.errors[sensor] = value, error
+
+
+def part_of(set_up: SetUp, pole: int, omega: float) -> tuple[FloatArray, FloatArray]:
+    """Return a mode at the sensors of one set-up, any scale, and its errors, shape (s,) each.
+
+    Parameters
+    ----------
+    set_up
+        Tests and poles.
+    pole
+        Index of the mode among its poles; -1: no stable pole, so that the spectral densities count.
+    omega
+        Angular frequency of the mode [rad/s].
+    """
+    if pole < 0:
+        return _singular_vector(set_up.tests, omega)
+    return set_up.fit.residues[:, pole].real, set_up.fit.residue_errors[:, pole]
 
 
 def _assurance(first: FloatArray, second: FloatArray) -> float:

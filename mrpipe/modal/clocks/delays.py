@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.clocks.interpolation import between_samples
 from mrpipe.modal.clocks.proof import LeftOut, parts_by_mode
 from mrpipe.modal.fit.projection import Problem, stack
 from mrpipe.modal.fit.result import MultiModeFit
@@ -83,7 +83,8 @@ class _SensorFit:
     ) -> None:
         samples = test.responses.shape[0]
         self.time = np.arange(samples) / test.sampling_rate_hz
-        self.spline = CubicSpline(self.time, test.responses[:, column] - test.responses[:, column].mean())
+        centred = test.responses[:, column] - test.responses[:, column].mean()
+        self.spline = between_samples(centred, test.sampling_rate_hz)
         self.lines = np.round(spectrum.omega * samples * spectrum.dt / (2.0 * np.pi)).astype(np.int64)
         self.weight = np.concatenate([line_weight, line_weight])[:, None]
         weighted = basis * self.weight
@@ -265,7 +266,7 @@ def corrected(test: FrameTest, clocks: Sequence[SensorClock]) -> FrameTest:
         if clock.test == test.name and not clock.is_zero:
             column = test.sensors.index(clock.sensor)
             moved = np.clip(time + clock.delay(time), time[0], time[-1])
-            responses[:, column] = CubicSpline(time, test.responses[:, column])(moved)
+            responses[:, column] = between_samples(test.responses[:, column], test.sampling_rate_hz)(moved)
     return replace(test, responses=responses)
 
 

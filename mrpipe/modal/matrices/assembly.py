@@ -16,6 +16,8 @@ from mrpipe.structures import Frame, frame_from_modes, modal_damping_matrix, nat
 
 _MODEL_ERROR = 0.02
 """Relative frequency error of the storey model above which the user is warned."""
+_OPEN_TURN = 0.1
+"""Standard error [rad] of the rotation of rows without a sensor, from which their shapes count as not determined."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,9 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
 
     A storey model with the known masses is fitted to the modes. It gives the mode numbers and the shapes at floors
     without a sensor. Where all modes were found, the matrices follow from the expanded shapes made orthogonal to the
-    mass; else they are those of the storey model, with the mean damping ratio for modes that were not found.
+    mass; else they are those of the storey model, with the mean damping ratio for modes that were not found. Shapes
+    that are orthogonal to known masses do not depend on the storey model: a storey that it leaves open leaves no row
+    of them open.
     """
     unknown_rows = [row for row in range(layout.floors) if row not in modes.measured]
     if not layout.is_chain or not can_scale(masses, modes):
@@ -110,9 +114,8 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
         scale_error=0.05 if modes.scale_errors is None else np.maximum(0.5 * modes.scale_errors, 0.005),
     )
     updated = fit_partial(masses, data, modes.possible_numbers)
-    open_rows = [row for row in unknown_rows if _is_open(updated, row)]
     orthogonal = len(updated.numbers) == layout.floors and bool(np.isfinite(masses).all())
-    findings = _findings(updated, modes, layout, unknown_rows, open_rows, orthogonal)
+    open_rows = [row for row in unknown_rows if not orthogonal and _is_open(updated, row)]
     mass = np.diag(updated.masses)
     model = natural_modes(Frame(mass, np.zeros_like(mass), updated.stiffness)).mode_shapes
     index = np.asarray(updated.numbers) - 1
@@ -121,17 +124,20 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
     zeta[index] = modes.damping_ratios
     storeys = storeys_of(updated)
     if len(index) == layout.floors:
-        whole = completed_shapes(shapes, modes.errors, modes.measured, updated.masses, modes.angular_frequencies)
+        completed = completed_shapes(shapes, modes.errors, modes.measured, updated.masses, modes.angular_frequencies)
+        whole = completed.shapes
         frame = frame_from_modes(
             whole, modes.angular_frequencies, zeta, updated.masses, name="identified", source=source
         )
         # orthogonality to masses that are estimates would change measured shapes, which are better known
         shapes = whole if orthogonal else shapes
+        open_rows = unknown_rows if orthogonal and completed.turn_error > _OPEN_TURN else open_rows
     else:
         damping = modal_damping_matrix(mass, updated.stiffness, zeta)
         frame = Frame(mass, damping, updated.stiffness, "identified, storey model")
     shapes = normalise_to_largest(shapes)
     shapes[open_rows] = np.nan
+    findings = _findings(updated, modes, layout, unknown_rows, open_rows, orthogonal)
     return Assembly(
         frame=frame,
         shapes=shapes,
@@ -161,7 +167,7 @@ def _modes_only(modes: PartialModes, masses: FloatArray, layout: Layout, unknown
 def _is_open(updated: UpdatedModel, row: int) -> bool:
     """Return whether the mass of a floor (from 0), or the storey below or above it, is not determined.
 
-    The shape of a floor without a sensor follows from them alone, so that it would be a guess.
+    The shape of a floor without a sensor then follows from them alone, so that it would be a guess.
     """
     return not {f"mass {row + 1}", f"storey {row + 1}", f"storey {row + 2}"}.isdisjoint(updated.undetermined)
 
@@ -187,7 +193,11 @@ def _findings(
         floors = ", ".join(str(row + 1) for row in open_rows)
         findings.append(
             f"floors without a sensor ({floors}): their mode shapes are not determined, because the data leave open "
-            "the mass of the floor or the stiffness of a storey next to it"
+            + (
+                "how their motion is divided among them"
+                if orthogonal
+                else "the mass of the floor or the stiffness of a storey next to it"
+            )
         )
     if expanded:
         floors = ", ".join(str(row + 1) for row in expanded)

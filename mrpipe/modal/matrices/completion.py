@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import expm
@@ -13,6 +14,29 @@ from mrpipe.artifacts import FloatArray
 _LEAST_ERROR = 1e-6
 """Error of a shape element over the norm of the shape, below which it only costs condition."""
 _TURNS = 50
+_SECOND_STEP = 1e-3
+"""Step of the second differences by an angle [rad]."""
+_OTHER = 0.3
+"""Rows of unit norm that differ by more than this are another solution."""
+_AMBIGUOUS = 4.0
+"""Two reflections whose squared misfits over their variance differ by less than this are both possible."""
+
+
+@dataclass(frozen=True)
+class Completion:
+    """Shapes at all floors.
+
+    Attributes
+    ----------
+    shapes
+        Shape (n, n), normalised to the mass.
+    turn_error
+        Standard error [rad] of the rotation of the rows of floors without a sensor; zero with one such floor at most,
+        infinite where another sign of a row is as likely.
+    """
+
+    shapes: FloatArray
+    turn_error: float
 
 
 def completed_shapes(
@@ -21,13 +45,14 @@ def completed_shapes(
     measured: Sequence[int],
     masses: FloatArray,
     angular_frequencies: FloatArray,
-) -> FloatArray:
+) -> Completion:
     """Return the shapes orthogonal to the mass; the rows of floors with a sensor decide, each by its certainty.
 
     With L = M^(1/2) the mass-normalised shapes form an orthogonal matrix. Its measured rows A are known up to a scale
     d_r of each mode, and A diag(d^2) A' = 1 gives these scales. The other rows span the complement of the measured
     ones. Of all rotations of the complement the one is taken that leaves the smallest stiffness between floors that
-    are not neighbours, because the measurements cannot show it.
+    are not neighbours, because the measurements cannot show it. The elements of K that this leaves beyond neighbours
+    are taken as errors of that assumption. They give the standard error of the rotation.
 
     Parameters
     ----------
@@ -55,9 +80,10 @@ def completed_shapes(
         rest = scaled[unknown] - scaled[unknown] @ whole[rows].T @ whole[rows]
         whole[unknown] = _nearest_orthonormal(rest)
     whole = _by_certainty(whole, scaled[rows], root[rows] * errors[rows] / size, rows)
+    turn_error = 0.0
     if unknown:
-        whole[unknown] = _rotated(whole, unknown, whole[unknown], angular_frequencies, masses)
-    return np.asarray(whole / root)
+        whole[unknown], turn_error = _rotated(whole, unknown, whole[unknown], angular_frequencies, masses)
+    return Completion(np.asarray(whole / root), turn_error)
 
 
 def _by_certainty(start: FloatArray, seen: FloatArray, errors: FloatArray, rows: Sequence[int]) -> FloatArray:
@@ -146,8 +172,11 @@ def _mode_scales(rows: FloatArray) -> FloatArray:
 
 def _rotated(
     whole: FloatArray, unknown: list[int], start: FloatArray, angular_frequencies: FloatArray, masses: FloatArray
-) -> FloatArray:
-    """Return the rows of floors without a sensor, rotated and reflected for the least stiffness beyond neighbours."""
+) -> tuple[FloatArray, float]:
+    """Return the rows of floors without a sensor, rotated and reflected for the least stiffness beyond neighbours.
+
+    The second result is the standard error of the rotation [rad].
+    """
     count, floors = len(unknown), whole.shape[0]
     beyond = np.abs(np.subtract.outer(np.arange(floors), np.arange(floors))) > 1
     root = np.sqrt(masses)
@@ -169,14 +198,35 @@ def _rotated(
         wrong = np.maximum(np.diag(relative, 1), 0.0)
         return float(np.sum(relative[beyond] ** 2) + 2.0 * np.sum(wrong**2))
 
-    best = (np.inf, start)
+    found = []
     for choice in range(2**count):
         signs = np.array([1.0 if choice >> bit & 1 else -1.0 for bit in range(count)])
         for angle in np.linspace(0.0, np.pi, 7)[:-1] if pairs else (0.0,):
             first = np.full(len(pairs), angle)
             angles = minimize(cost, first, args=(signs,)).x if pairs else first
-            best = min(best, (cost(angles, signs), rows_of(angles, signs)), key=lambda item: item[0])
-    return best[1]
+            found.append((cost(angles, signs), angles, signs))
+    least, angles, signs = min(found, key=lambda item: item[0])
+    best = rows_of(angles, signs)
+    # both triangles of K are counted in the cost
+    variance = least / max(0.5 * np.count_nonzero(beyond) - len(pairs), 1.0)
+    others = [value for value, *place in found if np.abs(rows_of(*place) - best).max() > _OTHER]
+    if others and min(others) - least < _AMBIGUOUS * variance:
+        return best, np.inf
+    return best, _turn_error(lambda moved: cost(moved, signs), angles, variance)
+
+
+def _turn_error(cost: Callable[[FloatArray], float], angles: FloatArray, variance: float) -> float:
+    """Return the largest standard error of the angles at the least cost, a sum of squares of so much variance each."""
+    if not angles.size:
+        return 0.0
+    steps = _SECOND_STEP * np.eye(angles.size)
+    corners = np.array([
+        [cost(angles + i + j) - cost(angles + i - j) - cost(angles - i + j) + cost(angles - i - j) for j in steps]
+        for i in steps
+    ])  # fmt: skip
+    curvature, directions = np.linalg.eigh(corners / (4.0 * _SECOND_STEP**2))
+    spread = 2.0 * variance * np.sum(directions**2 / np.maximum(curvature, 1e-12), axis=1)
+    return float(np.sqrt(spread.max()))
 
 
 def _nearest_orthonormal(rows: FloatArray) -> FloatArray:

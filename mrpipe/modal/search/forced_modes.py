@@ -51,12 +51,15 @@ class ModeSearch:
         Mode number (from 1) of each pole of the fit; 1, 2, ... n where the set is complete.
     candidates
         The stabilisation chart: poles that appear at several model orders.
+    notes
+        What the user should know of the modes, one line each.
     """
 
     fit: MultiModeFit
     band_hz: tuple[float, float]
     numbers: tuple[int, ...]
     candidates: tuple[PoleCandidate, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,7 @@ def find_modes(
     UserError
         If no mode is found, or a sensor does not respond to the excitation.
     """
-    best: _Found | None = None
+    incomplete: list[_Found] = []
     bands = bands_to_try(tests, low_hz, high_hz)
     for band in bands:
         spectra = tuple(record_spectrum(test, band) for test in tests)
@@ -187,17 +190,32 @@ def find_modes(
             if len(left) == layout.floors and not contradicts(refined, layout):
                 numbers = tuple(range(1, layout.floors + 1))
                 return ModeSearch(refined, band, numbers, found.candidates)
-        if found is not None and (
-            best is None or len(largest_set(found.fit, layout)) >= len(largest_set(best.fit, layout))
-        ):
-            best = found
-    span = f"between {low_hz:g} and {max(high for _, high in bands):.3g} Hz"
-    chosen = {} if best is None else largest_set(best.fit, layout)
-    if best is None or not chosen:
+        if found is not None:
+            incomplete.append(found)
+    best = _best_of_bands(incomplete, layout, source, decays)
+    if best is None:
+        span = f"between {low_hz:g} and {max(high for _, high in bands):.3g} Hz"
         raise UserError(
             source, "forced tests", f"no mode found {span}", "check the channels, or set identify_frame.band_high_hz"
         )
-    return _incomplete(best, chosen, layout, source, decays)
+    return best
+
+
+def _best_of_bands(
+    found: Sequence[_Found], layout: Layout, source: Path, decays: Sequence[FrameTest]
+) -> ModeSearch | None:
+    """Return the largest set of modes that the last fit leaves, of equal ones the last; None without modes.
+
+    A pole at the end of a narrow band stands for the modes beyond it, and the last fit moves it. The sets are therefore
+    compared after that fit.
+    """
+    sets = [(largest_set(item.fit, layout), item) for item in reversed(found)]
+    best: ModeSearch | None = None
+    for chosen, item in sorted(sets, key=lambda pair: -len(pair[0])):
+        if chosen and (best is None or len(chosen) > len(best.numbers)):
+            search = _incomplete(item, chosen, layout, source, decays)
+            best = search if best is None or len(search.numbers) > len(best.numbers) else best
+    return best
 
 
 def _incomplete(

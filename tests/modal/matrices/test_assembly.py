@@ -10,6 +10,7 @@ import pytest
 from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial, can_scale
 from mrpipe.modal.search.selection import Layout
 from mrpipe.structures import complex_modes, modal_assurance, natural_modes, shear_frame
+from tests.modal.towers import random_tower
 
 pytestmark = pytest.mark.planted
 
@@ -82,6 +83,20 @@ def test_a_shape_that_open_masses_leave_open_is_not_given() -> None:
         line.startswith("floors without a sensor (1, 3): their mode shapes are not determined, because the data leave")
         for line in found.findings
     )
+
+
+def test_a_shape_that_orthogonality_gives_does_not_wait_for_the_storey_model() -> None:
+    """Coupled floors make storeys uncertain: shapes that known masses determine had been withheld."""
+    tower = random_tower(np.random.default_rng(2), 7)
+    shapes = tower.shapes / np.linalg.norm(tower.shapes, axis=0)
+    shapes[3], errors = 0.0, np.full((7, 7), 1e-3)
+    errors[3] = np.inf
+    numbers = tuple((number, number) for number in range(1, 8))
+    measured = (0, 1, 2, 4, 5, 6)
+    modes = PartialModes(2.0 * np.pi * tower.frequencies_hz, np.full(7, 0.01), shapes, errors, measured, numbers)
+    found = assemble_partial(modes, tower.mass, Layout(7, tower.mass), Path("campaign.yaml"))
+    assert any("do not determine" in line and "storey 5" in line for line in found.findings)
+    assert np.diag(modal_assurance(found.shapes, tower.shapes)).min() > 0.9999
 
 
 def test_unknown_masses_leave_measured_shapes_as_they_are() -> None:

@@ -1,0 +1,39 @@
+"""Values of a record between its samples.
+
+A cubic spline through the samples is wrong where a mode has few samples a period: half a sample away it loses 5 % of a
+motion of 0.3 and 24 % of one of 0.4 of the sampling rate. A clock that drifts would then change the amplitude of the
+highest modes. The record is therefore first sampled more finely by a low-pass filter, which is exact up to nearly half
+the sampling rate, and the spline goes through the fine samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import firwin, resample_poly
+
+from mrpipe.artifacts import FloatArray
+
+_FINER = 4
+_REACH = 64
+"""Samples to each side that a value depends on."""
+_SHAPE = 6.0
+"""Shape of the Kaiser window: errors are about 1e-4."""
+
+
+def between_samples(values: FloatArray, sampling_rate_hz: float) -> CubicSpline:
+    """Return a record as a function of time.
+
+    Parameters
+    ----------
+    values
+        Samples, shape (n,); the first is at time zero.
+    sampling_rate_hz
+        [Hz].
+    """
+    taps = firwin(2 * _REACH * _FINER + 1, 1.0 / _FINER, window=("kaiser", _SHAPE))
+    # the ends are continued as an odd reflection, so that neither value nor slope jumps there
+    reach = min(_REACH, values.size - 1)
+    ends = np.pad(values, reach, mode="reflect", reflect_type="odd")
+    fine = resample_poly(ends, _FINER, 1, window=taps)[reach * _FINER : (reach + values.size - 1) * _FINER + 1]
+    return CubicSpline(np.arange(fine.size) / (_FINER * sampling_rate_hz), fine)
