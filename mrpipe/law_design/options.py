@@ -16,6 +16,9 @@ class MotionSettings(Section):
         "directions of a structure with `influence_y`; else the first one acts.",
     )
     unit: str = Field("m/s^2", description="Unit of the acceleration.")
+    file_channels: tuple[str | int, ...] = Field(
+        (), description="Channels of a record that are used, by name or number, as in `simulate.excitation`."
+    )
     scale: float = Field(1.0, gt=0.0, description="Factor on the record.")
 
 

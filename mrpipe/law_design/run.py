@@ -162,7 +162,12 @@ def load_of(
     for number, item in enumerate(settings.motions):
         setting = f"design.motions[{number}]"
         time_s, histories = read_histories(
-            Path(item.file), item.unit, file_setting=f"{setting}.file", unit_setting=f"{setting}.unit"
+            Path(item.file),
+            item.unit,
+            channels=item.file_channels,
+            file_setting=f"{setting}.file",
+            unit_setting=f"{setting}.unit",
+            channels_setting=f"{setting}.file_channels",
         )
         if frame is not None and frame.influence_y is not None and histories.shape[1] == HORIZONTAL:
             both = recorded(time_s, histories, scale=item.scale)
