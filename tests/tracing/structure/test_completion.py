@@ -91,6 +91,7 @@ def test_a_frame_that_loosens_is_recognised_with_two_of_four_floors_without_a_se
     assert found.summary["effects"] == []
     assert any("floors without a sensor (1, 3)" in line for line in found.findings)
     assert any("drifts from test test-1 to test-6" in line for line in found.findings)
+    assert "; the stiffness drifts from test test-1 to test-6 by -4." in found.summary["verdict"]
 
 
 @pytest.mark.planted
