@@ -108,6 +108,12 @@ def _identified(campaign: Campaign, missing: Sequence[int], progress: Progress) 
     from mrpipe.modal.options import IdentificationOptions
     from mrpipe.modal.records import frame_tests
 
+    # one direction of a structure: its channels have no suffix, so that places and inertias of a plate mean nothing
+    declared = dict(campaign.declared)
+    if "frame" in declared:
+        plate = ("sensor_positions_m", "floor_inertias_kg_m2")
+        declared["frame"] = {key: value for key, value in declared["frame"].items() if key not in plate}
+    campaign = replace(campaign, declared=declared)
     result = identify_frame(frame_tests(campaign), IdentificationOptions(), progress)
     frame = result.frame
     if frame is None or not np.all(np.isfinite(frame.stiffness)):

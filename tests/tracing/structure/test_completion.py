@@ -15,9 +15,11 @@ from mrpipe.structures import modal_damping_matrix, shear_frame
 from mrpipe.structures.response import linear_response
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.structure.completion import completed, without_sensor
+from mrpipe.tracing.structure.directions import in_direction
 from mrpipe.tracing.structure.records import COMPUTED
 from mrpipe.tracing.structure.verdict import trace_structure
 from tests.tracing.structure.rig import frame_campaign
+from tests.tracing.structure.test_directions import two_directions
 
 MASSES = [6.0, 5.5, 5.0, 5.0]
 STOREYS = np.array([9000.0, 8000.0, 7000.0, 6000.0])
@@ -101,6 +103,21 @@ def test_a_linear_frame_with_a_floor_without_a_sensor_leaves_noise() -> None:
     campaign = _without(frame_campaign("clean", 1), 2)
     found = trace_structure([campaign], effects, {}, options, rng=np.random.default_rng(1))
     assert found.summary["verdict_class"] == "noise"
+
+
+@pytest.mark.planted
+def test_a_direction_of_a_structure_is_completed_by_itself() -> None:
+    campaign = two_directions(frame_campaign("clean", 1), frame_campaign("clean", 3))
+    dropped = ("floor_acceleration_2_y1", "floor_acceleration_2_y2", "floor_displacement_2")
+    tests = tuple(
+        replace(test, channels={key: x for key, x in test.channels.items() if not key.startswith(dropped)})
+        for test in campaign.recordings
+    )
+    part = in_direction(replace(campaign, recordings=tests), "y")
+    assert part is not None
+    found, lines = completed(part)
+    assert "floors without a sensor (2)" in lines[0]
+    assert "floor_acceleration_2" in found.recordings[0].channels
 
 
 @pytest.mark.planted
