@@ -147,6 +147,9 @@ def test_a_cosmos_channel_without_a_number() -> None:
     assert start_s(header) is not None
     assert start_s(header.replace("39.137", "40.137")) == pytest.approx((start_s(header) or 0.0) + 1.0)
     assert start_s("Start time: 13/45/21, 10:00:00.0") is None
+    same = ("TRIGGER TIME: 05/02/83, 16:42:48.2 PDT", "Rcrd start time:05/02/1983, 23:42:48.200 UTC (Q=2)")
+    assert start_s(same[0]) == pytest.approx(start_s(same[1]))
+    assert start_s("Start time: 05/02/83, 16:42:48.2 XYZ") is None
     place = channel_name("Sta Chan  3: 90 deg (Rcrdr Chan  3) Location: Top of vertical shaft")
     assert not is_vertical(place, "")
 
@@ -187,7 +190,7 @@ def _at2(head: str, rows: str) -> str:
 def test_headers_and_rows_of_peer(tmp_path: Path, head: str, rows: str) -> None:
     values = np.append(RECORD, [0.0, 0.0]) if rows == "padded" else RECORD
     body = _fixed(values, per_row=8 if rows == "8" else 5)
-    (tmp_path / "a.AT2").write_text(_at2(head, body))
+    (tmp_path / "a.AT2").write_bytes((_at2(head, body).replace("\n", "\r\n") + "\x1a").encode())
     (found,) = read_strong_motion(tmp_path / "a.AT2")
     assert found.interval_s == 0.00244
     np.testing.assert_allclose(found.acceleration_m_s2, 9.80665 * RECORD, atol=1e-12)

@@ -43,10 +43,17 @@ _AZIMUTH, _RECORDED_STEP_S, _STEP_MS = 53, 33, 61
 """Places of the azimuth among the integers, and of sampling intervals among the reals of the header, from 0."""
 _RATES_HZ = (50.0, 100.0, 120.0, 125.0, 200.0, 240.0, 250.0, 400.0, 500.0, 1000.0)
 _START = re.compile(
-    r"\b(?:start|trigger)\s+time:\s*(\d+)[/-](\d+)[/-](\d+),?\s+(\d+):\s*(\d+):\s*(\d+(?:\.\d*)?)", re.IGNORECASE
+    r"\b(?:start|trigger)\s+time:\s*(\d+)[/-](\d+)[/-](\d+),?\s+(\d+):\s*(\d+):\s*(\d+(?:\.\d*)?)"
+    r"(?:\s+([A-Z]{3})\b)?",
+    re.IGNORECASE,
 )
+_EPOCH = datetime(1900, 1, 1)
 _YEAR_DIGITS = 3
 """A first number of the date with as many digits is the year."""
+_LAST_CENTURY = 50
+"""From this two-digit year on, the year is one of 19xx."""
+_BEHIND_UTC_H = {"": 0, "utc": 0, "gmt": 0, "pst": 8, "pdt": 7, "mst": 7, "mdt": 6, "hst": 10}
+"""Time zones of the networks -> hours behind UTC."""
 
 
 @dataclass(frozen=True)
@@ -95,11 +102,14 @@ def start_s(header: str) -> float | None:
         return None
     first, second, third, hour, minute = (int(said[place]) for place in range(1, 6))
     year, month, day = (first, second, third) if len(said[1]) > _YEAR_DIGITS else (third, first, second)
+    if year < 100:
+        year += 1900 if year >= _LAST_CENTURY else 2000
+    behind_h = _BEHIND_UTC_H.get((said[7] or "").lower())
     try:
         moment = datetime(year, month, day, hour, minute)
     except ValueError:
         return None
-    return (moment - datetime(1, 1, 1)).total_seconds() + float(said[6])
+    return None if behind_h is None else (moment - _EPOCH).total_seconds() + 3600.0 * behind_h + float(said[6])
 
 
 def interval_s(path: Path, said: str, header: str, count: int) -> float:

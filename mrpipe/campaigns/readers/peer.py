@@ -60,7 +60,8 @@ def peer_record(path: Path, text: str) -> PeerRecord:
     UserError
         If the header has no NPTS and DT, a row holds other things than numbers, or NPTS is wrong.
     """
-    lines = text.splitlines()
+    # programs of DOS end a text with this character
+    lines = text.replace("\x1a", "").splitlines()
     first = next((i for i, line in enumerate(lines) if i >= _HEADER_LINES and row_of_numbers(line)), len(lines))
     header = "\n".join(lines[:first])
     old, points, interval = _OLD_HEADER.search(header), _POINTS.search(header), _INTERVAL.search(header)
