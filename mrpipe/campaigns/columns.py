@@ -41,6 +41,9 @@ class DataFile:
         Other spellings of a name.
     headers
         Header lines of a text file, a word for each column; empty for other formats.
+    accelerations
+        Columns that are known to be accelerations [m/s^2], as those of strong-motion records are: name -> whether
+        horizontal.
     """
 
     path: Path
@@ -53,6 +56,7 @@ class DataFile:
     first_row: int = 0
     aliases: Mapping[str, str] = field(default_factory=dict)
     headers: tuple[tuple[str, ...], ...] = ()
+    accelerations: Mapping[str, bool] = field(default_factory=dict)
 
     def column(self, column: str | int, where: str) -> FloatArray:
         """Return one column, shape (n,).

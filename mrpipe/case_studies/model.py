@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from scipy.linalg import eigh
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.structures import Frame
+from mrpipe.structures.given import structure_from_settings
+from mrpipe.structures.given_storage import read_matrix
+from mrpipe.structures.options import MatrixEntry, StructureSettings
 
 Origin = Literal["published", "surrogate"]
 
@@ -25,8 +30,8 @@ class BenchmarkModel:
         `published` (read from its file) or `surrogate` (assembled by our own code from published facts).
     source
         Where the numbers come from, in a sentence.
-    mass, damping, stiffness
-        Shape (n, n), SI.
+    frame
+        Mass, damping and stiffness, and how the ground moves the structure, as every structure of the program.
     load
         G, shape (n, m): [kg] for ground accelerations, [1] for forces.
     devices
@@ -40,13 +45,26 @@ class BenchmarkModel:
     name: str
     origin: Origin
     source: str
-    mass: FloatArray
-    damping: FloatArray
-    stiffness: FloatArray
+    frame: Frame
     load: FloatArray
     devices: FloatArray
     total_mass_kg: float
     notes: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def mass(self) -> FloatArray:
+        """M, shape (n, n), SI."""
+        return self.frame.mass
+
+    @property
+    def damping(self) -> FloatArray:
+        """C, shape (n, n), SI."""
+        return self.frame.damping
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """K, shape (n, n), SI."""
+        return self.frame.stiffness
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -56,6 +74,38 @@ class BenchmarkModel:
     def with_devices(self, devices: FloatArray) -> BenchmarkModel:
         """Return the same structure with its devices elsewhere, shape (n, k)."""
         return replace(self, devices=np.asarray(devices, dtype=np.float64))
+
+
+def ground_load(frame: Frame) -> FloatArray:
+    """Return G of the accelerations of the ground in the one or two directions of a structure, shape (n, m) [kg]."""
+    directions = [frame.ground_influence] + ([] if frame.influence_y is None else [frame.influence_y])
+    return np.asarray(-frame.mass @ np.column_stack(directions))
+
+
+def published_frame(path: Path, name: str, mass: str, damping: str, stiffness: str) -> Frame:
+    """Return the structure of a published model, read as the section `structure` of the settings reads one.
+
+    Parameters
+    ----------
+    path
+        The file.
+    name
+        Of the structure.
+    mass, damping, stiffness
+        Variables of the file, in t, kN s/m and kN/m.
+
+    Raises
+    ------
+    UserError
+        If the file is not there, holds no such matrices, or they are not those of a structure.
+    """
+    settings = StructureSettings(
+        file=str(path),
+        mass=MatrixEntry(name=mass, unit="t"),
+        damping=MatrixEntry(name=damping, unit="kN*s/m"),
+        stiffness=MatrixEntry(name=stiffness, unit="kN/m"),
+    )
+    return structure_from_settings(settings, read_matrix, name)
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,23 @@ from mrpipe.options import Section
 
 
 class MotionSettings(Section):
-    """A recorded base motion that the design must withstand."""
+    """A recorded base motion, or recorded forces such as wind, that the design must withstand."""
 
     file: str = Field(
         ...,
         description="Text or CSV of time [s] and acceleration, or a record as downloaded. Two components act in both "
-        "directions of a structure with `influence_y`; else the first one acts.",
+        "directions of a structure with `influence_y`; else the first one acts. With `force_at`: text of time [s] and "
+        "forces.",
     )
-    unit: str = Field("m/s^2", description="Unit of the acceleration.")
+    unit: str = Field("m/s^2", description="Unit of the histories in a text file, for forces such as kN.")
+    force_at: dict[str | int, float] = Field(
+        {},
+        description="Degrees of freedom on which forces act in place of ground motion (wind, shaker), each with a "
+        "factor, as in `simulate.excitation`.",
+    )
+    file_channels: tuple[str | int, ...] = Field(
+        (), description="Channels of a record that are used, by name or number, as in `simulate.excitation`."
+    )
     scale: float = Field(1.0, gt=0.0, description="Factor on the record.")
 
 

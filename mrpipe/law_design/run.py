@@ -22,7 +22,7 @@ from mrpipe.law_design.study import COARSE, Loops, design_all, pareto_front, ref
 from mrpipe.law_design.uncertainty import DamperUncertainty, Draw, FrameUncertainty, Ranking, draw, rank
 from mrpipe.simulation.excitation import recorded
 from mrpipe.simulation.ground_record import HORIZONTAL, read_histories
-from mrpipe.simulation.inputs import in_two_directions
+from mrpipe.simulation.inputs import acting_as_forces, in_two_directions
 from mrpipe.simulation.response_curve import ResponseCurve
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.steady_state import CurveOptions, steady_values
@@ -162,9 +162,20 @@ def load_of(
     for number, item in enumerate(settings.motions):
         setting = f"design.motions[{number}]"
         time_s, histories = read_histories(
-            Path(item.file), item.unit, file_setting=f"{setting}.file", unit_setting=f"{setting}.unit"
+            Path(item.file),
+            item.unit,
+            channels=item.file_channels,
+            quantity="force" if item.force_at else "acceleration",
+            file_setting=f"{setting}.file",
+            unit_setting=f"{setting}.unit",
+            channels_setting=f"{setting}.file_channels",
         )
-        if frame is not None and frame.influence_y is not None and histories.shape[1] == HORIZONTAL:
+        if item.force_at:
+            if frame is None:
+                raise UserError(setting, "force_at", "needs a structure", "leave it out")
+            excitation = recorded(time_s, histories if histories.shape[1] > 1 else histories[:, 0], scale=item.scale)
+            excitation = acting_as_forces(excitation, frame, item.force_at, f"{setting}.force_at")
+        elif frame is not None and frame.influence_y is not None and histories.shape[1] == HORIZONTAL:
             both = recorded(time_s, histories, scale=item.scale)
             excitation = in_two_directions(both, frame, f"{setting}.file")
         else:

@@ -213,6 +213,7 @@ def _record(settings: SingleExcitationSettings, where: str) -> tuple[FloatArray,
         quantity=quantity,
         file_setting=f"{where}.file",
         unit_setting=f"{where}.file_unit",
+        channels_setting=f"{where}.file_channels",
     )
     if settings.file_y:
         second = f"{where}.file_y"

@@ -8,14 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.campaigns.readers.cosmos import StrongMotion
-from mrpipe.campaigns.readers.peer import refuse_integrated
-from mrpipe.campaigns.readers.strong_motion import ENDINGS, read_strong_motion
+from mrpipe.campaigns.readers.strong_motion import (
+    ENDINGS,
+    common_window,
+    read_strong_motion,
+    refuse_other_records,
+)
 from mrpipe.errors import UserError
 from mrpipe.units import to_si
 
 HORIZONTAL = 2
-"""Channels of a strong-motion record that are used where none is named: the first ones that are horizontal."""
+"""Most horizontal channels of a record that are used where none is named."""
 
 
 def read_histories(
@@ -26,6 +29,7 @@ def read_histories(
     quantity: str = "acceleration",
     file_setting: str = "simulate.excitation.file",
     unit_setting: str = "simulate.excitation.file_unit",
+    channels_setting: str = "simulate.excitation.file_channels",
 ) -> tuple[FloatArray, FloatArray]:
     """Return time [s], shape (m,), and histories in SI, shape (m, k).
 
@@ -37,12 +41,12 @@ def read_histories(
     unit
         Of the columns of a text file.
     channels
-        Names or numbers (from 1) of the histories; empty: all columns of a text file, and the first two horizontal
-        channels of a record.
+        Names or numbers (from 1) of the histories; empty: all columns of a text file, and the horizontal channels of
+        a record with at most two.
     quantity
         `acceleration` or `force`.
-    file_setting, unit_setting
-        Settings that name file and unit, for messages.
+    file_setting, unit_setting, channels_setting
+        Settings that name file, unit and channels, for messages.
 
     Raises
     ------
@@ -53,36 +57,31 @@ def read_histories(
         raise UserError(file_setting, "", "is empty", "name a text file of time [s] and acceleration, or a record")
     if not path.is_file():
         raise UserError(file_setting, str(path), "there is no such file", "name a text file or a record")
-    refuse_integrated(path)
+    refuse_other_records(path)
     if path.suffix.lower() in ENDINGS:
         if quantity != "acceleration":
             raise UserError(path, "", "holds accelerations", f"give a text file of time [s] and {quantity}")
-        return _from_record(path, channels)
+        return _from_record(path, channels, channels_setting)
     table = _table(path)
     names = [str(number) for number in range(1, table.shape[1])]
     columns = [_place(path, item, names) + 1 for item in channels] or list(range(1, table.shape[1]))
     return table[:, 0], to_si(table[:, columns], unit, where=unit_setting, quantity=quantity)
 
 
-def _from_record(path: Path, channels: Sequence[str | int]) -> tuple[FloatArray, FloatArray]:
+def _from_record(path: Path, channels: Sequence[str | int], channels_setting: str) -> tuple[FloatArray, FloatArray]:
     found = read_strong_motion(path)
     names = [item.name for item in found]
     chosen = [found[_place(path, item, names)] for item in channels]
-    chosen = chosen or [item for item in found if not item.vertical][:HORIZONTAL]
     if not chosen:
-        raise UserError(path, "", "holds no horizontal channel", f"name one of {', '.join(names)} in file_channels")
-    return _joined(path, chosen)
-
-
-def _joined(path: Path, chosen: Sequence[StrongMotion]) -> tuple[FloatArray, FloatArray]:
-    interval = chosen[0].interval_s
-    for item in chosen:
-        if abs(item.interval_s / interval - 1.0) > 1e-6:
-            problem = f"{item.name} has the interval {item.interval_s:g} s, {chosen[0].name} {interval:g} s"
-            raise UserError(path, "file_channels", problem, "name channels with one interval")
-    length = min(item.acceleration_m_s2.size for item in chosen)
-    histories = np.column_stack([item.acceleration_m_s2[:length] for item in chosen])
-    return interval * np.arange(length, dtype=np.float64), histories
+        chosen = [item for item in found if not item.vertical]
+        remedy = f"name one or two of {', '.join(names)} in {channels_setting}"
+        if not chosen:
+            raise UserError(path, "", "holds no horizontal channel", remedy)
+        if len(chosen) > HORIZONTAL:
+            # those of a structure begin anywhere, on the roof too
+            problem = f"holds {len(chosen)} horizontal channels, and which are those of the ground is not said"
+            raise UserError(path, "", problem, remedy)
+    return common_window(path, chosen)
 
 
 def _place(path: Path, channel: str | int, names: Sequence[str]) -> int:

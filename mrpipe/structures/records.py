@@ -17,8 +17,13 @@ from scipy.signal import resample_poly
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.readers.cosmos import ENDINGS as V2_ENDINGS
-from mrpipe.campaigns.readers.peer import peer_record, refuse_integrated
-from mrpipe.campaigns.readers.strong_motion import read_strong_motion
+from mrpipe.campaigns.readers.peer import peer_record
+from mrpipe.campaigns.readers.strong_motion import (
+    SAME_INTERVAL,
+    common_window,
+    read_strong_motion,
+    refuse_other_records,
+)
 from mrpipe.errors import UserError
 from mrpipe.units import to_si
 
@@ -155,7 +160,7 @@ def read_motion(
     path = Path(path)
     if not path.is_file():
         raise UserError(path, "", "no such record", "give the path of a ground-motion file")
-    refuse_integrated(path)
+    refuse_other_records(path)
     if path.suffix.lower() == ".at2":
         raw = _read_at2(path)
     elif path.suffix.lower() == ".mat":
@@ -197,15 +202,16 @@ def _read_at2(path: Path) -> _Raw:
 
 def _read_v2(path: Path) -> _Raw:
     """Return the first two horizontal channels of a CSMIP or COSMOS V2 file, or of a zip of V2 or AT2 files."""
-    channels = [item for item in read_strong_motion(path) if not item.vertical][:2]
-    if not channels:
+    horizontal = [item for item in read_strong_motion(path) if not item.vertical]
+    if not horizontal:
         raise UserError(path, "", "holds no horizontal channel", "give a record with a horizontal channel")
-    if any(abs(item.interval_s / channels[0].interval_s - 1.0) > 1e-6 for item in channels):
+    channels = horizontal[:2]
+    if abs(channels[-1].interval_s / channels[0].interval_s - 1.0) > SAME_INTERVAL:
         channels = channels[:1]
-    length = min(item.acceleration_m_s2.size for item in channels)
-    values = np.stack([item.acceleration_m_s2[:length] for item in channels], axis=1)
+    _, values = common_window(path, channels)
     names = " and ".join(item.name for item in channels)
-    return _Raw(values, channels[0].interval_s, "in m/s^2", (f"channels {names}",))
+    further = f", the first of {len(horizontal)} horizontal ones" if len(horizontal) > len(channels) else ""
+    return _Raw(values, channels[0].interval_s, "in m/s^2", (f"channels {names}{further}",))
 
 
 def _read_mat(path: Path) -> _Raw:

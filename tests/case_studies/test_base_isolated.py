@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.io import loadmat
+from scipy.io import loadmat, savemat
 
 from mrpipe.artifacts import FloatArray, public_data_directory
 from mrpipe.case_studies.base_isolated.design import isolation_outputs
@@ -133,7 +133,13 @@ def test_files_that_are_no_model(tmp_path: Path) -> None:
         published_building(tmp_path / "nothing.mat")
     wrong = tmp_path / "wrong.mat"
     wrong.write_text("no MATLAB file")
-    with pytest.raises(UserError, match="is not the published model"):
+    with pytest.raises(UserError, match="not what its ending says"):
+        published_building(wrong)
+    savemat(wrong, {"STRUC": {"M": np.eye(24), "K": np.eye(24)}})
+    with pytest.raises(UserError, match=r"STRUC\.C: is not in the file"):
+        published_building(wrong)
+    savemat(wrong, {"STRUC": {key: np.eye(6) for key in "MKC"} | {key: np.eye(3) for key in "mH"}})
+    with pytest.raises(UserError, match=r"STRUC\.M: has shape \(6, 6\)"):
         published_building(wrong)
 
 

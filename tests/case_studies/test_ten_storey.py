@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from mrpipe.artifacts import FloatArray, load_parameter_set, public_data_directory
 from mrpipe.case_studies.gains import two_component
 from mrpipe.case_studies.indices import FloorResponse, ten_storey_indices
-from mrpipe.case_studies.model import BenchmarkModel, ModalModel, modal_model
+from mrpipe.case_studies.model import ModalModel, modal_model
 from mrpipe.case_studies.motion import load_motion, spectrum_compatible_motion
 from mrpipe.case_studies.run import BinghamDevice, Controller, simulate
 from mrpipe.case_studies.ten_storey.structure import ten_storey
@@ -82,7 +82,7 @@ def test_dense_and_modal_steps_agree(study: TenStoreyStudy) -> None:
     model = study.model
     # a little coupling by damping sends the run through the dense step
     coupled = model.damping + np.diag(np.linspace(1.0, 50.0, 10))
-    damped = BenchmarkModel(**{**model.__dict__, "damping": coupled})
+    damped = replace(model, frame=replace(model.frame, damping=coupled))
     modal = modal_model(damped)
     assert not modal.classical
     loads = study.motion.acceleration_m_s2[:1000, :1]
@@ -100,7 +100,7 @@ def test_linear_device_is_a_linear_structure(study: TenStoreyStudy) -> None:
     c = 2e6
     model = study.model
     device = model.devices @ model.devices.T
-    inside = modal_model(BenchmarkModel(**{**model.__dict__, "damping": model.damping + c * device}))
+    inside = modal_model(replace(model, frame=replace(model.frame, damping=model.damping + c * device)))
     loads = study.motion.acceleration_m_s2[:2000, :1]
     expected = simulate(inside, loads, 0.005, ratio=10).displacement()
     ours = simulate(study.modal, loads, 0.005, Controller("kelvin", "active", viscous=c), ratio=10).displacement()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import loadmat, savemat
 from scipy.signal import csd, welch
 
 from mrpipe.artifacts import public_data_directory
@@ -67,8 +68,25 @@ def test_files_that_are_no_tower(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no such model"):
         published_tower(tmp_path / "nothing.mat")
     (tmp_path / "wrong.mat").write_bytes(b"no")
-    with pytest.raises(UserError, match="are not in it"):
+    with pytest.raises(UserError, match="not what its ending says"):
         published_tower(tmp_path / "wrong.mat")
+    savemat(tmp_path / "wrong.mat", {"M76": np.eye(5), "K76": np.eye(5)})
+    with pytest.raises(UserError, match="C76: is not in the file"):
+        published_tower(tmp_path / "wrong.mat")
+    savemat(tmp_path / "wrong.mat", {key: np.eye(5) for key in ("M76", "C76", "K76")})
+    with pytest.raises(UserError, match="holds a structure of 5 degrees of freedom"):
+        published_tower(tmp_path / "wrong.mat")
+
+
+@pytest.mark.real
+def test_the_common_route_gives_the_published_matrices() -> None:
+    folder = public_data_directory()
+    if folder is None:
+        pytest.skip("the public data are not there (MRPIPE_DATA)")
+    path = folder / "tall76" / "76dof_MKC_matrix.mat"
+    model, content = published_tower(path).model, loadmat(path)
+    for name, matrix in (("M76", model.mass), ("C76", model.damping), ("K76", model.stiffness)):
+        np.testing.assert_allclose(matrix, 500.0 * (content[name] + content[name].T), rtol=1e-14)
 
 
 @pytest.mark.literature

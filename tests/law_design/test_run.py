@@ -172,3 +172,19 @@ def test_a_motion_of_two_components_acts_in_both_directions(tmp_path: Path, plan
     one = load_of(settings, 0.79, (7.0, 9.0), plant.frame).motions[0].excitation
     assert not one.places
     np.testing.assert_array_equal(one.at(np.array([0.1])), [3.0])
+
+
+@pytest.mark.property
+def test_wind_acts_on_degrees_of_freedom(tmp_path: Path, plant: Plant, rig: Rig) -> None:
+    record = tmp_path / "wind.csv"
+    time = np.arange(0.0, 4.0, 0.01)
+    np.savetxt(record, np.column_stack([time, 0.02 * np.sin(7.0 * time)]), delimiter=",")
+    wind = MotionSettings(file=str(record), unit="kN", force_at={"floor 5": 1.0, 4: 0.5}, scale=2.0)
+    excitation = load_of(DesignSettings(motions=(wind,)), 0.79, (7.0, 9.0), plant.frame).motions[0].excitation
+    np.testing.assert_allclose(excitation.at(time).ravel(), 40.0 * np.sin(7.0 * time), atol=1e-9)
+    (place,) = excitation.places
+    np.testing.assert_array_equal(place.shape, [0.0, 0.0, 0.0, 0.5, 1.0])
+    response = rig.run(rig.controller("vd"), excitation)
+    assert np.ptp(response.displacement[:, -1]) > 0.0
+    with pytest.raises(UserError, match=r"design\.motions\[0\]\.force_at: floor 9: is not a degree of freedom"):
+        load_of(DesignSettings(motions=(wind.changed(force_at={"floor 9": 1.0}),)), 0.79, (7.0, 9.0), plant.frame)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -74,9 +75,19 @@ def columns_of(file: DataFile) -> list[Column]:
             except UserError:
                 continue
             if np.isfinite(values).sum() > 20:
-                found.append(Column(column, read_header(column.split("[:,")[0], unit_rows.get(name, "")), values))
+                known = name in file.accelerations
+                header = _of_a_record(name) if known else read_header(column.split("[:,")[0], unit_rows.get(name, ""))
+                found.append(Column(column, header, values))
     longest = max((item.values.size for item in found), default=0)
     return [item for item in found if item.values.size == longest]
+
+
+def _of_a_record(name: str) -> Header:
+    """Return what the name of a channel of a strong-motion record says (`7: 90 Deg, Roof: East`); SI is known."""
+    _, _, place = name.partition(":")
+    _, _, location = place.partition(",")
+    said = read_header(location)
+    return Header("acceleration", "m/s^2", "acceleration", said.floor)
 
 
 def _width(file: DataFile, name: str) -> int:
@@ -132,7 +143,7 @@ def lay_out_bench(columns: list[Column], file: DataFile) -> Layout:
 def lay_out_frame(columns: list[Column], file: DataFile) -> Layout:
     """Propose the channels of a frame test; floors are numbered by the numbers in the headers, or in order."""
     channels: dict[str, Guess] = {}
-    taken: set[str] = set()
+    taken = _across(file)
     time = _by_header(columns, "time", taken) or (None if file.time_s is not None else _clock(columns))
     if time is not None:
         channels["time"] = _time_guess(time)
@@ -155,7 +166,21 @@ def lay_out_frame(columns: list[Column], file: DataFile) -> Layout:
     if drive is not None and drive.header.unit:
         channels["drive"] = Guess(drive.name, drive.header.unit, set_point=drive.header.command)
         taken.add(drive.name)
-    return Layout(channels, tuple(item.name for item in columns if item.name not in taken))
+    used = {guess.column for guess in channels.values()}
+    return Layout(channels, tuple(item.name for item in columns if item.name not in used))
+
+
+def _across(file: DataFile) -> set[str]:
+    """Return the channels of a record that are vertical, or across the direction that most of its channels have."""
+    directions = {
+        name: name.partition(":")[2].partition(",")[0].strip().casefold() if horizontal else ""
+        for name, horizontal in file.accelerations.items()
+    }
+    counts = Counter(direction for direction in directions.values() if direction)
+    most = counts.most_common(1)[0][0] if counts else ""
+    return {
+        name for name, horizontal in file.accelerations.items() if not horizontal or directions[name] not in ("", most)
+    }
 
 
 def floor_columns(columns: list[Column]) -> int:

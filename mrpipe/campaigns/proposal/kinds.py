@@ -63,6 +63,13 @@ def kind_of(path: Path, channels: dict[str, FloatArray], rate: float) -> tuple[s
     return "random", "guessed"
 
 
+def kind_of_record(channels: dict[str, FloatArray]) -> tuple[str, str]:
+    """Return the kind of a strong-motion record: without a channel of the ground only the response is known."""
+    if "ground_acceleration" in channels:
+        return "random", ""
+    return "ambient", "because no channel is known to be the ground's; random if one is"
+
+
 def law_of(path: Path) -> str:
     """Return the control law that a file name states, empty where it states none."""
     words = split_words(path.stem)

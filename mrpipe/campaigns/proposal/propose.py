@@ -23,7 +23,7 @@ from mrpipe.campaigns.proposal.columns import (
     lay_out_frame,
     open_columns,
 )
-from mrpipe.campaigns.proposal.kinds import GAINS, kind_of, law_of, mode_of
+from mrpipe.campaigns.proposal.kinds import GAINS, kind_of, kind_of_record, law_of, mode_of
 from mrpipe.campaigns.proposal.roles import (
     Condition,
     condition_of,
@@ -114,9 +114,11 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
             skipped.append(f"{path.relative_to(folder)}: {error.problem}")
             continue
         if len(columns) < 2:
-            skipped.append(f"{path.relative_to(folder)}: fewer than two columns of numbers")
+            single = "one channel; put the channels of a record into one zip file"
+            reason = single if file.accelerations else "fewer than two columns of numbers"
+            skipped.append(f"{path.relative_to(folder)}: {reason}")
             continue
-        as_frame = rig == "frame" or (rig != "bench" and floor_columns(columns) >= 2)
+        as_frame = rig == "frame" or (rig != "bench" and (bool(file.accelerations) or floor_columns(columns) >= 2))
         layout = lay_out_frame(columns, file) if as_frame else lay_out_bench(columns, file)
         files.append(_File(path, file, columns, layout))
     if not files:
@@ -275,7 +277,12 @@ def _condition(item: _File, own: dict[str, Guess]) -> Condition:
 
 def _frame_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> tuple[list[TestText], str, list[str]]:
     tests, notes = [], []
-    kinds = [kind_of(item.path, _samples_of(item), item.rate) for item in files]
+    kinds = [
+        kind_of_record(_samples_of(item))
+        if item.file.accelerations
+        else kind_of(item.path, _samples_of(item), item.rate)
+        for item in files
+    ]
     roles = propose_frame_roles([item.path for item in files], [kind for kind, _ in kinds])
     for item, (kind, doubt), role in zip(files, kinds, roles, strict=True):
         name = _test_name(item.path, folder)

@@ -41,7 +41,7 @@ WORDS: dict[str, tuple[str, ...]] = {
 
 GROUND = {
     *("ground", "base", "table", "shaker", "shaking", "tisch", "boden", "fundament", "sol", "suelo", "mesa", "input"),
-    *("terreno", "basis", "rutteltisch", "excitation", "g"),
+    *("terreno", "basis", "rutteltisch", "excitation", "g", "grnd", "basement", "bsmt", "footing", "foundation"),
 }
 FLOOR = {
     "floor",

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.readers.channel_header import channel_name, interval_s, is_vertical, start_s
+from mrpipe.campaigns.readers.fortran import row_of_numbers
 from mrpipe.errors import UserError
 from mrpipe.units import conversion
 
@@ -19,35 +20,17 @@ _DATA = re.compile(
     r"(accel|veloc|displ)\w*\.?\s+(?:data|pts|points)\b(.*)$",
     re.IGNORECASE,
 )
-_STEP = re.compile(r"spaced\s+at\s+([\d.]+)\s*sec", re.IGNORECASE)
-_POINTS_RATE = re.compile(r"\bat\s+([\d.]+)\s*(?:pts|points|samples)\s*/\s*sec", re.IGNORECASE)
-_SECONDS = re.compile(r"approx\.?\s+([\d.]+)\s*sec", re.IGNORECASE)
-_RATE = re.compile(r"([\d.]+)\s*samples/sec", re.IGNORECASE)
-_REAL_VALUES = re.compile(r"^\s*(\d+)\s+real-header\s+values\b[^\n]*$", re.IGNORECASE | re.MULTILINE)
-_INTEGER_VALUES = re.compile(r"^\s*(\d+)\s+integer-header\s+values\b[^\n]*$", re.IGNORECASE | re.MULTILINE)
 _FORMAT = re.compile(r"\(\s*(?:\d+p,?\s*)?\d*\s*[fegdi]\s*(\d+)(?:\.\d+)?\s*(?:e\d*)?\s*\)", re.IGNORECASE)
 """Fortran format of the samples; some programs write the E of the exponent behind the width."""
 _UNIT = re.compile(
-    r"(?:units?\s*=\s*|\bin\s+(?:units?\s+of\s+)?)([a-z]+(?:\s*[/^*]\s*[a-z0-9]+|\.[a-z0-9]+)*)", re.IGNORECASE
+    r"(?:units?\s*[=:]\s*|\bin\s+(?:units?\s+of\s+)?)([a-z]+(?:\s*[/^*]\s*[a-z0-9]+|\.[a-z0-9]+)*)", re.IGNORECASE
 )
 _TENTH_OF_G = "g/10"
-_CHANNEL = re.compile(
-    r"\bchan(?:nel)?\.?\s*#?\s*(\d+)\b(?:\s*[:,]\s*([^\n]*?))?(?:\s{3,}|$)", re.IGNORECASE | re.MULTILINE
-)
-_STATION_CHANNEL = re.compile(
-    r"^\s*sta\s+chan?\b\s*:?\s*(\w+)\s*:?\s*([^\n(]*?)\s*\((?:rcrdr|recorder)[^)\n]*\)"
-    r"(?:[^\S\n]*location:[^\S\n]*([^\n]*?))?\s*$",
-    re.IGNORECASE | re.MULTILINE,
-)
-"""Line 9 of COSMOS: channel, azimuth and location."""
-_VERTICAL = re.compile(r"\b(up|vert\w*|dn|down|ud|[a-z]nz)\b", re.IGNORECASE)
-_UP, _DOWN, _ANY_VERTICAL = 400, 401, 402
-"""Azimuths that COSMOS gives to vertical channels."""
-_AZIMUTH, _RECORDED_STEP_S, _STEP_MS = 53, 33, 61
-"""Places of the azimuth among the integers, and of sampling intervals among the reals of the header, from 0."""
 _WIDTH = 10
-_RATES_HZ = (50.0, 100.0, 120.0, 125.0, 200.0, 240.0, 250.0, 400.0, 500.0, 1000.0)
-ENDINGS = (".v2", ".v2c", ".v1", ".v1c")
+ENDINGS = (".v2", ".v2c", ".v1", ".v1c", ".raw")
+UNCORRECTED = (".v1", ".v1c", ".raw")
+"""Endings of records as the instrument gave them."""
+_PAIRS = re.compile(r"units\s+of\s+uncor\w*\s+\w+\s+are\s+sec\s+and", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -64,12 +47,15 @@ class StrongMotion:
         Sampling interval [s].
     vertical
         Whether the header calls the channel vertical.
+    start_s
+        Start of the record [s] from a fixed day on; None where the header states none.
     """
 
     name: str
     acceleration_m_s2: FloatArray
     interval_s: float
     vertical: bool
+    start_s: float | None = None
 
 
 def cosmos_channels(path: Path, text: str) -> Iterator[StrongMotion]:
@@ -100,22 +86,19 @@ def cosmos_channels(path: Path, text: str) -> Iterator[StrongMotion]:
         count = int(said[1])
         factor = _factor(path, index + 1, said[3])
         values, begin = _numbers(path, lines, index, count, said[3])
-        number, place = _name(header)
+        name = channel_name(header)
         yield StrongMotion(
-            name=f"{number}: {place}" if place else number,
+            name=name.text,
             acceleration_m_s2=values * factor,
-            interval_s=_interval(path, said[3], header, count),
-            vertical=bool(_VERTICAL.search(f"{number} {place}")) or _is_vertical(header),
+            interval_s=interval_s(path, said[3], header, count),
+            vertical=is_vertical(name, header),
+            start_s=start_s(header),
         )
 
 
-def _name(header: str) -> tuple[str, str]:
-    """Return number (or code) of the channel and its direction and location, as the header gives them."""
-    station = list(_STATION_CHANNEL.finditer(header))
-    if station:
-        return station[-1][1], ", ".join(part for part in (station[-1][2], station[-1][3]) if part)
-    named = list(_CHANNEL.finditer(header))
-    return (named[-1][1], (named[-1][2] or "").strip()) if named else ("1", "")
+def holds_uneven_pairs(text: str) -> bool:
+    """Return whether a file is a digitised film record: pairs of a time and an acceleration, unevenly spaced."""
+    return bool(_PAIRS.search(text))
 
 
 def _factor(path: Path, line: int, said: str) -> float:
@@ -138,80 +121,19 @@ def _factor(path: Path, line: int, said: str) -> float:
 def _numbers(path: Path, lines: list[str], index: int, count: int, said: str) -> tuple[FloatArray, int]:
     """Return the numbers of a block, and the line after it: in columns of fixed width, else between blanks."""
     form = _FORMAT.search(said)
-    width = int(form[1]) if form else _WIDTH
     values: list[float] = []
-    row = index + 1
+    row, end = index + 1, ""
     while len(values) < count and row < len(lines):
-        line = lines[row].rstrip()
-        numbers = _floats(line[start : start + width] for start in range(0, len(line), width))
-        numbers = _floats(line.split()) if numbers is None else numbers
+        numbers = row_of_numbers(lines[row], int(form[1]) if form else None)
+        numbers = row_of_numbers(lines[row], _WIDTH) if numbers is None else numbers
         if numbers is None:
+            end = f"; line {row + 1} is not a row of numbers ({lines[row].strip()[:30]!r})"
             break
         values += numbers
         row += 1
     if len(values) != count:
-        problem = f"promises {count} values, {len(values)} follow"
+        problem = f"promises {count} values, {len(values)} follow{end}"
         raise UserError(path, f"line {index + 1}", problem, "download the record again")
+    if not np.all(np.isfinite(values)):
+        raise UserError(path, f"line {index + 1}", "a sample after it is not finite", "download the record again")
     return np.asarray(values), row
-
-
-def _floats(pieces: Iterable[str]) -> list[float] | None:
-    try:
-        return [float(piece) for piece in pieces if piece.strip()]
-    except ValueError:
-        return None
-
-
-def _interval(path: Path, said: str, header: str, count: int) -> float:
-    """Return the sampling interval [s].
-
-    CSMIP states it in the line before the samples. COSMOS states only a rounded duration there; the first interval of
-    the header that agrees with it counts, and without one the usual rate that agrees.
-    """
-    step = _STEP.search(said)
-    if step:
-        return float(step[1])
-    rate = _POINTS_RATE.search(said)
-    if rate and float(rate[1]) > 0.0:
-        return 1.0 / float(rate[1])
-    length = _SECONDS.search(said)
-    if not length:
-        raise UserError(path, "header", "states no sampling interval", "give a V2 file with `spaced at` or `approx`")
-    seconds = float(length[1])
-    reals = _header_values(_REAL_VALUES, header)
-    stated = [reals[_STEP_MS] * 1e-3] if len(reals) > _STEP_MS else []
-    stated += [reals[_RECORDED_STEP_S], reals[_RECORDED_STEP_S] * 1e-3] if len(reals) > _RECORDED_STEP_S else []
-    stated += [1.0 / float(rate) for rate in reversed(_RATE.findall(header)) if float(rate) > 0.0]
-    # the duration is rounded or cut to whole seconds
-    agrees = partial(_agrees, count=count, seconds=seconds)
-    for candidates in (
-        stated,
-        sorted((1.0 / rate for rate in _RATES_HZ), key=lambda item: abs(item * count - seconds)),
-    ):
-        if suitable := list(filter(agrees, candidates)):
-            return suitable[0]
-    return seconds / count
-
-
-def _agrees(interval_s: float, count: int, seconds: float) -> bool:
-    return interval_s > 0.0 and abs(interval_s * count - seconds) <= max(1.0, 0.01 * seconds)
-
-
-def _header_values(heading: re.Pattern[str], header: str) -> list[float]:
-    """Return the numbers that follow a heading of COSMOS, such as `100 Real-header values follow on 20 lines`."""
-    found = list(heading.finditer(header))
-    if not found:
-        return []
-    count = int(found[-1][1])
-    values: list[float] = []
-    for line in header[found[-1].end() :].splitlines()[1:]:
-        numbers = _floats(line.split())
-        if numbers is None or len(values) >= count:
-            break
-        values += numbers
-    return values[:count]
-
-
-def _is_vertical(header: str) -> bool:
-    integers = _header_values(_INTEGER_VALUES, header)
-    return len(integers) > _AZIMUTH and integers[_AZIMUTH] in (_UP, _DOWN, _ANY_VERTICAL)

@@ -9,17 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.readers.fortran import row_of_numbers
 from mrpipe.errors import UserError
 
 ENDINGS = (".at2",)
-INTEGRATED = {".vt2": "velocity", ".dt2": "displacement"}
-"""Endings of the records that PEER integrates from the acceleration, and what they hold."""
 
 _POINTS = re.compile(r"NPTS\s*[=:]\s*(\d+)", re.IGNORECASE)
 _INTERVAL = re.compile(r"\bDT\s*[=:]\s*([0-9.]+(?:E[-+]?\d+)?)", re.IGNORECASE)
 _OLD_HEADER = re.compile(r"^\s*(\d+)\s+([0-9.]+(?:E[-+]?\d+)?)\s+NPTS\s*,\s*DT", re.IGNORECASE | re.MULTILINE)
 _UNIT = re.compile(r"units?\s+of\s+([a-z]+(?:/[a-z0-9^*]+)*)", re.IGNORECASE)
-_VERTICAL = re.compile(r"(?:[-_](?:up|down|dwn|ver|vert|v)|up|dwn|[a-z]nz|ver)$", re.IGNORECASE)
+_VERTICAL = re.compile(r"(?:[-_.](?:up|ud|down|dwn|dn|ver|vert|v|z)|up|dwn|[a-z][hln]z|ver)$", re.IGNORECASE)
 _HEADER_LINES = 2
 """The first lines are names, which may begin with a number."""
 
@@ -61,24 +60,35 @@ def peer_record(path: Path, text: str) -> PeerRecord:
     UserError
         If the header has no NPTS and DT, a row holds other things than numbers, or NPTS is wrong.
     """
-    lines = text.splitlines()
-    first = next((i for i, line in enumerate(lines) if i >= _HEADER_LINES and _row(line)), len(lines))
+    # programs of DOS end a text with this character
+    lines = text.replace("\x1a", "").splitlines()
+    first = next((i for i, line in enumerate(lines) if i >= _HEADER_LINES and row_of_numbers(line)), len(lines))
     header = "\n".join(lines[:first])
     old, points, interval = _OLD_HEADER.search(header), _POINTS.search(header), _INTERVAL.search(header)
     count = int(points[1]) if points else int(old[1]) if old else None
     step = float(interval[1]) if interval else float(old[2]) if old else None
     if count is None or step is None:
         raise UserError(path, "header", "has no NPTS and DT", "an AT2 file says NPTS= 1234, DT= .0050 SEC in line 4")
+    if step <= 0.0:
+        raise UserError(path, "DT", f"is {step:g} s", "correct the sampling interval in the header")
     samples: list[float] = []
+    longest = 0
     for number, line in enumerate(lines[first:], start=first + 1):
-        row = _row(line)
+        row = row_of_numbers(line)
         if row is None:
-            raise UserError(path, f"line {number}", "is not a row of numbers", "leave text to the four header lines")
+            problem = f"is not a row of numbers ({line.strip()[:30]!r})"
+            raise UserError(path, f"line {number}", problem, "leave text to the header lines, or download it again")
         samples.extend(row)
+        longest = max(longest, len(row))
+    # some programs fill the last row with zeros
+    if count < len(samples) < count + longest and not any(samples[count:]):
+        samples = samples[:count]
     if len(samples) != count:
         raise UserError(
             path, "NPTS", f"promises {count} points, the file holds {len(samples)}", "correct the header or the file"
         )
+    if not np.all(np.isfinite(samples)):
+        raise UserError(path, "", "holds a sample that is not finite", "download the record again")
     unit = _UNIT.search(header)
     return PeerRecord(np.array(samples), step, header, unit[1].lower() if unit else "g")
 
@@ -86,23 +96,3 @@ def peer_record(path: Path, text: str) -> PeerRecord:
 def is_vertical(name: str) -> bool:
     """Return whether the name of a file without its ending says that the component is vertical, as `I-ELC-UP` does."""
     return bool(_VERTICAL.search(name))
-
-
-def refuse_integrated(path: Path) -> None:
-    """Refuse a record of velocity or displacement.
-
-    Raises
-    ------
-    UserError
-        If the ending is that of such a record.
-    """
-    ending = path.suffix.lower()
-    if ending in INTEGRATED:
-        raise UserError(path, "", f"is a record of {INTEGRATED[ending]}", "give the .AT2 file of the same component")
-
-
-def _row(line: str) -> list[float] | None:
-    try:
-        return [float(field) for field in line.replace(",", " ").split()]
-    except ValueError:
-        return None

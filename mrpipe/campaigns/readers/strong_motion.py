@@ -4,22 +4,35 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.readers import peer
 from mrpipe.campaigns.readers.cosmos import ENDINGS as COSMOS_ENDINGS
-from mrpipe.campaigns.readers.cosmos import StrongMotion, cosmos_channels
+from mrpipe.campaigns.readers.cosmos import UNCORRECTED, StrongMotion, cosmos_channels, holds_uneven_pairs
 from mrpipe.campaigns.readers.reader import Reader, require_size
 from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
 from mrpipe.units import conversion
 
+NOT_READ = {
+    ".vt2": ("a record of velocity", "give the .AT2 file of the same component"),
+    ".dt2": ("a record of displacement", "give the .AT2 file of the same component"),
+    ".v3": ("a file of response spectra", "give the .V2 file of the same record"),
+    ".v3c": ("a file of response spectra", "give the .V2c file of the same record"),
+    ".smc": ("a record in SMC form, which is not read", "download it in COSMOS form (.V2c), or as text with a clock"),
+    ".v1a": ("a record in GeoNet form, which is not read", "write time and acceleration as columns of a text file"),
+    ".v2a": ("a record in GeoNet form, which is not read", "write time and acceleration as columns of a text file"),
+}
+"""Endings of files of data centres that hold no acceleration in a known form -> what they are, and a remedy."""
+SAME_INTERVAL = 1e-6
+"""Relative difference up to which two sampling intervals are the same."""
 DEEPEST_ARCHIVE = 3
 """Archives within archives that are opened; a download of several stations has two."""
 ENDINGS = (*COSMOS_ENDINGS, *peer.ENDINGS, ".zip")
@@ -36,16 +49,42 @@ def read_strong_motion(path: Path) -> list[StrongMotion]:
         If no acceleration is found, or a file is not what its ending says.
     """
     found: list[StrongMotion] = []
+    files: list[str] = []
+    uneven = False
     for name, read in _files(path):
-        found += list(cosmos_channels(path, read())) if _is_cosmos(name) else [_peer_channel(path, name, read())]
+        text = read()
+        found += list(cosmos_channels(_within(path, name), text)) if _is_cosmos(name) else [_peer(path, name, text)]
+        files += [name.stem] * (len(found) - len(files))
+        uneven = uneven or holds_uneven_pairs(text)
+    if not found and uneven:
+        problem = "is a digitised film record: its samples are pairs of time and acceleration at uneven times"
+        raise UserError(path, "", problem, "download the corrected record (volume 2, .V2)")
     if not found:
         raise UserError(
             path, "", "holds no acceleration in V2 or AT2 form", "give a .V2 or .AT2 file, or a zip that contains some"
         )
-    names = [item.name for item in found]
+    names = _made_different([item.name for item in found], [f" ({file})" for file in files])
+    names = _made_different(names, [f" #{index + 1}" for index in range(len(names))])
+    return [replace(item, name=name) for item, name in zip(found, names, strict=True)]
+
+
+def refuse_other_records(path: Path) -> None:
+    """Refuse a record of another quantity, or in a form that is not read.
+
+    Raises
+    ------
+    UserError
+        If the ending is that of such a record.
+    """
+    said = NOT_READ.get(path.suffix.lower())
+    if said:
+        raise UserError(path, "", f"is {said[0]}", said[1])
+
+
+def _made_different(names: list[str], additions: list[str]) -> list[str]:
+    """Return names with an addition where a name occurs several times."""
     return [
-        item if names.count(item.name) == 1 else replace(item, name=f"{item.name} #{index + 1}")
-        for index, item in enumerate(found)
+        name if names.count(name) == 1 else f"{name}{addition}" for name, addition in zip(names, additions, strict=True)
     ]
 
 
@@ -53,9 +92,14 @@ def _is_cosmos(name: Path) -> bool:
     return name.suffix.lower() in COSMOS_ENDINGS
 
 
-def _peer_channel(path: Path, name: Path, text: str) -> StrongMotion:
-    record = peer.peer_record(path if path.suffix.lower() != ".zip" else path / name, text)
-    factor = conversion(record.unit, where=f"{name}: header", quantity="acceleration")
+def _within(path: Path, name: Path) -> Path:
+    """Return the path of a record for messages, also within an archive."""
+    return path / name if path.suffix.lower() == ".zip" else path
+
+
+def _peer(path: Path, name: Path, text: str) -> StrongMotion:
+    record = peer.peer_record(_within(path, name), text)
+    factor = conversion(record.unit, where=f"{_within(path, name)}: header", quantity="acceleration")
     return StrongMotion(name.stem, record.samples * factor, record.interval_s, peer.is_vertical(name.stem))
 
 
@@ -67,7 +111,7 @@ def _files(path: Path) -> list[tuple[Path, Callable[[], str]]]:
         members = _members(path, path.read_bytes())
     except zipfile.BadZipFile as error:
         raise UserError(path, "", f"is not a zip file that can be read ({error})", "download it again") from error
-    corrected = [item for item in members if not item[0].suffix.lower().startswith(".v1")]
+    corrected = [item for item in members if item[0].suffix.lower() not in UNCORRECTED]
     return [(name, partial(content.decode, "latin-1")) for name, content in sorted(corrected or members)]
 
 
@@ -88,22 +132,48 @@ def _members(path: Path, content: bytes, depth: int = 0) -> list[tuple[Path, byt
     return found
 
 
-def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
-    """Return the channels as columns in m/s^2; all must have the clock of the first."""
-    channels = read_strong_motion(path)
+def common_window(path: Path, channels: Sequence[StrongMotion]) -> tuple[FloatArray, FloatArray]:
+    """Return the time [s] from the common start on, shape (m,), and the accelerations [m/s^2], shape (m, k).
+
+    Recorders of a structure start and stop at their own times. Channels whose headers state different starts are
+    shifted by whole samples, and all are cut to the time that they share.
+
+    Raises
+    ------
+    UserError
+        If the channels differ in sampling interval, or share no time.
+    """
     interval = channels[0].interval_s
-    if any(abs(item.interval_s / interval - 1.0) > 1e-6 for item in channels):
-        raise UserError(path, "", "its channels differ in sampling interval", "give the channels in separate files")
-    columns = {item.name: item.acceleration_m_s2 for item in channels}
-    aliases = {name.partition(":")[0]: name for name in columns}
-    length = channels[0].acceleration_m_s2.size
+    for item in channels:
+        if abs(item.interval_s / interval - 1.0) > SAME_INTERVAL:
+            problem = f"{item.name} has the interval {item.interval_s:g} s, {channels[0].name} {interval:g} s"
+            raise UserError(path, "", problem, "give or name channels with one interval")
+    starts = [item.start_s for item in channels if item.start_s is not None]
+    skipped = [0] * len(channels)
+    if len(starts) == len(channels):
+        skipped = [round((max(starts) - start) / interval) for start in starts]
+    length = min(item.acceleration_m_s2.size - skip for item, skip in zip(channels, skipped, strict=True))
+    if length <= 1:
+        problem = f"its channels share no time: they start up to {max(starts) - min(starts):g} s apart"
+        raise UserError(path, "", problem, "give one file for each station")
+    parts = [item.acceleration_m_s2[skip : skip + length] for item, skip in zip(channels, skipped, strict=True)]
+    return interval * np.arange(length, dtype=np.float64), np.column_stack(parts)
+
+
+def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
+    """Return the channels as columns in m/s^2, on the time that they share."""
+    channels = read_strong_motion(path)
+    time_s, histories = common_window(path, channels)
+    columns = {item.name: histories[:, place] for place, item in enumerate(channels)}
+    numbers = [name.partition(":")[0] for name in columns]
     return DataFile(
         path=path,
         names=tuple(columns),
         fetch=columns.__getitem__,
-        time_s=np.asarray(interval * np.arange(length), dtype=np.float64),
-        sampling_rate_hz=1.0 / interval,
-        aliases=aliases,
+        time_s=time_s,
+        sampling_rate_hz=1.0 / channels[0].interval_s,
+        accelerations={item.name: not item.vertical for item in channels},
+        aliases={number: name for number, name in zip(numbers, columns, strict=True) if numbers.count(number) == 1},
     )
 
 

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 from scipy.linalg import block_diag, eigh
 
 from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set
-from mrpipe.case_studies.model import BenchmarkModel, Origin
+from mrpipe.case_studies.model import BenchmarkModel, Origin, ground_load, published_frame
 from mrpipe.case_studies.public_files import named_file
 from mrpipe.errors import UserError
+from mrpipe.structures import Frame
+from mrpipe.structures.given_storage import read_matrix
 
 FLOORS = 8
 BEARINGS = 92
@@ -139,16 +140,23 @@ def isolated_building(
     moved = base_mass + spread.T @ mass @ spread
     M = np.block([[mass, mass @ spread], [spread.T @ mass, moved]])
     planar = np.eye(3)[:, :2]
+    along, across = (np.append(np.zeros(mass.shape[0]), planar[:, axis]) for axis in (0, 1))
+    frame = Frame(
+        M,
+        block_diag(damping, isolation[1]),
+        block_diag(stiffness, isolation[0]),
+        "base-isolated",
+        influence=along,
+        influence_y=across,
+    )
     devices = np.zeros((M.shape[0], 2))
     devices[-3:, :] = planar
     model = BenchmarkModel(
         name="base-isolated",
         origin=origin,
         source=source,
-        mass=M,
-        damping=block_diag(damping, isolation[1]),
-        stiffness=block_diag(stiffness, isolation[0]),
-        load=-np.vstack([mass @ spread @ planar, moved @ planar]),
+        frame=frame,
+        load=ground_load(frame),
         devices=devices,
         total_mass_kg=float(moved[0, 0]),
     )
@@ -174,21 +182,17 @@ def published_building(
     """
     if not path.is_file():
         raise UserError(path, "", "no such model", "give the STRUC.mat of the benchmark")
-    try:
-        struc = loadmat(path)["STRUC"][0, 0]
-        M, K, C, m, H = (np.asarray(struc[key], dtype=np.float64) for key in ("M", "K", "C", "m", "H"))
-    except Exception as error:  # scipy raises half a dozen kinds for a bad file
-        raise UserError(path, "STRUC", "is not the published model", "a structure with M, K, C, m, H, R, dh") from error
-    for name, matrix, size in (("M", M, 24), ("K", K, 24), ("C", C, 24), ("m", m, 3), ("H", H, 3)):
+    above = published_frame(path, "superstructure", "STRUC.M", "STRUC.C", "STRUC.K")
+    m, H = (np.asarray(read_matrix(path, f"STRUC.{key}"), dtype=np.float64) for key in ("m", "H"))
+    for name, matrix, size in (("M", above.mass, 3 * FLOORS), ("m", m, 3), ("H", H, 3)):
         if matrix.shape != (size, size) or not np.all(np.isfinite(matrix)):
             raise UserError(path, f"STRUC.{name}", f"has shape {matrix.shape}", f"finite and ({size}, {size}) expected")
     bearings = _bearings_beside(path, H)
     isolation = (bearing_stiffness * H, bearing_viscosity * H)
-    symmetric = 0.5 * (K + K.T), 0.5 * (C + C.T)
     return isolated_building(
-        1e3 * M,
-        1e3 * symmetric[1],
-        1e3 * symmetric[0],
+        above.mass,
+        0.5 * (above.damping + above.damping.T),
+        above.stiffness,
         1e3 * m,
         isolation,
         bearings,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import ParameterSet, load_parameter_set
-from mrpipe.case_studies.model import BenchmarkModel
+from mrpipe.case_studies.model import BenchmarkModel, ground_load
 from mrpipe.errors import UserError
 from mrpipe.structures.dynamics import floor_position
-from mrpipe.structures.shear_frames import shear_stiffness
+from mrpipe.structures.shear_frames import shear_frame
 
 
 def lowest_factor(floors: int) -> float:
@@ -35,16 +35,14 @@ def ten_storey(parameters: ParameterSet | str = "ten-storey") -> BenchmarkModel:
         stiffness = mass * (values.scalar("lowest_angular_frequency") / lowest_factor(floors)) ** 2
     except KeyError as error:
         raise UserError(values.name, f"parameters.{error.args[0]}", "is missing", "give value and unit") from error
-    M = mass * np.eye(floors)
+    frame = shear_frame([mass] * floors, [stiffness] * floors, [0.0] * floors, name="ten-storey", source=values.name)
     return BenchmarkModel(
         name="ten-storey",
         origin="published",
         source=values.source,
-        mass=M,
-        damping=np.zeros((floors, floors)),
-        stiffness=shear_stiffness(np.full(floors, stiffness)),
-        load=-M @ np.ones((floors, 1)),
+        frame=frame,
+        load=ground_load(frame),
         devices=floor_position(floors, 1)[:, None],
-        total_mass_kg=float(M.sum()),
+        total_mass_kg=float(frame.mass.sum()),
         notes={"storey_stiffness_n_m": stiffness, "floor_mass_kg": mass},
     )

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.io import loadmat
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 
 from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set
-from mrpipe.case_studies.model import BenchmarkModel, ModalModel, Origin
+from mrpipe.case_studies.model import BenchmarkModel, ModalModel, Origin, published_frame
 from mrpipe.case_studies.public_files import named_file
 from mrpipe.errors import UserError
+from mrpipe.structures import Frame
 
 FLOORS = 76
 HEIGHT_M, WIDTH_M = 306.1, 42.0
@@ -147,19 +147,17 @@ class Tower:
     position: Position = "ground"
 
 
-def _tower(M: FloatArray, C: FloatArray, K: FloatArray, origin: Origin, source: str) -> Tower:
+def _tower(frame: Frame, origin: Origin, source: str) -> Tower:
     devices = np.zeros((FLOORS, 1))
     devices[0, 0] = 1.0
     model = BenchmarkModel(
         name="wind",
         origin=origin,
         source=source,
-        mass=M,
-        damping=C,
-        stiffness=K,
+        frame=frame,
         load=np.eye(FLOORS),
         devices=devices,
-        total_mass_kg=float(M.sum()),
+        total_mass_kg=float(frame.mass.sum()),
     )
     return Tower(model)
 
@@ -187,7 +185,7 @@ def surrogate_tower(parameters: ParameterSet | str = "wind-surrogate") -> Tower:
     kept = len(frequencies)
     ratios = ratio * np.maximum(omega / omega[kept - 1], 1.0)
     C = M @ shapes @ np.diag(2.0 * ratios * omega) @ shapes.T @ M
-    tower = _tower(M, 0.5 * (C + C.T), K, "surrogate", values.source)
+    tower = _tower(Frame(M, 0.5 * (C + C.T), K, "wind"), "surrogate", values.source)
     notes = {f"second_moment_{i}_m4": float(value / modulus) for i, value in enumerate(knots)}
     total = float(masses.sum() * height / floors)
     return replace(tower, model=replace(tower.model, notes=notes, total_mass_kg=total))
@@ -203,16 +201,13 @@ def published_tower(path: Path) -> Tower:
     """
     if not path.is_file():
         raise UserError(path, "", "no such model", "give the 76dof_MKC_matrix.mat of the benchmark")
-    try:
-        content = loadmat(path)
-        matrices = [1e3 * np.asarray(content[key], dtype=np.float64) for key in ("M76", "C76", "K76")]
-    except Exception as error:  # scipy raises half a dozen kinds for a bad file
-        raise UserError(path, "M76, C76, K76", "are not in it", "give the published 76-storey matrices") from error
-    for name, matrix in zip(("M76", "C76", "K76"), matrices, strict=True):
-        if matrix.shape != (FLOORS, FLOORS) or not np.all(np.isfinite(matrix)):
-            raise UserError(path, name, f"has shape {matrix.shape}", "finite and (76, 76) expected")
-    M, C, K = (0.5 * (matrix + matrix.T) for matrix in matrices)
-    return _tower(M, C, K, "published", f"published model {path.name}, 76 floors, rotations condensed")
+    frame = published_frame(path, "wind", "M76", "C76", "K76")
+    if frame.floors != FLOORS:
+        problem = f"holds a structure of {frame.floors} degrees of freedom"
+        raise UserError(path, "M76, C76, K76", problem, "give the published 76-storey matrices")
+    # rounding of the file leaves C not quite symmetric
+    frame = replace(frame, damping=0.5 * (frame.damping + frame.damping.T))
+    return _tower(frame, "published", f"published model {path.name}, 76 floors, rotations condensed")
 
 
 def tower_of(model: str | None, surrogate: str) -> Tower:
@@ -269,9 +264,12 @@ def with_tuned_mass(tower: Tower, mass_kg: float, frequency_ratio: float) -> Tow
     joint[FLOORS - 1, 0], joint[FLOORS, 0] = -1.0, 1.0
     grown = replace(
         model,
-        mass=block_diag(model.mass, [[mass_kg]]),
-        damping=block_diag(model.damping, [[0.0]]),
-        stiffness=K + spring * joint @ joint.T,
+        frame=Frame(
+            block_diag(model.mass, [[mass_kg]]),
+            block_diag(model.damping, [[0.0]]),
+            K + spring * joint @ joint.T,
+            model.name,
+        ),
         load=np.vstack([model.load, np.zeros((1, FLOORS))]),
         devices=joint,
     )

@@ -112,7 +112,8 @@ def missing(facts: RunFacts) -> str:
     if not effects:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         varies = f" It varies with {listed(states)}." if states else ""
-        return f"{subject} lacks something that no effect of the library explains.{varies} {errors}"
+        drift = _drift_of(summary)
+        return f"{subject} lacks something that no effect of the library explains.{varies}{drift} {errors}"
     named = listed([f"**{effect['name']}**{_value_of(effect)}" for effect in effects])
     sure = listed([_confidence(effect["confidence"]) for effect in effects])
     meanings = "".join(f" {effect['physics'].rstrip('.')}." for effect in effects if effect.get("physics"))
@@ -190,8 +191,16 @@ def trusted(facts: RunFacts) -> str:
     return text
 
 
+def _drift_of(summary: Mapping[str, Any]) -> str:
+    """Return how the stiffness of a structure changes over its tests; empty where it does not."""
+    between = (summary.get("frame") or {}).get("between_tests") or {}
+    if between.get("kind") not in ("drift", "step"):
+        return ""
+    return f" The stiffness changes by {percent(between['stiffness_change'])} over the tests."
+
+
 def weak_spots(facts: RunFacts) -> str:
-    """Return where the final damper model is bad: the worst unseen tests, and what the remaining error varies with."""
+    """Return where the final model is bad: the worst unseen tests, and what the remaining error varies with."""
     loop = facts.summary("close-loop")
     tests = [row for row in loop.get("tests", []) if row.get("nrmse_after") is not None]
     if not tests or verdict_class(loop) == "validation differs":
@@ -199,7 +208,7 @@ def weak_spots(facts: RunFacts) -> str:
     worst = sorted(tests, key=lambda row: -float(row["nrmse_after"]))[:2]
     made = _conditions(facts)
     named = listed([f"{row['name']} ({percent(row['nrmse_after'])}{made.get(str(row['name']), '')})" for row in worst])
-    text = f"The error of the final damper model is largest in {'test' if len(worst) == 1 else 'tests'} {named}."
+    text = f"The error of the final model is largest in {'test' if len(worst) == 1 else 'tests'} {named}."
     states = [str(item["state"]) for item in loop["unexplained"].get("depends_on", [])[:3]]
     if states and loop["unexplained"]["structured"]:
         text += f" It varies with {listed(states)}."

@@ -86,16 +86,19 @@ class StiffnessBetweenTests:
             ],
         }
 
-    def finding(self) -> str:
-        """Return one line for the user; empty where the stiffness does not drift."""
+    def sentence(self) -> str:
+        """Return what changes by how much; empty where the stiffness does not drift."""
         if not self.drifts:
             return ""
         first, last = self.tests[0].test, self.tests[-1].test
         how = f"steps before test {self.step_before}" if self.kind == "step" else f"drifts from test {first} to {last}"
-        return (
-            f"the stiffness {how} by {100 * self.change:+.1f} % (frequencies {50 * self.change:+.1f} %): joints loosen "
-            "or parts wear; check the bolts, and use tests of one state only"
-        )
+        return f"the stiffness {how} by {100 * self.change:+.1f} % (frequencies {50 * self.change:+.1f} %)"
+
+    def finding(self) -> str:
+        """Return one line for the user with a remedy; empty where the stiffness does not drift."""
+        said = self.sentence()
+        advice = "joints loosen or parts wear; check the bolts, and use tests of one state only"
+        return f"{said}: {advice}" if said else ""
 
 
 def _of_test(model: FrameModel, record: Spectra) -> TestStiffness:

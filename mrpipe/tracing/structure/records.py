@@ -44,6 +44,8 @@ class FrameRecord:
         Floors whose acceleration was differentiated.
     details
         What campaign.yaml says of the test.
+    computed
+        Floors (from 1) without a sensor, whose acceleration was computed.
     """
 
     name: str
@@ -57,6 +59,7 @@ class FrameRecord:
     damper: dict[str, FloatArray]
     from_displacement: tuple[int, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
+    computed: tuple[int, ...] = ()
 
     @property
     def dt(self) -> float:
@@ -93,6 +96,8 @@ class FrameData:
         return [item for item in self.records if item.role in roles]
 
 
+COMPUTED = "computed_floors"
+"""Key of a test's details: floors (from 1) whose motion was computed from that of the others."""
 _FLOORS = ("floor_acceleration_", "floor_displacement_")
 
 
@@ -218,5 +223,5 @@ def _record(recording: Recording, rate_hz: float) -> FrameRecord:
     }  # fmt: skip
     return FrameRecord(
         recording.name, recording.role, recording.kind, rate, ground, np.column_stack(columns), displacement, loads,
-        damper, tuple(derived), dict(recording.details),
+        damper, tuple(derived), dict(recording.details), tuple(recording.details.get(COMPUTED, ())),
     )  # fmt: skip

@@ -312,12 +312,23 @@ def _density_above(values: FloatArray, rate_hz: float, above_hz: float) -> float
     return float(np.quantile(density[high], 0.25)) / float(stats.chi2.ppf(0.25, freedom) / freedom)
 
 
+def _of_all(densities: FloatArray, computed: Sequence[int]) -> FloatArray:
+    """Return densities, (floors + 1,), where floors that were computed are as noisy as the noisiest sensor of a floor.
+
+    Above the band their computed motion falls to nothing, but in the band it carries the noise of their neighbours.
+    """
+    sensors = [floor for floor in range(1, densities.size) if floor not in computed]
+    densities = densities.copy()
+    densities[list(computed)] = densities[sensors].max(initial=0.0)
+    return densities
+
+
 def noise_of(record: FrameRecord, band: Band, rules: FrameRules | None = None) -> Noise:
     """Return the noise of a record's sensors, measured above the band."""
     above, rate, quietest = ABOVE_BAND * band.high_hz, record.rate_hz, (rules or FrameRules()).quietest
     channels = (record.ground, *record.acceleration.T)
     return Noise(
-        np.array([noise_density(channel, rate, above, quietest) for channel in channels]),
+        _of_all(np.array([noise_density(channel, rate, above, quietest) for channel in channels]), record.computed),
         {floor: noise_density(x, rate, above, quietest) for floor, x in record.measured_displacement.items()},
         {floor: noise_density(x, rate, above, quietest) for floor, x in record.known_loads.items()},
     )

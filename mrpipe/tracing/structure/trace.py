@@ -173,7 +173,7 @@ def _summary(
         },
         "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
         "effects": [item.as_json() for item in named],
-        **_verdict(selection, named, share, rules, reason).sentence_as_json(),
+        **_verdict(selection, named, share, rules, reason, between).sentence_as_json(),
         "candidates": [item.as_json() for item in ranking(selection, problem)],
         "after": _json(scores[1]),
         "ceiling": {"nrmse": best, "recovered": float(np.clip(recovered, 0.0, 1.0))},
@@ -341,11 +341,19 @@ def _ranked(item: FrameCandidate, selection: FrameSelection, problem: FrameProbl
 
 
 def _verdict(
-    selection: FrameSelection, named: Sequence[NamedEffect], share: float, rules: NamingRules, reason: str
+    selection: FrameSelection,
+    named: Sequence[NamedEffect],
+    share: float,
+    rules: NamingRules,
+    reason: str,
+    between: StiffnessBetweenTests,
 ) -> Verdict:
+    # the residual of tests of several states is their difference, which no effect explains
+    drift = f"; {between.sentence()}" if between.drifts else ""
     if reason:
-        return Verdict("unknown" if selection.structured else "noise", reason)
+        return Verdict("unknown" if selection.structured else "noise", f"{reason}{drift}")
     names = " and ".join(f"{item.name} ({item.place})" for item in named)
     if share >= rules.named_share:
-        return Verdict("explained", f"{names}: explains what is missing", share)
-    return Verdict("partly explained", f"{names}: explains part of what is missing, its form is not proven", share)
+        return Verdict("explained", f"{names}: explains what is missing{drift}", share)
+    form = "explains part of what is missing, its form is not proven"
+    return Verdict("partly explained", f"{names}: {form}{drift}", share)

@@ -14,6 +14,7 @@ from mrpipe.effects.contract import Effect
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.structure.completion import completed
 from mrpipe.tracing.structure.directions import directions_of, in_direction
 from mrpipe.tracing.structure.parts import Part, command_part, damper_part, merged
 from mrpipe.tracing.structure.records import FASTEST_HZ, FrameData, frame_data
@@ -93,7 +94,7 @@ def trace_structure(
     campaign, names = campaigns[0], campaigns[0].declared_effects
     declared = [effects[name] for name in names if name in effects]
     library = [item for item in effects.values() if item not in declared]
-    by_direction, findings = _by_direction(campaigns, options.fit_rate_hz)
+    by_direction, findings = _by_direction(campaigns, options.fit_rate_hz, progress)
     parts: list[Part] = []
     frames: dict[str, FrameTracing] = {}
     for axis, data in by_direction.items():
@@ -144,16 +145,21 @@ def _lines(frame: FrameTracing) -> list[str]:
     return [frame.between.finding()] if frame.between.drifts else []
 
 
-def _by_direction(campaigns: Sequence[Campaign], rate_hz: float) -> tuple[dict[str, FrameData], list[str]]:
+def _by_direction(
+    campaigns: Sequence[Campaign], rate_hz: float, progress: Progress
+) -> tuple[dict[str, FrameData], list[str]]:
     """Return the records by axis, with an empty name where the structure moves in one direction, and findings."""
     axes = sorted({axis for item in campaigns for axis in directions_of(item)})
     if not axes:
-        return {"": joined_data(campaigns, rate_hz)}, []
+        whole, findings = _completed(campaigns, progress)
+        return {"": joined_data(whole, rate_hz)}, findings
     found, findings = {}, []
     for axis in axes:
         own = [part for item in campaigns if (part := in_direction(item, axis)) is not None]
         if own and any(test.role == "validation" for item in own for test in item.recordings):
-            found[axis] = joined_data(own, rate_hz)
+            whole, lines = _completed(own, progress)
+            found[axis] = joined_data(whole, rate_hz)
+            findings += [f"direction {axis}: {line}" for line in lines]
         else:
             findings.append(f"direction {axis} is not traced: no validation test has a measured excitation along it")
     if not found:
@@ -164,6 +170,12 @@ def _by_direction(campaigns: Sequence[Campaign], rate_hz: float) -> tuple[dict[s
             f"give {' or '.join(f'ground_acceleration_{axis}' for axis in axes)}",
         )
     return found, findings
+
+
+def _completed(campaigns: Sequence[Campaign], progress: Progress) -> tuple[list[Campaign], list[str]]:
+    """Return the campaigns with the motion of floors without a sensor, and what was computed."""
+    found = [completed(item, progress) for item in campaigns]
+    return [item for item, _ in found], [line for _, lines in found for line in lines]
 
 
 def joined_data(campaigns: Sequence[Campaign], rate_hz: float = FASTEST_HZ) -> FrameData:
