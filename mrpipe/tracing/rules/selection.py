@@ -43,15 +43,15 @@ class SelectionRules(Section):
     further: float = Field(
         0.15,
         ge=0.0,
-        description="If less than this share remains, and the error is below `near_floors` noise floors, a further effect "
-        "must promise its share in screening.",
+        description="If less than this share remains, and the error is below `near_floors` noise floors, a further "
+        "effect must promise its share in screening.",
     )
     near_floors: float = Field(
         1.25,
         ge=1.0,
-        description="From this multiple of the noise floor on, further effects are always fitted, because the error is "
-        "larger than that of a model that explains the tests. Screening is linear and sees too little of an effect whose "
-        "shape is not among its starts.",
+        description="From this multiple of the noise floor on, further effects are always fitted, because the error "
+        "is larger than that of a model that explains the tests. Screening is linear and sees too little of an effect "
+        "whose shape is not among its starts.",
     )
     better_optimum: float = Field(
         0.03,

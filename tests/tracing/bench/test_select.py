@@ -13,8 +13,9 @@ from mrpipe.effects.contract import EffectScales
 from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import Fit, fit, predict, start_of
 from mrpipe.fitting.problem import Term
+from mrpipe.tracing.bench import select
 from mrpipe.tracing.bench.screen import Screened
-from mrpipe.tracing.bench.select import Candidate, Selection, admissible, refit
+from mrpipe.tracing.bench.select import Candidate, Selection, admissible, forward_selection, refit
 from mrpipe.tracing.bench.verdict import unnamed_reason
 from mrpipe.tracing.options import NamingRules
 from tests.tracing.bench.fits import plain_fit
@@ -74,3 +75,32 @@ def test_a_large_gap_is_found_although_a_small_one_raises_the_error(share: float
     found = fit(found.problem, found.theta, iterations=30)
     assert found.term_values[0]["gap"] == pytest.approx(gap, rel=0.02)
     assert found.chi_square < 1.05
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(("left", "rounds"), [(1.8, 2), (1.4, 1)])
+def test_screening_ends_the_search_only_where_the_error_is_near_the_noise_floor(
+    monkeypatch: pytest.MonkeyPatch, left: float, rounds: int
+) -> None:
+    """Screening saw 4 % in a Stribeck effect that removed all: the search ended at 1.4 noise floors without it."""
+
+    def after(found: float, terms: int) -> Any:
+        term = SimpleNamespace(form=SimpleNamespace(parameters=(), amplitudes=()), effect=SimpleNamespace(name="any"))
+        return SimpleNamespace(
+            chi_square=found,
+            problem=SimpleNamespace(terms=(term,) * terms),
+            theta=np.zeros(0),
+            term_values=[{}] * terms,
+            at_bound=(),
+        )
+
+    def candidates(before: Any, *_: Any, **__: Any) -> list[Candidate]:
+        count = len(before.problem.terms) + 1
+        return [Candidate(f"effect-{count}", after(left if count == 1 else 1.0, count), 0.9, {})]
+
+    monkeypatch.setattr(select, "candidates_after", candidates)
+    monkeypatch.setattr(select, "_nothing_more", lambda *_: True)
+    monkeypatch.setattr(select, "_nearer", lambda chosen, *_: chosen)
+    monkeypatch.setattr(select, "admissible", lambda *_: True)
+    found = forward_selection(after(10.0, 0), 1.0, [], most=2)
+    assert len(found.rounds) == rounds
