@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,7 @@ def test_the_bundled_configuration_is_the_case_study_written_by_hand(
         assert lowest_damping(alone, c[column], k[column]) == pytest.approx(expected, rel=1e-6)
     shapes, omega = free.shapes, free.angular_frequencies
     damping = model.mass @ shapes @ np.diag(2.0 * 0.01 * omega) @ shapes.T @ model.mass
-    damped = type(model)(**{**model.__dict__, "damping": damping, "devices": places})
+    damped = replace(model, frame=replace(model.frame, damping=damping), devices=places)
     controller = Controller("kelvin", "active", viscous=tuple(c), stiffness=tuple(k))
     by_hand_response = simulate(modal_model(damped), GROUND[:, None], INTERVAL, controller, ratio=400, save_every=400)
     artifact = Artifact(tmp_path / "run" / "response-dampers.h5")
