@@ -246,3 +246,11 @@ def test_channels_of_two_stations_are_named_by_their_files(tmp_path: Path) -> No
     assert names == ["1: 90 Deg, Ground (CE001)", "1: 90 Deg, Ground (CE002)"]
     with pytest.raises(UserError, match="no column '1'"):
         open_data_file(tmp_path / "event.zip").column("1", "test")
+
+
+@pytest.mark.property
+def test_a_channel_of_one_sample_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.V2"
+    path.write_text(_bridge(1, "Tran", "Deck", RECORD[:1], start=START))
+    with pytest.raises(UserError, match="fewer than two samples"):
+        open_data_file(path)

@@ -153,9 +153,11 @@ def common_window(path: Path, channels: Sequence[StrongMotion]) -> tuple[FloatAr
     if len(starts) == len(channels):
         skipped = [round((max(starts) - start) / interval) for start in starts]
     length = min(item.acceleration_m_s2.size - skip for item, skip in zip(channels, skipped, strict=True))
-    if length <= 1:
+    if length <= 1 and any(skipped):
         problem = f"its channels share no time: they start up to {max(starts) - min(starts):g} s apart"
         raise UserError(path, "", problem, "give one file for each station")
+    if length <= 1:
+        raise UserError(path, "", "holds a channel with fewer than two samples", "download the record again")
     parts = [item.acceleration_m_s2[skip : skip + length] for item, skip in zip(channels, skipped, strict=True)]
     return interval * np.arange(length, dtype=np.float64), np.column_stack(parts)
 
