@@ -190,11 +190,13 @@ def ambient_clocks(test: FrameTest, low_hz: float, high_hz: float = 0.0) -> list
         Band; 0 for `high_hz` takes the band in which the sensors move together.
     """
     sensors = len(test.sensors)
+    if sensors < 2:
+        return []
     first = lowest_peak_hz([test], low_hz)
     high = high_hz or min(USABLE_BAND * test.sampling_rate_hz, common_motion_ends_hz(test, first))
     found = _coherency(test, max(low_hz, 0.5 * first), high)
     bands = _bands(found)
-    if sensors < 2 or len(bands) < _BANDS:
+    if len(bands) < _BANDS:
         return []
     # a delay of more than half a period of the lowest mode would change the sign of its shape
     reach = 0.5 / first

@@ -78,6 +78,26 @@ def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz:
     return Records(tuple(blocks), own_rate, rows, high)
 
 
+def _require_length(records: Records, tests: Sequence[FrameTest], low_hz: float, source: Path) -> None:
+    """Refuse tests whose blocks are shorter than the correlation functions.
+
+    Raises
+    ------
+    UserError
+        If a block is too short.
+    """
+    shortest = min(block.shape[1] for block in records.blocks)
+    least = 2 * records.block_rows + 2
+    if shortest <= least:
+        place = f"tests.{tests[0].name}"
+        blocks = len(records.blocks) // len(tests)
+        lasts, needed = (blocks * count / records.rate_hz for count in (shortest, least))
+        peak = f"the lowest peak of the responses, at {lowest_peak_hz(tests, low_hz):.3g} Hz"
+        problem = f"lasts {lasts:.3g} s; {peak}, needs more than {needed:.3g} s"
+        remedy = "record longer, or set identify_frame.band_low_hz just below the first mode if the peak is a drift"
+        raise UserError(source, place, problem, remedy)
+
+
 def _assurance(first: ComplexArray, second: ComplexArray) -> float:
     return float(np.abs(np.vdot(first, second)) ** 2)
 
@@ -309,6 +329,7 @@ def _set_up(
 ) -> tuple[SetUp, list[PoleCandidate], float]:
     """Return the stable poles of tests with the same sensors, all candidates, and the end of the band [Hz]."""
     records = _records(tests, layout, *band_hz)
+    _require_length(records, tests, band_hz[0], source)
     orders = estimator.orders(layout.floors, len(tests[0].sensors))
     statistics = [estimator.statistic(block, records) for block in records.blocks]
     poles = estimator.poles(np.mean(np.array(statistics), axis=0), records, orders)

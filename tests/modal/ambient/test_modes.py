@@ -117,3 +117,16 @@ def test_a_pole_that_wanders_does_not_take_the_place_of_the_one_that_stays():
     assert best.orders == 15
     assert best.angular_frequency == pytest.approx(9.47)
     assert best.shape == pytest.approx(steady.real, abs=1e-12)
+
+
+@pytest.mark.property
+def test_a_record_too_short_for_its_lowest_peak_is_refused_in_one_line(recwarn):
+    """One sensor of a building for 109 s, with a drift: warnings and a traceback of pyOMA2."""
+    pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
+    rng = np.random.default_rng(3)
+    drift = np.sin(2 * np.pi * 0.08 * np.arange(20000) / 200.0)
+    seen = (drift + 0.01 * rng.standard_normal(20000))[:, None]
+    test = FrameTest("real", "ambient", 200.0, None, seen, (False,), places=(Place(1),))
+    with pytest.raises(UserError, match=r"tests.real: lasts 99.8 s; the lowest peak .* needs more than"):
+        identify_frame(FrameTests((), (), np.array([np.nan]), HERE, (test,)))
+    assert not recwarn.list
