@@ -58,11 +58,15 @@ def _training(summary: Mapping[str, Any]) -> str:
 
 
 def _simulation(summary: Mapping[str, Any]) -> str:
-    return (
+    response = (
         f"rms x_top {_number(summary.get('rms_x_top_m'), 1e3)} mm, x1 {_number(summary.get('rms_x1_m'), 1e3)} mm, "
-        f"a1 {_number(summary.get('rms_a1_m_s2'))} m/s2 relative to the ground, "
-        f"damping ratio {_number(summary.get('damping_ratio'))}"
+        f"a1 {_number(summary.get('rms_a1_m_s2'))} m/s2 relative to the ground"
     )
+    dampers = summary.get("dampers")
+    if dampers:
+        forces = ", ".join(f"{item['name']} {_number(item['rms_force_n'], 1e-3)} kN" for item in dampers)
+        return f"{response}, rms force of {forces}"
+    return f"{response}, damping ratio {_number(summary.get('damping_ratio'))}"
 
 
 def _damper(summary: Mapping[str, Any]) -> str:
@@ -79,6 +83,11 @@ def _frame(summary: Mapping[str, Any]) -> str:
 
 
 def _calibration(summary: Mapping[str, Any]) -> str:
+    dampers = summary.get("dampers")
+    if dampers:
+        laws = ", ".join(f"{item['name']} with {item['law']}" for item in dampers)
+        first = ((summary.get("together") or {}).get("damping_ratios") or [None])[0]
+        return f"{laws}: damping ratio {_number(first)} in the first mode"
     return (
         f"omega_0 {_number(summary.get('omega_0'), digits=4)} rad/s, "
         f"omega_inf {_number(summary.get('omega_inf'), digits=4)} rad/s, {len(summary.get('laws') or {})} laws"

@@ -22,7 +22,8 @@ def number(value: Any, digits: int = 3) -> str:
         return "-"
     if value == 0.0:
         return "0"
-    places = digits - 1 - math.floor(math.log10(abs(value)))
+    # rounded first: 0.9999 with three digits is 1.00, not 1.000
+    places = digits - 1 - math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if -6 <= places <= 6:
         return f"{round(value, places):.{max(places, 0)}f}"
     return f"{value:.{digits - 1}e}"

@@ -11,7 +11,7 @@ import pandas as pd
 from mrpipe.artifacts import Artifact
 from mrpipe.reporting.closed_loop_words import in_points
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.front import figures, statements, tables
+from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
 from mrpipe.reporting.words import listed, number, percent, quantity
@@ -208,22 +208,11 @@ def structure(facts: RunFacts) -> Section:
     if "frequencies_hz" not in summary:
         return section
     section.text(statements.structure(facts))
-    rows = []
-    for mode, frequency in enumerate(summary["frequencies_hz"]):
-        low, high = summary["frequency_intervals_hz"][mode]
-        damped = summary["damping_ratio_intervals"][mode]
-        rows.append(
-            {
-                "mode": mode + 1,
-                "frequency [Hz]": number(frequency, 4),
-                "± [Hz]": number(0.5 * (high - low), 2),
-                "damping ratio [%]": number(100.0 * summary["damping_ratios"][mode]),
-                "from [%]": number(100.0 * damped[0]),
-                "to [%]": number(100.0 * damped[1]),
-                "MAC of the model": number(summary["mac"][mode], 4),
-            }
-        )
-    section.table("modes", pd.DataFrame(rows), "Modes with 95 % intervals.")
+    if any(high > low for low, high in summary["frequency_intervals_hz"]):
+        section.table("modes", pd.DataFrame(_identified_modes(summary)), "Modes with 95 % intervals.")
+    else:
+        columns = ["mode", "frequency [Hz]", "damping ratio [%]"]
+        section.table("modes", pd.DataFrame(_identified_modes(summary))[columns], "Modes of the given structure.")
     shapes = np.asarray(summary["mode_shapes"], dtype=np.float64)
     section.figure(
         "shapes",
@@ -260,9 +249,38 @@ def structure(facts: RunFacts) -> Section:
     return section
 
 
+def _identified_modes(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+    rows = []
+    for mode, frequency in enumerate(summary["frequencies_hz"]):
+        low, high = summary["frequency_intervals_hz"][mode]
+        damped = summary["damping_ratio_intervals"][mode]
+        rows.append(
+            {
+                "mode": mode + 1,
+                "frequency [Hz]": number(frequency, 4),
+                "± [Hz]": number(0.5 * (high - low), 2),
+                "damping ratio [%]": number(100.0 * summary["damping_ratios"][mode]),
+                "from [%]": number(100.0 * damped[0]),
+                "to [%]": number(100.0 * damped[1]),
+                "MAC of the model": number(summary["mac"][mode], 4),
+            }
+        )
+    return rows
+
+
 def control(facts: RunFacts) -> Section:
     """Return one comparison of all laws, their last cycles, and prediction against measurement."""
     section = Section("control", "Control")
+    each = several_dampers.rows(facts)
+    if several_dampers.answer(facts):
+        section.text(several_dampers.answer(facts))
+    if each:
+        section.table(
+            "dampers",
+            pd.DataFrame(each),
+            "Each damper in the simulation: gains of its law, stroke, force, and RMS difference between force and "
+            "command over the RMS command.",
+        )
     runs = law_facts.comparison(facts)
     loop = facts.summary("close-loop").get("closed_loop") or {}
     if runs:

@@ -11,6 +11,7 @@ from typing import Any
 
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import laws as law_facts
+from mrpipe.reporting.front import several_dampers
 from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.words import duration, listed, number, percent, plain, quantity, with_interval
 
@@ -51,7 +52,7 @@ def statements(facts: RunFacts) -> list[Statement]:
         Statement("Models", models(facts)),
         Statement("Weak spots", weak_spots(facts)),
         Statement("Structure", structure(facts)),
-        Statement("Control", law_facts.answer(facts) or _without_laws(facts)),
+        Statement("Control", several_dampers.answer(facts) or law_facts.answer(facts) or _without_laws(facts)),
         Statement("Test next", next_tests(facts)),
         Statement("Distrust", " ".join(doubts(facts)[:4])),
     ]
@@ -312,9 +313,10 @@ def structure(facts: RunFacts) -> str:
     if "frequencies_hz" not in frame:
         return ""
     frequencies = listed([number(value) for value in frame["frequencies_hz"]])
-    ratios = [100.0 * value for value in frame["damping_ratios"]]
-    span = f"{number(min(ratios), 2)} to {number(max(ratios), 2)} %" if len(ratios) > 1 else f"{number(ratios[0], 2)} %"
-    return f"Modes at {frequencies} Hz with damping ratios of {span}."
+    least, largest = (number(100.0 * extreme(frame["damping_ratios"]), 2) for extreme in (min, max))
+    if least == largest:
+        return f"Modes at {frequencies} Hz with a damping ratio of {least} %."
+    return f"Modes at {frequencies} Hz with damping ratios of {least} to {largest} %."
 
 
 def next_tests(facts: RunFacts) -> str:
