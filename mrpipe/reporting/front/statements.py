@@ -52,7 +52,7 @@ def statements(facts: RunFacts) -> list[Statement]:
         Statement("Models", models(facts)),
         Statement("Weak spots", weak_spots(facts)),
         Statement("Structure", structure(facts)),
-        Statement("Control", several_dampers.answer(facts) or law_facts.answer(facts) or _without_laws(facts)),
+        Statement("Control", law_facts.answer(facts) or several_dampers.answer(facts) or _without_laws(facts)),
         Statement("Test next", next_tests(facts)),
         Statement("Distrust", " ".join(doubts(facts)[:4])),
     ]
