@@ -208,11 +208,11 @@ def structure(facts: RunFacts) -> Section:
     if "frequencies_hz" not in summary:
         return section
     section.text(statements.structure(facts))
+    modes = pd.DataFrame(_mode_rows(summary))
     if any(high > low for low, high in summary["frequency_intervals_hz"]):
-        section.table("modes", pd.DataFrame(_identified_modes(summary)), "Modes with 95 % intervals.")
+        section.table("modes", modes, "Modes with 95 % intervals.")
     else:
-        columns = ["mode", "frequency [Hz]", "damping ratio [%]"]
-        section.table("modes", pd.DataFrame(_identified_modes(summary))[columns], "Modes of the given structure.")
+        section.table("modes", modes[["mode", "frequency [Hz]", "damping ratio [%]"]], "Modes of the given structure.")
     shapes = np.asarray(summary["mode_shapes"], dtype=np.float64)
     section.figure(
         "shapes",
@@ -249,7 +249,7 @@ def structure(facts: RunFacts) -> Section:
     return section
 
 
-def _identified_modes(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _mode_rows(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     rows = []
     for mode, frequency in enumerate(summary["frequencies_hz"]):
         low, high = summary["frequency_intervals_hz"][mode]
@@ -271,9 +271,9 @@ def _identified_modes(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 def control(facts: RunFacts) -> Section:
     """Return one comparison of all laws, their last cycles, and prediction against measurement."""
     section = Section("control", "Control")
-    each = several_dampers.rows(facts)
-    if several_dampers.answer(facts):
-        section.text(several_dampers.answer(facts))
+    together, each = several_dampers.answer(facts), several_dampers.rows(facts)
+    if together:
+        section.text(together)
     if each:
         section.table(
             "dampers",

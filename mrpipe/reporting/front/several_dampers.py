@@ -30,7 +30,7 @@ def answer(facts: RunFacts) -> str:
 
 
 def rows(facts: RunFacts) -> list[dict[str, Any]]:
-    """Return a row for each damper that was simulated: stroke, force, share of commands that it cannot follow."""
+    """Return a row for each damper that was simulated: gains, stroke, force, and error of the force."""
     simulated = facts.summary("simulate-dampers").get("dampers") or []
     gains = {item["name"]: item["gains"] for item in facts.summary("calibrate").get("dampers") or []}
     return [_row(item, gains.get(item["name"], {})) for item in simulated]

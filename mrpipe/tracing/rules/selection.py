@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from mrpipe.options import Section
+from mrpipe.tracing.rules.validation import ValidationRules
 
 
 class SelectionRules(Section):
@@ -47,7 +48,7 @@ class SelectionRules(Section):
         "effect must promise its share in screening.",
     )
     near_floors: float = Field(
-        1.25,
+        ValidationRules().within_floors,
         ge=1.0,
         description="From this multiple of the noise floor on, further effects are always fitted, because the error "
         "is larger than that of a model that explains the tests. Screening is linear and sees too little of an effect "

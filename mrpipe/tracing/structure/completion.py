@@ -20,8 +20,8 @@ from scipy.optimize import minimize_scalar
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
-from mrpipe.structures import Frame
-from mrpipe.tracing.structure.records import COMPUTED
+from mrpipe.structures import Frame, natural_modes
+from mrpipe.tracing.structure.records import COMPUTED, floor_of_force, without_sensor
 
 _GROUND, _FORCE = "ground_acceleration", "input_force"
 _ACCELERATION, _DISPLACEMENT = "floor_acceleration_", "floor_displacement_"
@@ -40,15 +40,6 @@ class _Spectra:
     floors: NDArray[np.complex128]  # (f, s)
     ground: NDArray[np.complex128]  # (f,)
     forces: NDArray[np.complex128]  # (f, n)
-
-
-def without_sensor(test: Recording, floors: int) -> list[int]:
-    """Return the floors (from 1) of which a test records neither acceleration nor displacement."""
-    return [
-        floor
-        for floor in range(1, floors + 1)
-        if f"{_ACCELERATION}{floor}" not in test.channels and f"{_DISPLACEMENT}{floor}" not in test.channels
-    ]
 
 
 def completed(campaign: Campaign, progress: Progress = no_progress) -> tuple[Campaign, list[str]]:
@@ -136,7 +127,7 @@ def _completed_test(test: Recording, frame: Frame, places: Sequence[int]) -> tup
     for place, history in zip(places, motion.T, strict=True):
         channels[f"{_ACCELERATION}{place}"] = history + ground
     # what happened before and after the record is not known, so that its ends are left out
-    slowest_hz = float(np.sqrt(np.min(_squares(frame)))) / (2.0 * np.pi)
+    slowest_hz = float(natural_modes(frame).angular_frequencies[0]) / (2.0 * np.pi)
     end = round(test.sampling_rate_hz / slowest_hz)
     segments = tuple((max(a, end), min(b, size - end)) for a, b in test.segments or ((0, size),))
     kept = tuple((a, b) for a, b in segments if b > a)
@@ -163,8 +154,7 @@ def _spectra(test: Recording, frame: Frame, seen: NDArray[np.intp]) -> _Spectra:
             columns.append(np.gradient(np.gradient(shift, dt), dt))
     forces = np.zeros((size, frame.floors))
     if _FORCE in test.channels:
-        place = int(test.details.get("floor", test.details.get("input_force_floor", 1)))
-        forces[:, place - 1] = _centred(test, _FORCE)
+        forces[:, floor_of_force(test) - 1] = _centred(test, _FORCE)
     omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(length, dt), dtype=np.float64)
     return _Spectra(
         omega,
@@ -172,11 +162,6 @@ def _spectra(test: Recording, frame: Frame, seen: NDArray[np.intp]) -> _Spectra:
         np.fft.rfft(ground, length),
         np.fft.rfft(forces, length, axis=0),
     )
-
-
-def _squares(frame: Frame) -> FloatArray:
-    """Return the squared circular frequencies in rising order, shape (n,) [1/s^2]."""
-    return np.sort(np.linalg.eigvals(np.linalg.solve(frame.mass, frame.stiffness)).real)
 
 
 def _stiffness(frame: Frame, omega: FloatArray, factor: float) -> NDArray[np.complex128]:
@@ -204,8 +189,8 @@ def _hidden_motion(
 
 def _factor(frame: Frame, spectra: _Spectra, seen: NDArray[np.intp], hidden: NDArray[np.intp]) -> float:
     """Return the factor on damping and stiffness with the least squared force that the equations lack."""
-    squares = _squares(frame)
-    used = (spectra.omega > LOWEST * np.sqrt(squares[0])) & (spectra.omega < HIGHEST * np.sqrt(squares[-1]))
+    omega = natural_modes(frame).angular_frequencies
+    used = (spectra.omega > LOWEST * omega[0]) & (spectra.omega < HIGHEST * omega[-1])
     band = _Spectra(spectra.omega[used], spectra.floors[used], spectra.ground[used], spectra.forces[used])
     load = _load(frame, band)
 

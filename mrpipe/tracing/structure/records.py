@@ -126,7 +126,7 @@ def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
     masses = np.asarray(campaign.floor_masses_kg, dtype=np.float64)
     whole, left_out = [], []
     for item in campaign.recordings:
-        missing = set(range(1, floors + 1)) - set(_floors_of(item))
+        missing = without_sensor(item, floors)
         ground = "ground_acceleration" in item.channels or "input_force" in item.channels or item.kind == "free-decay"
         if missing or not ground:
             left_out.append(item.name)
@@ -153,6 +153,17 @@ def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
 def _floors_of(recording: Recording) -> list[int]:
     found = {int(name.rpartition("_")[2]) for name in recording.channels if name.startswith(_FLOORS)}
     return sorted(found)
+
+
+def without_sensor(recording: Recording, floors: int) -> list[int]:
+    """Return the floors (from 1) of which a recording holds neither acceleration nor displacement."""
+    recorded = _floors_of(recording)
+    return [floor for floor in range(1, floors + 1) if floor not in recorded]
+
+
+def floor_of_force(recording: Recording) -> int:
+    """Return the floor (from 1) on which the recorded force acts."""
+    return int(recording.details.get("floor", recording.details.get("input_force_floor", 1)))
 
 
 def part_of(recording: Recording) -> slice:
@@ -211,8 +222,7 @@ def _record(recording: Recording, rate_hz: float) -> FrameRecord:
         columns.append(twice + ground)
     loads: dict[int, FloatArray] = {}
     if "input_force" in channels:
-        place = recording.details.get("floor", recording.details.get("input_force_floor", 1))
-        loads[int(place)] = channels["input_force"]
+        loads[floor_of_force(recording)] = channels["input_force"]
     damper = {
         key: channels[name]
         for key, name in (

@@ -14,9 +14,9 @@ from mrpipe.errors import UserError
 from mrpipe.structures import modal_damping_matrix, shear_frame
 from mrpipe.structures.response import linear_response
 from mrpipe.tracing.options import TracingOptions
-from mrpipe.tracing.structure.completion import completed, without_sensor
+from mrpipe.tracing.structure.completion import completed
 from mrpipe.tracing.structure.directions import in_direction
-from mrpipe.tracing.structure.records import COMPUTED
+from mrpipe.tracing.structure.records import COMPUTED, without_sensor
 from mrpipe.tracing.structure.verdict import trace_structure
 from tests.tracing.structure.rig import frame_campaign
 from tests.tracing.structure.test_directions import two_directions
