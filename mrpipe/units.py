@@ -38,9 +38,13 @@ _WORDS = {
     "Gal": "cm/s^2",
     '"': "inch",
     "t": "metric_ton",
+    "kp": "kilogram_force",
 }
 
 _USUAL = ("mm", "cm", "m", "um", "in", "N", "kN", "MN", "lbf", "kip", "kgf", "A", "mA", "V", "mV", "s", "ms", "us", "g")
+_MASSES_AS_FORCES = {"kg": "kgf", "lb": "lbf", "lbs": "lbf", "pound": "lbf", "pounds": "lbf", "t": "tf", "g": "gf"}
+"""Unit of mass -> the unit of force that a load cell which counts in it means."""
+
 _USUAL_RATES = ("m/s", "mm/s", "cm/s", "m/s^2", "mm/s^2", "cm/s^2", "in/s", "kg", "Hz")
 
 _WORD = r"(?:[A-Za-zµμ°Ω%_]{1,40}|1)"
@@ -61,13 +65,20 @@ def _registry() -> Any:
     return registry
 
 
-def _nearest(unit: str) -> str:
-    """Return a remedy that names the usual unit that was probably meant, where there is one."""
-    usual = (*_USUAL, *_USUAL_RATES)
+def _nearest(unit: str, quantity: str | None = None) -> str:
+    """Return a remedy that names the usual unit, of the quantity if given, that was probably meant, if there is one."""
+    usual = [item for item in (*_USUAL, *_USUAL_RATES) if quantity is None or same_dimension(item, quantity)]
     folded = {item.casefold(): item for item in usual}
     close = difflib.get_close_matches(unit, usual, n=1, cutoff=0.6)
     meant = folded.get(unit.casefold()) or (close[0] if close else "")
     return f"did you mean {meant}?" if meant and meant != unit else ""
+
+
+def _of_quantity(unit: str, quantity: str) -> str:
+    """Return a remedy that names a unit of the quantity that was probably meant, where there is one."""
+    if quantity == "force" and unit in _MASSES_AS_FORCES:
+        return f"did you mean {_MASSES_AS_FORCES[unit]}?"
+    return _nearest(unit, quantity)
 
 
 def _parse(unit: str, where: str) -> Any:
@@ -107,7 +118,7 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
     if quantity is not None:
         wanted = SI_UNITS[quantity]
         if parsed.dimensionality != registry.parse_units(wanted).dimensionality:
-            remedy = _nearest(str(unit).strip()) or f"write one such as {wanted}"
+            remedy = _of_quantity(str(unit).strip(), quantity) or f"write one such as {wanted}"
             raise UserError(where or "unit", f"unit {unit!r}", f"is not a unit of {quantity}", remedy)
     try:
         return float((1.0 * parsed).to_base_units().magnitude)

@@ -81,3 +81,25 @@ def test_compound_units_as_people_write_them(unit: str, factor: float) -> None:
 def test_a_unit_in_the_wrong_case_names_the_right_one(unit: str, meant: str) -> None:
     with pytest.raises(UserError, match=f"did you mean {meant}"):
         conversion(unit, quantity="force")
+
+
+@pytest.mark.golden
+def test_a_kilopond_is_the_weight_of_a_kilogram() -> None:
+    assert conversion("kp", quantity="force") == pytest.approx(9.80665)
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize(("unit", "meant"), [("kg", "kgf"), ("lbs", "lbf"), ("lb", "lbf"), ("t", "tf")])
+def test_a_load_cell_that_counts_in_a_mass_is_offered_its_weight(unit: str, meant: str) -> None:
+    with pytest.raises(UserError, match=rf"did you mean {meant}\?"):
+        conversion(unit, quantity="force")
+    assert same_dimension(meant, "force")
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("unit", ["N/mm", "mm", "kNm", "s", "mA"])
+def test_a_unit_that_is_offered_is_one_of_the_quantity(unit: str) -> None:
+    with pytest.raises(UserError) as told:
+        conversion(unit, quantity="force")
+    offered = str(told.value).rpartition(" ")[2].strip("?")
+    assert same_dimension(offered, "force")

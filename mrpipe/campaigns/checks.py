@@ -27,7 +27,7 @@ def require_finite(file: DataFile, values: FloatArray, first: int, channel: str,
     """
     bad = np.flatnonzero(~(np.abs(values) < LARGEST_SAMPLE))
     if bad.size:
-        row = file.first_row + first + int(bad[0])
+        row = file.line_of(first + int(bad[0]))
         value = values[bad[0]]
         if bad.size == 1 and bad[0] == values.size - 1 and np.isnan(value):
             raise UserError(

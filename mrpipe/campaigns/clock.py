@@ -16,6 +16,9 @@ RATE_TOLERANCE = 0.01
 JITTER_TOLERANCE = 0.02
 """Largest rms deviation of an interval from the median, over the median, that goes unmentioned."""
 
+MOST_REPEATED_TIMES = 0.05
+"""Share of samples with the time of the sample before, above which the clock was printed with too few digits."""
+
 
 @dataclass(frozen=True)
 class Clock:
@@ -76,19 +79,26 @@ def build_clock(
 
 
 def _require_increasing(file: DataFile, time: FloatArray, where: str) -> None:
-    row = file.first_row
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
         raise UserError(
-            file.path, f"{where}, row {row + int(bad[0])}", f"time is {time[bad[0]]}", "every sample needs its time"
+            file.path,
+            f"{where}, row {file.line_of(int(bad[0]))}",
+            f"time is {time[bad[0]]}",
+            "every sample needs its time",
         )
     steps = np.diff(time)
     wrong = np.flatnonzero(~(steps > 0.0))
     if wrong.size:
         index = int(wrong[0]) + 1
+        place = f"{where}, row {file.line_of(index)}"
+        if wrong.size > MOST_REPEATED_TIMES * steps.size and not np.any(steps < 0.0):
+            problem = f"{wrong.size} of {time.size} samples have the same time as the one before, the first at "
+            remedy = "export the time with more digits, or leave the time channel out and give sampling_rate_hz"
+            raise UserError(file.path, place, f"{problem}{time[index]:.9g} s", remedy)
         raise UserError(
             file.path,
-            f"{where}, row {row + index}",
+            place,
             f"time goes from {time[index - 1]:.9g} to {time[index]:.9g} s",
             "a clock that increases with every sample expected",
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,11 @@ from mrpipe.artifacts.yaml_source import nearest
 from mrpipe.errors import UserError
 
 _INDEXED = re.compile(r"^(?P<name>.*?)\s*\[(?P<index>[^\]]*)\]$")
+
+
+def _plain(name: str) -> str:
+    """Return a name in which spellings that look the same are the same, such as those of an umlaut and of micro."""
+    return " ".join(unicodedata.normalize("NFKC", name).split())
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,8 @@ class DataFile:
         Half-open index ranges between the pauses of a logger; empty where there are none.
     first_row
         Line of the first sample in a text file, 0 where lines mean nothing.
+    row_lines
+        Line of each sample in a text file where other lines stand between them, else empty.
     aliases
         Other spellings of a name.
     headers
@@ -54,9 +62,14 @@ class DataFile:
     sampling_rate_hz: float | None = None
     parts: tuple[tuple[int, int], ...] = ()
     first_row: int = 0
+    row_lines: tuple[int, ...] = ()
     aliases: Mapping[str, str] = field(default_factory=dict)
     headers: tuple[tuple[str, ...], ...] = ()
     accelerations: Mapping[str, bool] = field(default_factory=dict)
+
+    def line_of(self, sample: int) -> int:
+        """Return the line of a sample in a text file, for messages; its number from 0 where lines mean nothing."""
+        return self.row_lines[sample] if sample < len(self.row_lines) else self.first_row + sample
 
     def column(self, column: str | int, where: str) -> FloatArray:
         """Return one column, shape (n,).
@@ -87,6 +100,8 @@ class DataFile:
         if index is not None:
             array = self._pick(array, index, column, where)
         array = np.squeeze(array)
+        if array.ndim == 0 and self.table:
+            raise UserError(self.path, where, "holds a single row of numbers", "a recording needs at least two samples")
         if array.ndim != 1 or array.size < 2:
             shape = " x ".join(map(str, array.shape)) or "one number"
             raise UserError(
@@ -105,6 +120,9 @@ class DataFile:
                 return match["name"], match["index"]
             if self.table and match and not match["name"]:
                 column = match["index"].split(",")[-1].strip()
+            alike = [name for name in self.names if _plain(name) == _plain(column)]
+            if len(alike) == 1:
+                return alike[0], None
         if self.table and re.fullmatch(r"-?\d+", str(column)):
             position = int(column)
             if -len(self.names) <= position < len(self.names):

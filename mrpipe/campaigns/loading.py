@@ -10,7 +10,7 @@ import numpy as np
 
 from mrpipe import units
 from mrpipe.artifacts import FloatArray, public_data_directory
-from mrpipe.artifacts.yaml_source import Place, YamlSource, nearest, read_yaml
+from mrpipe.artifacts.yaml_source import Place, YamlSource, dotted, nearest, read_yaml
 from mrpipe.campaigns.checks import find_clipping, find_dropouts, force_sign, require_finite, require_roles
 from mrpipe.campaigns.clock import build_clock
 from mrpipe.campaigns.columns import DataFile
@@ -25,10 +25,12 @@ from mrpipe.campaigns.schema import (
     known_channels,
     quantity_of,
 )
+from mrpipe.campaigns.segments import find_segments, segments_beyond
 from mrpipe.campaigns.writing import CAMPAIGN_FILE
 from mrpipe.errors import UserError
 
 _NEEDED_ON_BENCH = ("displacement", "force", "drive")
+_DRIVE_REMEDY = "write A or V; for percent or a duty cycle give scale: the current in A of one such unit, and unit: A"
 _ONLY_CLOSED_LOOP = (
     "damper_force",
     "damper_displacement",
@@ -193,6 +195,7 @@ def _test_entry(reader: _Reader, shared: dict[str, ChannelEntry], index: int) ->
                 f"no channel {missing[0]}",
                 f"write {missing[0]}: {{column: ..., unit: ...}}, or {{value: ..., unit: ...}} for a constant",
             )
+        _require_own_columns(reader, merged, place)
         if entry.role is None:
             raise source.error((*place, "role"), "is missing", "write role: training, validation or repeat")
     elif entry.kind is None:
@@ -202,6 +205,18 @@ def _test_entry(reader: _Reader, shared: dict[str, ChannelEntry], index: int) ->
             raise source.error((*place, "kind"), "is missing", remedy)
         entry = entry.model_copy(update={"kind": guess})
     return entry, merged
+
+
+def _require_own_columns(reader: _Reader, channels: dict[str, ChannelEntry], place: Place) -> None:
+    """Raise where two channels of a bench test name the same column."""
+    owners: dict[str | int, str] = {}
+    for name, channel in channels.items():
+        if channel.column is None:
+            continue
+        other = owners.setdefault(channel.column, name)
+        if other != name:
+            problem = f"names the column {channel.column!r}, which is also that of {other}"
+            raise reader.source.error(_place_of(reader, name, place), problem, "give each channel its own column")
 
 
 def _number(value: Any) -> bool:
@@ -228,7 +243,8 @@ def _read_test(reader: _Reader, shared: dict[str, ChannelEntry], index: int) -> 
     for name, channel in channels.items():
         if channel.value is not None:
             columns[name] = np.full(samples, _constant(reader, name, channel, place))
-    begin, end, segments = _segments(reader, file, entry, clock.time_s, clock.sampling_rate_hz, place)
+    begin, end, segments = find_segments(reader.source, file, entry, clock, place)
+    reader.findings += segments_beyond(entry, clock)
     values = {name: column[begin:end] for name, column in columns.items()}
     for name, column in values.items():
         for first, last in segments:
@@ -262,20 +278,31 @@ def _has(file: DataFile, channel: ChannelEntry) -> bool:
     return True
 
 
+def _place_of(reader: _Reader, name: str, place: Place) -> Place:
+    """Return where a channel is written: in the test at `place`, else among the channels of the campaign."""
+    own = ((*place, "channels", name), (*place, name))
+    return next((item for item in own if item in reader.source.lines), ("channels", name))
+
+
 def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tuple[str, str | None]:
     """Return the unit of a channel and its quantity; the drive settles the campaign's drive unit."""
     if channel.unit is None:
-        own = next((item for item in ((*place, "channels", name), (*place, name)) if item in reader.source.lines), None)
-        raise reader.source.error(
-            (*(own or ("channels", name)), "unit"), "is missing", "write its unit, such as mm or N"
+        usual = {"time": "s", "drive": "A"}.get(
+            name, units.SI_UNITS.get(quantity_of(name, reader.entry.rig) or "", "N")
         )
-    where = f"{reader.source.path}: {reader.source.where(('channels', name))}"
+        raise reader.source.error(
+            (*_place_of(reader, name, place), "unit"), "is missing", f"write its unit, such as {usual}"
+        )
+    where = f"{reader.source.path}: {reader.source.where(_place_of(reader, name, place))}"
     quantity = quantity_of(name, reader.entry.rig)
     if quantity == "drive":
-        kind = "current" if units.same_dimension(channel.unit, "current") else "voltage"
+        kind = next((item for item in ("current", "voltage") if units.same_dimension(channel.unit, item)), "")
+        if not kind:
+            raise UserError(where, f"unit {channel.unit!r}", "is not a unit of current or voltage", _DRIVE_REMEDY)
         known = reader.drive_units.setdefault("drive", units.SI_UNITS[kind])
         if known != units.SI_UNITS[kind]:
-            raise reader.source.error((*place, name), "is in A in one test and in V in another", "use one of the two")
+            problem = f"is in {units.SI_UNITS[kind]} in {dotted(place)} and in {known} in the tests before"
+            raise reader.source.error(_place_of(reader, name, place), problem, "use one of the two")
         quantity = kind
     if channel.mass_kg is not None:
         quantity = "acceleration"
@@ -288,7 +315,7 @@ def _read_channel(
 ) -> FloatArray:
     unit, quantity = _unit(reader, name, channel, place)
     if channel.column is None:
-        raise reader.source.error((*place, "channels", name), "has neither column nor value", "write column: ...")
+        raise reader.source.error(_place_of(reader, name, place), "has neither column nor value", "write column: ...")
     values = file.column(channel.column, f"{where}, {name}")
     values = np.asarray(units.to_si(channel.scale * values + channel.offset, unit, quantity=quantity))
     return values if channel.mass_kg is None else -channel.mass_kg * values
@@ -308,36 +335,6 @@ def _one_length(file: DataFile, columns: dict[str, FloatArray], where: str) -> i
         sizes = ", ".join(f"{name} {size}" for name, size in lengths.items())
         raise UserError(file.path, where, f"channels differ in length ({sizes})", "pick columns of one length")
     return next(iter(lengths.values()))
-
-
-def _segments(
-    reader: _Reader, file: DataFile, entry: TestEntry, time: FloatArray, rate: float, place: Place
-) -> tuple[int, int, tuple[tuple[int, int], ...]]:
-    """Return the range of samples to keep, and the segments within it."""
-    parts = file.parts or ((0, time.size),)
-    if entry.part is not None:
-        if entry.part > len(parts):
-            raise reader.source.error(
-                (*place, "part"), f"is {entry.part}, the file has {len(parts)}", f"write 1 to {len(parts)}"
-            )
-        parts = (parts[entry.part - 1],)
-    wanted = entry.segments_s or ((-np.inf, np.inf),)
-    tolerance = 1e-3 / rate
-    ranges = []
-    for begin_s, end_s in wanted:
-        first, last = np.searchsorted(time, [begin_s - tolerance, end_s - tolerance])
-        hits = [(max(int(first), begin), min(int(last), end)) for begin, end in parts]
-        hits = [(begin, end) for begin, end in hits if end > begin]
-        if not hits:
-            raise reader.source.error(
-                (*place, "segments_s"),
-                f"[{begin_s:g}, {end_s:g}] holds no sample",
-                f"the clock of {entry.file} runs from {time[0]:.6g} to {time[-1]:.6g} s",
-            )
-        ranges += hits
-    ranges.sort()
-    begin, end = ranges[0][0], ranges[-1][1]
-    return begin, end, tuple((first - begin, last - begin) for first, last in ranges)
 
 
 def _require_unique_names(source: YamlSource, recordings: list[Recording]) -> None:

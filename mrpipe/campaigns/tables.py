@@ -21,6 +21,7 @@ _NUMBER = re.compile(r"^[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?$|^[+-]?(na
 _DATE = r"(?:\d{4}[-/]\d{1,2}[-/]\d{1,2}|\d{1,2}[./]\d{1,2}[./]\d{2,4})"
 _TIME = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s?[AaPp][Mm])?(?:Z|[+-]\d{2}:?\d{2})?"
 _STAMP = re.compile(rf"^(?:{_DATE}(?:[T ]{_TIME})?|{_TIME})$")
+_DAY_S = 86400.0
 _LABELS = {"name", "names", "channel", "channels", "signal", "signals"}
 
 
@@ -39,6 +40,8 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
     """
     layout = layout or TextEntry()
     lines = text.splitlines()
+    if not text.strip():
+        raise UserError(path, "", "is empty", "export the measurement again, or name another file")
     if lines and lines[0].lower().startswith("header size"):
         return read_logger(path, lines)
     comment = layout.comment or "%#"
@@ -46,32 +49,34 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
     fields = _split(lines[first], delimiter)
     headers = _headers(lines[layout.skip_lines : first], delimiter, comment, fields)
     width = max([len(fields), *(len(row) for row in headers)])
-    frame = _rows(path, lines, first, comment, delimiter, decimal, width)
+    rows = [index for index in range(first, len(lines)) if lines[index].strip() and lines[index][0] not in comment]
+    frame = _rows(path, [lines[index] for index in rows], rows, delimiter, decimal, width)
     if _labelled(fields):
         frame.iloc[0, 0] = np.nan
     keep = [index for index in range(width) if not (index == width - 1 and frame[index].isna().all())]
     names = _names(headers, keep)
     aliases = {word: names[index] for row in headers for index, word in enumerate(row) if word and index < len(names)}
     positions = dict(zip(names, keep, strict=True))
+    numbers = tuple(index + 1 for index in rows)
     return DataFile(
         path=path,
         names=tuple(names),
-        fetch=lambda name: _numbers(path, frame[positions[name]], name, first),
+        fetch=lambda name: _numbers(path, frame[positions[name]], name, numbers),
         table=True,
         first_row=first + 1,
+        row_lines=numbers if rows[-1] - first + 1 > len(rows) else (),
         aliases={word: name for word, name in aliases.items() if word not in names},
         headers=tuple(tuple(row) for row in headers),
     )
 
 
 def _rows(
-    path: Path, lines: list[str], first: int, comment: str, delimiter: str | None, decimal: str, width: int
+    path: Path, lines: list[str], places: list[int], delimiter: str | None, decimal: str, width: int
 ) -> pd.DataFrame:
-    """Return the rows from the first one on; a row with too many fields is reported with its line."""
-    text = "\n".join(line for line in lines[first:] if line.strip() and line[0] not in comment)
+    """Return the rows of numbers; a row with too many fields is reported with its line (`places` count from 0)."""
     try:
         return pd.read_csv(
-            io.StringIO(text),
+            io.StringIO("\n".join(lines)),
             sep=delimiter or r"\s+",
             decimal=decimal,
             header=None,
@@ -83,11 +88,11 @@ def _rows(
             na_values=[],
         )
     except pd.errors.ParserError:
-        for number, line in enumerate(lines[first:], start=first + 1):
+        for place, line in zip(places, lines, strict=True):
             fields = _split(line.strip() if delimiter is None else line, delimiter)
-            if line.strip() and line[0] not in comment and len(fields) > width:
+            if len(fields) > width:
                 problem = f"has {len(fields)} fields, the rows above have {width}"
-                raise UserError(path, f"line {number}", problem, "correct the row") from None
+                raise UserError(path, f"line {place + 1}", problem, "correct the row") from None
         raise
 
 
@@ -159,31 +164,34 @@ def _names(headers: list[list[str]], keep: list[int]) -> list[str]:
     return names
 
 
-def _numbers(path: Path, column: Any, name: str, first: int) -> FloatArray:
+def _numbers(path: Path, column: Any, name: str, lines: tuple[int, ...]) -> FloatArray:
     """Return a column as floats; text that is not a time stamp is reported with its line."""
     if column.dtype.kind in "fiub":
         return np.asarray(column, dtype=np.float64)
     filled = column.dropna()
     if len(filled) and all(_STAMP.match(str(item).strip()) for item in filled.iloc[[0, len(filled) // 2, -1]]):
-        return _seconds(path, column, name, first)
+        return _seconds(path, column, name, lines)
     numbers = pd.to_numeric(column, errors="coerce")
-    wrong = numbers.isna() & column.notna()
+    wrong = (numbers.isna() & column.notna()).to_numpy()
     if wrong.any():
-        row = int(np.argmax(wrong.to_numpy()))
-        raise UserError(
-            path, f"line {first + 1 + row}, column {name}", f"{column.iloc[row]!r} is not a number", "write a number"
-        )
+        row = int(np.argmax(wrong))
+        at_the_end = not numbers.iloc[row:].notna().any()
+        remedy = "delete the lines after the last sample" if at_the_end and row else "write a number"
+        raise UserError(path, f"line {lines[row]}, column {name}", f"{column.iloc[row]!r} is not a number", remedy)
     return np.asarray(numbers, dtype=np.float64)
 
 
-def _seconds(path: Path, column: Any, name: str, first: int) -> FloatArray:
-    """Return time stamps as seconds from the first one."""
+def _seconds(path: Path, column: Any, name: str, lines: tuple[int, ...]) -> FloatArray:
+    """Return time stamps as seconds from the first one; times of day may pass midnight."""
     text = column.astype(str).str.strip().str.replace(",", ".", regex=False)
     day_first = bool(re.match(r"^\d{1,2}\.", text.iloc[0]))
     stamps = pd.to_datetime(text, errors="coerce", dayfirst=day_first, format="mixed", utc=True)
     wrong = stamps.isna()
     if wrong.any():
         row = int(np.argmax(wrong.to_numpy()))
-        where = f"line {first + 1 + row}, column {name}"
+        where = f"line {lines[row]}, column {name}"
         raise UserError(path, where, f"{column.iloc[row]!r} is not a time stamp", "write it as 2026-03-01T12:00:00.000")
-    return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
+    seconds = np.array((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
+    if re.fullmatch(_TIME, text.iloc[0]):
+        seconds[1:] += _DAY_S * np.cumsum(np.diff(seconds) < -0.5 * _DAY_S)
+    return seconds

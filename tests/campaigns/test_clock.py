@@ -61,3 +61,11 @@ def test_jitter_is_reported_and_is_no_gap() -> None:
 def test_an_impossible_clock_is_refused(time: Any, rate: float | None, samples: int, message: str) -> None:
     with pytest.raises(UserError, match=message):
         build_clock(data_file(), time, rate, samples, "test one")
+
+
+def test_a_clock_with_too_few_digits_names_the_way_out() -> None:
+    time = np.floor(np.arange(500) / 2.0) / 1000.0
+    with pytest.raises(
+        UserError, match=r"250 of 500 samples have the same time .*; export the time with more digits, or"
+    ):
+        build_clock(data_file(), time, None, 500, "test one")

@@ -173,7 +173,7 @@ def test_uff_without_its_package_is_told_in_a_line(tmp_path: Path, monkeypatch: 
         ("a.h5", b"nothing of the kind", "is damaged or not what its ending says"),
         ("a.json", b"{", "is damaged or not what its ending says"),
         ("a.json", b"3", "holds no named columns"),
-        ("a.csv", b"", "holds no row of numbers"),
+        ("a.csv", b"", "is empty"),
         ("a.csv", b"only,words\nhere,too\n", "holds no row of numbers"),
         ("a.csv", b"t,x\n1,2\n2,3,4,5,6\n", "line 3: has 5 fields, the rows above have 2; correct the row"),
         ("a.txt", b"Header Size: x\n", "the logger's header is incomplete"),

@@ -135,7 +135,7 @@ def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: d
         ({"name": "two"}, "tests[1].name: 'two' is used twice"),
         ({"part": 2}, "part: is 2, the file has 1"),
         ({"file": "one.xls"}, "one.xls: data file not found"),
-        ({"drive": {"value": 1.0, "unit": "V"}}, "is in A in one test and in V in another"),
+        ({"drive": {"value": 1.0, "unit": "V"}}, "drive: is in A in tests[1] and in V in the tests before"),
         ({"drive": {"value": 1.0, "column": "i", "unit": "A"}}, "either column or value expected, not both"),
         ({"drive": {"value": float("inf"), "unit": "A"}}, "a finite number expected"),
     ],
@@ -145,6 +145,31 @@ def test_each_fault_of_a_test_has_its_line(tmp_path: Path, change: dict, expecte
     tests[0] = {key: value for key, value in (tests[0] | change).items() if value is not None}
     message = told(campaign(tmp_path, tests=tests)).replace(str(tmp_path), "")
     assert expected in message
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("unit", ["%", "1", "Nm"])
+def test_a_drive_that_is_no_current_and_no_voltage_is_told_how_to_become_one(tmp_path: Path, unit: str) -> None:
+    channels = {**CHANNELS, "drive": {"column": "i", "unit": unit}}
+    assert "is not a unit of current or voltage; write A or V; for percent" in told(
+        campaign(tmp_path, channels=channels)
+    )
+
+
+@pytest.mark.golden
+def test_a_faulty_channel_is_told_where_it_is_written(tmp_path: Path) -> None:
+    channels = {**CHANNELS, "displacement": {"unit": "mm"}}
+    assert "line 8, channels.displacement: has neither" in told(campaign(tmp_path / "a", channels=channels))
+    tests = content()["tests"]
+    tests[1]["channels"] = {"force": {"unit": "mm"}}
+    assert ", tests[1].channels.force: unit 'mm': is not a unit of force" in told(campaign(tmp_path / "b", tests=tests))
+
+
+@pytest.mark.golden
+def test_two_channels_of_one_column_are_refused(tmp_path: Path) -> None:
+    channels = {**CHANNELS, "force": {"column": "x", "unit": "N"}}
+    expected = "channels.force: names the column 'x', which is also that of displacement"
+    assert expected in told(campaign(tmp_path, channels=channels))
 
 
 @pytest.mark.golden

@@ -45,3 +45,37 @@ def test_time_stamps_become_seconds() -> None:
 def test_a_faulty_row_is_named(text: str, message: str) -> None:
     with pytest.raises(UserError, match=message):
         table_of_text(Path("a.csv"), text).column(1, "")
+
+
+@pytest.mark.parametrize("between", ["\n", "\n% a note\n"])
+def test_lines_count_also_those_without_numbers(between: str) -> None:
+    text = "t,x\n0,1\n1,2\n" + between + "2,3\n3,OVL\n4,5\n"
+    line = text.splitlines().index("3,OVL") + 1
+    table = table_of_text(Path("a.csv"), text)
+    with pytest.raises(UserError, match=f"line {line}, column x: 'OVL' is not a number; write a number"):
+        table.column(1, "")
+    assert [table.line_of(index) for index in (1, 3)] == [3, line]
+
+
+def test_words_after_the_last_sample_are_to_be_deleted() -> None:
+    text = "t,x\n0,1\n1,2\n\nEnd of test\n"
+    with pytest.raises(UserError, match="line 5, column t: 'End of test' is not a number; delete the lines after"):
+        table_of_text(Path("a.csv"), text).column("t", "")
+
+
+@pytest.mark.parametrize(("text", "message"), [("", "is empty"), ("\n \n", "is empty"), ("t,x\n0,1\n", "single row")])
+def test_a_file_without_samples_is_refused_as_such(text: str, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        table_of_text(Path("a.csv"), text).column("t", "")
+
+
+def test_times_of_day_may_pass_midnight() -> None:
+    text = "when,x\n23:59:59.500,1\n23:59:59.999,2\n00:00:00.500,3\n00:00:01.500,4\n"
+    assert table_of_text(Path("a.csv"), text).column("when", "").tolist() == [0.0, 0.499, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("header", "asked"), [("La\u0308nge", "Länge"), ("x [\u03bcm]", "x [\u00b5m]"), ("a  b", "a b")]
+)
+def test_names_that_look_the_same_are_the_same(header: str, asked: str) -> None:
+    assert table_of_text(Path("a.csv"), f"t,{header}\n0,1\n1,2\n").column(asked, "").tolist() == [1.0, 2.0]
