@@ -188,6 +188,8 @@ def parse(text: str, source: str | Path) -> tuple[Any, Any]:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        if "'\\t'" in problem:
+            raise UserError(source, where, "not valid YAML (a tab)", "write spaces in place of the tab") from error
         raise UserError(source, where, f"not valid YAML ({problem})", "correct the syntax") from error
     except RecursionError:
         raise UserError(source, "", "is nested too deeply", f"nest at most {DEEPEST} levels") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import unicodedata
 from functools import cache
 from pathlib import Path
 
@@ -32,6 +33,26 @@ def ending_of(path: Path) -> str:
     return f"{Path(path.stem).suffix.lower()}.gz" if ending == ".gz" else ending
 
 
+def not_found(path: Path) -> UserError:
+    """Return the error for a data file that is missing.
+
+    It names the file of the folder whose name differs in case, spaces, signs or ending alone. A name with other digits
+    is that of another test and is not offered.
+    """
+    remedy = "correct `file:` in the campaign file, or put the file there"
+    try:
+        names = sorted(item.name for item in path.parent.iterdir())
+    except (OSError, ValueError):
+        names = []
+    wanted = {_letters(path.name), _letters(path.stem)}
+    alike = next((name for name in names if {_letters(name), _letters(Path(name).stem)} & wanted), "")
+    return UserError(path, "", "data file not found", f"did you mean {alike}? {remedy}" if alike else remedy)
+
+
+def _letters(name: str) -> str:
+    return "".join(letter for letter in unicodedata.normalize("NFKD", name).casefold() if letter.isalnum())
+
+
 def open_data_file(path: Path, layout: TextEntry | None = None) -> DataFile:
     """Open a data file; only requested columns are converted to numbers.
 
@@ -50,7 +71,7 @@ def open_data_file(path: Path, layout: TextEntry | None = None) -> DataFile:
     except (OSError, ValueError):
         found = False
     if not found:
-        raise UserError(path, "", "data file not found", "correct `file:` in the campaign file, or put the file there")
+        raise not_found(path)
     readers = all_readers()
     ending = ending_of(path)
     if ending not in readers:

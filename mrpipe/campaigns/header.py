@@ -28,6 +28,24 @@ class CampaignHeader:
     laws: Mapping[int, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
 
 
+def campaign_file(path: Path) -> Path:
+    """Return the campaign file of a campaign, which is given as its directory or as the file.
+
+    Raises
+    ------
+    UserError
+        If there is none.
+    """
+    path = Path(path)
+    file = path / CAMPAIGN_FILE if path.is_dir() else path
+    remedy = f"name a directory that holds {CAMPAIGN_FILE}, or such a file"
+    if not file.is_file():
+        raise UserError(file, "", "no such campaign", remedy)
+    if file.suffix.lower() not in (".yaml", ".yml"):
+        raise UserError(file, "", "is not a campaign file, because it does not end in .yaml", remedy)
+    return file
+
+
 def read_header(path: Path) -> CampaignHeader:
     """Read the head of a campaign without its data.
 
@@ -36,10 +54,7 @@ def read_header(path: Path) -> CampaignHeader:
     UserError
         If there is no campaign at `path`, or its file is faulty.
     """
-    path = Path(path)
-    file = path / CAMPAIGN_FILE if path.is_dir() else path
-    if not file.is_file():
-        raise UserError(file, "", "no such campaign", f"name a directory that holds {CAMPAIGN_FILE}, or such a file")
+    file = campaign_file(path)
     source = read_yaml(file)
     entry = source.build(CampaignEntry, source.content, ())
     kinds = {

@@ -15,6 +15,7 @@ from mrpipe.campaigns.checks import find_clipping, find_dropouts, force_sign, re
 from mrpipe.campaigns.clock import build_clock
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.files import open_data_file
+from mrpipe.campaigns.header import campaign_file
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.campaigns.schema import (
     CampaignEntry,
@@ -26,7 +27,6 @@ from mrpipe.campaigns.schema import (
     quantity_of,
 )
 from mrpipe.campaigns.segments import find_segments, segments_beyond
-from mrpipe.campaigns.writing import CAMPAIGN_FILE
 from mrpipe.errors import UserError
 
 _NEEDED_ON_BENCH = ("displacement", "force", "drive")
@@ -74,10 +74,7 @@ def load_campaign(path: Path) -> Campaign:
     UserError
         For every fault of the campaign file or of the data that the reader can see; one line each.
     """
-    path = Path(path)
-    file = path / CAMPAIGN_FILE if path.is_dir() else path
-    if not file.is_file():
-        raise UserError(file, "", "no such campaign", f"name a directory that holds {CAMPAIGN_FILE}, or such a file")
+    file = campaign_file(path)
     source = read_yaml(file)
     entry = source.build(CampaignEntry, source.content, ())
     reader = _Reader(source, entry, _folder(source, entry))
@@ -114,8 +111,7 @@ def campaign_files(path: Path) -> tuple[Path, ...]:
     UserError
         If the campaign file is faulty.
     """
-    path = Path(path)
-    file = path / CAMPAIGN_FILE if path.is_dir() else path
+    file = campaign_file(path)
     source = read_yaml(file)
     entry = source.build(CampaignEntry, source.content, ())
     folder = _folder(source, entry)

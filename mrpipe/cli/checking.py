@@ -121,6 +121,7 @@ def check_headers(loaded: LoadedConfig) -> None:
         If a campaign belongs under another key, declares an unknown effect, or lacks a file.
     """
     from mrpipe.campaigns import campaign_files
+    from mrpipe.campaigns.files import not_found
     from mrpipe.campaigns.header import read_header
 
     for key, path in measured_campaigns(loaded).items():
@@ -137,8 +138,7 @@ def check_headers(loaded: LoadedConfig) -> None:
         require_known_laws(header)
         for file in campaign_files(path):
             if not file.is_file():
-                remedy = "correct `file:` in the campaign file, or put the file there"
-                raise UserError(file, "", "data file not found", remedy)
+                raise not_found(file)
 
 
 def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -55,7 +56,7 @@ def show(
         print_any(description)
 
 
-@with_common_options("run", "campaign", "jobs", "seed", "force")
+@with_common_options("run", "jobs", "seed", "force")
 def check(
     options: CommonOptions,
     explain: Annotated[bool, typer.Option("--explain", help="List every setting with its meaning and value.")] = False,
@@ -66,12 +67,12 @@ def check(
     """
     from mrpipe.cli import checking
     from mrpipe.cli.output import print_json
-    from mrpipe.config.loader import default_config_path, load_config
+    from mrpipe.cli.session import load
     from mrpipe.config.model import options as all_options
     from mrpipe.errors import CheckFailed
     from mrpipe.pipeline.settings_view import setting_named
 
-    loaded = load_config(options.config or default_config_path(), options.overrides, options.settings)
+    loaded = load(replace(options, quiet=True))
     checking.check_stages(loaded)
     if explain:
         content = [
@@ -116,7 +117,9 @@ def check(
         for stage, campaign in without.items():
             print(f"  {stage}: will be skipped, because there is no {campaign} campaign")
         if not result.errors:
-            print(f"next: mrpipe run {options.config or _shortest(loaded.path)}")
+            named = "" if options.config is None and options.campaign else options.config or _shortest(loaded.path)
+            given = f"--campaign {options.campaign}" if options.campaign else ""
+            print(" ".join(f"next: mrpipe run {named} {given}".split()))
     if result.errors:
         raise CheckFailed(f"{loaded.path}: {count} in the measured data (listed above)")
 

@@ -106,8 +106,9 @@ def one_config(named: Path | None, positional: Path | None) -> Path | None:
     if named is not None and positional is not None and named != positional:
         raise UserError("--config", str(named), f"and {positional} are two configurations", "give one of them")
     chosen = named or positional
-    if chosen is not None and chosen.name == "campaign.yaml":
-        raise UserError(chosen, "", "is a campaign and not a configuration", f"use --campaign {chosen.parent}")
+    if chosen is not None and (chosen.name == "campaign.yaml" or (chosen / "campaign.yaml").is_file()):
+        folder = chosen.parent if chosen.name == "campaign.yaml" else chosen
+        raise UserError(chosen, "", "is a campaign and not a configuration", f"use --campaign {folder}")
     return chosen
 
 

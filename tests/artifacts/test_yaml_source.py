@@ -53,3 +53,12 @@ def test_dates_stay_text(tmp_path: Path) -> None:
 def test_merged_mappings_are_no_repeated_keys(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("base: &b {x: 1, y: 2}\nown: {<<: *b, x: 3}\n", encoding="utf-8")
     assert read_yaml(tmp_path / "a.yaml").content["own"] == {"x": 3, "y": 2}
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("text", ["a:\n\tb: 1\n", "a: 1\nb:\t\tc: 2\n", "a:\n  b: 1\n\tc: 2\n"])
+def test_a_tab_names_its_remedy(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(text)
+    with pytest.raises(UserError, match=r"line \d: not valid YAML \(a tab\); write spaces in place of the tab"):
+        read_yaml(path)

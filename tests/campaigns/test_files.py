@@ -253,3 +253,19 @@ def test_writing_refuses_what_could_not_be_read(tmp_path: Path) -> None:
 def test_a_table_with_numbers_for_names(tmp_path: Path) -> None:
     write_csv(tmp_path / "a.csv", COLUMNS, header=False)
     np.testing.assert_allclose(open_data_file(tmp_path / "a.csv").column(4, "t"), COLUMNS["F"], rtol=1e-9)
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("asked", ["sine_1hz.csv", "Sine 1Hz.csv", "Sine_1Hz", "Sine_1Hz.txt"])
+def test_a_missing_file_offers_the_one_of_almost_that_name(tmp_path: Path, asked: str) -> None:
+    (tmp_path / "Sine_1Hz.csv").write_text("t,x\n0,1\n1,2\n")
+    with pytest.raises(UserError, match=r"data file not found; did you mean Sine_1Hz\.csv\? correct `file:`"):
+        open_data_file(tmp_path / asked)
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("asked", ["Sine_2Hz.csv", "nowhere/Sine_1Hz.csv", "Sine_1Hz_b.csv"])
+def test_a_missing_file_of_another_test_offers_none(tmp_path: Path, asked: str) -> None:
+    (tmp_path / "Sine_1Hz.csv").write_text("t,x\n0,1\n1,2\n")
+    with pytest.raises(UserError, match="data file not found; correct `file:`"):
+        open_data_file(tmp_path / asked)

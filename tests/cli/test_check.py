@@ -146,6 +146,38 @@ def test_the_configuration_is_an_argument_or_an_option(tmp_path: Path, capsys: p
     assert checked(capsys, "--config", str(config)) == checked(capsys, str(config))
 
 
+@pytest.mark.planted
+def test_a_campaign_is_checked_with_the_option_that_the_message_names(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tests = sound_tests(6)
+    tests[3] = replace(tests[3], force_n=-tests[3].force_n)
+    project(tmp_path, tests)
+    monkeypatch.chdir(tmp_path)
+    for wrong in ("data", "data/campaign.yaml"):
+        status, _, err = checked(capsys, wrong)
+        assert status == 2 and "is a campaign and not a configuration; use --campaign data" in err
+    status, out, _ = checked(capsys, "--campaign", "data")
+    assert status == 1 and "error: test T3, force: force or displacement has the opposite sign" in out
+
+
+@pytest.mark.golden
+def test_after_a_sound_campaign_the_next_command_has_it_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = project(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = checked(capsys, config.name, "--campaign", "data")
+    assert status == 0 and out.splitlines()[-1] == f"next: mrpipe run {config.name} --campaign data"
+
+
+@pytest.mark.golden
+def test_a_data_file_given_as_a_campaign(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project(tmp_path)
+    status, _, err = checked(capsys, "--campaign", str(tmp_path / "data" / "T1.h5"))
+    assert status == 2 and "T1.h5: is not a campaign file, because it does not end in .yaml; name a directory" in err
+
+
 @pytest.mark.golden
 def test_explain_prints_no_python_objects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = checked(capsys, str(project(tmp_path)), "--explain")
