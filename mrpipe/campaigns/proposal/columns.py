@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from mrpipe.campaigns.proposal.words import Header, read_header
 from mrpipe.errors import UserError
 
 MOST_COLUMNS = 200
+_DRIVE_GUESSED = "no unit in the header; guessed from the numbers"
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class Guess:
         Whether a drive is a command.
     value
         Constant, for a drive that no column holds.
+    size
+        Amplitude from which the unit was guessed, None where the header gives the unit.
     """
 
     column: str
@@ -49,6 +53,7 @@ class Guess:
     unsure: str = ""
     set_point: bool = False
     value: float | None = None
+    size: float | None = None
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,20 @@ def columns_of(file: DataFile) -> list[Column]:
                 found.append(Column(column, header, values))
     longest = max((item.values.size for item in found), default=0)
     return [item for item in found if item.values.size == longest]
+
+
+def unreadable_channels(file: DataFile) -> dict[str, str]:
+    """Return why a column is not used, for each one whose header names a channel and whose samples cannot be read."""
+    lines = {}
+    for name in file.names[:MOST_COLUMNS] if file.table else ():
+        header = read_header(name)
+        if not (header.quantity or header.unit_quantity):
+            continue
+        try:
+            file.column(name, "")
+        except UserError as error:
+            lines[name] = f"{error.where}: {error.problem}" if error.where else error.problem
+    return lines
 
 
 def _of_a_record(name: str) -> Header:
@@ -132,8 +151,9 @@ def lay_out_bench(columns: list[Column], file: DataFile) -> Layout:
     if drive is not None:
         quantity = drive.header.unit_quantity or drive.header.quantity
         unit = drive.header.unit or ("V" if quantity == "voltage" else _drive_unit(drive.values))
-        unsure = "" if drive.header.unit else "no unit in the header; guessed from the numbers"
-        take("drive", drive, Guess(drive.name, unit, unsure, set_point=drive.header.command))
+        unsure = "" if drive.header.unit else _DRIVE_GUESSED
+        size = None if drive.header.unit or quantity == "voltage" else float(np.nanmax(np.abs(drive.values)))
+        take("drive", drive, Guess(drive.name, unit, unsure, set_point=drive.header.command, size=size))
     rest = [item for item in left if item.name not in taken and not item.header.quantity]
     _by_samples(channels, taken, [item for item in rest if not item.header.unit])
     unused = tuple(item.name for item in columns if item.name not in taken)
@@ -246,15 +266,20 @@ def _guess(column: Column, quantity: str) -> Guess:
     header = column.header
     if header.unit_quantity == quantity:
         return Guess(column.name, header.unit)
-    unit, why = unit_by_size(column.values, quantity)
+    size = amplitude(column.values)
+    unit, why = unit_by_size(size, quantity)
     if header.unit:
         why = f"the header gives {header.unit}, which is not a unit of {quantity}: give scale and unit of the sensor"
-    return Guess(column.name, unit, why)
+    return Guess(column.name, unit, why, size=size)
 
 
-def unit_by_size(values: FloatArray, quantity: str) -> tuple[str, str]:
-    """Return the likeliest unit of a quantity for samples of this size, and why it is unsure."""
-    size = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+def amplitude(values: FloatArray) -> float:
+    """Return half the range of samples that may hold NaN."""
+    return 0.5 * float(np.nanmax(values) - np.nanmin(values))
+
+
+def unit_by_size(size: float, quantity: str) -> tuple[str, str]:
+    """Return the likeliest unit of a quantity for samples of this amplitude, and why it is unsure."""
     limits = {
         "displacement": (("m", 0.3), ("mm", 1e9)),
         "velocity": (("m/s", 2.0), ("mm/s", 1e9)),
@@ -266,7 +291,31 @@ def unit_by_size(values: FloatArray, quantity: str) -> tuple[str, str]:
 
 
 def _drive_unit(values: FloatArray) -> str:
-    return "mA" if float(np.abs(values).max()) > 30.0 else "A"
+    return "mA" if float(np.nanmax(np.abs(values))) > 30.0 else "A"
+
+
+def share_units(layouts: Sequence[Layout]) -> list[Layout]:
+    """Return the layouts of the files of a folder, with one unit for a column whose header names none.
+
+    The amplitude of one test does not show the unit: 20 of 80 mA could be 20 A, and a slow test of 4 N could be one of
+    4 kN. Files with the same column therefore share the unit of the test with the largest amplitude.
+    """
+    largest: dict[tuple[str, str], Guess] = {}
+    for layout in layouts:
+        for channel, guess in layout.channels.items():
+            best = largest.setdefault((channel, guess.column), guess)
+            if guess.size is not None and guess.size > (best.size or 0.0):
+                largest[channel, guess.column] = guess
+    return [
+        replace(
+            layout,
+            channels={
+                channel: guess if guess.size is None else largest[channel, guess.column]
+                for channel, guess in layout.channels.items()
+            },
+        )
+        for layout in layouts
+    ]
 
 
 def _by_samples(channels: dict[str, Guess], taken: set[str], columns: list[Column]) -> None:
@@ -279,13 +328,15 @@ def _by_samples(channels: dict[str, Guess], taken: set[str], columns: list[Colum
     constant = [item for item in columns if _few_levels(item.values)]
     moving = [item for item in columns if item not in constant]
     if "drive" not in channels and constant:
-        channels["drive"] = Guess(constant[0].name, _drive_unit(constant[0].values), why)
+        size = float(np.nanmax(np.abs(constant[0].values)))
+        channels["drive"] = Guess(constant[0].name, _drive_unit(constant[0].values), why, size=size)
         taken.add(constant[0].name)
     moving.sort(key=lambda item: mean_frequency(np.nan_to_num(item.values), 1.0))
     for channel in ("displacement", "force"):
         if channel not in channels and moving:
             column = moving.pop(0) if channel == "displacement" else moving.pop()
-            channels[channel] = Guess(column.name, unit_by_size(column.values, channel)[0], why)
+            size = amplitude(column.values)
+            channels[channel] = Guess(column.name, unit_by_size(size, channel)[0], why, size=size)
             taken.add(column.name)
 
 

@@ -22,6 +22,8 @@ from mrpipe.campaigns.proposal.columns import (
     lay_out_bench,
     lay_out_frame,
     open_columns,
+    share_units,
+    unreadable_channels,
 )
 from mrpipe.campaigns.proposal.kinds import GAINS, kind_of, kind_of_record, law_of, mode_of
 from mrpipe.campaigns.proposal.roles import (
@@ -126,6 +128,8 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
         raise UserError(
             folder, "", f"holds no readable data file{reason}", f"one of {', '.join(sorted(all_readers()))}"
         )
+    layouts = share_units([item.layout for item in files])
+    files = [replace(item, layout=layout) for item, layout in zip(files, layouts, strict=True)]
     proposals = []
     for kind, wanted in (("bench", "damper-bench"), ("frame", "shear-frame")):
         chosen = [item for item in files if item.layout.rig == wanted]
@@ -162,6 +166,7 @@ def _propose(
             for item in files
             if key not in item.layout.channels and any(key in other.layout.channels for other in files)
         ]
+    unsure += _not_used(files)
     tests, why, notes = _bench_tests(files, folder, shared) if bench else _frame_tests(files, folder, shared)
     unsure += notes
     unused = sorted({column for item in files for column in item.layout.unused})
@@ -189,6 +194,18 @@ def _propose(
     channels = {key: f"{guess.column or guess.value} [{guess.unit}]" for key, guess in found.items()}
     listed = tuple((item.name, ", ".join(word for word in (item.kind, item.role) if word)) for item in tests)
     return Proposal("bench" if bench else "frame", text, channels, listed, tuple(unsure), tuple(skipped))
+
+
+def _not_used(files: list[_File]) -> list[str]:
+    """Return a line for each column that names a channel and cannot be read; files with the same column share it."""
+    found: dict[str, list[str]] = {}
+    for item in files:
+        for column, why in unreadable_channels(item.file).items():
+            found.setdefault(column, []).append(f"{item.path.name}: {why}")
+    return [
+        f"column {column} is not used: {lines[0]}" + (f" (and in {len(lines) - 1} other files)" if lines[1:] else "")
+        for column, lines in found.items()
+    ]
 
 
 def _shared(files: list[_File]) -> dict[str, Guess]:

@@ -208,3 +208,47 @@ def test_a_folder_that_holds_nothing_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("only words\n")
     with pytest.raises(UserError, match="holds no readable data file"):
         propose_campaigns(tmp_path, "own", None, tmp_path / "p")
+
+
+def _write_bench(folder: Path, tests: dict[str, tuple[float, float, float]], tail: str = "") -> Path:
+    """Write a file per test: name -> amplitudes of displacement and force, and the drive. Headers name no units."""
+    folder.mkdir()
+    time = np.arange(3000) / 500.0
+    for name, (travel, force, drive) in tests.items():
+        wave = np.sin(2.0 * np.pi * time)
+        rows = np.column_stack([time, travel * wave, np.full(time.size, drive), force * np.cos(2.0 * np.pi * time)])
+        text = "\n".join(",".join(f"{value:.6f}" for value in row) for row in rows)
+        (folder / name).write_text(f"time,displacement,current,force\n{text}\n{tail}")
+    return folder
+
+
+@pytest.mark.planted
+def test_columns_without_units_have_one_unit_in_all_files(tmp_path: Path) -> None:
+    sizes = {
+        "a.csv": (0.1, 4.0, 0.0),
+        "b.csv": (8.0, 90.0, 20.0),
+        "c.csv": (8.0, 170.0, 80.0),
+        "d.csv": (6.0, 95.0, 20.0),
+    }
+    found, path = _proposed(_write_bench(tmp_path / "raw", sizes), tmp_path / "beside")
+    assert {key: text.split()[-1] for key, text in found.channels.items()} == {
+        "time": "[s]",
+        "displacement": "[mm]",
+        "drive": "[mA]",
+        "force": "[N]",
+    }
+    read = load_campaign(path)
+    assert [float(np.ptp(test.channels["displacement"])) for test in read.recordings] == pytest.approx(
+        [2e-4, 16e-3, 16e-3, 12e-3], rel=1e-3
+    )
+    assert [float(test.channels["drive"][0]) for test in read.recordings] == pytest.approx([0.0, 0.02, 0.08, 0.02])
+
+
+@pytest.mark.planted
+def test_a_clock_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    sizes = {"a.csv": (5.0, 90.0, 1.0), "b.csv": (8.0, 170.0, 2.0)}
+    found, _ = _proposed(_write_bench(tmp_path / "raw", sizes, tail="End of test\n"), tmp_path / "beside")
+    expected = (
+        "column time is not used: a.csv: line 3002, column time: 'End of test' is not a number (and in 1 other files)"
+    )
+    assert expected in found.unsure
