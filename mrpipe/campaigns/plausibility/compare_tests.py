@@ -19,8 +19,8 @@ def compare_tests(tests: Sequence[TestArrays]) -> tuple[Finding, ...]:
     """Return everything by which a test contradicts the others or cannot be a sound recording.
 
     The findings are named `dead-channel`, `stuck-channel`, `spikes`, `same-record`, `sign-reversed`, `unit-decades`,
-    `channels-exchanged`, `force-unrelated`, `gain-differs` and `delay-differs`. Tests with a dead channel, a stuck
-    channel or spikes are left out of the comparison of forces, because their fault is known already.
+    `at-rest`, `channels-exchanged`, `force-unrelated`, `gain-differs` and `delay-differs`. Tests with a dead
+    channel, a stuck channel or spikes are left out of the comparison of forces, because their fault is known already.
 
     Parameters
     ----------

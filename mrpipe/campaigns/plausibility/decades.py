@@ -12,6 +12,9 @@ from mrpipe.campaigns.plausibility.reference import Slow
 DECADES = 100.0
 """Ratio of RMS force or drive between a test and all others from which a unit is suspected by itself."""
 
+RELATED = 0.3
+"""Correlation of force and velocity below which a test with very small motion is one at rest."""
+
 LARGE_DRIVE = 20.0
 """Drive [A or V] above which milliamperes or millivolts are suspected."""
 
@@ -42,7 +45,25 @@ def find_decades(tests: Sequence[Slow]) -> list[Finding]:
         evidence = f"the RMS is {times:.3g} times that of the nearest of the {len(order) - len(named)} others"
         for index in sorted(named):
             findings.append(unit_finding(tests[index], channel, 1e-3 if large else 1e3, evidence, {"ratio": times}))
-    return findings
+    small = {item.test for item in findings if item.channel == "displacement" and item.numbers["ratio"] < 1.0}
+    resting = [test for test in tests if test.name in small and abs(test.work) < RELATED]
+    kept = [item for item in findings if item.test not in {test.name for test in resting}]
+    return [*kept, *(_at_rest(test) for test in resting)]
+
+
+def _at_rest(test: Slow) -> Finding:
+    """Return the finding that nothing moves in a test."""
+    travel, force = float(np.std(test.displacement)), float(np.std(test.force))
+    return Finding(
+        name="at-rest",
+        severity="warning",
+        test=test.name,
+        channel="displacement",
+        sentence=f"the rod does not move (RMS {1e3 * travel:.2g} mm), and the force (RMS {force:.3g} N about its mean) "
+        "does not follow it",
+        remedy="leave the test out, because it does not show what the damper does",
+        numbers={"displacement_m": travel, "force_n": force},
+    )
 
 
 def unit_finding(test: Slow, channel: str, factor: float, evidence: str, numbers: dict[str, float]) -> Finding:

@@ -84,6 +84,41 @@ def test_one_drive_level_only(level: float, name: str) -> None:
     assert found.name == name and "no inverse model is possible" in found.sentence.replace("so no", "no")
 
 
+@pytest.mark.planted
+def test_a_drive_that_is_negative_in_all_tests_is_an_error() -> None:
+    (found,) = [item for item in judge(_bench(_scaled("drive", -1.0))) if item.name == "drive-negative"]
+    assert (found.severity, found.channel, found.remedy) == ("error", "drive", "give the drive `scale: -1`")
+
+
+@pytest.mark.planted
+def test_a_drive_of_both_signs_is_a_warning() -> None:
+    signed = iter([1.0, 1.0, 1.0, -1.0])
+    (found,) = judge(_bench(lambda channels: {**channels, "drive": next(signed) * channels["drive"]}))
+    assert (found.name, found.severity, found.numbers["tests"]) == ("drive-negative", "warning", 1.0)
+    assert found.test and "in 1 of 4 tests" in found.sentence
+
+
+@pytest.mark.planted
+def test_the_offset_of_a_current_probe_is_no_negative_drive() -> None:
+    assert judge(_bench(lambda channels: {**channels, "drive": channels["drive"] - 0.02})) == ()
+
+
+@pytest.mark.planted
+def test_a_test_at_rest_is_called_so_and_not_given_another_unit_or_clock() -> None:
+    rng = np.random.default_rng(0)
+    order = iter(range(4))
+
+    def still(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        if next(order) != 1:
+            return channels
+        size = channels["force"].size
+        noise = {"displacement": 2e-6 * rng.standard_normal(size), "force": 1.0 + 0.3 * rng.standard_normal(size)}
+        return {**channels, **noise}
+
+    (found,) = judge(_bench(still))
+    assert (found.name, found.severity, found.test) == ("at-rest", "warning", "T1")
+
+
 def _frame(change: Callable[[dict[str, np.ndarray]], None] = lambda channels: None) -> Campaign:
     rng = np.random.default_rng(5)
     recordings = []

@@ -1,22 +1,56 @@
-"""Whether the drive of a bench campaign has more than one level."""
+"""Whether the drive of a bench campaign has more than one level, and none below zero."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from mrpipe.campaigns.model import Campaign
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.campaigns.plausibility.finding import Finding
 from mrpipe.campaigns.plausibility.library import Check
 
+NEGATIVE = 0.05
+"""Drive below zero, over the largest magnitude, from which it is reported; smaller ones are the offset of a sensor."""
+
+
+def _levels(tests: Iterable[Recording]) -> FloatArray:
+    """Return the mean drive of each twentieth of each record, which separates a level from the noise on it."""
+    drives = [test.used("drive") for test in tests if "drive" in test.channels]
+    means = [block.mean() for drive in drives for block in np.array_split(drive, 20) if block.size]
+    return np.array(means, dtype=np.float64)
+
 
 def _judge(campaign: Campaign) -> Iterator[Finding]:
-    training = [test.used("drive") for test in campaign.with_role("training") if "drive" in test.channels]
-    if not training:
+    levels = _levels(campaign.with_role("training"))
+    if levels.size:
+        yield from _one_level(campaign, levels)
+    yield from _below_zero(campaign)
+
+
+def _below_zero(campaign: Campaign) -> Iterator[Finding]:
+    """Yield a finding where the drive is negative: an error in all tests, a warning in some."""
+    levels = {test.name: _levels([test]) for test in campaign.recordings if "drive" in test.channels}
+    largest = max((float(np.abs(item).max()) for item in levels.values()), default=0.0)
+    below = {name: float(item.min()) for name, item in levels.items() if item.min() < -NEGATIVE * largest}
+    if not below:
         return
-    # the mean of each twentieth of a record separates a level from the noise on it
-    levels = np.concatenate([[block.mean() for block in np.array_split(drive, 20) if block.size] for drive in training])
+    above = any(item.max() > NEGATIVE * largest for item in levels.values())
+    unit, lowest = campaign.drive_unit, min(below.values())
+    yield Finding(
+        name="drive-negative",
+        severity="warning" if above else "error",
+        test=next(iter(below)) if len(below) == 1 else "",
+        channel="drive",
+        sentence=f"the drive is negative, down to {lowest:.4g} {unit}, in {len(below)} of {len(levels)} tests, but the "
+        "damper models hold for drives from 0 upwards",
+        remedy="leave these tests out, or record the magnitude of the drive" if above else "give the drive `scale: -1`",
+        numbers={f"lowest_{unit.lower()}": lowest, "tests": float(len(below))},
+    )
+
+
+def _one_level(campaign: Campaign, levels: FloatArray) -> Iterator[Finding]:
     largest = float(np.abs(levels).max())
     unit = campaign.drive_unit
     if largest == 0.0:

@@ -17,6 +17,9 @@ RATES_HZ = (15.0, 200e3)
 MOTIONS_HZ = {"damper-bench": (0.002, 200.0), "shear-frame": (0.01, 500.0)}
 """Plausible mean frequencies of the motion, by rig."""
 
+AT_REST = 1.0 / 300.0
+"""Range of the displacement, over that of the largest test of a bench, below which a test is at rest."""
+
 
 def _judge(campaign: Campaign) -> Iterator[Finding]:
     low, high = RATES_HZ
@@ -35,7 +38,12 @@ def _judge(campaign: Campaign) -> Iterator[Finding]:
     if slow or fast:
         return
     low, high = MOTIONS_HZ[campaign.rig]
-    frequencies = {test.name: _frequency(test, campaign.rig) for test in campaign.recordings}
+    spans = {test.name: _span(test, campaign.rig) for test in campaign.recordings}
+    # the noise of a test at rest has no frequency of a motion
+    resting = {name for name, span in spans.items() if span < AT_REST * max(spans.values())}
+    frequencies = {
+        test.name: 0.0 if test.name in resting else _frequency(test, campaign.rig) for test in campaign.recordings
+    }
     odd = [test for test in campaign.recordings if frequencies[test.name] and not low <= frequencies[test.name] <= high]
     if odd:
         frequency = frequencies[odd[0].name]
@@ -46,6 +54,10 @@ def _judge(campaign: Campaign) -> Iterator[Finding]:
             "correct the unit of time or sampling_rate_hz",
             {"frequency_hz": frequency},
         )
+
+
+def _span(test: Recording, rig: str) -> float:
+    return float(np.ptp(test.used("displacement"))) if rig == "damper-bench" else 1.0
 
 
 def _frequency(test: Recording, rig: str) -> float:
