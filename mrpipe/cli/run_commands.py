@@ -230,7 +230,8 @@ def status(
     for name, reasons in found.items():
         print(f"{name:20} {'; '.join(reasons) if reasons else 'up to date'}")
     if any(reasons and not reasons[0].startswith("skipped") for reasons in found.values()):
-        print(f"next: mrpipe run {loaded.path} --run {pipeline.run_directory}")
+        given = f" --campaign {options.campaign}" if options.campaign else ""
+        print(f"next: mrpipe run {loaded.path}{given} --run {pipeline.run_directory}")
 
 
 def register(app: typer.Typer) -> None:

@@ -172,6 +172,17 @@ def test_after_a_sound_campaign_the_next_command_has_it_too(
 
 
 @pytest.mark.golden
+def test_the_next_command_of_status_keeps_the_campaign(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = project(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert run(["status", "--config", config.name, "--campaign", "data"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("next: mrpipe run ") and last.endswith("own.yaml --campaign data --run runs/own")
+
+
+@pytest.mark.golden
 def test_a_data_file_given_as_a_campaign(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     project(tmp_path)
     status, _, err = checked(capsys, "--campaign", str(tmp_path / "data" / "T1.h5"))
