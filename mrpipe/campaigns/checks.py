@@ -36,6 +36,9 @@ def require_finite(file: DataFile, values: FloatArray, first: int, channel: str,
                 "is missing in the last row, as where a recording was cut off",
                 "delete this row, or end the test before it with segments_s",
             )
+        if bad.size == values.size and np.isnan(values).all():
+            problem = f"holds no number in any of {values.size} samples"
+            raise UserError(file.path, f"{where}, {channel}", problem, "name another column, or correct the file")
         kind = (
             "NaN (no number)" if np.isnan(value) else "infinite" if np.isinf(value) else f"{value:.3g}, no measurement"
         )

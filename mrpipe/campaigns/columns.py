@@ -102,6 +102,11 @@ class DataFile:
         array = np.squeeze(array)
         if array.ndim == 0 and self.table:
             raise UserError(self.path, where, "holds a single row of numbers", "a recording needs at least two samples")
+        if array.ndim == 0:
+            remedy = (
+                "name a variable with one number a sample; for a sampling interval give sampling_rate_hz in its place"
+            )
+            raise UserError(self.path, where, f"column {column!r} holds one number", remedy)
         if array.ndim != 1 or array.size < 2:
             shape = " x ".join(map(str, array.shape)) or "one number"
             raise UserError(

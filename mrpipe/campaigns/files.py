@@ -14,6 +14,9 @@ from mrpipe.campaigns.readers.reader import Reader
 from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
 
+_SAVE_AS = {".xls": ".xlsx", ".xlsb": ".xlsx", ".ods": ".xlsx or .csv"}
+"""Ending of spreadsheets that are not read -> ending as which their program saves them."""
+
 LOADS_FROM = ("mrpipe.campaigns.readers",)
 
 
@@ -76,7 +79,8 @@ def open_data_file(path: Path, layout: TextEntry | None = None) -> DataFile:
     ending = ending_of(path)
     if ending not in readers:
         known = ", ".join(sorted(readers))
-        raise UserError(path, "", f"files that end in {ending!r} are not read", f"use one of {known}")
+        remedy = f"save it as {_SAVE_AS[ending]}" if ending in _SAVE_AS else f"use one of {known}"
+        raise UserError(path, "", f"files that end in {ending!r} are not read", remedy)
     try:
         return readers[ending].read(path, layout)
     except UserError:

@@ -11,17 +11,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.logger import read_logger
 from mrpipe.campaigns.schema import TextEntry
+from mrpipe.campaigns.stamps import is_stamp, seconds_of
 from mrpipe.errors import UserError
 
 _NUMBER = re.compile(r"^[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?$|^[+-]?(nan|inf(inity)?)$", re.IGNORECASE)
-_DATE = r"(?:\d{4}[-/]\d{1,2}[-/]\d{1,2}|\d{1,2}[./]\d{1,2}[./]\d{2,4})"
-_TIME = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s?[AaPp][Mm])?(?:Z|[+-]\d{2}:?\d{2})?"
-_STAMP = re.compile(rf"^(?:{_DATE}(?:[T ]{_TIME})?|{_TIME})$")
-_DAY_S = 86400.0
+_THOUSANDS = re.compile(r"^[+-]?\d{1,3}(?:[.,'\u00a0\u202f ]\d{3})+(?:[.,]\d+)?$")
+_DOTTED_THOUSANDS = r"[+-]?\d{1,3}(?:\.\d{3})+"
+MOST_ROWS_LOOKED_AT = 1000
+"""Rows in which the decimal sign is looked for."""
+
 _LABELS = {"name", "names", "channel", "channels", "signal", "signals"}
 
 
@@ -39,7 +41,7 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
         If the text holds no row of numbers.
     """
     layout = layout or TextEntry()
-    lines = text.splitlines()
+    lines = text.replace("\u2212", "-").splitlines()  # a minus sign of typesetters
     if not text.strip():
         raise UserError(path, "", "is empty", "export the measurement again, or name another file")
     if lines and lines[0].lower().startswith("header size"):
@@ -53,7 +55,8 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
     frame = _rows(path, [lines[index] for index in rows], rows, delimiter, decimal, width)
     if _labelled(fields):
         frame.iloc[0, 0] = np.nan
-    keep = [index for index in range(width) if not (index == width - 1 and frame[index].isna().all())]
+    named = any(len(row) == width and row[-1] for row in headers)
+    keep = list(range(width if named or not frame[width - 1].isna().all() else width - 1))
     names = _names(headers, keep)
     aliases = {word: names[index] for row in headers for index, word in enumerate(row) if word and index < len(names)}
     positions = dict(zip(names, keep, strict=True))
@@ -61,7 +64,7 @@ def table_of_text(path: Path, text: str, layout: TextEntry | None = None) -> Dat
     return DataFile(
         path=path,
         names=tuple(names),
-        fetch=lambda name: _numbers(path, frame[positions[name]], name, numbers),
+        fetch=lambda name: _numbers(path, frame[positions[name]], name, numbers, decimal),
         table=True,
         first_row=first + 1,
         row_lines=numbers if rows[-1] - first + 1 > len(rows) else (),
@@ -120,12 +123,12 @@ def _is_numeric(fields: list[str]) -> bool:
     """Whether every field is a number, a time stamp or empty, with a number among them."""
     filled = [item for item in fields if item]
     numbers = [item for item in filled if _NUMBER.match(item)]
-    return bool(numbers) and all(_NUMBER.match(item) or _STAMP.match(item) for item in filled)
+    return bool(numbers) and all(_NUMBER.match(item) or is_stamp(item) for item in filled)
 
 
 def _labelled(fields: list[str]) -> bool:
     """Whether a row of numbers begins with a word, as the first one that dSPACE writes (`trace_values`)."""
-    return bool(fields[0]) and not _NUMBER.match(fields[0]) and not _STAMP.match(fields[0])
+    return bool(fields[0]) and not _NUMBER.match(fields[0]) and not is_stamp(fields[0])
 
 
 def _first_row(path: Path, lines: list[str], layout: TextEntry, comment: str) -> tuple[int, str | None, str]:
@@ -141,9 +144,22 @@ def _first_row(path: Path, lines: list[str], layout: TextEntry, comment: str) ->
                 continue
             rows = _is_numeric(fields) or _begins_with_label(fields, lines[index + 1 : index + 2], delimiter)
             if rows and (delimiter is None or len(fields) > 1):
-                comma = any("," in item for item in fields if _NUMBER.match(item))
-                return index, delimiter, layout.decimal or ("," if comma else ".")
+                return index, delimiter, layout.decimal or _decimal(fields, lines[index + 1 :], delimiter)
     raise UserError(path, "", "holds no row of numbers", "name a delimited text, or give text: {skip_lines, delimiter}")
+
+
+def _decimal(fields: list[str], following: list[str], delimiter: str | None) -> str:
+    """Return the decimal sign; the first row may be one of whole numbers, so that later ones show it.
+
+    Where the comma is the delimiter too, a comma in quotes of a later row may separate thousands.
+    """
+    if any("," in item for item in fields if _NUMBER.match(item)):
+        return ","
+    for line in following[:MOST_ROWS_LOOKED_AT] if delimiter != "," else ():
+        numbers = [item for item in _split(line.strip("\r\n"), delimiter) if _NUMBER.match(item)]
+        if any("," in item or "." in item for item in numbers):
+            return "," if any("," in item for item in numbers) else "."
+    return "."
 
 
 def _begins_with_label(fields: list[str], following: list[str], delimiter: str | None) -> bool:
@@ -164,34 +180,33 @@ def _names(headers: list[list[str]], keep: list[int]) -> list[str]:
     return names
 
 
-def _numbers(path: Path, column: Any, name: str, lines: tuple[int, ...]) -> FloatArray:
+def _numbers(path: Path, column: Any, name: str, lines: tuple[int, ...], decimal: str) -> FloatArray:
     """Return a column as floats; text that is not a time stamp is reported with its line."""
     if column.dtype.kind in "fiub":
         return np.asarray(column, dtype=np.float64)
     filled = column.dropna()
-    if len(filled) and all(_STAMP.match(str(item).strip()) for item in filled.iloc[[0, len(filled) // 2, -1]]):
-        return _seconds(path, column, name, lines)
+    if len(filled) and all(is_stamp(str(item).strip()) for item in filled.iloc[[0, len(filled) // 2, -1]]):
+        return seconds_of(path, column, name, lines)
     numbers = pd.to_numeric(column, errors="coerce")
+    if decimal == ",":
+        # one word in a column of decimal commas leaves all of it as text
+        text = column.astype(str)
+        numbers = numbers.fillna(pd.to_numeric(text.str.replace(",", ".", regex=False), errors="coerce"))
+        if text.str.contains(",", regex=False).any():
+            numbers = numbers.mask(text.str.fullmatch(_DOTTED_THOUSANDS))
     wrong = (numbers.isna() & column.notna()).to_numpy()
     if wrong.any():
         row = int(np.argmax(wrong))
-        at_the_end = not numbers.iloc[row:].notna().any()
-        remedy = "delete the lines after the last sample" if at_the_end and row else "write a number"
-        raise UserError(path, f"line {lines[row]}, column {name}", f"{column.iloc[row]!r} is not a number", remedy)
+        found = str(column.iloc[row])
+        raise UserError(path, f"line {lines[row]}, column {name}", f"{found!r} is not a number", _remedy(found, wrong))
     return np.asarray(numbers, dtype=np.float64)
 
 
-def _seconds(path: Path, column: Any, name: str, lines: tuple[int, ...]) -> FloatArray:
-    """Return time stamps as seconds from the first one; times of day may pass midnight."""
-    text = column.astype(str).str.strip().str.replace(",", ".", regex=False)
-    day_first = bool(re.match(r"^\d{1,2}\.", text.iloc[0]))
-    stamps = pd.to_datetime(text, errors="coerce", dayfirst=day_first, format="mixed", utc=True)
-    wrong = stamps.isna()
-    if wrong.any():
-        row = int(np.argmax(wrong.to_numpy()))
-        where = f"line {lines[row]}, column {name}"
-        raise UserError(path, where, f"{column.iloc[row]!r} is not a time stamp", "write it as 2026-03-01T12:00:00.000")
-    seconds = np.array((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
-    if re.fullmatch(_TIME, text.iloc[0]):
-        seconds[1:] += _DAY_S * np.cumsum(np.diff(seconds) < -0.5 * _DAY_S)
-    return seconds
+def _remedy(found: str, wrong: BoolArray) -> str:
+    """Return what to do about the first of some fields that are not numbers."""
+    if _THOUSANDS.match(found):
+        return "write numbers without separators of thousands"
+    last = np.flatnonzero(~wrong)[-1:]
+    if last.size and wrong[last[0] + 1 :].all() and wrong.sum() == wrong.size - last[0] - 1 and not found[:1].isdigit():
+        return "delete the lines after the last sample"
+    return "write a number"

@@ -167,7 +167,7 @@ def test_uff_without_its_package_is_told_in_a_line(tmp_path: Path, monkeypatch: 
 @pytest.mark.parametrize(
     ("name", "content", "expected"),
     [
-        ("a.xls", b"PK", "files that end in '.xls' are not read; use one of .asc"),
+        ("a.xls", b"PK", "files that end in '.xls' are not read; save it as .xlsx"),
         ("a.xlsx", b"PK", "is damaged or not what its ending says"),
         ("a.mat", b"nothing of the kind", "is damaged or not what its ending says"),
         ("a.h5", b"nothing of the kind", "is damaged or not what its ending says"),
@@ -195,7 +195,7 @@ def test_damaged_files_are_told_in_a_line(tmp_path: Path, name: str, content: by
         ("x_F[:,3]", "lies outside an array of 500 x 3; count from 0"),
         ("x_F[:,a]", "index [:,a] is not understood"),
         ("note", "column 'note' holds no numbers"),
-        ("one", "is not a vector (one number)"),
+        ("one", "holds one number; name a variable with one number a sample"),
     ],
 )
 def test_columns_that_do_not_fit(tmp_path: Path, column: str, expected: str) -> None:
@@ -269,3 +269,27 @@ def test_a_missing_file_of_another_test_offers_none(tmp_path: Path, asked: str) 
     (tmp_path / "Sine_1Hz.csv").write_text("t,x\n0,1\n1,2\n")
     with pytest.raises(UserError, match="data file not found; correct `file:`"):
         open_data_file(tmp_path / asked)
+
+
+@pytest.mark.oracle
+def test_channels_in_an_array_of_structures_go_by_their_names(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    values = np.arange(50.0)
+    channels = [{"Name": "Force", "Data": 2.0 * values}, {"Name": "Pos", "Data": 3.0 * values}]
+    savemat(
+        tmp_path / "a.mat", {"rec": {"X": {"Data": values}, "Y": channels}, "plain": [{"a": values}, {"a": -values}]}
+    )
+    file = open_data_file(tmp_path / "a.mat")
+    assert file.column("rec.Y.Force", "").tolist() == file.column("Force", "").tolist() == (2.0 * values).tolist()
+    assert file.column("rec.X.Data", "").tolist() == values.tolist()
+    assert file.column("plain.2.a", "").tolist() == (-values).tolist()
+
+
+@pytest.mark.golden
+def test_a_sampling_interval_in_place_of_a_clock_names_the_way_out(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"dt": 0.002, "x": np.arange(50.0)})
+    with pytest.raises(UserError, match=r"column 'dt' holds one number; .* give sampling_rate_hz in its place"):
+        open_data_file(tmp_path / "a.mat").column("dt", "")

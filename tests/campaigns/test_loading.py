@@ -196,6 +196,15 @@ def test_bad_samples_are_told_with_their_row(tmp_path: Path, column: str, value:
 
 
 @pytest.mark.golden
+def test_a_column_without_any_number_is_called_so(tmp_path: Path) -> None:
+    columns = motion()
+    columns["F"][:] = np.nan
+    assert "test one, force: holds no number in any of 4000 samples; name another column" in told(
+        campaign(tmp_path, columns)
+    )
+
+
+@pytest.mark.golden
 def test_a_channel_that_nobody_uses_may_hold_anything(tmp_path: Path) -> None:
     columns = motion() | {"notes": np.full(4000, np.nan)}
     assert load_campaign(campaign(tmp_path, columns)).recordings[0].time_s.size == 4000

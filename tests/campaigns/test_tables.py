@@ -79,3 +79,35 @@ def test_times_of_day_may_pass_midnight() -> None:
 )
 def test_names_that_look_the_same_are_the_same(header: str, asked: str) -> None:
     assert table_of_text(Path("a.csv"), f"t,{header}\n0,1\n1,2\n").column(asked, "").tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t", "  "])
+def test_a_first_row_of_whole_numbers_does_not_hide_decimal_commas(delimiter: str) -> None:
+    text = (
+        delimiter.join("tx") + "\n" + "\n".join(delimiter.join(row) for row in (["0", "0"], ["1", "0"], ["2", "0,5"]))
+    )
+    assert table_of_text(Path("a.csv"), text).column("x", "").tolist() == [0.0, 0.0, 0.5]
+
+
+def test_one_word_among_decimal_commas_is_named_and_not_the_numbers() -> None:
+    text = "t;x\n0,0;1,5\n0,1;OVL\n0,2;2,5\n"
+    with pytest.raises(UserError, match="line 3, column x: 'OVL' is not a number; write a number"):
+        table_of_text(Path("a.csv"), text).column("x", "")
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "found"),
+    [
+        ("t;x\n0,0;997,41\n0,1;1.005,39\n", 3, r"1\.005,39"),
+        ("t;x\n0,0;997,41\n0,1;1.005\n", 3, r"1\.005"),
+        ('t,x\n0.0,997.41\n0.1,"1,005.39"\n', 3, "1,005.39"),
+        ("t;x\n0,0;997,41\n0,1;1\u00a0005,39\n", 3, "1.*005,39"),
+    ],
+)
+def test_separators_of_thousands_are_named_and_never_read_as_decimal_signs(text: str, line: int, found: str) -> None:
+    with pytest.raises(UserError, match=f"line {line}, column x: '{found}' is not a number; write numbers without sep"):
+        table_of_text(Path("a.csv"), text).column("x", "")
+
+
+def test_the_minus_sign_of_a_typesetter_is_a_minus() -> None:
+    assert table_of_text(Path("a.csv"), "t,x\n0,\u22121.5\n1,2.5\n").column("x", "").tolist() == [-1.5, 2.5]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.readers.hdf5 import read_hdf5
-from mrpipe.campaigns.readers.reader import LARGEST_BYTES, Reader, flatten, require_size
+from mrpipe.campaigns.readers.reader import LARGEST_BYTES, Reader, flatten, require_size, short_names
 from mrpipe.campaigns.schema import TextEntry
 
 _COMPRESSED = 15
@@ -23,7 +23,8 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
     require_size(path, _unpacked_bytes(path), path.stat().st_size)
     content = scipy.io.loadmat(path, simplify_cells=True)
     leaves = flatten({key: value for key, value in content.items() if not key.startswith("__")})
-    return DataFile(path=path, names=tuple(leaves), fetch=leaves.__getitem__)
+    aliases = short_names(list(leaves), ".")
+    return DataFile(path=path, names=tuple(leaves), fetch=leaves.__getitem__, aliases=aliases)
 
 
 def _unpacked_bytes(path: Path) -> int:

@@ -25,6 +25,10 @@ MOST_EXPANSION = 300
 """Largest ratio of unpacked to packed bytes of files above 256 MiB; measurements do not shrink that much."""
 
 
+MOST_MAPPINGS = 500
+"""Longest list of mappings that is read as channels; a longer one holds rows."""
+
+
 @dataclass(frozen=True)
 class Reader:
     """How files of some endings are read.
@@ -78,6 +82,9 @@ def require_size(path: Path, claimed: int, stored: int) -> None:
 def flatten(content: Mapping[str, Any], prefix: str = "", depth: int = 0) -> dict[str, Any]:
     """Return dotted name -> leaf of nested mappings.
 
+    Of a list of mappings, each one is called by its `Name`, where all have `Name` and `Data` (as ControlDesk writes
+    the channels of a record), else by its number from 1.
+
     Raises
     ------
     ValueError
@@ -90,9 +97,26 @@ def flatten(content: Mapping[str, Any], prefix: str = "", depth: int = 0) -> dic
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
             leaves.update(flatten(value, f"{name}.", depth + 1))
+        elif isinstance(value, list | np.ndarray) and len(items := _mappings(value)):
+            leaves.update(flatten(items, f"{name}.", depth + 1))
         else:
             leaves[name] = value
     return leaves
+
+
+def _mappings(values: Any) -> dict[str, Any]:
+    """Return the mappings of a list by name or number; empty where it holds anything else."""
+    if (
+        getattr(values, "ndim", 1) != 1
+        or not 0 < len(values) <= MOST_MAPPINGS
+        or not all(isinstance(item, Mapping) for item in values)
+    ):
+        return {}
+    if all({"Name", "Data"} <= set(item) for item in values):
+        named = {str(item["Name"]).strip("\"' "): item["Data"] for item in values}
+        if len(named) == len(values):
+            return named
+    return {str(index): item for index, item in enumerate(values, start=1)}
 
 
 def short_names(names: list[str], separator: str) -> dict[str, str]:

@@ -27,7 +27,7 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
     if not rows:
         raise UserError(path, "", "holds no row of numbers", "fill one sheet with a header and rows of numbers")
     text = "\n".join("\t".join(_cell(value) for value in row) for row in rows)
-    return table_of_text(path, text, TextEntry(delimiter="\t", decimal="."))
+    return table_of_text(path, text, TextEntry(delimiter="\t"))
 
 
 def _cell(value: Any) -> str:
