@@ -327,7 +327,8 @@ def next_steps(facts: RunFacts) -> Section:
     wanted = loop.get("next_tests") or {}
     if wanted.get("tests"):
         caption = f"Tests that would decide what is open ({wanted['file']})."
-        section.table("tests", tables.wanted_tests(wanted["tests"]), caption)
+        unit = str(facts.summary("prepare").get("drive_unit") or "A")
+        section.table("tests", tables.wanted_tests(wanted["tests"], unit), caption)
     remedies = [
         f"{effect['name']}: {effect['remedy']}" for effect in statements.proper_effects(loop) if effect.get("remedy")
     ]

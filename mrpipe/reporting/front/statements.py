@@ -214,9 +214,10 @@ def weak_spots(facts: RunFacts) -> str:
     if states and loop["unexplained"]["structured"]:
         text += f" It varies with {listed(states)}."
     where = (loop.get("residual") or {}).get("where") or {}
-    if where:
+    if where and verdict_class(loop) != "noise":
         part, share = max(where.items(), key=lambda item: float(item[1]))
-        text += f" Before the correction, {percent(share)} of the squared residual lay {PARTS.get(part, plain(part))}."
+        lay = "Before the correction" if proper_effects(loop) else "With the declared model"
+        text += f" {lay}, {percent(share)} of the squared residual lay {PARTS.get(part, plain(part))}."
     recordings = [row for row in (loop.get("closed_loop") or {}).get("tests", []) if _history_error(row) is not None]
     if recordings:
         row = max(recordings, key=lambda item: _history_error(item) or 0.0)
@@ -274,7 +275,7 @@ def models(facts: RunFacts) -> str:
 
 
 def _fitted_again(facts: RunFacts) -> str:
-    """Return why the error of the damper model differs from the one before the effect is added."""
+    """Return why the error of the damper model differs from that of the declared model of close-loop."""
     damper, loop = facts.summary("identify-damper"), facts.summary("close-loop")
     if "validation_nrmse" not in damper or "before" not in loop or damper.get("form") != loop.get("model"):
         return ""
@@ -283,7 +284,7 @@ def _fitted_again(facts: RunFacts) -> str:
         return ""
     return (
         f" close-loop fits {damper['form']} again, with weights from the noise and an offset for each test: "
-        f"{percent(before)} before the effect is added."
+        f"{percent(before)}{' before the effect is added' if proper_effects(loop) else ''}."
     )
 
 

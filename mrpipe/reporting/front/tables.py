@@ -133,12 +133,13 @@ def determined(low: float, high: float) -> bool:
     return low * high <= 0.0 or large <= UNDETERMINED * small
 
 
-def wanted_tests(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+def wanted_tests(tests: Sequence[Mapping[str, Any]], drive_unit: str = "A") -> pd.DataFrame:
     """Return tests to be made, with the headings and units that people use."""
+    headings = {**_COLUMNS, "current_a": (f"largest drive [{drive_unit}]", 1.0)}
     rows = []
     for test in tests:
         row = {}
-        for key, (heading, factor) in _COLUMNS.items():
+        for key, (heading, factor) in headings.items():
             if key in test:
                 row[heading] = number(factor * test[key]) if factor else str(test[key])
         rows.append(row | {plain(key): str(value) for key, value in test.items() if key not in {*_COLUMNS, "later"}})

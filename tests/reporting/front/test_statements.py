@@ -161,6 +161,15 @@ def test_what_supports_the_finding_and_where_the_model_is_bad(tmp_path: Path) ->
     assert "90 % of the squared residual lay after yield" in found["Weak spots"]
 
 
+def test_without_an_effect_nothing_is_called_added_or_corrected(tmp_path: Path) -> None:
+    residual = {"structured": False, "where": {"pre_yield": 0.1, "post_yield": 0.9}}
+    noise = {"verdict_class": "noise", "effects": [], "residual": residual, "before": {"nrmse": 0.005}}
+    found = answers(tmp_path, **noise)
+    assert "for each test: 0.50 %." in found["Models"] and "residual" not in found["Weak spots"]
+    found = answers(tmp_path, **{**noise, "verdict_class": "unknown", "residual": {**residual, "structured": True}})
+    assert "With the declared model, 90 % of the squared residual lay after yield" in found["Weak spots"]
+
+
 def test_tests_to_be_made_are_described(tmp_path: Path) -> None:
     made = {"motion": "triangle", "amplitude_m": 0.008, "current": "steps", "name": "x", "role": "training"}
     wanted = {

@@ -31,6 +31,12 @@ def test_an_interval_over_decades_determines_nothing(low: float, high: float, ex
     assert (effects([effect])["from"][0] == "not determined") is not expected
 
 
+@pytest.mark.parametrize("unit", ["A", "V"])
+def test_the_drive_of_tests_to_be_made_is_in_the_unit_of_the_campaign(unit: str) -> None:
+    frame = wanted_tests([{"name": "a", "current_a": 1.5}], unit)
+    assert frame[f"largest drive [{unit}]"].tolist() == ["1.50"]
+
+
 def test_tests_to_be_made_are_in_practical_units() -> None:
     frame = wanted_tests(
         [{"name": "a", "amplitude_m": 0.0083, "later": True, "current": "steps", "rounds": 3}, {"name": "b"}]
