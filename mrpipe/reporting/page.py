@@ -105,6 +105,7 @@ def write_report(facts: RunFacts, formats: Sequence[str]) -> list[Path]:
     if "markdown" in formats:
         _save_figures(facts.directory, front)
         environment.filters["item"] = lambda item: _item_markdown(facts.directory, item)
+        environment.filters["cell"] = _cell
         text = environment.get_template("report.md").render(content)
         atomic_write_text(facts.directory / "report.md", re.sub(r"\n{3,}", "\n\n", text))
         written.append(facts.directory / "report.md")

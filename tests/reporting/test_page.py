@@ -98,3 +98,13 @@ def test_a_warning_appears_once_and_one_matrix_has_one_notation(tmp_path: Path, 
     for text in (html.read_text(encoding="utf-8"), markdown.read_text(encoding="utf-8")):
         assert text.count("the laser is noisy") == 1
         assert "9569" in text and "10190" in text and "e+04" not in text
+
+
+def test_a_bar_in_the_name_of_a_campaign_keeps_the_row_of_its_stage_whole(
+    tmp_path: Path, stages: list[ReportStage]
+) -> None:
+    failed = replace(stages[1], skipped="campaign a|b is not there")
+    (path,) = write_report(RunFacts(tmp_path, "T", "", [stages[0], failed]), ["markdown"])
+    (row,) = [line for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("| identify-frame |")]
+    assert len(re.findall(r"(?<!\\)\|", row)) == 4
+    assert r"a\|b" in row
