@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.forms import DEFAULT_FORM
 from mrpipe.dampers.laws import Law, LawShape, constant_law, for_blocks
@@ -38,11 +38,16 @@ BEGUN_STEPS = 3
 """Steps after which the points that promise most are chosen."""
 
 
+def tests_of_varying_drive(recordings: Recordings) -> BoolArray:
+    """Return the tests within which the drive changes, shape (tests,)."""
+    largest = float(np.max(np.abs(recordings.drive)))
+    spans = [float(np.ptp(recordings.drive[a:b])) for a, b in itertools.pairwise(recordings.starts)]
+    return np.array(spans) > VARYING_SHARE * largest
+
+
 def drive_varies(recordings: Recordings) -> bool:
     """Return whether the drive changes within any test."""
-    largest = float(np.max(np.abs(recordings.drive)))
-    pieces = [recordings.drive[a:b] for a, b in itertools.pairwise(recordings.starts)]
-    return largest > 0.0 and any(float(np.ptp(piece)) > VARYING_SHARE * largest for piece in pieces)
+    return bool(np.any(tests_of_varying_drive(recordings)))
 
 
 def mean_levels(recordings: Recordings) -> FloatArray:

@@ -14,6 +14,7 @@ from mrpipe.artifacts import Progress, no_progress
 from mrpipe.fitting.engine import Fit, fit, solve, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.start import tests_of_varying_drive
 from mrpipe.fitting.weighting import weighting
 from mrpipe.tracing.bench.crossvalidation import folds_of
 from mrpipe.tracing.bench.screen import Screened, screen
@@ -141,13 +142,20 @@ def left_of(found: Fit, noise: float, share: float) -> float:
 
 
 def draft_tests(recordings: Recordings) -> list[int]:
-    """Return the indices of a share of the tests that still holds every drive level; all where there are few."""
-    parts = min(-(-len(recordings.force) // DRAFT_SAMPLES), MOST_PARTS, recordings.tests // 4)
-    return folds_of(recordings, max(1, parts))[0]
+    """Return the indices of a share of the tests that still holds every drive level; all where there are few.
+
+    Tests of constant and of varying drive are drawn separately. Otherwise a draft may hold no step of the drive, and
+    the screening of the draft finds no effect that follows such steps.
+    """
+    parts = max(1, min(-(-len(recordings.force) // DRAFT_SAMPLES), MOST_PARTS, recordings.tests // 4))
+    varying = tests_of_varying_drive(recordings)
+    groups = [np.flatnonzero(item) for item in (varying, ~varying) if np.any(item)]
+    drawn = [group[folds_of(recordings.subset(list(group)), parts)[0]] for group in groups]
+    return sorted(int(index) for index in np.concatenate(drawn))
 
 
 def draft(found: Fit) -> Fit:
-    """Return the fit on a share of its tests that still holds every drive level: enough to screen and to rank forms."""
+    """Return the fit on the tests of :func:`draft_tests`, which suffice to screen and to rank forms."""
     recordings = found.problem.recordings
     keep = draft_tests(recordings)
     if len(keep) == recordings.tests:

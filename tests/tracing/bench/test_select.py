@@ -15,7 +15,7 @@ from mrpipe.fitting.engine import Fit, fit, predict, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench import select
 from mrpipe.tracing.bench.screen import Screened
-from mrpipe.tracing.bench.select import Candidate, Selection, admissible, forward_selection, refit
+from mrpipe.tracing.bench.select import Candidate, Selection, admissible, draft_tests, forward_selection, refit
 from mrpipe.tracing.bench.verdict import unnamed_reason
 from mrpipe.tracing.options import NamingRules
 from tests.tracing.bench.fits import plain_fit
@@ -37,6 +37,20 @@ def test_a_spring_of_hardly_any_stiffness_is_no_spring() -> None:
     assert not admissible(fitted(500.0, 1.4e6))
     assert admissible(fitted(500.0, 5e4))
     assert not admissible(fitted(0.0, 5e4))
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("stepping", [(0,), (1,), (2,), (3, 9)])
+def test_a_draft_holds_tests_of_varying_and_of_constant_drive(stepping: tuple[int, ...]) -> None:
+    # by its mean drive, a test with steps lies between constant ones, and every second test could miss all of them
+    recordings = plain_fit("").problem.recordings
+    level = np.arange(recordings.tests) % 4
+    time = np.arange(len(recordings.force))
+    steps = np.isin(recordings.test, stepping) * np.sign(np.sin(time / 20.0))
+    drawn = draft_tests(replace(recordings, drive=4.0 + level[recordings.test] + steps))
+    assert len(drawn) < recordings.tests
+    assert set(drawn) & set(stepping)
+    assert set(drawn) - set(stepping)
 
 
 def selected(share: float, ground: float = 101.0) -> Selection:
