@@ -22,7 +22,7 @@ def describe(sink: Sink, frame: Frame, summary: Mapping[str, Any]) -> None:
         sink.text(
             f"It was reduced from {summary['full_degrees_of_freedom']} degrees of freedom. The largest error of the "
             f"response to ground motion up to {summary['reduction_band_high_hz']:.3g} Hz is "
-            f"{100.0 * summary['reduction_error']:.2g} % of the largest response."
+            f"{100.0 * summary['reduction_error']:.3g} % of the largest response."
         )
     rows = {
         "mode": summary["mode_numbers"],
