@@ -293,7 +293,7 @@ def without_massless(frame: Frame, warn: Callable[[str], None] | None = None) ->
     if np.linalg.matrix_rank(inner) < len(gone):
         nowhere = ", ".join(frame.names[place] for place in gone[:6])
         raise UserError("structure", nowhere, "has neither mass nor a spring", "remove it, or give it a mass")
-    static = -np.linalg.solve(inner, frame.stiffness[np.ix_(gone, places)])
+    static = np.asarray(-np.linalg.solve(inner, frame.stiffness[np.ix_(gone, places)]), dtype=np.float64)
     basis = np.zeros((frame.floors, len(places)))
     basis[places] = np.eye(len(places))
     basis[gone] = static
