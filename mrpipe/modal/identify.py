@@ -25,7 +25,7 @@ from mrpipe.modal.matrices.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.matrices.tridiagonal import fit_tridiagonal
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
-from mrpipe.modal.search.checks import check_mode_matrix, orthogonal_shapes
+from mrpipe.modal.search.checks import check_mode_matrix, orthogonal_shapes, reversed_finding
 from mrpipe.modal.search.chosen_tests import ChosenTests, choose_tests, training_first, with_clocks, without_complex
 from mrpipe.modal.search.forced_modes import ModeSearch, check_channels
 from mrpipe.modal.search.free_response import with_decays
@@ -41,6 +41,7 @@ from mrpipe.modal.search.selection import (
 from mrpipe.modal.verification import (
     TimeVerification,
     compare_in_time,
+    misfit_findings,
     verify_in_frequency,
     verify_in_time,
 )
@@ -193,6 +194,10 @@ def _identify(
         picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)
         chosen = replace(chosen, search=replace(chosen.search, fit=picked))
     fit = chosen.search.fit
+    findings += tests.notes
+    if layout.is_chain and chosen.search.numbers[0] == 1:
+        shapes, errors = floor_shapes(fit, layout)
+        findings += reversed_finding(shapes[:, 0], errors[:, 0])
     findings += _check_coherence(fit, tests) if forced else []
     progress(0.5, "decays")
     decays, notes = decays_of_modes(tests, fit)
@@ -228,6 +233,7 @@ def _identify(
     in_time: tuple[TimeVerification, ...] = ()
     if frame is not None and forced:
         in_time = tuple(_verified(frame, test, inside, None if rigid is None else tests.positions) for test in shown)
+        findings += misfit_findings(frame, shown, in_time, inside) if rigid is None else []
     # the synthesised frequency responses are those of one direction
     verified = frame if rigid is None and forced else None
     amplitude = None
