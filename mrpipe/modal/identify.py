@@ -18,7 +18,7 @@ from mrpipe.modal.decays.choice import choose_damping, decays_of_modes
 from mrpipe.modal.decays.decay import Estimate
 from mrpipe.modal.fit.own_residues import with_own_residues
 from mrpipe.modal.fit.result import MultiModeFit
-from mrpipe.modal.identification import FrameIdentification, GivenShapes
+from mrpipe.modal.identification import FrameIdentification, GivenShapes, errors_of_rows
 from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial
 from mrpipe.modal.matrices.rigid_floors import RigidShapes, assemble_rigid, rigid_response, rigid_shapes
 from mrpipe.modal.matrices.scaling import Scale, find_scale, masses_of
@@ -60,11 +60,9 @@ _LOOSE_SIGNS = 0.03
 
 def _ambient_findings(tests: FrameTests) -> list[str]:
     given = np.isfinite(tests.floor_masses).any()
-    scale = "given floor masses" if given else "the added masses" if tests.with_added_masses else "nothing"
-    return [
-        "the excitation was not measured: modal masses and participations cannot be known; the scale of M, C and K "
-        f"comes from {scale}"
-    ]
+    known = "given floor masses" if given else "the added masses" if tests.with_added_masses else ""
+    scale = f"the scale of M, C and K comes from {known}" if known else "and nothing gives M, C and K a scale"
+    return [f"the excitation was not measured: modal masses and participations cannot be known; {scale}"]
 
 
 def _clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
@@ -250,6 +248,7 @@ def _identify(
         sweep_damping=sweep,
         mode_shapes=assembly.shapes,
         mac=_assurance(fit, layout, assembly, rigid),
+        shape_errors=errors_of_rows(assembly.shapes, *_measured_rows(fit, layout, rigid)),
         decays=decays,
         fit=fit,
         tridiagonal=assembly.storeys,
@@ -287,6 +286,13 @@ def _shown(forced: Sequence[FrameTest], chosen: ChosenTests, clocks: Sequence[Se
     others = [test for test in forced if test.name not in fitted]
     delays = expected_clocks(clocks, chosen.tests, others)
     return tuple(fitted[test.name] if test.name in fitted else corrected(test, delays) for test in forced)
+
+
+def _measured_rows(fit: MultiModeFit, layout: Layout, rigid: RigidShapes | None) -> tuple[FloatArray, FloatArray]:
+    """Return measured shapes and their errors in the rows of the result."""
+    if rigid is not None:
+        return rigid.shapes, rigid.errors
+    return floor_shapes(fit, layout) if layout.is_chain else (fit.residues.real, fit.residue_errors)
 
 
 def _names(fit: MultiModeFit, layout: Layout) -> tuple[str, ...]:

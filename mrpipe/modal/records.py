@@ -376,7 +376,7 @@ def _plan(
         raise UserError(source, place, f"has no entry {missing[0]!r}", "give x and y of every sensor's suffix in m")
     if inertias.size and inertias.size != floors:
         place = "frame.floor_inertias_kg_m2"
-        raise UserError(source, place, f"has {inertias.size} entries", f"give one for each of the {floors} floors")
+        raise UserError(source, place, f"has {inertias.size} entries", f"give one for each floor, {floors} in all")
     return positions, inertias
 
 
