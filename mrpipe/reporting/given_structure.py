@@ -33,10 +33,10 @@ def describe(sink: Sink, frame: Frame, summary: Mapping[str, Any]) -> None:
     sink.table("modes", pd.DataFrame(rows), "Modes.")
     if frame.floors > _LARGEST_TABLE:
         return
-    for name, text in (("mass", "M [kg]."), ("stiffness", "K [N/m]."), ("damping", "C [N s/m].")):
-        sink.table(name, pd.DataFrame(getattr(frame, name), columns=list(frame.names)), text)
+    figures.matrix_tables(sink, frame)
+    names, shapes = summary["degrees_of_freedom"], np.asarray(summary["mode_shapes"])
     sink.figure(
         "mode-shapes",
-        figures.mode_shapes(np.asarray(summary["mode_shapes"]), summary["frequencies_hz"], summary["heights_m"]),
-        "Mode shapes.",
+        figures.mode_shapes(shapes, summary["frequencies_hz"], summary["heights_m"], names),
+        figures.shapes_caption(names),
     )
