@@ -10,7 +10,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -94,12 +94,27 @@ class YamlSource:
             return model.model_validate({str(key): value for key, value in content.items()})
         except ValidationError as error:
             first = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")[0]
-            key = (*place, *first["loc"])
+            key = (*place, *(part for part in first["loc"] if part != "[key]"))
             if first["type"] == "extra_forbidden":
-                raise self.error(key, "unknown key", nearest(str(first["loc"][-1]), model.model_fields)) from None
+                known = _model_at(model, first["loc"][:-1]).model_fields
+                raise self.error(key, "unknown key", nearest(str(first["loc"][-1]), known)) from None
             if first["type"] == "missing":
                 raise self.error(key, "is missing", f"write {first['loc'][-1]}: ... here") from None
             raise self.error(key, f"is {shown(first['input'])}", expected(first)) from None
+
+
+def _model_at(model: type[BaseModel], place: Place) -> type[BaseModel]:
+    """Return the model at a place within a model; keys of a plain mapping and indices are passed over."""
+    for part in place:
+        entry = model.model_fields.get(part) if isinstance(part, str) else None
+        model = (entry and _model_within(entry.annotation)) or model
+    return model
+
+
+def _model_within(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for item in get_args(annotation) if (found := _model_within(item)) is not None), None)
 
 
 def expected(fault: Mapping[str, Any]) -> str:
@@ -110,6 +125,8 @@ def expected(fault: Mapping[str, Any]) -> str:
         close = difflib.get_close_matches(str(fault["input"]), words, n=1, cutoff=0.5)
         hint = f"did you mean {close[0]}? " if close else ""
         return f"{hint}{context['expected']} expected"
+    if kind == "too_long":
+        return f"a list of at most {context['max_length']} values expected"
     if kind == "too_short":
         least = int(context.get("min_length", 1))
         return f"a list of at least {least} {'value' if least == 1 else 'values'} expected"

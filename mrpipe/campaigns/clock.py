@@ -109,7 +109,7 @@ def _measured_rate(file: DataFile, time: FloatArray) -> float:
     if file.sampling_rate_hz is not None and file.time_s is time:
         return float(file.sampling_rate_hz)
     steps = np.diff(time)
-    lost = _lost_samples(time, 1.0 / float(np.median(steps)))
+    lost = lost_samples(time, 1.0 / float(np.median(steps)))
     gaps = np.flatnonzero(lost)
     regular = np.ones(steps.size, dtype=bool)
     regular[gaps] = False
@@ -118,7 +118,7 @@ def _measured_rate(file: DataFile, time: FloatArray) -> float:
     return rounded if abs(rounded / rate - 1.0) < 2e-5 else rate
 
 
-def _lost_samples(time: FloatArray, rate: float) -> IntArray:
+def lost_samples(time: FloatArray, rate: float) -> IntArray:
     """Return how many samples are missing after each sample, shape (n - 1,).
 
     A jittering clock also has long intervals, but short ones next to them make up for it. After lost samples the
@@ -150,11 +150,12 @@ def _irregularities(time: FloatArray, rate: float, parts: tuple[tuple[int, int],
     steps = np.diff(time) * rate
     pauses = np.zeros(steps.size, dtype=bool)
     pauses[[start - 1 for start, _ in parts if start > 0]] = True
-    lost = np.where(pauses, 0, _lost_samples(time, rate))
+    lost = np.where(pauses, 0, lost_samples(time, rate))
     gaps = np.flatnonzero(lost)
     if gaps.size:
+        count = "1 gap" if gaps.size == 1 else f"{gaps.size} gaps"
         findings.append(
-            f"{gaps.size} gaps in the clock, {int(lost.sum())} samples are missing; the first gap is at "
+            f"{count} in the clock, {int(lost.sum())} samples are missing; the first gap is at "
             f"{time[gaps[0]]:.4g} s, the longest lasts {steps[gaps].max() / rate:.3g} s"
         )
     regular = steps[(lost == 0) & ~pauses]

@@ -302,6 +302,9 @@ def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tu
         quantity = kind
     if channel.mass_kg is not None:
         quantity = "acceleration"
+    elif name.startswith("input_force") and units.same_dimension(channel.unit, "acceleration"):
+        remedy = "give mass_kg of the moving mass where its acceleration was recorded, or a unit of force"
+        raise UserError(where, f"unit {channel.unit!r}", "is not a unit of force", remedy)
     units.conversion(channel.unit, where=where, quantity=quantity)
     return channel.unit, quantity
 

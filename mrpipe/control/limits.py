@@ -95,8 +95,12 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     w = np.asarray(position, dtype=np.float64)
     if w.shape != (n,) or not np.any(w):
         raise UserError("calibrate", "position", f"has {w.size} entries", f"{n} floors need {n}, not all zero")
+    if n < 2:
+        problem = "of a structure with one degree of freedom does not exist: a locked damper leaves no motion"
+        raise UserError("calibrate", "target_mode", problem, "give a structure with at least two degrees of freedom")
     if not 1 <= mode <= n - 1:
-        raise UserError("calibrate", "mode", f"is {mode}", f"with {n} floors and a locked damper it is 1 to {n - 1}")
+        remedy = f"with {n} degrees of freedom and a locked damper it is 1 to {n - 1}"
+        raise UserError("calibrate", "target_mode", f"is {mode}", remedy)
     M = 0.5 * (frame.mass + frame.mass.T)
     K = 0.5 * (frame.stiffness + frame.stiffness.T)
     if not np.all(np.linalg.eigvalsh(M) > 0.0):
@@ -108,7 +112,9 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     if mode not in moving:
         listed = ", ".join(map(str, moving[:6]))
         problem = f"mode {mode} does not move the damper"
-        raise UserError("calibrate", "position", problem, f"choose another place, or a target mode among {listed}")
+        raise UserError(
+            "calibrate", "place of the damper", problem, f"choose another place, or a target mode among {listed}"
+        )
     if len(moving) == n:
         basis = null_space(w[None, :])
     else:
@@ -118,7 +124,7 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     partner = moving.index(mode)
     if partner >= locked_squared.size:
         problem = f"mode {mode} is the last one that moves the damper, so that it has no locked partner"
-        raise UserError("calibrate", "mode", problem, f"choose one of {', '.join(map(str, moving[:-1][:6]))}")
+        raise UserError("calibrate", "target_mode", problem, f"choose one of {', '.join(map(str, moving[:-1][:6]))}")
     shape_0 = shapes[:, mode - 1] * (1.0 if shapes[frame.top, mode - 1] >= 0.0 else -1.0)
     shape_inf = basis @ locked[:, partner]
     kappa = float(shape_inf @ M @ shape_0)
@@ -127,7 +133,7 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     u_0 = float(w @ shape_0)
     omega_0, omega_inf = math.sqrt(squared[mode - 1]), math.sqrt(locked_squared[partner])
     if omega_inf - omega_0 < 1e-6 * omega_0:
-        raise UserError("calibrate", "position", f"mode {mode} does not move the damper", "choose another floor")
+        raise UserError("calibrate", "place of the damper", f"mode {mode} does not move it", "choose another place")
     return LimitingModes(mode, omega_0, omega_inf, shape_0, shape_inf, u_0, kappa, frame.top)
 
 

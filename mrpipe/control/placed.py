@@ -165,12 +165,19 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
     if "network" in law.needs:
         raise UserError(where, law.name, "needs a network, which is trained for one damper", "choose another law")
     own = replace(options, mode=damper.mode, overrides={law.name: dict(damper.gains or {})})
-    plant = plant_of(frame, damper.position, own)
     calibrated = None
     gains = Gains()
-    if law.calibrated and law.name != CENTRAL_LAW:
-        calibrated = calibrate_law(plant, law, own)
-        gains = calibrated.gains
+    try:
+        plant = plant_of(frame, damper.position, own)
+        if law.calibrated and law.name != CENTRAL_LAW:
+            calibrated = calibrate_law(plant, law, own)
+            gains = calibrated.gains
+        else:
+            law.check(Gains(**(damper.gains or {})))
+    except UserError as error:
+        # the settings of this damper are at fault, not those of the section calibrate
+        key = f"gains.{error.where}" if error.source == f"calibrate.{law.name}" else error.where
+        raise UserError(where, key, error.problem, error.remedy) from error
     found = PlacedCalibration(damper, plant.modes, plant.static_stiffness_n_m, gains, gains, calibrated, plant.weights)
     own_route = math.isinf(damper.brace_n_m) and not damper.gains
     if own_route or not _is_tunable(found) or options.source != "exact":

@@ -82,7 +82,12 @@ def accelerometers_of(frame: Frame, names: Sequence[str | int]) -> tuple[int, ..
     """Return the indices (from 0) of the degrees of freedom with an accelerometer; all where none is named."""
     if not names:
         return tuple(range(frame.floors))
-    return tuple(degree_of_freedom(frame, name, "structure.accelerometers") for name in names)
+    where = "structure.accelerometers"
+    places = tuple(degree_of_freedom(frame, name, where) for name in names)
+    twice = next((place for place in places if places.count(place) > 1), None)
+    if twice is not None:
+        raise UserError(where, frame.names[twice], "is named more than once", "name each degree of freedom once")
+    return places
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.modal.amplitude.law_fit import AmplitudeDependence
@@ -70,6 +72,9 @@ class FrameIdentification:
     amplitude, amplitude_in_time
         Modes over amplitude and their simulation of each forced test; None and empty where constant modes predict as
         well.
+    shape_errors
+        Standard errors of the measured rows of `mode_shapes`, in their scale, shape (n, r); nan at rows that no sensor
+        measures.
     """
 
     frame: Frame | None
@@ -96,3 +101,19 @@ class FrameIdentification:
     mass_intervals: FloatArray
     amplitude: AmplitudeDependence | None = None
     amplitude_in_time: tuple[TimeVerification, ...] = ()
+    shape_errors: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def errors_of_rows(mode_shapes: FloatArray, measured: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return the errors of measured shapes in the scale of the shapes of the structure; nan where nothing is measured.
+
+    Parameters
+    ----------
+    mode_shapes
+        Shapes of the structure, shape (n, r).
+    measured, errors
+        Shape (n, r) in any scale; an infinite error at rows without a sensor.
+    """
+    known = np.isfinite(errors)
+    sizes = [np.linalg.norm(np.where(known, shapes, 0.0), axis=0) for shapes in (mode_shapes, measured)]
+    return np.where(known, errors * (sizes[0] / np.maximum(sizes[1], 1e-300)), np.nan)

@@ -18,14 +18,14 @@ from mrpipe.modal.decays.choice import choose_damping, decays_of_modes
 from mrpipe.modal.decays.decay import Estimate
 from mrpipe.modal.fit.own_residues import with_own_residues
 from mrpipe.modal.fit.result import MultiModeFit
-from mrpipe.modal.identification import FrameIdentification, GivenShapes
+from mrpipe.modal.identification import FrameIdentification, GivenShapes, errors_of_rows
 from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial
 from mrpipe.modal.matrices.rigid_floors import RigidShapes, assemble_rigid, rigid_response, rigid_shapes
 from mrpipe.modal.matrices.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.matrices.tridiagonal import fit_tridiagonal
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
-from mrpipe.modal.search.checks import check_mode_matrix, orthogonal_shapes
+from mrpipe.modal.search.checks import check_mode_matrix, orthogonal_shapes, reversed_finding
 from mrpipe.modal.search.chosen_tests import ChosenTests, choose_tests, training_first, with_clocks, without_complex
 from mrpipe.modal.search.forced_modes import ModeSearch, check_channels
 from mrpipe.modal.search.free_response import with_decays
@@ -41,6 +41,7 @@ from mrpipe.modal.search.selection import (
 from mrpipe.modal.verification import (
     TimeVerification,
     compare_in_time,
+    misfit_findings,
     verify_in_frequency,
     verify_in_time,
 )
@@ -59,11 +60,9 @@ _LOOSE_SIGNS = 0.03
 
 def _ambient_findings(tests: FrameTests) -> list[str]:
     given = np.isfinite(tests.floor_masses).any()
-    scale = "given floor masses" if given else "the added masses" if tests.with_added_masses else "nothing"
-    return [
-        "the excitation was not measured: modal masses and participations cannot be known; the scale of M, C and K "
-        f"comes from {scale}"
-    ]
+    known = "given floor masses" if given else "the added masses" if tests.with_added_masses else ""
+    scale = f"the scale of M, C and K comes from {known}" if known else "and nothing gives M, C and K a scale"
+    return [f"the excitation was not measured: modal masses and participations cannot be known; {scale}"]
 
 
 def _clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
@@ -193,6 +192,10 @@ def _identify(
         picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)
         chosen = replace(chosen, search=replace(chosen.search, fit=picked))
     fit = chosen.search.fit
+    findings += tests.notes
+    if layout.is_chain and chosen.search.numbers[0] == 1:
+        shapes, errors = floor_shapes(fit, layout)
+        findings += reversed_finding(shapes[:, 0], errors[:, 0])
     findings += _check_coherence(fit, tests) if forced else []
     progress(0.5, "decays")
     decays, notes = decays_of_modes(tests, fit)
@@ -228,6 +231,7 @@ def _identify(
     in_time: tuple[TimeVerification, ...] = ()
     if frame is not None and forced:
         in_time = tuple(_verified(frame, test, inside, None if rigid is None else tests.positions) for test in shown)
+        findings += misfit_findings(frame, shown, in_time, inside) if rigid is None else []
     # the synthesised frequency responses are those of one direction
     verified = frame if rigid is None and forced else None
     amplitude = None
@@ -244,6 +248,7 @@ def _identify(
         sweep_damping=sweep,
         mode_shapes=assembly.shapes,
         mac=_assurance(fit, layout, assembly, rigid),
+        shape_errors=errors_of_rows(assembly.shapes, *_measured_rows(fit, layout, rigid)),
         decays=decays,
         fit=fit,
         tridiagonal=assembly.storeys,
@@ -281,6 +286,13 @@ def _shown(forced: Sequence[FrameTest], chosen: ChosenTests, clocks: Sequence[Se
     others = [test for test in forced if test.name not in fitted]
     delays = expected_clocks(clocks, chosen.tests, others)
     return tuple(fitted[test.name] if test.name in fitted else corrected(test, delays) for test in forced)
+
+
+def _measured_rows(fit: MultiModeFit, layout: Layout, rigid: RigidShapes | None) -> tuple[FloatArray, FloatArray]:
+    """Return measured shapes and their errors in the rows of the result."""
+    if rigid is not None:
+        return rigid.shapes, rigid.errors
+    return floor_shapes(fit, layout) if layout.is_chain else (fit.residues.real, fit.residue_errors)
 
 
 def _names(fit: MultiModeFit, layout: Layout) -> tuple[str, ...]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.clock import lost_samples
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
 
@@ -67,6 +69,8 @@ class FrameTest:
         Direction of the first excitation; empty where the campaign has one direction only.
     added_masses
         Floor (from 1) and known mass [kg] that was added to it in this test.
+    note
+        What the user should know of the part that is used; empty for none.
     """
 
     name: str
@@ -83,6 +87,7 @@ class FrameTest:
     further_inputs: tuple[tuple[Place, FloatArray], ...] = ()
     direction: str = ""
     added_masses: tuple[tuple[int, float], ...] = ()
+    note: str = ""
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
@@ -110,6 +115,13 @@ class FrameTest:
 _FLOOR_CHANNEL = re.compile(r"^(floor_acceleration|floor_displacement)_([1-9][0-9]*)(?:_([a-z][a-z0-9]*))?$")
 _GROUND_CHANNEL = re.compile(r"^ground_acceleration(?:_([a-z][a-z0-9]*))?$")
 _FORCE_CHANNEL = re.compile(r"^input_force(?:_([a-z0-9]+))?$")
+
+SHORTEST_GAP = 3
+"""So many lost samples break a record; fewer disturb it less than noise does."""
+
+
+def _is_input(name: str) -> bool:
+    return bool(_FORCE_CHANNEL.match(name) or _GROUND_CHANNEL.match(name))
 
 
 def _sensors(recording: Recording) -> dict[Sensor, str]:
@@ -152,12 +164,43 @@ def _inputs(recording: Recording, source: Path, floors: int) -> dict[Place, Floa
     return {**forces, **ground}
 
 
-def _cut(recording: Recording) -> slice:
-    # a modal fit needs an unbroken record, so the longest segment of a test is used
-    if not recording.segments:
-        return slice(None)
-    start, stop = max(recording.segments, key=lambda item: item[1] - item[0])
-    return slice(start, stop)
+def _cut(recording: Recording) -> tuple[slice, str]:
+    """Return the longest unbroken part of a recording, and a note where a gap in the clock made it shorter."""
+    # a modal fit needs an unbroken record
+    segments = recording.segments or ((0, recording.time_s.size),)
+    parts = [part for segment in segments for part in _unbroken(recording, *segment)]
+    start, stop = max(parts, key=lambda item: item[1] - item[0])
+    note = ""
+    if len(parts) > len(segments):
+        first, last = recording.time_s[start], recording.time_s[stop - 1]
+        note = f"its clock has gaps; the longest part without one is used, from {first:.4g} to {last:.4g} s"
+    return slice(start, stop), note
+
+
+def _unbroken(recording: Recording, start: int, stop: int) -> list[tuple[int, int]]:
+    """Return the parts of a segment between the gaps of its clock."""
+    lost = lost_samples(recording.time_s[start:stop], recording.sampling_rate_hz)
+    gaps = start + 1 + np.flatnonzero(lost >= SHORTEST_GAP)
+    return list(pairwise([start, *(int(gap) for gap in gaps), stop]))
+
+
+def _require_signal(recording: Recording, names: Iterable[str], part: slice, source: Path) -> None:
+    """Refuse a channel that never changes.
+
+    Raises
+    ------
+    UserError
+        Naming the channel.
+    """
+    for name in names:
+        values = recording.channels[name][part]
+        if np.ptp(values) == 0.0:
+            place = f"tests.{recording.name}.channels.{name}"
+            problem = f"never changes: all samples are {values[0]:g}"
+            remedy = "leave the channel out of this test, or name the right column"
+            if not _FLOOR_CHANNEL.match(name):
+                remedy = "name the right column, or write kind: ambient where the excitation was not measured"
+            raise UserError(source, place, problem, remedy)
 
 
 def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest:
@@ -186,8 +229,15 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
     beyond = [name for sensor, name in sensors.items() if sensor.floor > n]
     if beyond:
         raise UserError(source, f"{place}.{beyond[0]}", "is above the top floor", f"the frame has floors 1 to {n}")
-    part = _cut(recording)
+    part, note = _cut(recording)
+    _require_signal(recording, sensors.values(), part, source)
     inputs = [(where, values[part]) for where, values in _inputs(recording, source, n).items()]
+    if inputs and recording.kind in {"sweep", "random"}:
+        # of several shakers some may rest in a test
+        moving = [(where, values) for where, values in inputs if np.ptp(values) > 0.0]
+        if not moving:
+            _require_signal(recording, filter(_is_input, recording.channels), part, source)
+        inputs = moving
     if not inputs and recording.kind in {"sweep", "random"}:
         raise UserError(
             source,
@@ -216,6 +266,7 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
         further_inputs=() if recording.kind == "ambient" else tuple(inputs[1:]),
         direction=first.direction,
         added_masses=_added_masses(recording, source, n, {sensor.floor for sensor in sensors}),
+        note=note,
     )
 
 
@@ -263,6 +314,12 @@ class FrameTests:
     with_added_masses: tuple[FrameTest, ...] = ()
     positions: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     inertias: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def notes(self) -> list[str]:
+        """What the user should know of the parts of the tests that are used."""
+        every = (*self.forced, *self.ambient, *self.decays, *self.with_added_masses)
+        return [f"test {test.name}: {test.note}" for test in every if test.note]
 
 
 def frame_tests(campaign: Campaign) -> FrameTests:
@@ -319,7 +376,7 @@ def _plan(
         raise UserError(source, place, f"has no entry {missing[0]!r}", "give x and y of every sensor's suffix in m")
     if inertias.size and inertias.size != floors:
         place = "frame.floor_inertias_kg_m2"
-        raise UserError(source, place, f"has {inertias.size} entries", f"give one for each of the {floors} floors")
+        raise UserError(source, place, f"has {inertias.size} entries", f"give one for each floor, {floors} in all")
     return positions, inertias
 
 

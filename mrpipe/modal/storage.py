@@ -53,7 +53,7 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
         "degrees_of_freedom": list(result.degrees_of_freedom),
         "frequency_intervals_hz": [_interval(item, _TWO_PI) for item in result.frequencies],
         "damping_ratio_intervals": [_interval(item) for item in result.damping],
-        "mode_shape_errors": _shape_errors(result),
+        "mode_shape_errors": _plain(result.shape_errors),
         "damping_source": list(result.damping_source),
         "second_method_damping_ratios": [float(item.value) for item in result.sweep_damping],
         "second_method_damping_ratio_intervals": [_interval(item) for item in result.sweep_damping],
@@ -123,11 +123,6 @@ def _over_amplitude(result: FrameIdentification) -> dict[str, Any] | None:
 def _plain(values: FloatArray) -> list[Any]:
     """Return nested lists with None in place of nan, because JSON has no nan."""
     return [[float(item) if np.isfinite(item) else None for item in row] for row in np.atleast_2d(values)]
-
-
-def _shape_errors(result: FrameIdentification) -> list[list[float]]:
-    largest = np.abs(result.fit.residues).max(axis=0)
-    return np.asarray(result.fit.residue_errors / largest).tolist()
 
 
 def _clock_row(clock: SensorClock) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import signal
@@ -15,6 +16,12 @@ from mrpipe.structures import Frame, frequency_response
 from mrpipe.structures.response import linear_response
 
 _FILTER_ORDER = 3
+
+POOR_FIT_PERCENT = 30.0
+"""Where the fit of a test (median of the sensors) is smaller, its excitation may have the wrong sign, unit or place."""
+
+EXPLAINED_FIT_PERCENT = 70.0
+"""A correction that gives at least this fit explains a poor one."""
 
 
 @dataclass(frozen=True)
@@ -135,3 +142,58 @@ def verify_in_frequency(frame: Frame, fit: MultiModeFit, band_hz: tuple[float, f
         error=error,
         floors=tuple(sensor.floor for sensor in spectrum.sensors),
     )
+
+
+def misfit_findings(
+    frame: Frame, tests: Sequence[FrameTest], found: Sequence[TimeVerification], band_hz: tuple[float, float]
+) -> list[str]:
+    """Return what explains forced tests that the frame does not reproduce, a sentence for each.
+
+    Modes do not depend on sign, unit and place of the excitation, so that a mistake there shows only now.
+
+    Parameters
+    ----------
+    frame
+        The identified structure.
+    tests, found
+        Tests with measured excitation, and their verification.
+    band_hz
+        Band of the verification.
+    """
+    lines = (_misfit(frame, test, item, band_hz) for test, item in zip(tests, found, strict=True))
+    return [line for line in lines if line]
+
+
+def _misfit(frame: Frame, test: FrameTest, found: TimeVerification, band_hz: tuple[float, float]) -> str:
+    usual = float(np.median(found.fit_percent))
+    if usual > POOR_FIT_PERCENT:
+        return ""
+    factor, fit = _scaled_fit(found)
+    if fit > EXPLAINED_FIT_PERCENT and factor < 0.0:
+        said = "opposite to the simulated one: the sign of the excitation, or of all sensors, is wrong"
+        return f"test {test.name}: the measured response is {said}"
+    if fit > EXPLAINED_FIT_PERCENT:
+        said = f"{factor:.3g} times the simulated one: the unit of the excitation or of the sensors is wrong"
+        return f"test {test.name}: the measured response is {said}"
+    floor = test.shaker_floor
+    if floor > 0 and len(test.inputs) == 1:
+        others = [other for other in range(1, frame.floors + 1) if other != floor]
+        fits = [_scaled_fit(verify_in_time(frame, replace(test, shaker_floor=other), band_hz)) for other in others]
+        best = int(np.argmax([fit if factor > 0.0 else -np.inf for factor, fit in fits]))
+        if fits[best][1] > EXPLAINED_FIT_PERCENT:
+            said = f"that to a force on floor {others[best]}, and the campaign says floor {floor}"
+            return f"test {test.name}: the measured response is {said}: correct the floor of the shaker"
+    if usual > 0.0:
+        return ""
+    return (
+        f"test {test.name}: the structure does not reproduce the response to the measured excitation (fit {usual:.0f} "
+        "%): channel, place or sign of the excitation, or the sign of a sensor, may be wrong"
+    )
+
+
+def _scaled_fit(found: TimeVerification) -> tuple[float, float]:
+    """Return the factor on the simulated response that fits best, and the fit with it [%]."""
+    measured, simulated = found.measured, found.simulated
+    factor = float(np.sum(measured * simulated) / max(float(np.sum(simulated**2)), 1e-300))
+    error = float(np.linalg.norm(measured - factor * simulated)) / max(float(np.linalg.norm(measured)), 1e-300)
+    return factor, 100.0 * (1.0 - error)

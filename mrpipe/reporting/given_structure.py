@@ -22,7 +22,7 @@ def describe(sink: Sink, frame: Frame, summary: Mapping[str, Any]) -> None:
         sink.text(
             f"It was reduced from {summary['full_degrees_of_freedom']} degrees of freedom. The largest error of the "
             f"response to ground motion up to {summary['reduction_band_high_hz']:.3g} Hz is "
-            f"{100.0 * summary['reduction_error']:.2g} % of the largest response."
+            f"{100.0 * summary['reduction_error']:.3g} % of the largest response."
         )
     rows = {
         "mode": summary["mode_numbers"],
@@ -33,10 +33,10 @@ def describe(sink: Sink, frame: Frame, summary: Mapping[str, Any]) -> None:
     sink.table("modes", pd.DataFrame(rows), "Modes.")
     if frame.floors > _LARGEST_TABLE:
         return
-    for name, text in (("mass", "M [kg]."), ("stiffness", "K [N/m]."), ("damping", "C [N s/m].")):
-        sink.table(name, pd.DataFrame(getattr(frame, name), columns=list(frame.names)), text)
+    figures.matrix_tables(sink, frame)
+    names, shapes = summary["degrees_of_freedom"], np.asarray(summary["mode_shapes"])
     sink.figure(
         "mode-shapes",
-        figures.mode_shapes(np.asarray(summary["mode_shapes"]), summary["frequencies_hz"], summary["heights_m"]),
-        "Mode shapes.",
+        figures.mode_shapes(shapes, summary["frequencies_hz"], summary["heights_m"], names),
+        figures.shapes_caption(names),
     )

@@ -37,11 +37,7 @@ def describe(sink: Sink, result: IdentifiedFrame) -> None:
     """Write the section."""
     found, values = result.identification, result.summary
     count, frequencies = len(found.numbers), values["frequencies_hz"]
-    sink.text(
-        f"{count} modes between {frequencies[0]:.3g} and {frequencies[-1]:.3g} Hz. Poles are fitted to all sensors of "
-        "all tests at once, including the transients at both ends of each record. Damping comes from free decays where "
-        "there are any, and from the forced tests as a second, independent method."
-    )
+    sink.text(f"{count} modes between {frequencies[0]:.3g} and {frequencies[-1]:.3g} Hz. {_method(bool(found.tests))}")
     sink.table("modes", pd.DataFrame(figures.mode_rows(values)), "Modes with 95 % intervals.")
     if found.clocks:
         sink.table("clocks", pd.DataFrame(values["clocks"]), "Delays of sensors that were corrected.")
@@ -52,9 +48,7 @@ def describe(sink: Sink, result: IdentifiedFrame) -> None:
             "Stabilisation: in how many model orders a pole appears; lines: modes of the structure.",
         )
     if found.frame is not None:
-        for name, text in (("mass", "M [kg]."), ("stiffness", "K [N/m]."), ("damping", "C [N s/m].")):
-            columns = [f"floor {i + 1}" for i in range(found.frame.floors)]
-            sink.table(name, pd.DataFrame(getattr(found.frame, name), columns=columns), text)
+        figures.matrix_tables(sink, found.frame)
     if found.in_frequency is not None:
         averaged = averaged_responses(found.tests[0], result.segment_s)
         sink.figure(
@@ -62,7 +56,9 @@ def describe(sink: Sink, result: IdentifiedFrame) -> None:
             figures.frequency_responses(found.in_frequency, averaged, found.band_hz),
             "Frequency responses: measured (leakage taken out), of M, C and K, and coherence of the averaged spectra.",
         )
-    sink.figure("mode-shapes", figures.mode_shapes(found.mode_shapes, frequencies), "Mode shapes.")
+    names = found.degrees_of_freedom
+    shapes = figures.mode_shapes(found.mode_shapes, frequencies, names=names)
+    sink.figure("mode-shapes", shapes, figures.shapes_caption(names))
     law = values["amplitude_dependence"]
     if law is not None:
         rows = [
@@ -87,3 +83,17 @@ def describe(sink: Sink, result: IdentifiedFrame) -> None:
     if found.in_time:
         text = "Measured and simulated response of a forced test."
         sink.figure("verification", figures.verification(found.in_time[0]), text)
+
+
+def _method(forced: bool) -> str:
+    """Return how modes and damping were found."""
+    if forced:
+        return (
+            "Poles are fitted to all sensors of all tests at once, including the transients at both ends of each "
+            "record. Damping comes from free decays where there are any, and from the forced tests as a second, "
+            "independent method."
+        )
+    return (
+        "The excitation was not measured. Poles come from the responses alone, and frequency and damping of each mode "
+        "from maximum likelihood. Damping comes from free decays where there are any."
+    )

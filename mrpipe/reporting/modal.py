@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.modal.decays.decay import DecayResult
 from mrpipe.modal.spectra import FrequencyResponses
 from mrpipe.modal.verification import FrequencyVerification, TimeVerification
+from mrpipe.reporting.places import ROTATION, by_direction
+from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
+from mrpipe.structures import Frame
 
 _MOST_POINTS = 4000
+_MOST_SHAPES = 12
 
 
 def mode_rows(values: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -69,23 +76,80 @@ def frequency_responses(
     return figure
 
 
+def matrix_tables(sink: Sink, frame: Frame) -> None:
+    """Write M, K and C with the names of their rows and columns."""
+    names = list(frame.names)
+    for name, text in (("mass", "M [kg]"), ("stiffness", "K [N/m]"), ("damping", "C [N s/m]")):
+        table = pd.DataFrame(getattr(frame, name), columns=names)
+        table.insert(0, "degree of freedom", names)
+        rotations = any(item.endswith(ROTATION) for item in names)
+        sink.table(name, table, f"{text}; rows of rotations in SI units of moments." if rotations else f"{text}.")
+
+
+def shapes_caption(names: Sequence[str]) -> str:
+    """Return the caption of :func:`mode_shapes`."""
+    if any(name.endswith(ROTATION) for name in names):
+        return "Mode shapes; dashed: rotation in rad where displacements are in m."
+    return "Mode shapes." if by_direction(names) else "Mode shapes at the degrees of freedom."
+
+
 def mode_shapes(
-    shapes: FloatArray, frequencies_hz: Sequence[float], heights_m: Sequence[float] | None = None
+    shapes: FloatArray,
+    frequencies_hz: Sequence[float],
+    heights_m: Sequence[float] | None = None,
+    names: Sequence[str] = (),
 ) -> Figure:
-    """Draw the shapes (floors by modes) over the floors or their heights; floors without a value are left out."""
-    floors, modes = shapes.shape
-    figure, axes = figure_with_axes(1, modes, width=1.5 * modes + 0.8, height=3.6)
-    height = np.arange(floors + 1.0) if heights_m is None else np.concatenate([[0.0], heights_m])
-    vertical = "floor" if heights_m is None else "height [m]"
-    for mode in range(modes):
+    """Draw the shapes (rows by modes); rows without a value are left out.
+
+    Floors are drawn over their number or height, with a line for each direction. Degrees of freedom that are not called
+    as floors are drawn as bars with their names.
+
+    Parameters
+    ----------
+    shapes
+        A row for each degree of freedom.
+    frequencies_hz
+        Of the modes.
+    heights_m
+        Height of each floor; None: unknown.
+    names
+        Of the degrees of freedom; empty: floors in one direction.
+    """
+    rows, modes = shapes.shape
+    names = list(names) or [f"floor {row + 1}" for row in range(rows)]
+    directions = by_direction(names)
+    if directions is None and heights_m is not None:
+        directions = {"": {row + 1: row for row in range(rows)}}
+    shown = min(modes, _MOST_SHAPES)
+    extra = 0.0 if directions is not None else 0.09 * max(map(len, names))
+    figure, axes = figure_with_axes(1, shown, width=1.5 * shown + 0.8 + extra, height=max(3.6, 0.16 * rows))
+    for mode in range(shown):
         axis = axes[0, mode]
-        values = np.concatenate([[0.0], shapes[:, mode]])
-        known = np.isfinite(values)
-        axis.plot(values[known], height[known], "o-", color=COLOURS[0], linewidth=1.4, markersize=4)
+        if directions is None:
+            axis.barh(np.arange(rows), np.nan_to_num(shapes[:, mode]), color=COLOURS[0])
+            axis.set_yticks(np.arange(rows), names if mode == 0 else [""] * rows, fontsize=7)
+        else:
+            _draw_floors(axis, shapes[:, mode], directions, heights_m)
+        vertical = "" if directions is None else "floor" if heights_m is None else "height [m]"
         axis.axvline(0.0, color=MEASURED, linewidth=0.6)
         axis.set_xlim(-1.15, 1.15)
         label(axis, "", vertical if mode == 0 else "", f"{mode + 1}: {frequencies_hz[mode]:.3g} Hz")
+    if directions is not None and len(directions) > 1:
+        axes[0, 0].legend(fontsize=7, frameon=False)
     return figure
+
+
+def _draw_floors(
+    axis: Axes, shape: FloatArray, directions: Mapping[str, Mapping[int, int]], heights_m: Sequence[float] | None
+) -> None:
+    """Draw one mode over the floors, a line for each direction."""
+    for colour, (direction, places) in zip(cycle(COLOURS), directions.items(), strict=False):
+        floors = sorted(places)
+        values = np.concatenate([[0.0], shape[[places[floor] for floor in floors]]])
+        height = np.array([0.0, *(float(floor) if heights_m is None else heights_m[floor - 1] for floor in floors)])
+        known = np.isfinite(values)
+        style = "o--" if direction == ROTATION else "o-"
+        axis.plot(values[known], height[known], style, color=colour, linewidth=1.4, markersize=4, label=direction)
 
 
 def stabilisation(candidates: Sequence[Mapping[str, Any]], frequencies_hz: Sequence[float]) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,10 +16,19 @@ from mrpipe.campaigns.readers.strong_motion import (
     refuse_other_records,
 )
 from mrpipe.errors import UserError
-from mrpipe.units import to_si
+from mrpipe.units import conversion, to_si
 
 HORIZONTAL = 2
 """Most horizontal channels of a record that are used where none is named."""
+
+UNIFORM_SHARE = 0.9
+"""A clock is that of a recorder, and not of straight lines, where so many of its steps are equal."""
+
+LONGEST_GAP = 10.0
+"""Longest step of the clock of a recorder over its usual one; a longer one is a gap in the record."""
+
+_BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]")
+_DECIMAL_COMMA = re.compile(r"^[+-]?\d+,\d+([eE][+-]?\d+)?$")
 
 
 def read_histories(
@@ -62,9 +72,12 @@ def read_histories(
         if quantity != "acceleration":
             raise UserError(path, "", "holds accelerations", f"give a text file of time [s] and {quantity}")
         return _from_record(path, channels, channels_setting)
-    table = _table(path)
+    table, headers = _table(path)
+    _require_unit(path, headers, unit, quantity, unit_setting)
     names = [str(number) for number in range(1, table.shape[1])]
     columns = [_place(path, item, names) + 1 for item in channels] or list(range(1, table.shape[1]))
+    if not np.any(table[:, columns]):
+        raise UserError(path, "", "holds nothing but zeros", "give a record that moves")
     return table[:, 0], to_si(table[:, columns], unit, where=unit_setting, quantity=quantity)
 
 
@@ -96,11 +109,15 @@ def _place(path: Path, channel: str | int, names: Sequence[str]) -> int:
     raise UserError(path, f"channel {text}", "is not in the record", f"it has {', '.join(names)}")
 
 
-def _table(path: Path) -> FloatArray:
+def _table(path: Path) -> tuple[FloatArray, list[str]]:
+    """Return the rows of numbers and the header lines."""
     rows: list[list[float]] = []
+    headers: list[str] = []
+    lines: list[int] = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
-        words = line.replace(",", " ").replace(";", " ").split()
+        words = _words(line)
         if not words or not (words[0][0].isdigit() or words[0][0] in "+-."):
+            headers.append(line)
             continue
         try:
             row = [float(word) for word in words]
@@ -112,12 +129,45 @@ def _table(path: Path) -> FloatArray:
             problem = f"has {len(row)} numbers, the first row {len(rows[0])}"
             raise UserError(path, f"line {number}", problem, "write time and the same histories in each row")
         rows.append(row)
+        lines.append(number)
     if len(rows) < 2:
         raise UserError(path, "", f"holds {len(rows)} rows of numbers", "give at least two")
     table = np.array(rows, dtype=np.float64)
-    wrong = np.flatnonzero(~(np.diff(table[:, 0]) > 0.0))
+    bad = np.flatnonzero(~np.all(np.isfinite(table), axis=1))
+    if bad.size:
+        raise UserError(path, f"line {lines[bad[0]]}", "holds a number that is not finite", "give finite numbers")
+    _require_clock(path, table[:, 0])
+    return table, headers
+
+
+def _words(line: str) -> list[str]:
+    """Return the fields of a row; a comma is a decimal one between semicolons, or where each field holds one."""
+    fields = line.replace(";", " ").split()
+    decimal = ";" in line or (len(fields) > 1 and all(_DECIMAL_COMMA.match(field) for field in fields))
+    return [field.replace(",", ".") for field in fields] if decimal else line.replace(",", " ").split()
+
+
+def _require_clock(path: Path, time_s: FloatArray) -> None:
+    steps = np.diff(time_s)
+    wrong = np.flatnonzero(~(steps > 0.0))
     if wrong.size:
         raise UserError(path, f"row {wrong[0] + 2}", "time does not rise", "give a strictly rising clock in seconds")
-    if not np.all(np.isfinite(table)):
-        raise UserError(path, "", "holds a number that is not finite", "give finite numbers")
-    return table
+    usual = float(np.median(steps))
+    if np.mean(np.abs(steps - usual) < 0.02 * usual) < UNIFORM_SHARE:
+        return  # a history of straight lines between times that the user chose
+    gap = int(np.argmax(steps))
+    if steps[gap] > LONGEST_GAP * usual:
+        problem = f"time jumps from {time_s[gap]:g} to {time_s[gap + 1]:g} s, and other rows are {usual:g} s apart"
+        raise UserError(path, f"row {gap + 2}", problem, "fill the gap, or give the part before or after it")
+
+
+def _require_unit(path: Path, headers: Sequence[str], unit: str, quantity: str, unit_setting: str) -> None:
+    """Refuse a unit that a header contradicts, as in `acceleration [g]`."""
+    wanted = conversion(unit, where=unit_setting, quantity=quantity)
+    for said in (found for line in headers for found in _BRACKETS.findall(line)):
+        try:
+            factor = conversion(said.strip(), quantity=quantity)
+        except UserError:
+            continue  # another quantity, such as the time, or a remark
+        if not np.isclose(factor, wanted, rtol=1e-3):
+            raise UserError(unit_setting, unit, f"is not the unit that the header of {path} says", f"set it to {said}")

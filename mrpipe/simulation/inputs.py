@@ -153,7 +153,7 @@ def ground_amplitude(details: Mapping[str, Any], purpose: str) -> float:
             "simulate.excitation",
             "force_at",
             f"{purpose} is measured under motion of the ground, but the settings give a force",
-            "leave force_at out, or study the force with simulate --law",
+            "leave force_at out; mrpipe simulate runs under the force, and design.motions takes its history",
         )
     raise UserError(
         "simulate.excitation", "kind", f"{details.get('kind')} has no amplitude", f"set kind: harmonic for {purpose}"

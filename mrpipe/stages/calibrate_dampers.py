@@ -21,7 +21,13 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.calibration import CalibrationOptions, balanced_weights
     from mrpipe.control.limits import placement_warning
     from mrpipe.control.placed import calibrate_placed, modes_together, placed_warnings
-    from mrpipe.control.placed_storage import damper_as_json, placed_dampers, together_as_json, write_placed
+    from mrpipe.control.placed_storage import (
+        accelerometers_of,
+        damper_as_json,
+        placed_dampers,
+        together_as_json,
+        write_placed,
+    )
     from mrpipe.dampers.model import read_tested
     from mrpipe.reporting import several_dampers as report
     from mrpipe.simulation.several_rig import damper_model
@@ -33,6 +39,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         replace(item, gains={**settings.given(item.law), **(item.gains or {})})
         for item in placed_dampers(frame, entries, settings.target_mode)
     ]
+    accelerometers_of(frame, context.settings.structure.accelerometers)  # so that a wrong name is reported here
     options = CalibrationOptions(
         source=settings.gains,
         published=settings.published,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.errors import UserError
 from mrpipe.structures.frame import Frame
+from mrpipe.structures.given_checks import (
+    require_positive_masses,
+    require_restoring_forces,
+    symmetric,
+    tell_of_asymmetric_damping,
+    tell_of_changed_modes,
+)
 from mrpipe.structures.options import MatrixEntry, StoreyColumn, StructureSettings
 from mrpipe.structures.shear_frames import frame_from_modes, frame_from_parameter_set, modal_damping_matrix, shear_frame
 from mrpipe.units import conversion, same_unit_dimension
@@ -22,8 +30,8 @@ Reader = Callable[[Path, str], Any]
 
 _GROUND = ("ground", "0")
 
-SYMMETRY = 1e-8
-"""Largest relative asymmetry of M and K that is taken for rounding."""
+_UNIT_IN_NAME = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
+"""A unit in brackets at the end of the name of a column."""
 
 
 def structure_from_settings(
@@ -52,7 +60,7 @@ def structure_from_settings(
     """
     ways = {
         "frame": bool(settings.frame),
-        "file": bool(settings.file or settings.mass.file),
+        "file": bool(settings.file or settings.mass.file or settings.stiffness.file),
         "storeys": bool(settings.storeys),
         "storey_table": settings.storey_table.given,
         "mode_shapes": bool(settings.mode_shapes),
@@ -80,7 +88,12 @@ def structure_from_settings(
         _names(settings, frame.floors),
         influence_y=_influence("influence_y", settings.influence_y, frame.floors),
     )
-    return without_massless(full, warn)
+    tell_of_asymmetric_damping(full.damping, warn)
+    complete = without_massless(full, warn)
+    require_restoring_forces(complete)
+    if given == ["mode_shapes"]:
+        tell_of_changed_modes(complete, settings.frequencies_hz, warn)
+    return complete
 
 
 def _from_storeys(settings: StructureSettings, name: str) -> Frame:
@@ -120,7 +133,21 @@ def _column(key: str, column: StoreyColumn, file: str, read: Reader, si: str) ->
     if not np.all(np.isfinite(found)) or np.any(found <= 0.0):
         row = int(np.flatnonzero(~(np.isfinite(found) & (found > 0.0)))[0])
         raise UserError(where, f"storey {row + 1}", f"is {found[row]:g}", "give a positive number for each storey")
-    return found * _factor(column.unit or si, si, f"{where}.unit")
+    return found * _factor(_unit_of_column(column, where) or si, si, f"{where}.unit")
+
+
+def _unit_of_column(column: StoreyColumn, where: str) -> str:
+    """Return the unit of a column, which its name may state in brackets; empty: neither says."""
+    found = _UNIT_IN_NAME.search(column.name)
+    named = found.group(1).strip() if found and not column.values else ""
+    try:
+        factor = conversion(named) if named else 0.0
+    except UserError:
+        return column.unit  # a remark in brackets
+    if column.unit and named and not math.isclose(conversion(column.unit, where=f"{where}.unit"), factor):
+        problem = f"is {column.unit}, and the column is called {column.name!r}"
+        raise UserError(where, "unit", problem, f"give {named}, or correct the name of the column")
+    return column.unit or named
 
 
 def _from_modes(settings: StructureSettings, name: str) -> Frame:
@@ -148,22 +175,17 @@ def _from_matrices(settings: StructureSettings, read: Reader, name: str) -> Fram
         raise UserError(
             "structure", "stiffness", f"is {_size(stiffness)}, the mass is {_size(mass)}", "give matrices of one size"
         )
-    mass, stiffness = _symmetric("mass", mass), _symmetric("stiffness", stiffness)
-    with_mass = np.any(mass != 0.0, axis=0)
-    if not np.any(with_mass) or np.min(np.linalg.eigvalsh(mass[np.ix_(with_mass, with_mass)])) <= 0.0:
-        raise UserError(
-            "structure",
-            "mass",
-            "is not positive definite",
-            "correct the signs, or remove the degrees of freedom whose masses depend on each other",
-        )
+    mass, stiffness = symmetric("mass", mass), symmetric("stiffness", stiffness)
+    require_positive_masses(mass)
     if settings.damping.name or settings.damping.file:
         damping = _matrix("damping", settings.damping, settings, read, "N*s/m")
         if damping.shape != (n, n):
             raise UserError("structure", "damping", f"is {_size(damping)}", f"give a matrix of {n} x {n}")
     else:
-        condensed = without_massless(Frame(mass, np.zeros((n, n)), stiffness))
+        names = _names(settings, n)
+        condensed = without_massless(Frame(mass, np.zeros((n, n)), stiffness, degrees_of_freedom=names))
         damping = np.zeros((n, n))
+        with_mass = np.any(mass != 0.0, axis=0)
         damping[np.ix_(with_mass, with_mass)] = modal_damping_matrix(
             condensed.mass, condensed.stiffness, _ratios(settings, condensed.floors)
         )
@@ -175,6 +197,13 @@ def _matrix(key: str, entry: MatrixEntry, settings: StructureSettings, read: Rea
     if not file:
         raise UserError("structure", f"{key}.file", "is not given", "name the file of the matrix, or structure.file")
     content = read(Path(file), entry.name)
+    if np.iscomplexobj(content):
+        raise UserError(
+            file,
+            entry.name or key,
+            "holds complex numbers",
+            "give real matrices; a loss factor of the material is twice the damping ratio at resonance",
+        )
     try:
         values = np.asarray(content.toarray() if hasattr(content, "toarray") else content, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -197,26 +226,15 @@ def _factor(unit: str, si: str, where: str) -> float:
     return conversion(unit, where=where) / conversion(si, where=where)
 
 
-def _symmetric(key: str, matrix: FloatArray) -> FloatArray:
-    scale = float(np.max(np.abs(matrix)))
-    difference = float(np.max(np.abs(matrix - matrix.T)))
-    if difference > SYMMETRY * scale:
-        row, column = np.unravel_index(int(np.argmax(np.abs(matrix - matrix.T))), matrix.shape)
-        raise UserError(
-            "structure",
-            f"{key}[{row + 1}, {column + 1}]",
-            f"differs from its mirror image by {difference / scale:.1e} of the largest entry",
-            "a mass or stiffness matrix is symmetric; check the export",
-        )
-    return np.asarray(0.5 * (matrix + matrix.T))
-
-
 def _size(matrix: FloatArray) -> str:
     return f"{matrix.shape[0]} x {matrix.shape[1]}"
 
 
 def _ratios(settings: StructureSettings, count: int) -> FloatArray:
-    given = list(settings.damping_ratio)[:count]
+    given = list(settings.damping_ratio)
+    if len(given) > count:
+        problem = f"has {len(given)} entries, and the structure has {count} modes"
+        raise UserError("structure", "damping_ratio", problem, "give one for each mode, or fewer")
     return np.array(given + [given[-1]] * (count - len(given)))
 
 
@@ -233,6 +251,13 @@ def _names(settings: StructureSettings, count: int) -> tuple[str, ...]:
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise UserError("structure", "degrees_of_freedom", f"{twice} occurs more than once", "give different names")
+    for place, name in enumerate(names, start=1):
+        where = f"degrees_of_freedom[{place}]"
+        if name in _GROUND:
+            raise UserError("structure", where, f"is called {name}, which means the ground", "choose another name")
+        if name.isdigit() and name != str(place):
+            problem = f"is called {name}, which also means the degree of freedom number {name}"
+            raise UserError("structure", where, problem, f"call it {place}, or give it a word")
     return names
 
 
@@ -268,14 +293,13 @@ def without_massless(frame: Frame, warn: Callable[[str], None] | None = None) ->
     if np.linalg.matrix_rank(inner) < len(gone):
         nowhere = ", ".join(frame.names[place] for place in gone[:6])
         raise UserError("structure", nowhere, "has neither mass nor a spring", "remove it, or give it a mass")
+    static = np.asarray(-np.linalg.solve(inner, frame.stiffness[np.ix_(gone, places)]), dtype=np.float64)
     basis = np.zeros((frame.floors, len(places)))
     basis[places] = np.eye(len(places))
-    basis[gone] = -np.linalg.solve(inner, frame.stiffness[np.ix_(gone, places)])
+    basis[gone] = static
     mass, damping, stiffness = (basis.T @ item @ basis for item in (frame.mass, frame.damping, frame.stiffness))
-    names = [frame.names[place] for place in gone]
-    listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
     if warn is not None:
-        warn(f"{len(names)} degrees of freedom without mass were condensed, which is exact: {listed}")
+        warn(_condensed(frame, places, gone, static))
     return replace(
         frame,
         mass=mass,
@@ -287,11 +311,31 @@ def without_massless(frame: Frame, warn: Callable[[str], None] | None = None) ->
     )
 
 
+def _condensed(frame: Frame, places: IntArray, gone: IntArray, static: FloatArray) -> str:
+    """Return a sentence that says what was condensed, and whether that is exact."""
+    names = [frame.names[place] for place in gone]
+    listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+    count = f"{len(names)} degree{'s' if len(names) > 1 else ''} of freedom without mass"
+    # forces of the dashpots on them while they follow statically
+    left = frame.damping[np.ix_(gone, places)] + frame.damping[np.ix_(gone, gone)] @ static
+    if np.max(np.abs(left)) > 1e-6 * max(float(np.max(np.abs(frame.damping))), 1e-300):
+        return (
+            f"{count} ({listed}) had to be condensed. This is an approximation, because the dashpots there are not "
+            "proportional to the springs. Give a mass there if these dashpots matter"
+        )
+    return f"{count} ({listed}) had to be condensed. This is exact"
+
+
 def floor_heights(settings: StructureSettings, read: Reader) -> list[float] | None:
     """Return the height of each floor above the ground [m]; None if a storey has no height."""
     column = settings.storey_table.height
     if settings.storey_table.given and (column.name or column.values):
-        return np.cumsum(_column("height", column, settings.storey_table.file, read, "m")).tolist()
+        storeys = _column("height", column, settings.storey_table.file, read, "m")
+        floors = _column("mass", settings.storey_table.mass, settings.storey_table.file, read, "kg").size
+        if storeys.size != floors:
+            problem = f"has {storeys.size} values, and the table has {floors} storeys"
+            raise UserError("structure.storey_table", "height", problem, "give the height of each storey")
+        return np.cumsum(storeys).tolist()
     heights = [row.height_m for row in settings.storeys for _ in range(row.repeat)]
     known = [height for height in heights if height is not None]
     return np.cumsum(known).tolist() if heights and len(known) == len(heights) else None

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import ArtifactWriter
+from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.files import open_data_file
 from mrpipe.errors import UserError
 from mrpipe.structures.dynamics import modal_assurance, natural_modes, normalise_to_largest
 from mrpipe.structures.frame import Frame, write_frame
+from mrpipe.structures.given_checks import require_dissipation
 from mrpipe.structures.opensees import opensees_matrices
 from mrpipe.structures.reduction import Reduced
 
@@ -36,17 +38,27 @@ def read_matrix(file: Path, name: str) -> Any:
         key = found.aliases.get(name, name)
         if key not in found.names:
             known = ", ".join(found.names[:12]) or "nothing"
-            raise UserError(file, name, "is not in the file", f"it holds {known}")
-        content = found.fetch(key)
+            bare = found.table and all(column.isdigit() for column in found.names)
+            whole = "; for the whole table write name: ''" if bare else ""
+            raise UserError(file, name, "is not in the file", f"it holds {known}{whole}")
+        content = _fetched(found, key)
     elif found.table:
         content = np.column_stack([np.asarray(found.fetch(column), dtype=np.float64) for column in found.names])
     elif len(found.names) == 1:
-        content = found.fetch(found.names[0])
+        content = _fetched(found, found.names[0])
     else:
         raise UserError(file, "", f"holds {len(found.names)} variables", "name one of them in the setting")
     if isinstance(content, UserError):
         raise content
     return content
+
+
+def _fetched(found: DataFile, name: str) -> Any:
+    try:
+        return found.fetch(name)
+    except ValueError as error:
+        said = " ".join(str(error).split())[:200]
+        raise UserError(found.path, name, f"cannot be read ({said})", "give a matrix of numbers") from error
 
 
 def given_summary(full: Frame, reduced: Reduced, heights_m: list[float] | None = None) -> dict[str, Any]:
@@ -58,19 +70,13 @@ def given_summary(full: Frame, reduced: Reduced, heights_m: list[float] | None =
     Raises
     ------
     UserError
-        If the stiffness is not positive definite.
+        If the damping matrix feeds energy into a mode.
     """
     frame = reduced.frame
     modes = natural_modes(frame)
     omega, shapes = modes.angular_frequencies, modes.mode_shapes
-    if not np.all(omega > 1e-6 * np.nanmax(omega)):
-        raise UserError(
-            "structure",
-            "stiffness",
-            "is not positive definite, so the structure can move without a restoring force",
-            "add the stiffness of the supports, or correct the signs",
-        )
     damping_ratios = np.diag(shapes.T @ frame.damping @ shapes) / (2.0 * omega)
+    require_dissipation(damping_ratios)
     frequencies = modes.frequencies_hz
     mac = modal_assurance(reduced.basis @ shapes, natural_modes(full).mode_shapes[:, : omega.size])
     return {

@@ -21,6 +21,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
 from mrpipe.structures.frame import Frame
+from mrpipe.structures.given_checks import SYMMETRY, largest_asymmetry
 
 NEGLIGIBLE = 1e-12
 """Entries of a matrix below this share of the largest one get no element."""
@@ -69,8 +70,13 @@ def opensees_script(frame: Frame, devices: Sequence[ViscousDevice] = (), notes: 
     Raises
     ------
     UserError
-        If a device does not connect two degrees of freedom, or a braced device has its own stiffness.
+        If a matrix is not symmetric, a device does not connect two degrees of freedom, or a braced device has its own
+        stiffness.
     """
+    for key in ("mass", "damping", "stiffness"):
+        if largest_asymmetry(getattr(frame, key))[0] > SYMMETRY:
+            remedy = "give a symmetric matrix, or export another format"
+            raise UserError("opensees", key, "is not symmetric, so springs and dashpots cannot represent it", remedy)
     lines = [
         f'"""OpenSees model of the structure {frame.name}, written by mrpipe (SI units)."""',
         "",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from mrpipe.options import Section
 
@@ -98,12 +99,15 @@ class ReductionSettings(Section):
         "`modal`: the lowest modes; `balanced`: the shapes that ground motion and forces on `keep` excite most. The "
         "degrees of freedom in `keep` stay.",
     )
-    keep: tuple[str, ...] = Field((), description="Degrees of freedom that stay, by name or number from 1.")
+    keep: tuple[str | int, ...] = Field((), description="Degrees of freedom that stay, by name or number from 1.")
     modes: int = Field(
         10, ge=1, description="Modes that stay (craig-bampton: fixed-interface modes; balanced: all coordinates)."
     )
     band_high_hz: float | None = Field(
-        None, gt=0.0, description="Highest frequency at which the error is stated; null: that of the last mode kept."
+        None,
+        gt=0.0,
+        description="Highest frequency at which the error is stated; null: that of the last mode kept (`modal`), else "
+        "half the last frequency of the reduced structure, and at least 1.5 times its first one.",
     )
 
 
@@ -151,12 +155,39 @@ class StructureSettings(Section):
         "empty: all.",
     )
 
+    @field_validator("damping_ratio")
+    @classmethod
+    def _ratios_are_shares(cls, ratios: tuple[float, ...]) -> tuple[float, ...]:
+        if not all(0.0 <= ratio < 1.0 for ratio in ratios):
+            raise ValueError("numbers from 0 to below 1 expected; 2 % is 0.02")
+        return ratios
+
+    @field_validator("influence", "influence_y")
+    @classmethod
+    def _influence_is_finite(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if not all(math.isfinite(value) for value in values):
+            raise ValueError("finite numbers expected")
+        return values
+
+    @field_validator("frequencies_hz")
+    @classmethod
+    def _frequencies_are_positive(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if not all(0.0 < value < math.inf for value in values):
+            raise ValueError("positive frequencies in Hz expected")
+        return values
+
+    @field_validator("mode_shapes")
+    @classmethod
+    def _rows_have_one_length(cls, rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+        if len({len(row) for row in rows}) > 1:
+            raise ValueError("a row for each degree of freedom expected, all of one length")
+        return rows
+
     @property
     def given(self) -> bool:
         """Whether a structure is given at all."""
-        return bool(
-            self.frame or self.file or self.storeys or self.storey_table.given or self.mode_shapes or self.mass.file
-        )
+        tables = self.storeys or self.storey_table.given or self.mode_shapes
+        return bool(self.frame or self.file or tables or self.mass.file or self.stiffness.file)
 
     def in_folder(self, folder: Path) -> StructureSettings:
         """Return the same settings with the paths of all files resolved against a folder."""

@@ -21,6 +21,12 @@ from mrpipe.structures.frame import Frame
 from mrpipe.structures.given import degree_of_freedom
 from mrpipe.structures.options import ReductionSettings
 
+WORST_CONDITION = 1e6
+"""Shapes at the places to keep with a larger condition number do not determine the amplitudes of the modes."""
+
+BEYOND_FIRST = 1.5
+"""The error of a reduction is stated at least up to this multiple of the first natural frequency."""
+
 
 @dataclass(frozen=True)
 class Reduced:
@@ -57,7 +63,8 @@ def guyan(frame: Frame, kept: Sequence[int], band_high_hz: float | None = None) 
     kept
         Indices of the degrees of freedom that stay, from 0.
     band_high_hz
-        Up to where the error is stated; None: twice the lowest natural frequency.
+        Up to where the error is stated; None: half the last natural frequency of the reduced structure, and at least
+        1.5 times its first one.
     """
     kept, others = _partition(frame, kept)
     basis = np.zeros((frame.floors, len(kept)))
@@ -78,7 +85,7 @@ def craig_bampton(frame: Frame, kept: Sequence[int], modes: int, band_high_hz: f
     modes
         Number of fixed-interface modes.
     band_high_hz
-        Up to where the error is stated; None: the frequency of the last mode of the reduced structure, halved.
+        Up to where the error is stated; None: as in :func:`guyan`.
     """
     kept, others = _partition(frame, kept)
     modes = min(modes, len(others))
@@ -115,8 +122,12 @@ def modal(frame: Frame, modes: int, kept: Sequence[int] = (), band_high_hz: floa
         raise UserError(
             "structure.reduction", "keep", f"has {len(kept)} entries", f"give as many as modes, which are {modes}"
         )
-    basis = shapes @ np.linalg.inv(shapes[list(kept)])
-    return _projected(frame, basis, list(kept), band_high_hz)
+    rows = shapes[list(kept)]
+    if np.linalg.cond(rows) > WORST_CONDITION:
+        names = ", ".join(frame.names[place] for place in kept)
+        problem = f"{names} cannot tell the {modes} lowest modes apart"
+        raise UserError("structure.reduction", "keep", problem, "keep other degrees of freedom, or use craig-bampton")
+    return _projected(frame, shapes @ np.linalg.inv(rows), list(kept), band_high_hz)
 
 
 def balanced_structure(
@@ -139,7 +150,7 @@ def balanced_structure(
     coordinates
         Number of coordinates of the reduced structure, at least as many as `kept`.
     band_high_hz
-        Up to where the error is stated; None: half the last natural frequency of the reduced structure.
+        Up to where the error is stated; None: as in :func:`guyan`.
 
     Raises
     ------
@@ -249,20 +260,25 @@ def _require_stable(space: StateSpace) -> None:
 def frequency_error(frame: Frame, reduced: Frame, basis: FloatArray, places: Sequence[int], high_hz: float) -> float:
     """Return the largest error of the response to ground motion over the largest response, from 0 to `high_hz`.
 
-    Where the ground moves nothing, the response is that to a force on all places. The lines lie at the natural
-    frequencies and between them, because a resonance is narrow.
+    Of two directions of the ground the worse one counts. Where the ground moves nothing, the response is that to a
+    force on all places. The lines lie at the natural frequencies and between them, because a resonance is narrow.
     """
     omega = natural_modes(frame).angular_frequencies
     omega = omega[(omega > 0.0) & (omega <= 2.0 * math.pi * high_hz)]
     between = np.linspace(0.0, 2.0 * math.pi * high_hz, 200)[1:]
     lines = np.unique(np.concatenate([omega, between]))
     rows = list(places) if len(places) else list(range(frame.floors))
-    load = -(frame.mass @ frame.ground_influence)
-    if not np.any(load):
-        load[rows] = 1.0
-    full = _response(frame, lines, load)[:, rows]
-    small = (_response(reduced, lines, basis.T @ load) @ basis.T)[:, rows]
-    return float(np.max(np.abs(full - small)) / np.max(np.abs(full)))
+    directions = (frame.ground_influence, frame.influence_y)
+    loads = [-(frame.mass @ vector) for vector in directions if vector is not None and np.any(vector)]
+    if not loads:
+        loads = [np.zeros(frame.floors)]
+        loads[0][rows] = 1.0
+    errors = []
+    for load in loads:
+        full = _response(frame, lines, load)[:, rows]
+        small = (_response(reduced, lines, basis.T @ load) @ basis.T)[:, rows]
+        errors.append(float(np.max(np.abs(full - small)) / np.max(np.abs(full))))
+    return max(errors)
 
 
 def _response(
@@ -299,7 +315,9 @@ def _projected(frame: Frame, basis: FloatArray, kept: Sequence[int], band_high_h
     names += tuple(f"mode {k + 1}" for k in range(modes))
     reduced = Frame(mass, damping, stiffness, f"{frame.name}, reduced", influence, names, modes, influence_y)
     if band_high_hz is None:
-        band_high_hz = float(natural_modes(reduced).angular_frequencies[-1]) / (4.0 * math.pi)
+        omega = natural_modes(reduced).angular_frequencies
+        # below the first resonance every reduction is good
+        band_high_hz = max(0.5 * float(omega[-1]), BEYOND_FIRST * float(omega[0])) / (2.0 * math.pi)
     error = frequency_error(frame, reduced, basis, kept, band_high_hz)
     return Reduced(reduced, basis, tuple(kept), error, band_high_hz)
 

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel, ConfigDict
 
 from mrpipe.artifacts.yaml_source import parse, read_yaml
 from mrpipe.errors import UserError
@@ -62,3 +63,39 @@ def test_a_tab_names_its_remedy(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     with pytest.raises(UserError, match=r"line \d: not valid YAML \(a tab\); write spaces in place of the tab"):
         read_yaml(path)
+
+
+class Inner(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    mass_kg: float = 1.0
+    pair: tuple[float, float] = (0.0, 0.0)
+
+
+class Outer(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    other: int = 1
+    one: Inner | None = None
+    many: dict[str, Inner] = {}
+    listed: tuple[Inner, ...] = ()
+    counted: dict[int, float] = {}
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("one:\n  weight: 2\n", "line 2, one.weight: unknown key; known: mass_kg, pair"),
+        ("many:\n  a: {mass_gk: 2}\n", "line 2, many.a.mass_gk: unknown key; did you mean mass_kg?"),
+        ("listed:\n  - {weight: 2}\n", "line 2, listed[0].weight: unknown key; known: mass_kg, pair"),
+        ("xyz: 1\n", "line 1, xyz: unknown key; known: counted, listed, many, one, other"),
+        ("one: {pair: [1, 2, 3]}\n", "line 1, one.pair: is [1, 2, 3]; a list of at most 2 values expected"),
+        ("counted: {top: 1}\n", "line 1, counted.top: is 'top'; a whole number expected"),
+    ],
+)
+def test_an_unknown_key_is_compared_with_those_of_its_own_mapping(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(text)
+    source = read_yaml(path)
+    with pytest.raises(UserError) as caught:
+        source.build(Outer, source.content, ())
+    assert str(caught.value) == f"{path}: {message}"

@@ -39,7 +39,7 @@ def test_a_clock_with_few_digits_is_made_even() -> None:
 def test_lost_samples_are_counted() -> None:
     kept = np.delete(TIME, [100, 101, 102])
     (finding,) = build_clock(data_file(), kept, None, kept.size, "test one").findings
-    assert "1 gaps in the clock, 3 samples are missing" in finding and "at 0.396 s" in finding
+    assert "1 gap in the clock, 3 samples are missing" in finding and "at 0.396 s" in finding
 
 
 def test_jitter_is_reported_and_is_no_gap() -> None:

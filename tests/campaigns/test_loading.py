@@ -249,6 +249,20 @@ def test_compression_as_positive_is_found_and_turned_round(tmp_path: Path) -> No
     np.testing.assert_allclose(wrong.recordings[0].channels["force"], right.recordings[0].channels["force"])
 
 
+@pytest.mark.golden
+def test_a_mass_driver_needs_its_mass(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,u,a1\n" + "".join(f"{k / 10},{k % 3},{k % 4}\n" for k in range(50)))
+    (tmp_path / "campaign.yaml").write_text(
+        "campaign: driver\nrig: shear-frame\nchannels:\n"
+        "  time: {column: t, unit: s}\n"
+        "  input_force: {column: u, unit: m/s^2, floor: 1}\n"
+        "  floor_acceleration_1: {column: a1, unit: m/s^2}\n"
+        "tests:\n  - {name: one, file: a.csv, kind: sweep, role: training}\n"
+    )
+    with pytest.raises(UserError, match=r"input_force: unit 'm/s\^2': is not a unit of force; give mass_kg"):
+        load_campaign(tmp_path)
+
+
 @pytest.mark.planted
 def test_clipping_dropouts_and_jitter_are_reported(tmp_path: Path) -> None:
     columns = motion()
@@ -259,7 +273,7 @@ def test_clipping_dropouts_and_jitter_are_reported(tmp_path: Path) -> None:
     columns["t"] = columns["t"] + 1e-4 * rng.uniform(-1, 1, 4000)
     findings = load_campaign(campaign(tmp_path, {key: value[keep] for key, value in columns.items()})).findings
     assert any(line.startswith("test one: force looks clipped") for line in findings)
-    assert any("1 gaps in the clock, 20 samples are missing; the first gap is at 1.499 s" in line for line in findings)
+    assert any("1 gap in the clock, 20 samples are missing; the first gap is at 1.499 s" in line for line in findings)
     assert any("clock jitter of" in line for line in findings)
     assert not any("test two" in line for line in findings)
 

@@ -161,6 +161,10 @@ def test_bad_input_is_told_in_one_line(thesis_frame, floor_one):
         (lambda: limits.limiting_modes(thesis_frame, floor_one, 5), "mode: is 5"),
         (lambda: limits.limiting_modes(thesis_frame, np.zeros(5)), "not all zero"),
         (
+            lambda: limits.limiting_modes(Frame(np.eye(1), np.zeros((1, 1)), np.eye(1)), np.ones(1)),
+            "one degree of freedom",
+        ),
+        (
             lambda: limits.limiting_modes(
                 Frame(np.diag([1.0, 0.0, 1.0]), np.zeros((3, 3)), np.eye(3)), np.array([1.0, 0.0, 0.0])
             ),

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mrpipe.control.calibration import CalibrationOptions
+from mrpipe.control.placed import calibrate_placed
 from mrpipe.control.placed_storage import accelerometers_of, placed_dampers, read_placed
 from mrpipe.errors import UserError
 from mrpipe.structures import natural_modes
@@ -40,11 +42,28 @@ def test_mistakes_name_the_damper(dampers: list[dict[str, Any]], problem: str) -
         placed_dampers(FRAME, structure(*dampers).dampers, 1)
 
 
+@pytest.mark.parametrize(
+    ("damper", "problem"),
+    [
+        ({"law": "vd", "gains": {"k_n_m": 5.0}}, r"^structure\.dampers: damper 1: gains\.k_n_m: law vd has no such"),
+        ({"law": "passive-on", "gains": {"c_n_s_m": 5.0}}, r"^structure\.dampers: damper 1: gains\.c_n_s_m: "),
+        ({"law": "vd", "gains": {"c_n_s_m": -5.0}}, r"^structure\.dampers: damper 1: gains\.c_n_s_m: is -5"),
+        ({"law": "vd", "target_mode": 9}, r"^structure\.dampers: damper 1: target_mode: is 9; .* 1 to 2"),
+    ],
+)
+def test_mistakes_of_gains_and_modes_name_the_damper(damper: dict[str, Any], problem: str) -> None:
+    placed = placed_dampers(FRAME, structure({"between": (1, "ground"), **damper}).dampers, 1)
+    with pytest.raises(UserError, match=problem):
+        calibrate_placed(FRAME, placed, CalibrationOptions())
+
+
 def test_accelerometers_are_counted_from_zero() -> None:
     assert accelerometers_of(FRAME, ()) == (0, 1, 2)
     assert accelerometers_of(FRAME, (3, 1)) == (2, 0)
     with pytest.raises(UserError, match=r"structure\.accelerometers"):
         accelerometers_of(FRAME, (4,))
+    with pytest.raises(UserError, match=r"structure\.accelerometers: floor 2: is named more than once"):
+        accelerometers_of(FRAME, (2, "floor 2"))
 
 
 def test_what_was_written_builds_the_same_controllers(tmp_path) -> None:

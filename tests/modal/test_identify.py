@@ -12,7 +12,14 @@ from mrpipe.modal.identification import GivenShapes
 from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests, Place, frame_tests
-from mrpipe.structures import complex_modes, frame_from_parameter_set, modal_assurance, natural_modes
+from mrpipe.modal.storage import summary
+from mrpipe.structures import (
+    complex_modes,
+    frame_from_parameter_set,
+    modal_assurance,
+    natural_modes,
+    normalise_to_largest,
+)
 from mrpipe.structures.response import linear_response
 from tests.modal.rig import (
     Rig,
@@ -242,6 +249,12 @@ def test_a_floor_without_a_sensor_is_expanded(missing):
     result = identify_one(frame, part)
     assert_close(result, frame)
     assert any(f"floors without a sensor ({missing})" in line for line in result.findings)
+    # errors have the rows of the shapes, and none where no sensor is
+    errors = summary(result)["mode_shape_errors"]
+    assert [row[0] is None for row in errors] == [floor == missing for floor in (1, 2, 3, 4)]
+    truth = normalise_to_largest(natural_modes(frame).mode_shapes)[keep]
+    scatter = (result.mode_shapes[keep] - truth) / result.shape_errors[keep]
+    assert 0.05 < np.sqrt(np.mean(scatter**2)) < 5.0
 
 
 @pytest.mark.planted

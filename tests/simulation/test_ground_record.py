@@ -29,7 +29,9 @@ def test_headers_separators_and_units(tmp_path):
         ("0 1\n1\n", "m/s^2", "line 2: has no two numbers"),
         ("a b\n", "m/s^2", "holds 0 rows"),
         ("0 1\n1 2\n", "mm", "is not a unit of acceleration"),
-        ("0 1\n1 nan\n", "m/s^2", "not finite"),
+        ("0 1\n1 nan\n", "m/s^2", "line 2: holds a number that is not finite"),
+        ("t,a\n0,0\n1,0\n2,0\n", "m/s^2", "nothing but zeros"),
+        ("time [s],acc [g]\n0,1\n1,2\n", "m/s^2", r"m/s\^2: is not the unit that the header .* set it to g"),
     ],
 )
 def test_faults(tmp_path, text, unit, words):
@@ -38,6 +40,34 @@ def test_faults(tmp_path, text, unit, words):
     with pytest.raises(UserError, match=words) as caught:
         read_histories(path, unit)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.golden
+@pytest.mark.parametrize("rows", ["0,00;0,5\n0,01;-1,25\n", "0,00\t0,5\n0,01\t-1,25\n", "0.00,0.5\n0.01,-1.25\n"])
+def test_decimal_commas(tmp_path, rows):
+    path = tmp_path / "record.csv"
+    path.write_text(f"Zeit [s];Beschleunigung [m/s^2]\n{rows}")
+    time, histories = read_histories(path, "m/s^2")
+    np.testing.assert_allclose(time, [0.0, 0.01])
+    np.testing.assert_allclose(histories[:, 0], [0.5, -1.25])
+
+
+@pytest.mark.property
+def test_a_header_that_agrees_with_the_unit_or_says_another_quantity_is_no_fault(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("time [s],north [Gal] (first floor)\n0,1\n1,2\n")
+    np.testing.assert_allclose(read_histories(path, "cm/s^2")[1][:, 0], [0.01, 0.02])
+
+
+@pytest.mark.property
+def test_a_gap_in_a_record_is_told_and_a_history_of_straight_lines_is_not(tmp_path):
+    path = tmp_path / "record.txt"
+    time = np.concatenate([np.arange(50) * 0.01, 3.0 + np.arange(50) * 0.01])
+    np.savetxt(path, np.column_stack([time, np.cos(time)]))
+    with pytest.raises(UserError, match=r"row 51: time jumps from 0\.49 to 3 s, and other rows are 0\.01 s"):
+        read_histories(path, "m/s^2")
+    path.write_text("0 0\n1 5\n2 5\n60 5\n61 0\n")
+    assert read_histories(path, "m/s^2")[0][-1] == 61.0
 
 
 @pytest.mark.golden

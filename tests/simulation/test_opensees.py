@@ -6,6 +6,7 @@ import importlib.util
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -125,3 +126,11 @@ def test_the_elements_add_up_to_the_matrices() -> None:
             row[one - 1], row[two - 1] = 1.0, -1.0
             built += value * np.outer(row[1:], row[1:])
         np.testing.assert_allclose(built, matrix, atol=1e-9 * np.abs(matrix).max())
+
+
+@pytest.mark.property
+def test_what_springs_and_dashpots_cannot_represent_is_refused() -> None:
+    frame = coupled_structure()
+    gyroscopic = 0.1 * float(np.max(frame.damping)) * (np.eye(4, k=1) - np.eye(4, k=-1))
+    with pytest.raises(UserError, match="damping: is not symmetric"):
+        opensees_script(replace(frame, damping=frame.damping + gyroscopic))

@@ -8,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.sparse import csc_matrix
 
 from mrpipe.errors import UserError
@@ -70,7 +71,14 @@ def test_a_storey_table_is_a_shear_frame() -> None:
         ({"storeys": (Storey(mass_kg=1.0, stiffness_n_m=1.0),)}, CONTENT, "", "2 times"),
         ({}, {**CONTENT, "K": FRAME.stiffness[:2, :2]}, "stiffness", "2 x 2"),
         ({}, {**CONTENT, "K": FRAME.stiffness + np.diag([9.0, 9.0], 1)}, "stiffness[1, 2]", "mirror"),
-        ({}, {**CONTENT, "M": np.diag([1.0, -2.0, 1.0])}, "mass", "positive definite"),
+        ({}, {**CONTENT, "M": np.diag([1.0, -2.0, 1.0])}, "mass[2, 2]", "negative mass"),
+        ({}, {**CONTENT, "M": np.eye(3) + 2.0 * np.eye(3)[[1, 0, 2]]}, "mass", "not positive definite"),
+        ({}, {**CONTENT, "K": FRAME.stiffness + 2j * np.eye(3)}, "K", "complex"),
+        ({}, {**CONTENT, "K": FRAME.stiffness - np.diag([500.0, 0.0, 0.0])}, "stiffness", "restoring force"),
+        ({}, {**CONTENT, "K": np.triu(FRAME.stiffness)}, "stiffness[1, 2]", "one triangle"),
+        ({"damping_ratio": (0.01,) * 4, "damping": MatrixEntry()}, CONTENT, "damping_ratio", "3 modes"),
+        ({"degrees_of_freedom": ("3", "2", "1")}, CONTENT, "degrees_of_freedom[1]", "number 3"),
+        ({"degrees_of_freedom": ("a", "ground", "b")}, CONTENT, "degrees_of_freedom[2]", "ground"),
         ({"influence_y": (1.0, 0.0)}, CONTENT, "influence_y", "2 entries"),
         ({}, {**CONTENT, "K": "text"}, "K", "numbers"),
         ({}, {**CONTENT, "K": np.full((3, 3), np.nan)}, "K[1, 1]", "not finite"),
@@ -153,7 +161,7 @@ def test_degrees_of_freedom_without_mass_are_condensed_exactly() -> None:
         reader({"M": M, "K": K}),
         warn=warnings.append,
     )
-    assert frame.names == ("u1", "u2") and "r1, r2" in warnings[0]
+    assert frame.names == ("u1", "u2") and "r1, r2" in warnings[0] and "exact" in warnings[0]
     np.testing.assert_allclose(np.linalg.inv(frame.stiffness), np.linalg.inv(K)[::2, ::2], rtol=1e-10)
     np.testing.assert_allclose(frame.ground_influence, [1.0, 1.0])
     modes = natural_modes(frame)
@@ -200,3 +208,90 @@ def test_sparse_matrices_of_matlab_7_3(tmp_path: Path) -> None:
         file["M"] = FRAME.mass
     np.testing.assert_allclose(read_matrix(tmp_path / "model.mat", "K"), FRAME.stiffness)
     np.testing.assert_allclose(read_matrix(tmp_path / "model.mat", "M"), FRAME.mass)
+
+
+@pytest.mark.property
+def test_condensation_is_called_exact_only_where_it_is() -> None:
+    # a massless node between two springs: with dashpots of another proportion it does not follow statically
+    K = np.array([[3.0, -1.0, 0.0], [-1.0, 3.0, -2.0], [0.0, -2.0, 2.0]])
+    content = {"M": np.diag([1.0, 0.0, 1.0]), "K": K, "C": 0.1 * K}
+    for dashpot, word in ((0.0, "exact"), (0.5, "approximation")):
+        warnings: list[str] = []
+        structure_from_settings(
+            settings(), reader({**content, "C": content["C"] + np.diag([0.0, dashpot, 0.0])}), warn=warnings.append
+        )
+        assert len(warnings) == 1 and word in warnings[0] and "floor 2" in warnings[0]
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"damping_ratio": (2.0,)},
+        {"damping_ratio": (-0.01,)},
+        {"damping_ratio": (float("nan"),)},
+        {"influence": (1.0, float("nan"))},
+        {"frequencies_hz": (-1.0, 2.0)},
+        {"mode_shapes": ((1.0, 2.0), (1.0,))},
+    ],
+)
+def test_impossible_numbers_are_refused_before_anything_runs(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        StructureSettings(**wrong)
+
+
+@pytest.mark.property
+def test_a_stiffness_file_alone_is_a_structure_that_lacks_its_mass() -> None:
+    given = StructureSettings(stiffness=MatrixEntry(file="K.csv"))
+    assert given.given
+    with pytest.raises(UserError, match=r"mass\.file"):
+        structure_from_settings(given, reader({}))
+
+
+@pytest.mark.property
+def test_the_unit_in_the_name_of_a_column_counts() -> None:
+    content = {"m [t]": [5.0, 4.0], "k [kN/mm]": [9.0, 8.0], "k (south)": [9.0, 8.0]}
+
+    def table(**stiffness: str) -> StructureSettings:
+        mass = StoreyColumn(name="m [t]")
+        return StructureSettings(storey_table=StoreyTable(file="a.csv", mass=mass, stiffness=StoreyColumn(**stiffness)))
+
+    frame = structure_from_settings(table(name="k [kN/mm]"), reader(content))
+    np.testing.assert_allclose(np.diag(frame.mass), [5000.0, 4000.0])
+    assert frame.stiffness[1, 1] == pytest.approx(8.0e6)
+    south = structure_from_settings(table(name="k (south)", unit="MN/m"), reader(content))
+    assert south.stiffness[1, 1] == pytest.approx(8.0e6)
+    with pytest.raises(UserError, match=r"stiffness: unit: is kN/m, and the column is called"):
+        structure_from_settings(table(name="k [kN/mm]", unit="kN/m"), reader(content))
+
+
+@pytest.mark.property
+def test_a_height_belongs_to_each_storey() -> None:
+    table = StoreyTable(
+        mass=StoreyColumn(values=(5.0, 4.0)),
+        stiffness=StoreyColumn(values=(9.0, 8.0)),
+        height=StoreyColumn(values=(3.0,)),
+    )
+    with pytest.raises(UserError, match="has 1 values, and the table has 2 storeys"):
+        floor_heights(StructureSettings(storey_table=table), reader({}))
+
+
+@pytest.mark.property
+def test_a_matrix_of_json_is_a_list_of_rows(tmp_path: Path) -> None:
+    (tmp_path / "bare.json").write_text("[[2, -1], [-1, 1]]")
+    np.testing.assert_array_equal(read_matrix(tmp_path / "bare.json", ""), [[2.0, -1.0], [-1.0, 1.0]])
+    (tmp_path / "ragged.json").write_text("[[2, -1], [-1]]")
+    with pytest.raises(UserError, match="row 2: has 1 values, the first row 2"):
+        read_matrix(tmp_path / "ragged.json", "")
+    # a list of uneven rows beside a matrix does not make the file unreadable
+    (tmp_path / "model.json").write_text('{"K": [[2, -1], [-1, 1]], "notes": [[1], [2, 3]]}')
+    np.testing.assert_array_equal(read_matrix(tmp_path / "model.json", "K"), [[2.0, -1.0], [-1.0, 1.0]])
+    with pytest.raises(UserError, match="notes: cannot be read"):
+        read_matrix(tmp_path / "model.json", "notes")
+
+
+@pytest.mark.property
+def test_the_matrix_of_a_table_without_a_header_needs_no_name(tmp_path: Path) -> None:
+    (tmp_path / "M.csv").write_text("2,0\n0,1\n")
+    with pytest.raises(UserError, match="for the whole table write name: ''"):
+        read_matrix(tmp_path / "M.csv", "M")

@@ -139,3 +139,43 @@ def test_both_directions_of_the_ground_are_reduced() -> None:
     for reduced in (guyan(two, KEPT), craig_bampton(two, KEPT, 3), balanced_structure(two, KEPT, 8)):
         for vector, small in ((two.influence, reduced.frame.influence), (two.influence_y, reduced.frame.influence_y)):
             np.testing.assert_allclose(reduced.frame.mass @ small, reduced.basis.T @ two.mass @ vector)
+
+
+@pytest.mark.property
+def test_the_error_is_stated_beyond_the_first_resonance() -> None:
+    # one floor kept: half of the only frequency lies below the resonance, where every reduction looks exact
+    reduced = guyan(FRAME, [11])
+    first = natural_modes(FRAME).frequencies_hz[0]
+    shifted = natural_modes(reduced.frame).frequencies_hz[0]
+    assert shifted > 1.02 * first
+    assert reduced.band_high_hz > first
+    assert reduced.error > 0.5
+
+
+@pytest.mark.property
+def test_the_error_is_that_of_the_worse_direction() -> None:
+    # two uncoupled directions: one keeps every third floor, the other the top only
+    both = np.kron(np.eye(2), FRAME.stiffness), np.kron(np.eye(2), FRAME.damping), np.kron(np.eye(2), FRAME.mass)
+    x, y = np.repeat([1.0, 0.0], 12), np.repeat([0.0, 1.0], 12)
+    one = replace(FRAME, stiffness=both[0], damping=both[1], mass=both[2], influence=x)
+    kept = (*KEPT, 23)
+    errors = [guyan(frame, kept, 3.0).error for frame in (one, replace(one, influence=y))]
+    assert errors[1] > 2.0 * errors[0]
+    assert guyan(replace(one, influence_y=y), kept, 3.0).error == pytest.approx(errors[1], rel=1e-9)
+
+
+@pytest.mark.property
+def test_places_that_do_not_tell_modes_apart_are_refused() -> None:
+    # two uncoupled equal directions: both lowest modes move, but only one is seen at the places kept
+    K = np.kron(np.eye(2), FRAME.stiffness[:3, :3])
+    frame = replace(FRAME, mass=np.diag([1.0, 1, 1, 1.1, 1.1, 1.1]), stiffness=K, damping=0.0 * K)
+    with pytest.raises(UserError, match="cannot tell the 2 lowest modes apart"):
+        modal(frame, 2, [0, 2])
+    with pytest.raises(UserError, match="cannot tell the 2 lowest modes apart"):
+        reduced_structure(frame, ReductionSettings(method="modal", keep=[1, "floor 3"], modes=2))
+
+
+@pytest.mark.property
+def test_places_are_kept_by_number_or_name() -> None:
+    settings = ReductionSettings(method="guyan", keep=[3, "floor 6", "9", 12])
+    assert reduced_structure(FRAME, settings).kept == KEPT

@@ -203,7 +203,7 @@ def decay_start(test: FrameTest, coordinate: FloatArray, omega: float) -> int:
     near = _band_pass(test.excitation - np.median(test.excitation), omega, rate)
     power = np.convolve(near**2, np.full(width, 1.0 / width), mode="same")
     quiet, top = float(np.quantile(power, 0.05)), float(power.max())
-    if top < 9.0 * quiet:
+    if top <= 9.0 * quiet:  # also where the channel of the excitation is zero
         return largest
     # filter and average are symmetric, so the power falls through its half where the excitation stops
     stop = int(np.flatnonzero(power > 0.5 * (quiet + top))[-1]) + 1

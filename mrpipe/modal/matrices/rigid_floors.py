@@ -161,8 +161,11 @@ def assemble_rigid(
     numbers = tuple(range(1, modes + 1))
     intervals = np.column_stack([masses, masses])
     known = masses.size * 3 == count and inertias.size * 3 == count and bool(np.isfinite(masses).all())
-    if not known or modes < count:
-        reason = f"{modes} of {count} modes were found" if known else "masses or moments of inertia are missing"
+    if not known or modes != count:
+        found = f"{modes} of {count} modes were found"
+        if modes > count:
+            found = f"{modes} modes were found, and {count // 3} rigid floors have {count}"
+        reason = found if known else "masses or moments of inertia are missing"
         findings.append(f"only modes are determined, because {reason}: matrices are left out")
         shapes = normalise_to_largest(rigid.shapes)
         return Assembly(None, shapes, numbers, None, masses, intervals, tuple(findings))

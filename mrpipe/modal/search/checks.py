@@ -13,6 +13,9 @@ from mrpipe.artifacts import FloatArray
 LARGEST_COUPLING = 0.1
 _FLIPS = 3
 _SUSPECT_COUPLING = 0.05
+_SURE_ERRORS = 5.0
+_SURE_SHARE = 0.1
+"""The sign of an element of a shape is sure above so many standard errors and this share of the largest element."""
 
 
 @dataclass(frozen=True)
@@ -176,3 +179,36 @@ def orthogonal_shapes(mode_shapes: ArrayLike, mass: ArrayLike, relative_errors: 
     weight = 1.0 / np.maximum(np.asarray(relative_errors, dtype=np.float64), 1e-5) ** 2
     left, _, right = np.linalg.svd(scaled / size * (weight / weight.max()))
     return np.asarray(left @ right / root * size)
+
+
+def reversed_finding(mode_shape: ArrayLike, error: ArrayLike) -> list[str]:
+    """Return a sentence on floors that move against the others in the first mode of a chain; empty for none.
+
+    Springs between floors and to the ground give a first mode in which all floors move to one side (theorem of Perron
+    and Frobenius for the inverse of the stiffness). A floor against it has a sensor with the opposite sign.
+
+    Parameters
+    ----------
+    mode_shape
+        First mode, shape (n,).
+    error
+        Standard errors, shape (n,); infinite at floors without a sensor.
+    """
+    shape = np.asarray(mode_shape, dtype=np.float64)
+    size = np.abs(shape)
+    sure = size > np.maximum(_SURE_ERRORS * np.asarray(error, dtype=np.float64), _SURE_SHARE * size.max())
+    up, down = (np.flatnonzero(sure & (sign * shape > 0.0)) + 1 for sign in (1.0, -1.0))
+    fewer = up if up.size < down.size else down
+    if not fewer.size:
+        return []
+    listed = ", ".join(map(str, fewer))
+    one = fewer.size == 1
+    subject, sign = (
+        (f"floor {listed} moves", "the sign of its sensor is")
+        if one
+        else (f"floors {listed} move", "the signs of their sensors are")
+    )
+    return [
+        f"{subject} against the others in the first mode, which springs between floors do not allow: {sign} probably "
+        "wrong (scale: -1 in campaign.yaml turns it)"
+    ]

@@ -239,7 +239,8 @@ def shapes_on_frame(shapes: FloatArray, frequencies_hz: Sequence[float], damping
     figure, axes = figure_with_axes(1, shown, width=max(1.25 * shown, 3.0), height=0.42 * floors + 1.1)
     heights = np.arange(floors + 1, dtype=np.float64)
     for mode, axis in enumerate(axes[0]):
-        shift = 0.55 * np.concatenate([[0.0], shapes[:, mode] / np.max(np.abs(shapes[:, mode]))])
+        largest = np.nanmax(np.abs(shapes[:, mode]), initial=0.0)
+        shift = 0.55 * np.concatenate([[0.0], shapes[:, mode] / (largest or 1.0)])
         fine = np.linspace(0.0, 1.0, 12)
         ease = 3.0 * fine**2 - 2.0 * fine**3
         for side in (-0.4, 0.4):

@@ -9,11 +9,13 @@ import numpy as np
 import pandas as pd
 
 from mrpipe.artifacts import Artifact
+from mrpipe.reporting import modal
 from mrpipe.reporting.closed_loop_words import in_points
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
+from mrpipe.reporting.places import is_chain
 from mrpipe.reporting.words import listed, number, percent, quantity
 from mrpipe.reporting.writer import Section
 
@@ -214,11 +216,13 @@ def structure(facts: RunFacts) -> Section:
     else:
         section.table("modes", modes[["mode", "frequency [Hz]", "damping ratio [%]"]], "Modes of the given structure.")
     shapes = np.asarray(summary["mode_shapes"], dtype=np.float64)
-    section.figure(
-        "shapes",
-        figures.shapes_on_frame(shapes, summary["frequencies_hz"], summary["damping_ratios"]),
-        "Mode shapes drawn on the frame.",
-    )
+    names = summary.get("degrees_of_freedom") or [f"floor {row + 1}" for row in range(len(shapes))]
+    frequencies = summary["frequencies_hz"]
+    if is_chain(names):
+        drawn = figures.shapes_on_frame(shapes, frequencies, summary["damping_ratios"])
+        section.figure("shapes", drawn, "Mode shapes drawn on the frame.")
+    else:
+        section.figure("shapes", modal.mode_shapes(shapes, frequencies, names=names), modal.shapes_caption(names))
     stiffness, intervals = summary.get("storey_stiffnesses_n_m"), summary.get("storey_stiffness_intervals_n_m")
     if stiffness:
         storeys = [

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -144,3 +146,14 @@ def test_a_record_that_begins_with_the_release_is_a_decay(zeta):
             result = analyse_decay(test, modes.mode_shapes, modes.angular_frequencies, np.full(3, 0.7 * zeta))
             assert result is not None
             assert result.exponential_fit.value == pytest.approx(zeta, rel=0.02)
+
+
+@pytest.mark.planted
+def test_a_channel_of_the_excitation_that_is_zero_is_no_excitation():
+    # a pull-and-release test records the ground too, as zeros
+    test = decay_of(0.01)
+    still = replace(test, excitation=np.zeros(test.responses.shape[0]))
+    assert decay_start(still, still.responses[:, 0], 20.0) == decay_start(test, test.responses[:, 0], 20.0) == 0
+    found = analyse_decay(still, np.ones((1, 1)), np.array([20.0]), np.array([0.01]))
+    assert found is not None
+    assert found.exponential_fit.value == pytest.approx(0.01, rel=0.01)

@@ -11,7 +11,13 @@ from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.campaigns import Campaign, Recording
 from mrpipe.errors import UserError
 from mrpipe.modal.identify import identify_frame
-from mrpipe.modal.matrices.rigid_floors import ground_influence, measured_rows, rigid_response
+from mrpipe.modal.matrices.rigid_floors import (
+    RigidShapes,
+    assemble_rigid,
+    ground_influence,
+    measured_rows,
+    rigid_response,
+)
 from mrpipe.modal.records import FrameTest, FrameTests, Place, frame_tests
 from mrpipe.modal.storage import summary, write_identification
 from mrpipe.modal.verification import compare_in_time
@@ -81,6 +87,7 @@ def test_close_modes_in_two_axes_with_torsion_give_modes_and_matrices(identified
     truth = tower.stiffness / root / root.T
     assert np.abs(scaled - truth).max() < 0.05 * np.abs(truth).max()
     assert summary(result)["degrees_of_freedom"][-1] == "floor 2 rotation"
+    assert np.shape(summary(result)["mode_shape_errors"]) == np.shape(summary(result)["mode_shapes"])
     path = tmp_path / "frame.h5"
     with ArtifactWriter.create(path, Provenance("identify-frame")) as artifact:
         write_identification(artifact, result)
@@ -146,3 +153,11 @@ def test_sensors_that_do_not_show_the_rotation_are_refused(identified):
     same = {"x": (0.0, 4.0), "y1": (8.0, 0.0), "y2": (8.0, 0.0)}
     with pytest.raises(UserError, match="floor 1 do not determine"):
         identify_frame(FrameTests((), (), MASSES, HERE, (test,), positions=same, inertias=INERTIAS))
+
+
+@pytest.mark.property
+def test_more_modes_than_rigid_floors_have_leave_the_matrices_out():
+    rigid = RigidShapes(np.eye(3, 4) + 0.1, np.full((3, 4), 0.01), ("x", "y", "rotation"), np.zeros(4))
+    found = assemble_rigid(None, rigid, np.full(4, 0.01), np.array([5.0]), np.array([2.0]), "x")
+    assert found.frame is None
+    assert "4 modes were found, and 1 rigid floors have 3" in found.findings[-1]

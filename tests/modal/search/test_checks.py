@@ -9,6 +9,7 @@ from mrpipe.modal.search.checks import (
     modal_coupling,
     orthogonal_shapes,
     possible_sign_changes,
+    reversed_finding,
     sign_changes,
     wrong_signs,
 )
@@ -87,3 +88,26 @@ def test_a_noisy_shape_is_mended_by_those_that_are_known_well():
     before = np.linalg.norm(noisy[:, 4] - truth[:, 4])
     after = mended[:, 4] / np.linalg.norm(mended[:, 4]) * np.linalg.norm(truth[:, 4])
     assert np.linalg.norm(after - truth[:, 4]) < 0.02 * before
+
+
+@pytest.mark.literature
+def test_in_the_first_mode_of_a_chain_all_floors_move_to_one_side():
+    rng = np.random.default_rng(4)
+    for floors in (2, 5, 8):
+        frame = shear_frame(rng.uniform(1.0, 3.0, floors), rng.uniform(100.0, 900.0, floors), 0.01)
+        first = natural_modes(frame).mode_shapes[:, 0]
+        assert reversed_finding(first, np.full(floors, 1e-3 * first.max())) == []
+        assert reversed_finding(-first, np.full(floors, 1e-3 * first.max())) == []
+
+
+@pytest.mark.planted
+def test_sensors_with_the_opposite_sign_are_named():
+    first = natural_modes(shear_frame(np.ones(5), np.full(5, 100.0), 0.01)).mode_shapes[:, 0]
+    small = np.full(5, 1e-3)
+    [line] = reversed_finding(first * [1, -1, 1, 1, 1], small)
+    assert line.startswith("floor 2 moves against the others") and "sign of its sensor is" in line
+    [line] = reversed_finding(first * [1, 1, -1, 1, -1], small)
+    assert line.startswith("floors 3, 5 move against the others") and "their sensors are" in line
+    # a sign within the error, or at a floor without a sensor, is open
+    assert reversed_finding(first * [1, -1, 1, 1, 1], [1e-3, 0.2, 1e-3, 1e-3, 1e-3]) == []
+    assert reversed_finding(first * [1, 0, 1, 1, 1], [1e-3, np.inf, 1e-3, 1e-3, 1e-3]) == []
