@@ -26,7 +26,16 @@ LEVEL_SHARE = 0.02
 """Levels of drive that differ by less than this share of the largest drive count as one."""
 
 MANY_LEVELS = 99
-"""Number of levels where the drive varies within tests."""
+"""Number of levels where the drive varies continuously within tests."""
+
+LEAST_HELD = 0.01
+"""Numerical technique: an interval of drive is held if it has at least this share of the samples."""
+
+MOST_HELD = 0.9
+"""Numerical technique: a drive of steps has at least this share of its samples in intervals that are held ..."""
+
+WIDEST_LEVEL = 0.1
+"""Numerical technique: ... and no interval of its levels is wider than this share of the largest drive."""
 
 MOST_STARTS = 36
 """Of more combinations of the parameters' starts, this many are tried, evenly picked."""
@@ -56,13 +65,29 @@ def mean_levels(recordings: Recordings) -> FloatArray:
 
 
 def distinct_levels(recordings: Recordings) -> int:
-    """Return how many levels of drive the tests hold; :data:`MANY_LEVELS` where it varies within tests."""
+    """Return how many levels of drive the tests hold; :data:`MANY_LEVELS` where it varies continuously within tests."""
     largest = float(np.max(np.abs(recordings.drive)))
     if largest == 0.0:
         return 1
     if drive_varies(recordings):
-        return MANY_LEVELS
+        return _levels_of_steps(recordings.drive / largest)
     return 1 + int(np.sum(np.diff(np.sort(mean_levels(recordings))) > LEVEL_SHARE * largest))
+
+
+def _levels_of_steps(drive: FloatArray) -> int:
+    """Return the number of levels between which a drive steps; :data:`MANY_LEVELS` if it is not one of steps.
+
+    A drive of steps has nearly all of its samples in a few narrow intervals. A continuous drive fills wide intervals.
+    """
+    counts, edges = np.histogram(
+        drive, bins=np.arange(np.min(drive) - LEVEL_SHARE, 1.0 + 2.0 * LEVEL_SHARE, LEVEL_SHARE)
+    )
+    held = counts > LEAST_HELD * len(drive)
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(np.int64), [0]])))
+    widths = edges[ends[1::2]] - edges[ends[::2]]
+    if np.sum(counts[held]) < MOST_HELD * len(drive) or np.any(widths > WIDEST_LEVEL):
+        return MANY_LEVELS
+    return len(widths)
 
 
 def polynomial_laws(form: BaseForm, levels: int, yield_order: int, viscosity_order: int) -> tuple[LawShape, ...]:

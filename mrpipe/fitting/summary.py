@@ -130,7 +130,8 @@ def findings(fit: FormFit) -> list[str]:
     lines += [f"{fit.form.name}: {name} ended at its bound, the data do not determine it" for name in silent]
     levels = distinct_levels(problem.recordings)
     if levels < 4:
-        lines.append(f"{levels} level(s) of drive: the yield force is {problem.base.laws[0].name} in it")
+        count = "1 level" if levels == 1 else f"{levels} levels"
+        lines.append(f"{count} of drive: the yield force is {problem.base.laws[0].name} in it")
     drive = np.linspace(0.0, problem.scales.drive, 50)
     strength = fit.model.yield_force(drive)
     if np.any(np.diff(strength) < -0.02 * np.max(np.abs(strength))):

@@ -166,7 +166,7 @@ def test_constant_drive_is_said(tmp_path, campaign):
     constant = [test for test in campaign if np.ptp(test.drive) == 0.0]
     _, context, _ = run_stage(tmp_path, constant, compare=("bouc-wen",), starts=1, maximum_samples=2000)
     assert any("does not determine its lag" in line for line in context.warnings)
-    assert any("3 level(s) of drive" in line for line in context.warnings)
+    assert any("3 levels of drive" in line for line in context.warnings)
 
 
 @pytest.mark.property

@@ -232,6 +232,23 @@ def test_orders_follow_the_levels_of_drive(campaign):
 
 
 @pytest.mark.property
+@pytest.mark.parametrize(
+    ("shape", "levels"),
+    [(lambda t: np.sin(2.0 * t) > 0.0, 2), (lambda t: np.floor(2.999 * np.abs(np.sin(t))), 3), (np.abs, None)],
+)
+def test_a_drive_that_steps_between_levels_determines_no_more_than_these(campaign, shape, levels):
+    # two levels do not determine a cubic law, although the lag passes through all drives between them
+    recordings = bench_recordings(campaign)
+    time = np.arange(len(recordings.drive)) * 0.004
+    drive = np.asarray(shape(time), dtype=np.float64)
+    noise = 0.005 * np.max(drive) * np.random.default_rng(3).standard_normal(len(drive))
+    found = distinct_levels(replace(recordings, drive=drive + noise))
+    assert found == levels if levels else found > 10
+    orders = [law.order for law in polynomial_laws(base_form("bouc-wen"), found, 3, 1)]
+    assert orders == [min(3, (levels or 9) - 1), 1]
+
+
+@pytest.mark.property
 def test_a_lag_that_cannot_be_told_is_assumed(campaign):
     constant = [test for test in campaign if np.ptp(test.drive) == 0.0 and test.role == "training"]
     fit = fit_form(problem_of(constant), FitMethod(starts=1, assumed_eta=70.0))

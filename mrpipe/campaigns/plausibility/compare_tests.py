@@ -99,6 +99,7 @@ def _spikes(test: TestArrays) -> list[Finding]:
         if not spikes.size:
             continue
         largest = int(spikes[np.argmax(np.abs(values[spikes]))])
+        alone = spikes.size == 1
         time = float(test.time_s[largest] - test.time_s[0])
         findings.append(
             Finding(
@@ -106,8 +107,8 @@ def _spikes(test: TestArrays) -> list[Finding]:
                 severity="error",
                 test=test.name,
                 channel=name,
-                sentence=f"has {spikes.size} samples far from their neighbours, the largest {values[largest]:.4g} (SI) "
-                f"at {time:.4g} s",
+                sentence=f"has {'1 sample' if alone else f'{spikes.size} samples'} far from "
+                f"{'its' if alone else 'their'} neighbours, the largest {values[largest]:.4g} (SI) at {time:.4g} s",
                 remedy="correct these samples in the file, or cut them off with segments_s",
                 numbers={"samples": float(spikes.size), "largest_si": float(values[largest]), "time_s": time},
             )
