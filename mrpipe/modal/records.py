@@ -224,6 +224,10 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
     beyond = [name for sensor, name in sensors.items() if sensor.floor > n]
     if beyond:
         raise UserError(source, f"{place}.{beyond[0]}", "is above the top floor", f"the frame has floors 1 to {n}")
+    mode = int(recording.details.get("mode") or 0)
+    if mode > n and not any(sensor.direction for sensor in sensors):
+        remedy = f"a frame of {n} floors has {n} modes; correct it, or leave it out"
+        raise UserError(source, f"tests.{recording.name}.mode", f"is {mode}", remedy)
     part, note = _cut(recording)
     require_signal(recording, sensors.values(), part, source)
     inputs = [(where, values[part]) for where, values in _inputs(recording, source, n).items()]
@@ -254,7 +258,7 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
         responses=np.column_stack([recording.channels[name][part] for name in sensors.values()]),
         is_displacement=tuple(sensor.is_displacement for sensor in sensors),
         shaker_floor=first.floor,
-        mode=int(recording.details.get("mode") or 0),
+        mode=mode,
         role=recording.role,
         displacements=tuple((floor, recording.channels[name][part]) for floor, name in lasers),
         places=tuple(Place(sensor.floor, sensor.direction) for sensor in sensors),

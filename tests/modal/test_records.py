@@ -80,3 +80,10 @@ def test_a_shaker_that_rests_is_no_input() -> None:
     details = {"input_force_floor": 1, "input_force_2_floor": 2}
     test = frame_test(replace(whole, channels=channels, details=details), SOURCE)
     assert list(test.inputs) == [Place(2)]
+
+
+def test_a_decay_of_a_mode_that_does_not_exist_is_refused() -> None:
+    decay = replace(recording("free-decay"), details={"mode": 3})
+    with pytest.raises(UserError, match=r"tests\.one\.mode: is 3; a frame of 2 floors has 2 modes"):
+        frame_test(decay, SOURCE)
+    assert frame_test(replace(decay, details={"mode": 2}), SOURCE).mode == 2
