@@ -245,6 +245,12 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
             "add it, or input_force with its floor, or write kind: ambient where the excitation was not measured",
         )
     first, values = inputs[0] if inputs else (Place(0), None)
+    seen, driven = (
+        {item.direction[:1] for item in items} - {""} for items in (sensors, [place for place, _ in inputs])
+    )
+    if seen and driven and not seen & driven:
+        where = f"its excitation acts along {', '.join(driven)} and its sensors along {', '.join(seen)}"
+        note = "; ".join(filter(None, (note, f"{where}: correct the suffixes of the channels if that is not meant")))
     lasers = sorted(
         (int(match.group(2)), name)
         for name in recording.channels
