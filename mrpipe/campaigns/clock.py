@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +20,9 @@ JITTER_TOLERANCE = 0.02
 
 MOST_REPEATED_TIMES = 0.05
 """Share of samples with the time of the sample before, above which the clock was printed with too few digits."""
+
+SHORTEST_GAP = 3
+"""So many lost samples break a record; fewer disturb it less than noise does."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +137,26 @@ def lost_samples(time: FloatArray, rate: float) -> IntArray:
         late = np.median(late_by[gap + 1 - first :]) - np.median(late_by[: gap + 1 - first])
         lost[gap] = max(0, round(float(late) - 0.1))
     return lost
+
+
+def longest_part(time_s: FloatArray, rate_hz: float, segments: Sequence[tuple[int, int]] = ()) -> tuple[int, int, bool]:
+    """Return begin and end of the longest part of a test without a gap, and whether there was a gap.
+
+    Parameters
+    ----------
+    time_s, rate_hz
+        Clock of the test, shape (n,), and its nominal rate.
+    segments
+        Half-open index ranges that are used; empty: all samples.
+    """
+    used = segments or ((0, time_s.size),)
+    parts: list[tuple[int, int]] = []
+    for begin, end in used:
+        lost = lost_samples(time_s[begin:end], rate_hz)
+        gaps = begin + 1 + np.flatnonzero(lost >= SHORTEST_GAP)
+        parts += pairwise([begin, *(int(gap) for gap in gaps), end])
+    begin, end = max(parts, key=lambda item: item[1] - item[0])
+    return begin, end, len(parts) > len(used)
 
 
 def _unrounded(time: FloatArray) -> FloatArray:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.campaigns.clock import lost_samples
+from mrpipe.campaigns.clock import longest_part
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
 
@@ -116,11 +115,9 @@ _FLOOR_CHANNEL = re.compile(r"^(floor_acceleration|floor_displacement)_([1-9][0-
 _GROUND_CHANNEL = re.compile(r"^ground_acceleration(?:_([a-z][a-z0-9]*))?$")
 _FORCE_CHANNEL = re.compile(r"^input_force(?:_([a-z0-9]+))?$")
 
-SHORTEST_GAP = 3
-"""So many lost samples break a record; fewer disturb it less than noise does."""
 
-
-def _is_input(name: str) -> bool:
+def is_input(name: str) -> bool:
+    """Return whether a channel is a measured excitation."""
     return bool(_FORCE_CHANNEL.match(name) or _GROUND_CHANNEL.match(name))
 
 
@@ -167,25 +164,23 @@ def _inputs(recording: Recording, source: Path, floors: int) -> dict[Place, Floa
 def _cut(recording: Recording) -> tuple[slice, str]:
     """Return the longest unbroken part of a recording, and a note where a gap in the clock made it shorter."""
     # a modal fit needs an unbroken record
-    segments = recording.segments or ((0, recording.time_s.size),)
-    parts = [part for segment in segments for part in _unbroken(recording, *segment)]
-    start, stop = max(parts, key=lambda item: item[1] - item[0])
-    note = ""
-    if len(parts) > len(segments):
-        first, last = recording.time_s[start], recording.time_s[stop - 1]
-        note = f"its clock has gaps; the longest part without one is used, from {first:.4g} to {last:.4g} s"
-    return slice(start, stop), note
+    begin, end, gaps = longest_part(recording.time_s, recording.sampling_rate_hz, recording.segments)
+    first, last = recording.time_s[begin], recording.time_s[end - 1]
+    note = f"its clock has gaps; the longest part without one is used, from {first:.4g} to {last:.4g} s"
+    return slice(begin, end), note if gaps else ""
 
 
-def _unbroken(recording: Recording, start: int, stop: int) -> list[tuple[int, int]]:
-    """Return the parts of a segment between the gaps of its clock."""
-    lost = lost_samples(recording.time_s[start:stop], recording.sampling_rate_hz)
-    gaps = start + 1 + np.flatnonzero(lost >= SHORTEST_GAP)
-    return list(pairwise([start, *(int(gap) for gap in gaps), stop]))
-
-
-def _require_signal(recording: Recording, names: Iterable[str], part: slice, source: Path) -> None:
+def require_signal(recording: Recording, names: Iterable[str], part: slice, source: Path) -> None:
     """Refuse a channel that never changes.
+
+    Parameters
+    ----------
+    recording, names
+        The test, and the channels that are looked at.
+    part
+        Samples that are used.
+    source
+        campaign.yaml, for messages.
 
     Raises
     ------
@@ -229,14 +224,18 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
     beyond = [name for sensor, name in sensors.items() if sensor.floor > n]
     if beyond:
         raise UserError(source, f"{place}.{beyond[0]}", "is above the top floor", f"the frame has floors 1 to {n}")
+    mode = int(recording.details.get("mode") or 0)
+    if mode > n and not any(sensor.direction for sensor in sensors):
+        remedy = f"a frame of {n} floors has {n} modes; correct it, or leave it out"
+        raise UserError(source, f"tests.{recording.name}.mode", f"is {mode}", remedy)
     part, note = _cut(recording)
-    _require_signal(recording, sensors.values(), part, source)
+    require_signal(recording, sensors.values(), part, source)
     inputs = [(where, values[part]) for where, values in _inputs(recording, source, n).items()]
     if inputs and recording.kind in {"sweep", "random"}:
         # of several shakers some may rest in a test
         moving = [(where, values) for where, values in inputs if np.ptp(values) > 0.0]
         if not moving:
-            _require_signal(recording, filter(_is_input, recording.channels), part, source)
+            require_signal(recording, filter(is_input, recording.channels), part, source)
         inputs = moving
     if not inputs and recording.kind in {"sweep", "random"}:
         raise UserError(
@@ -246,6 +245,12 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
             "add it, or input_force with its floor, or write kind: ambient where the excitation was not measured",
         )
     first, values = inputs[0] if inputs else (Place(0), None)
+    seen, driven = (
+        {item.direction[:1] for item in items} - {""} for items in (sensors, [place for place, _ in inputs])
+    )
+    if seen and driven and not seen & driven:
+        where = f"its excitation acts along {', '.join(driven)} and its sensors along {', '.join(seen)}"
+        note = "; ".join(filter(None, (note, f"{where}: correct the suffixes of the channels if that is not meant")))
     lasers = sorted(
         (int(match.group(2)), name)
         for name in recording.channels
@@ -259,7 +264,7 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
         responses=np.column_stack([recording.channels[name][part] for name in sensors.values()]),
         is_displacement=tuple(sensor.is_displacement for sensor in sensors),
         shaker_floor=first.floor,
-        mode=int(recording.details.get("mode") or 0),
+        mode=mode,
         role=recording.role,
         displacements=tuple((floor, recording.channels[name][part]) for floor, name in lasers),
         places=tuple(Place(sensor.floor, sensor.direction) for sensor in sensors),

@@ -37,7 +37,9 @@ def describe(sink: Sink, result: IdentifiedFrame) -> None:
     """Write the section."""
     found, values = result.identification, result.summary
     count, frequencies = len(found.numbers), values["frequencies_hz"]
-    sink.text(f"{count} modes between {frequencies[0]:.3g} and {frequencies[-1]:.3g} Hz. {_method(bool(found.tests))}")
+    sink.text(
+        f"{count} modes between {frequencies[0]:.3g} and {frequencies[-1]:.3g} Hz. {method_in_words(bool(found.tests))}"
+    )
     sink.table("modes", pd.DataFrame(figures.mode_rows(values)), "Modes with 95 % intervals.")
     if found.clocks:
         sink.table("clocks", pd.DataFrame(values["clocks"]), "Delays of sensors that were corrected.")
@@ -85,7 +87,7 @@ def describe(sink: Sink, result: IdentifiedFrame) -> None:
         sink.figure("verification", figures.verification(found.in_time[0]), text)
 
 
-def _method(forced: bool) -> str:
+def method_in_words(forced: bool) -> str:
     """Return how modes and damping were found."""
     if forced:
         return (

@@ -69,9 +69,9 @@ class SingleExcitationSettings(Section):
     random_seed: int = Field(1, ge=0, description="Seed of random motion; all laws meet the same motion.")
     file: str = Field(
         "",
-        description="Recorded motion: PEER AT2, COSMOS or CSMIP V2 (also V1 and RAW), a zip of them, or text of time "
-        "[s] and one column for each history. Two components act in the two directions of the structure "
-        "(`structure.influence_y`).",
+        description="Recorded motion: PEER AT2, COSMOS or CSMIP V2 (also V1 and RAW), SMC, GeoNet V2A, a zip of them, "
+        "or text of time [s] and one column for each history. Two components act in the two directions of the "
+        "structure (`structure.influence_y`).",
     )
     file_y: str = Field("", description="Record of the second direction, where each direction has its own file.")
     file_unit: str = Field(

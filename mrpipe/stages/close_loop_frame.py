@@ -5,7 +5,8 @@ Takes the place of the stage on a bench campaign where the user gives a campaign
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import StageSkipped
@@ -29,12 +30,12 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     for campaign in campaigns:
         for finding in campaign.findings:
             context.warn(finding)
-    if not any(campaign.floor_masses_kg for campaign in campaigns) and not any(
+    if not any(_masses_are_known(campaign.floor_masses_kg) for campaign in campaigns) and not any(
         "drive" in test.channels for campaign in campaigns for test in campaign.recordings
     ):
         raise StageSkipped(
-            "the masses of the floors are not given, so no storey force can be computed: write frame: "
-            "{floor_masses_kg: [...]} in campaign.yaml"
+            "the masses of the floors are not given, or not all of them, so no storey force can be computed: "
+            "write frame: {floor_masses_kg: [...]} in campaign.yaml"
         )
     known = {**all_structural_effects(), **damper_effects()}
     for name in campaigns[0].declared_effects:
@@ -57,6 +58,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     _write(context, traced)
     section.describe(context.report, section.TracedStructure(traced, settings.named_share, settings.least_share))
     return traced.summary
+
+
+def _masses_are_known(masses_kg: Sequence[float]) -> bool:
+    return bool(masses_kg) and all(math.isfinite(mass) for mass in masses_kg)
 
 
 def _write(context: StageContext, traced: StructureTracing) -> None:

@@ -16,9 +16,9 @@ from scipy.io import loadmat
 from scipy.signal import resample_poly
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.campaigns.readers.cosmos import ENDINGS as V2_ENDINGS
 from mrpipe.campaigns.readers.peer import peer_record
 from mrpipe.campaigns.readers.strong_motion import (
+    ENDINGS,
     SAME_INTERVAL,
     common_window,
     read_strong_motion,
@@ -165,7 +165,7 @@ def read_motion(
         raw = _read_at2(path)
     elif path.suffix.lower() == ".mat":
         raw = _read_mat(path)
-    elif path.suffix.lower() in {*V2_ENDINGS, ".zip"}:
+    elif path.suffix.lower() in ENDINGS:
         raw = _read_v2(path)
     elif path.suffix.lower() in _FOREIGN:
         raise UserError(path, "", f"a {path.suffix} file is not a ground-motion record", "use .at2, .txt, .csv or .mat")
@@ -201,7 +201,7 @@ def _read_at2(path: Path) -> _Raw:
 
 
 def _read_v2(path: Path) -> _Raw:
-    """Return the first two horizontal channels of a CSMIP or COSMOS V2 file, or of a zip of V2 or AT2 files."""
+    """Return the first two horizontal channels of a record as it is downloaded, or of a zip of records."""
     horizontal = [item for item in read_strong_motion(path) if not item.vertical]
     if not horizontal:
         raise UserError(path, "", "holds no horizontal channel", "give a record with a horizontal channel")

@@ -213,7 +213,12 @@ def test_bad_rows_intervals_and_other_records_get_one_line(tmp_path: Path) -> No
         (tmp_path / name).write_text(text)
         with pytest.raises(UserError, match=words):
             read_strong_motion(tmp_path / name)
-    for ending, words in ((".VT2", "velocity"), (".DT2", "displacement"), (".V3", "response spectra"), (".smc", "SMC")):
+    for ending, words in (
+        (".VT2", "velocity"),
+        (".DT2", "displacement"),
+        (".V3", "response spectra"),
+        (".V1A", "GeoNet"),
+    ):
         (tmp_path / f"a{ending}").write_text("")
         for read in (read_motion, lambda path: read_histories(path, "g")):
             with pytest.raises(UserError, match=words):

@@ -299,6 +299,12 @@ def test_a_structure_without_masses_is_not_traced_and_the_rest_goes_on(
     )
     with pytest.raises(StageSkipped, match=r"masses of the floors are not given.*write frame: \{floor_masses_kg"):
         close_loop_frame.variant(load_config(config).config).run(context)  # type: ignore[union-attr, arg-type]
+    # the same where a mass is unknown
+    content = yaml.safe_load((tmp_path / "data" / "campaign.yaml").read_text(encoding="utf-8"))
+    content["frame"] = {"floor_masses_kg": [200, None]}
+    (tmp_path / "data" / "campaign.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    with pytest.raises(StageSkipped, match="or not all of them"):
+        close_loop_frame.variant(load_config(config).config).run(context)  # type: ignore[union-attr, arg-type]
 
 
 @pytest.mark.property

@@ -80,3 +80,18 @@ def test_a_shaker_that_rests_is_no_input() -> None:
     details = {"input_force_floor": 1, "input_force_2_floor": 2}
     test = frame_test(replace(whole, channels=channels, details=details), SOURCE)
     assert list(test.inputs) == [Place(2)]
+
+
+def test_a_decay_of_a_mode_that_does_not_exist_is_refused() -> None:
+    decay = replace(recording("free-decay"), details={"mode": 3})
+    with pytest.raises(UserError, match=r"tests\.one\.mode: is 3; a frame of 2 floors has 2 modes"):
+        frame_test(decay, SOURCE)
+    assert frame_test(replace(decay, details={"mode": 2}), SOURCE).mode == 2
+
+
+def test_an_excitation_across_all_sensors_is_told() -> None:
+    whole = recording()
+    turned = {f"{name}_{'y' if name.startswith('ground') else 'x'}": item for name, item in whole.channels.items()}
+    assert "acts along y and its sensors along x" in frame_test(replace(whole, channels=turned), SOURCE).note
+    along = {f"{name}_x": item for name, item in whole.channels.items()}
+    assert not frame_test(replace(whole, channels=along), SOURCE).note

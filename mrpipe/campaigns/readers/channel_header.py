@@ -47,7 +47,8 @@ _START = re.compile(
     r"(?:\s+([A-Z]{3})\b)?",
     re.IGNORECASE,
 )
-_EPOCH = datetime(1900, 1, 1)
+EPOCH = datetime(1900, 1, 1)
+"""Starts of records are counted from here."""
 _YEAR_DIGITS = 3
 """A first number of the date with as many digits is the year."""
 _LAST_CENTURY = 50
@@ -109,7 +110,7 @@ def start_s(header: str) -> float | None:
         moment = datetime(year, month, day, hour, minute)
     except ValueError:
         return None
-    return None if behind_h is None else (moment - _EPOCH).total_seconds() + 3600.0 * behind_h + float(said[6])
+    return None if behind_h is None else (moment - EPOCH).total_seconds() + 3600.0 * behind_h + float(said[6])
 
 
 def interval_s(path: Path, said: str, header: str, count: int) -> float:

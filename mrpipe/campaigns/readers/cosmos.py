@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.readers.channel_header import channel_name, interval_s, is_vertical, start_s
 from mrpipe.campaigns.readers.fortran import row_of_numbers
+from mrpipe.campaigns.readers.motion import StrongMotion
 from mrpipe.errors import UserError
 from mrpipe.units import conversion
 
@@ -31,31 +31,6 @@ ENDINGS = (".v2", ".v2c", ".v1", ".v1c", ".raw")
 UNCORRECTED = (".v1", ".v1c", ".raw")
 """Endings of records as the instrument gave them."""
 _PAIRS = re.compile(r"units\s+of\s+uncor\w*\s+\w+\s+are\s+sec\s+and", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class StrongMotion:
-    """Acceleration of one channel.
-
-    Attributes
-    ----------
-    name
-        Number and place or direction as the header gives them, such as `3: 90 Deg`.
-    acceleration_m_s2
-        Shape (n,).
-    interval_s
-        Sampling interval [s].
-    vertical
-        Whether the header calls the channel vertical.
-    start_s
-        Start of the record [s] from a fixed day on; None where the header states none.
-    """
-
-    name: str
-    acceleration_m_s2: FloatArray
-    interval_s: float
-    vertical: bool
-    start_s: float | None = None
 
 
 def cosmos_channels(path: Path, text: str) -> Iterator[StrongMotion]:

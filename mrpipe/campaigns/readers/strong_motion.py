@@ -1,4 +1,4 @@
-"""Strong-motion records as they are downloaded: COSMOS and CSMIP V2, PEER AT2, and the zips of CESMD and PEER."""
+"""Strong-motion records as they are downloaded: COSMOS and CSMIP V2, PEER AT2, SMC, GeoNet V2A, and zips of them."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
-from mrpipe.campaigns.readers import peer
+from mrpipe.campaigns.readers import geonet, peer, smc
 from mrpipe.campaigns.readers.cosmos import ENDINGS as COSMOS_ENDINGS
-from mrpipe.campaigns.readers.cosmos import UNCORRECTED, StrongMotion, cosmos_channels, holds_uneven_pairs
+from mrpipe.campaigns.readers.cosmos import UNCORRECTED, cosmos_channels, holds_uneven_pairs
+from mrpipe.campaigns.readers.motion import StrongMotion
 from mrpipe.campaigns.readers.reader import Reader, require_size
 from mrpipe.campaigns.schema import TextEntry
 from mrpipe.errors import UserError
@@ -26,20 +27,18 @@ NOT_READ = {
     ".dt2": ("a record of displacement", "give the .AT2 file of the same component"),
     ".v3": ("a file of response spectra", "give the .V2 file of the same record"),
     ".v3c": ("a file of response spectra", "give the .V2c file of the same record"),
-    ".smc": ("a record in SMC form, which is not read", "download it in COSMOS form (.V2c), or as text with a clock"),
-    ".v1a": ("a record in GeoNet form, which is not read", "write time and acceleration as columns of a text file"),
-    ".v2a": ("a record in GeoNet form, which is not read", "write time and acceleration as columns of a text file"),
+    ".v1a": ("an uncorrected record of GeoNet, which is not read", "give the .V2A file of the same record"),
 }
 """Endings of files of data centres that hold no acceleration in a known form -> what they are, and a remedy."""
 SAME_INTERVAL = 1e-6
 """Relative difference up to which two sampling intervals are the same."""
 DEEPEST_ARCHIVE = 3
 """Archives within archives that are opened; a download of several stations has two."""
-ENDINGS = (*COSMOS_ENDINGS, *peer.ENDINGS, ".zip")
+ENDINGS = (*COSMOS_ENDINGS, *peer.ENDINGS, *smc.ENDINGS, *geonet.ENDINGS, ".zip")
 
 
 def read_strong_motion(path: Path) -> list[StrongMotion]:
-    """Return the accelerations of all channels of a V2 or AT2 file, or of all such files in a zip and the zips in it.
+    """Return the accelerations of all channels of a record, or of all records in a zip and the zips in it.
 
     Uncorrected records (V1) are left out where a zip contains corrected ones.
 
@@ -53,7 +52,7 @@ def read_strong_motion(path: Path) -> list[StrongMotion]:
     uneven = False
     for name, read in _files(path):
         text = read()
-        found += list(cosmos_channels(_within(path, name), text)) if _is_cosmos(name) else [_peer(path, name, text)]
+        found += _channels(path, name, text)
         files += [name.stem] * (len(found) - len(files))
         uneven = uneven or holds_uneven_pairs(text)
     if not found and uneven:
@@ -61,7 +60,10 @@ def read_strong_motion(path: Path) -> list[StrongMotion]:
         raise UserError(path, "", problem, "download the corrected record (volume 2, .V2)")
     if not found:
         raise UserError(
-            path, "", "holds no acceleration in V2 or AT2 form", "give a .V2 or .AT2 file, or a zip that contains some"
+            path,
+            "",
+            "holds no acceleration in V2, AT2, SMC or V2A form",
+            "give such a file, or a zip that contains some",
         )
     names = _made_different([item.name for item in found], [f" ({file})" for file in files])
     names = _made_different(names, [f" #{index + 1}" for index in range(len(names))])
@@ -88,8 +90,14 @@ def _made_different(names: list[str], additions: list[str]) -> list[str]:
     ]
 
 
-def _is_cosmos(name: Path) -> bool:
-    return name.suffix.lower() in COSMOS_ENDINGS
+def _channels(path: Path, name: Path, text: str) -> list[StrongMotion]:
+    """Return the channels of one record, by its ending."""
+    ending, within = name.suffix.lower(), _within(path, name)
+    if ending in COSMOS_ENDINGS:
+        return list(cosmos_channels(within, text))
+    if ending in smc.ENDINGS:
+        return [smc.smc_record(within, text)]
+    return list(geonet.geonet_channels(within, text)) if ending in geonet.ENDINGS else [_peer(path, name, text)]
 
 
 def _within(path: Path, name: Path) -> Path:

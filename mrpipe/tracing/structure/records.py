@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy import signal
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.clock import longest_part
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
+from mrpipe.modal.records import is_input, require_signal
 
 FASTEST_HZ = 250.0
 """Numerical technique: records are decimated to about this rate unless the caller gives another."""
@@ -84,12 +87,16 @@ class FrameRecord:
 
 @dataclass(frozen=True)
 class FrameData:
-    """The tests whose floors are all recorded, and those of the closed loop, which may lack some."""
+    """The tests whose floors are all recorded, and those of the closed loop, which may lack some.
+
+    `source` is campaign.yaml, for messages.
+    """
 
     masses_kg: FloatArray
     records: tuple[FrameRecord, ...]
     loops: tuple[Recording, ...]
     left_out: tuple[str, ...]
+    source: Path = Path("campaign.yaml")
 
     def with_role(self, *roles: str) -> list[FrameRecord]:
         """Return the records of these roles."""
@@ -137,17 +144,23 @@ def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
             source,
             "channels",
             "no test records every floor and the ground",
-            "give floor_acceleration_1, ... and ground",
+            "give floor_acceleration_1, ... and ground_acceleration, or input_force with its floor",
         )
     if whole and masses.size != floors:
         raise UserError(
             source, "frame.floor_masses_kg", f"has {masses.size} entries, the channels are of {floors} floors",
             "give the mass of every floor in kg",
         )  # fmt: skip
+    unknown = np.flatnonzero(~np.isfinite(masses))
+    if whole and unknown.size:
+        problem = f"does not give the mass of floor {unknown[0] + 1}"
+        raise UserError(source, "frame.floor_masses_kg", problem, "give the mass of every floor in kg")
+    for item in whole:
+        _require_signals(item, source)
     if not any(item.role == "validation" for item in (*whole, *loops)):
         raise UserError(source, "tests", "no validation test", "give one test the role validation")
     records = tuple(_record(item, rate_hz) for item in whole)
-    return FrameData(masses, records, loops, tuple(left_out))
+    return FrameData(masses, records, loops, tuple(left_out), source)
 
 
 def _floors_of(recording: Recording) -> list[int]:
@@ -167,11 +180,19 @@ def floor_of_force(recording: Recording) -> int:
 
 
 def part_of(recording: Recording) -> slice:
-    """Return the longest segment of a recording that is used."""
-    if not recording.segments:
-        return slice(None)
-    begin, end = max(recording.segments, key=lambda item: item[1] - item[0])
+    """Return the longest part of a recording that is used and has no gap in its clock."""
+    begin, end, _ = longest_part(recording.time_s, recording.sampling_rate_hz, recording.segments)
     return slice(begin, end)
+
+
+def _require_signals(recording: Recording, source: Path) -> None:
+    """Refuse a recording with a dead sensor, or a forced one whose excitation never changes."""
+    part = part_of(recording)
+    require_signal(recording, [name for name in recording.channels if name.startswith(_FLOORS)], part, source)
+    inputs = [name for name in recording.channels if is_input(name)]
+    forced = recording.kind in {"sweep", "random"} and "damper_force" not in recording.channels
+    if forced and not any(np.ptp(recording.channels[name][part]) > 0.0 for name in inputs):
+        require_signal(recording, inputs, part, source)
 
 
 def thinning(rate_hz: float, wanted_hz: float) -> int:

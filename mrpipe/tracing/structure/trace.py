@@ -11,6 +11,7 @@ from scipy import stats
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
+from mrpipe.errors import UserError
 from mrpipe.tracing.bench.verdict import confidence_of
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
@@ -37,6 +38,9 @@ LISTED = 6
 
 NO_GAIN = 1e-12
 """Numerical technique: a smaller squared error counts as zero in a ratio."""
+
+FEWEST_PERIODS = 5
+"""Numerical technique: a shorter record, in periods of the first mode, is refused."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,7 @@ def trace_frame(
     """
     training = data.with_role("training", "repeat")
     problem = frame_problem(training, data.with_role("validation") or training, data.masses_kg, frame_rules)
+    _require_length(problem, data)
     progress(0.2, "spectra")
     selection = select(
         problem, effects, rules, most=most, declared=declared, rng=rng, draws=draws, jobs=jobs, progress=progress
@@ -102,6 +107,17 @@ def trace_frame(
     between = stiffness_between_tests(before, _in_order(problem, data), problem.rules)
     summary = _summary(problem, selection, before, after, between, declared, rules, reason)
     return FrameTracing(summary, problem, selection, before, after, between)
+
+
+def _require_length(problem: FrameProblem, data: FrameData) -> None:
+    """Refuse a record in which the first mode hardly moves; noise would hide everything that it could show."""
+    first_hz = float(problem.frequencies_hz[0])
+    for record in data.records:
+        seconds = len(record.ground) / record.rate_hz
+        if seconds * first_hz < FEWEST_PERIODS:
+            problem_said = f"lasts {seconds:.3g} s, which is {seconds * first_hz:.2g} periods of the first mode"
+            remedy = f"record at least {FEWEST_PERIODS} periods, or leave the test out"
+            raise UserError(data.source, f"tests.{record.name}", problem_said, remedy)
 
 
 def _in_order(problem: FrameProblem, data: FrameData) -> list[Spectra]:

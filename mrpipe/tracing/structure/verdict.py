@@ -37,6 +37,9 @@ UNCOUPLED = (
 )
 """What the result says about structures whose sensors measure in directions."""
 
+UNLIKELY_ERROR = 0.1
+"""A larger error of a linear frame that no effect explains is often a mistake in the description of the channels."""
+
 
 @dataclass(frozen=True)
 class StructureTracing:
@@ -142,7 +145,15 @@ def trace_structure(
 
 
 def _lines(frame: FrameTracing) -> list[str]:
-    return [frame.between.finding()] if frame.between.drifts else []
+    lines = [frame.between.finding()] if frame.between.drifts else []
+    summary = frame.summary
+    error = float(summary["before"]["nrmse"])
+    if not summary["effects"] and summary["unexplained"]["structured"] and error > UNLIKELY_ERROR:
+        lines.append(
+            f"a linear frame misses {100.0 * error:.0f} % of the storey forces, and no effect explains it. So large an "
+            "error often comes from the sign, the unit or the floor of a channel: see what mrpipe identify-frame finds"
+        )
+    return lines
 
 
 def _by_direction(
@@ -187,6 +198,7 @@ def joined_data(campaigns: Sequence[Campaign], rate_hz: float = FASTEST_HZ) -> F
         tuple(record for item in parts for record in item.records),
         tuple(record for item in parts for record in item.loops),
         tuple(name for item in parts for name in item.left_out),
+        parts[0].source,
     )
 
 

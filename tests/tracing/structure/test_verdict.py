@@ -72,3 +72,17 @@ def test_a_campaign_that_shows_nothing_is_refused() -> None:
         trace_structure(
             [only_drives(frame_campaign("clean"))], all_structural_effects(), damper_effects(), OPTIONS, rng=rng
         )
+
+
+def test_a_mistake_in_the_channels_is_suspected_where_nothing_explains_a_large_error() -> None:
+    campaign = frame_campaign("clean")
+    tests = []
+    for item in campaign.recordings:
+        turned = {**item.channels, "floor_acceleration_2": -item.channels["floor_acceleration_2"]}
+        tests.append(replace(item, channels=turned))
+    effects = {"cubic-stiffness": all_structural_effects()["cubic-stiffness"]}
+    wrong = replace(campaign, recordings=tuple(tests))
+    for given, suspected in ((wrong, True), (campaign, False)):
+        found = trace_structure([given], effects, damper_effects(), OPTIONS, rng=np.random.default_rng(1))
+        assert not found.summary["effects"]
+        assert any("sign, the unit or the floor of a channel" in line for line in found.findings) == suspected
