@@ -79,12 +79,6 @@ class Evidence:
         unrepeated = self.events**2 + self.disturbance**2
         return self.after > rules.noise_floors * self.floor and unrepeated >= rules.accounts * excess
 
-    def quiet(self, floors: float) -> bool:
-        """Return whether the error is at most this many noise floors, as a whole and on every validation test."""
-        return self.after <= floors * self.floor and all(
-            item.after <= floors * max(item.floor, self.floor) for item in self.conditions
-        )
-
     @property
     def share(self) -> float:
         """Share of the recoverable squared error that is removed, 0 to 1."""
@@ -101,9 +95,10 @@ def classify(evidence: Evidence, rules: ValidationRules) -> VerdictClass:
     """Return the class of the comparable part of the validation tests."""
     better = evidence.after < evidence.before
     if not evidence.effects and not evidence.base_changed:
-        # a long record shows structure that is far below the noise, so structure alone does not make a finding
-        limit = rules.within_floors if evidence.structured else rules.noise_floors
-        return "noise" if evidence.quiet(limit) else "unknown"
+        quiet = evidence.after <= rules.noise_floors * evidence.floor and all(
+            item.after <= rules.noise_floors * max(item.floor, evidence.floor) for item in evidence.conditions
+        )
+        return "noise" if quiet and not evidence.structured else "unknown"
     if not better:
         return "unknown"
     explained = reached(evidence, rules)

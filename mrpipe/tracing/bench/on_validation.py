@@ -314,12 +314,6 @@ def _sentence(
 ) -> str:
     listed = " and ".join(names) + (f" with the base form {base_taken}" if base_taken else "")
     verb = "explains" if len(names) == 1 else "explain"
-    if kind == "noise" and evidence.structured:
-        ratio = evidence.after / evidence.floor
-        return (
-            f"the residual is noise within the accuracy of the noise floor: {ratio:.3g} noise floors remain on the "
-            "validation tests, and nothing larger than that is missing"
-        )
     if kind == "noise":
         return "the residual is noise: nothing is missing"
     if kind == "explained":

@@ -45,10 +45,6 @@ def evidence(
         # above twice the floor nothing is noise, whatever the training tests say
         (evidence(0.021, 0.021, structured=False, effects=False), "unknown"),
         (evidence(0.015, 0.015, structured=False, effects=False, worse=0.01), "unknown"),
-        # structure that a long record shows far below the noise is no finding within the accuracy of the floor
-        (evidence(0.0112, 0.0112, effects=False), "noise"),
-        (evidence(0.0112, 0.0112, effects=False, worse=0.004), "unknown"),
-        (evidence(0.014, 0.014, effects=False), "unknown"),
         (evidence(0.05, 0.05, effects=False), "unknown"),
         (evidence(0.1, 0.012, effects=False, changed=True), "base form"),
         (evidence(0.1, 0.095, effects=False, changed=True), "unknown"),
