@@ -196,20 +196,20 @@ def compare_forms(
 
     Parameters
     ----------
+    forms
+        Forms that are compared.
+    tests
+        Prepared tests.
+    options
+        How forms are fitted.
     folds
         Above 1: cross-validate the fitted forms in so many parts.
     keep
         Names of forms that are fitted to all samples whatever their rank.
     jobs
         Threads; the result does not depend on their number.
-    options
-        How forms are fitted.
     progress
         Called with the share done and a text.
-    forms
-        Forms that are compared.
-    tests
-        Prepared tests.
     """
     training = [test for test in tests if test.role == "training"]
     unit = training[0].drive_unit or "A"

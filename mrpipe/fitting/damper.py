@@ -24,6 +24,8 @@ def damper_model(
 
     Parameters
     ----------
+    found
+        The fit.
     drive_unit
         `A` or `V`.
     effects
@@ -32,8 +34,6 @@ def damper_model(
         Rate of the lag [1/s] where the recordings do not determine it; infinite: no lag.
     effect_files
         Effect -> the user's own file that defines it.
-    found
-        The fit.
     """
     base, scales = found.problem.base, found.problem.scales
     numbers: dict[str, float] = {}

@@ -40,6 +40,8 @@ class Fit:
 
     Attributes
     ----------
+    problem
+        What was fitted.
     theta
         Searched values as the search sees them.
     linear
@@ -52,8 +54,6 @@ class Fit:
         Weighted residual, shape (n,), 0 where not compared.
     at_bound
         Names of searched parameters and amplitudes of terms at a bound.
-    problem
-        What was fitted.
     iterations
         Iterations of the search.
     """

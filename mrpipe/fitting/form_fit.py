@@ -126,14 +126,14 @@ def form_problem(
 
     Parameters
     ----------
-    offsets
-        An offset for each test; else one for all.
-    weights
-        Factor on the error of each sample, shape (n,); 1 where left out.
     recordings
         Tests laid end to end.
     base
         Base form.
+    offsets
+        An offset for each test; else one for all.
+    weights
+        Factor on the error of each sample, shape (n,); 1 where left out.
     """
     problem = first_problem(recordings, base)
     root = problem.root_weight if weights is None else problem.root_weight * weights
@@ -149,12 +149,12 @@ def fit_form(
     ----------
     problem
         See :func:`form_problem`.
-    warm
-        Parameters to start from in place of the form's own starts.
     method
         Optimiser.
     drive_unit
         A or V.
+    warm
+        Parameters to start from in place of the form's own starts.
 
     Raises
     ------

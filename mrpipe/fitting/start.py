@@ -73,14 +73,14 @@ def base_of(
 
     Parameters
     ----------
-    laws
-        One for each block of the form; the first one serves further blocks.
-    held
-        Parameters that are not searched.
     recordings
         Tests laid end to end.
     form
         Form of the damper.
+    laws
+        One for each block of the form; the first one serves further blocks.
+    held
+        Parameters that are not searched.
     """
     shapes = for_blocks(laws, len(form.blocks))
     fixed = {**form.constants(recordings.scales()), **(held or {})}

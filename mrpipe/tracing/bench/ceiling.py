@@ -36,14 +36,14 @@ class Ceiling:
 
     Attributes
     ----------
-    error
-        Measured less predicted force [N], shape (n,), of pieces left out.
-    piece
-        Piece of each sample, shape (n,).
     recordings
         Validation tests.
     measured
         Measured force without offset [N], shape (n,).
+    error
+        Measured less predicted force [N], shape (n,), of pieces left out.
+    piece
+        Piece of each sample, shape (n,).
     """
 
     recordings: Recordings
@@ -79,12 +79,12 @@ def cross_fitted(
     ----------
     found
         The fit whose simulated states the trees see.
+    training
+        Training tests.
     residual
         Measured less simulated force of the training tests [N], shape (n,), 0 where not compared.
     validation, measured, simulated
         Validation tests, their offset-free force and the simulated one [N], shape (m,).
-    training
-        Training tests.
     seed
         Of the trees.
     iterations
@@ -174,10 +174,10 @@ def flexible_residual(
     ----------
     found
         The fit whose residual it is; its simulated states are what the trees see.
-    residual
-        Residual force of the training tests [N], shape (n,), 0 where not compared.
     training
         Training tests.
+    residual
+        Residual force of the training tests [N], shape (n,), 0 where not compared.
     validation
         Validation tests.
     seed

@@ -60,10 +60,10 @@ def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Correction
 
     Parameters
     ----------
-    tests
-        All prepared tests, so that those the tracing left out have their offset too.
     traced
         The tracing.
+    tests
+        All prepared tests, so that those the tracing left out have their offset too.
     """
     found = Corrections()
     chosen = traced.selection.chosen

@@ -34,10 +34,10 @@ def without_superfluous(
         Named effects with their fit.
     declared
         How many terms the campaign declares: they belong to the baseline and are never dropped.
-    orders
-        Largest degrees of the laws of the drive.
     lead
         An effect is dropped if the fit without it has at most this multiple of the chi-square of the fit with it.
+    orders
+        Largest degrees of the laws of the drive.
     race
         The models that competed; None if no other base form is tried.
     jobs

@@ -105,10 +105,6 @@ def on_validation(
 
     Parameters
     ----------
-    own_offsets
-        Whether the offsets of the tests are a finding: the base is then judged with one offset for all.
-    record_gain
-        Whether every record gets a gain, from its first part; the errors are those of the rest.
     base
         Fit of the base model.
     chosen
@@ -121,6 +117,10 @@ def on_validation(
         Validation tests.
     rules
         Decision thresholds.
+    own_offsets
+        Whether the offsets of the tests are a finding: the base is then judged with one offset for all.
+    record_gain
+        Whether every record gets a gain, from its first part; the errors are those of the rest.
     """
     before, after = predict(base, validation), predict(chosen, validation)
     first = first_parts(validation, rules.first_part)
@@ -200,6 +200,16 @@ def judge(
 
     Parameters
     ----------
+    found
+        Both models on the validation tests.
+    base
+        Fit of the base model.
+    chosen
+        Fit with the named effects.
+    training
+        Training tests.
+    rules
+        Decision thresholds.
     names
         Effects that are named.
     base_taken
@@ -214,16 +224,6 @@ def judge(
         Of the cross-validation on training tests.
     session
         Gain that several validation tests share; None if there is none.
-    found
-        Both models on the validation tests.
-    base
-        Fit of the base model.
-    chosen
-        Fit with the named effects.
-    training
-        Training tests.
-    rules
-        Decision thresholds.
     jobs
         Processes; the result does not depend on their number.
     """

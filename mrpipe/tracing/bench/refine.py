@@ -47,12 +47,12 @@ def with_richer_forms(
 
     Parameters
     ----------
+    selection
+        Named effects with their fit.
     declared
         How many terms the campaign declares: they keep their forms.
     folds, draws
         Of the cross-validation and its bootstrap.
-    selection
-        Named effects with their fit.
     rng
         Source of randomness.
     model_error

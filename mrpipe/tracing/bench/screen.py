@@ -26,12 +26,12 @@ class Screened:
 
     Attributes
     ----------
+    term
+        The effect in the form that was tried.
     gain
         Share of the residual's sum of squares that it takes to first order.
     values
         Start values for a joint fit.
-    term
-        The effect in the form that was tried.
     """
 
     term: Term

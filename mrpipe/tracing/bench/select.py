@@ -43,14 +43,14 @@ class Candidate:
 
     Attributes
     ----------
+    name
+        Of the effect.
     fit
         With the terms chosen before and this one, which is the last.
     share
         Share of the recoverable residual of the base that the whole set recovers.
     forms
         Share of each form that was tried.
-    name
-        Of the effect.
     """
 
     name: str
