@@ -41,6 +41,8 @@ def build_clock(
 
     Parameters
     ----------
+    file
+        Data file, for messages.
     time
         Time channel [s], shape (n,), or None.
     stated_rate_hz
@@ -49,8 +51,6 @@ def build_clock(
         Number of samples n.
     where
         Names the test in messages.
-    file
-        Data file, for messages.
 
     Raises
     ------

@@ -20,8 +20,6 @@ class Recording:
     ----------
     name, role
         As in campaign.yaml; role is training, validation or repeat.
-    kind
-        Frame tests: sweep, free-decay, closed-loop or random; empty on a bench.
     sampling_rate_hz
         Nominal rate.
     time_s
@@ -31,6 +29,8 @@ class Recording:
     segments
         Half-open index ranges to use; the whole test where none were given. Channels hold what lies between the first
         and the last; samples between two segments are not checked and may be NaN.
+    kind
+        Frame tests: sweep, free-decay, closed-loop or random; empty on a bench.
     details
         What else campaign.yaml says of the test (mode, law, gains, shaker floor, ...).
     """

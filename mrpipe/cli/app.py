@@ -27,13 +27,21 @@ GROUPS = {
 }
 """Headings of the help -> commands; others are listed at the end."""
 EXAMPLES = (
-    ("mrpipe demo", "a virtual damper from the first measurement to the verdict"),
-    ("mrpipe init my-rig --from DATA", "make a project from files that were measured"),
-    ("mrpipe run", "all stages of the project in this folder"),
-    ("mrpipe close-loop --campaign DIR", "which effect the model of this damper lacks"),
-    ("mrpipe status runs/my-rig", "what is out of date, and why"),
-    ("mrpipe compare runs/before runs/after", "settings, data and results that differ"),
+    ("mrpipe demo", "run a virtual damper from the first measurement to the verdict"),
+    ("mrpipe init my-rig --from DATA", "create a project from measured files"),
+    ("mrpipe run", "run all stages of the project in this folder"),
+    ("mrpipe close-loop --campaign DIR", "find the effect that the model of this damper lacks"),
+    ("mrpipe status runs/my-rig", "show what is out of date, and why"),
+    ("mrpipe compare runs/before runs/after", "show settings, data and results that differ"),
 )
+
+DESCRIPTION = """From bench tests of a magnetorheological (MR) damper to the closed loop with a structure, and back to
+the physical effect that the model lacks.
+
+Every stage is a command; `mrpipe run CONFIG` runs all of them in order. The command of a stage first builds the stages
+before it that are missing or out of date. Numbers are SI; --json prints one JSON document.
+"""
+"""Text above the list of commands."""
 
 
 class Commands(TyperGroup):
@@ -45,7 +53,7 @@ class Commands(TyperGroup):
         for name in self.list_commands(ctx):
             command = self.get_command(ctx, name)
             if command is not None and not command.hidden:
-                texts[name] = command.get_short_help_str(limit=80)
+                texts[name] = command.get_short_help_str(limit=130)
         listed = {name for names in GROUPS.values() for name in names}
         others = {"Further stages": tuple(name for name in texts if name not in listed)}
         for heading, names in {**GROUPS, **others}.items():
@@ -60,7 +68,7 @@ class Commands(TyperGroup):
 app = typer.Typer(
     name="mrpipe",
     cls=Commands,
-    help="From measured magnetorheological dampers to a closed-loop run, and back to the effect that a model lacks.",
+    help=DESCRIPTION,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
@@ -72,11 +80,7 @@ def version(
     context: typer.Context,
     show: Annotated[bool, typer.Option("--version", help="Print the version and exit.", is_eager=True)] = False,
 ) -> None:
-    """From measured magnetorheological dampers to a closed-loop run, and back to the effect that a model lacks.
-
-    Every stage is a command; `mrpipe run CONFIG` is all of them in order. A stage builds whatever before it is
-    missing or out of date, and nothing else. Numbers are SI; --json prints one JSON document.
-    """
+    """Print the version, or the help if no command is given."""
     if show:
         from mrpipe import __version__
 
@@ -89,9 +93,12 @@ def version(
 @app.command(name="help")
 def help_of(
     context: typer.Context,
-    command: Annotated[str | None, typer.Argument(metavar="COMMAND", help="Command to explain.")] = None,
+    command: Annotated[
+        str | None,
+        typer.Argument(metavar="COMMAND", help="Command whose help is shown. Default: the list of commands."),
+    ] = None,
 ) -> None:
-    """Show this help, or that of a command."""
+    """Show the list of commands, or the help of one command."""
     top = context.find_root()
     if command is None:
         print(top.get_help())

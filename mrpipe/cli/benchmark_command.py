@@ -27,7 +27,7 @@ def overrides_of(
     Raises
     ------
     UserError
-        If there is no such benchmark, a file is missing, or `--all` is asked where there are no seven motions.
+        If there is no such benchmark, a file is missing, or `--all` is given for a benchmark without a set of motions.
     """
     if name not in NAMES:
         from mrpipe.artifacts.yaml_source import nearest
@@ -81,7 +81,7 @@ def table_of(name: str, summary: Mapping[str, Any]) -> list[str]:
         for law, values in table.items():
             row = " ".join(f"{key} {value:.3g}" for key, value in values.items() if key.startswith("J"))
             lines.append(f"  {law:12} {row}")
-    return [*lines, "", f"why ours differ: {summary['why_different']}"]
+    return [*lines, "", f"why the values differ from the thesis: {summary['why_different']}"]
 
 
 def _more_facts(summary: Mapping[str, Any]) -> list[str]:
@@ -109,7 +109,7 @@ def _file(option: str, value: str, needs_file: bool = False) -> str:
     if path.is_file():
         return str(path.resolve())
     if needs_file or path.suffix or "/" in value:
-        raise UserError(option, value, "no such file", "give the path of a file that is there")
+        raise UserError(option, value, "no such file", "give the path of an existing file")
     return value
 
 
@@ -118,14 +118,26 @@ def benchmark(
     options: CommonOptions,
     name: Annotated[str, typer.Argument(metavar="NAME", help="ten-storey, base-isolated or wind.")],
     model: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Published model. Default: the surrogate built by our own code.")
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="File of the published model, or published. Default: the surrogate model that mrpipe assembles.",
+        ),
     ] = None,
     motion: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Ground motion (AT2, text, csv, mat; or elcentro, kobe, ..) or wind load."),
+        typer.Option(
+            metavar="FILE",
+            help="Ground motion (AT2, text, CSV or MATLAB file, or a name such as elcentro or kobe), or file of wind "
+            "forces.",
+        ),
     ] = None,
-    law: Annotated[list[str] | None, typer.Option(metavar="LAW", help="Control law; may be repeated.")] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All seven motions, all laws (base-isolated).")] = False,
+    law: Annotated[
+        list[str] | None, typer.Option(metavar="LAW", help="Control law. May be given several times.")
+    ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Run all seven motions and all laws (base-isolated only).")
+    ] = False,
 ) -> None:
     """Run a benchmark structure and compare its indices with those of the thesis."""
     extra = overrides_of(name, model, motion, law, everything)

@@ -22,9 +22,9 @@ _REMEDIES = {
     errno.EDQUOT: "make space within your quota, then call again: the run resumes",
     errno.EACCES: "give permission, or choose another directory with --run",
     errno.EPERM: "give permission, or choose another directory with --run",
-    errno.EROFS: "choose a directory that can be written with --run",
-    errno.ENOENT: "name a file or directory that is there",
-    errno.EEXIST: "choose another name: this is a file, or a link to a place that is not there",
+    errno.EROFS: "choose a directory that is not read-only (option --run)",
+    errno.ENOENT: "name an existing file or directory",
+    errno.EEXIST: "choose another name: this is a file, or a link to a place that does not exist",
     errno.ENAMETOOLONG: "choose a shorter name",
     errno.EMFILE: "raise the limit of open files (ulimit -n)",
 }

@@ -1,4 +1,4 @@
-"""What `check` looks at: settings, campaign files and data, as `run` would meet them."""
+"""The checks of `mrpipe check`: settings, campaign files and data, read in the same way as by `mrpipe run`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class CheckResult:
     campaigns
         Key of `campaigns` -> the campaign in a few words.
     notes
-        Key of `campaigns` -> lines that the reader noticed.
+        Key of `campaigns` -> notes of the reader of the campaign files.
     findings
         Key of `campaigns` -> findings of the plausibility checks.
     """
@@ -57,7 +57,7 @@ class CheckResult:
 def check_stages(loaded: LoadedConfig) -> None:
     """Check the settings of every stage of the configuration.
 
-    Effect files are read and not run, because the configuration may be somebody else's.
+    Effect files are read and not run, because the configuration may come from somebody else.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def check_headers(loaded: LoadedConfig) -> None:
 
 
 def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> None:
-    """Refuse effects that a campaign declares and nobody knows.
+    """Refuse unknown effects that a campaign declares.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> 
     Raises
     ------
     UserError
-        Naming the nearest known effect.
+        If an effect is unknown; the message names the nearest known effect.
     """
     if not header.declared_effects:
         return
@@ -170,12 +170,12 @@ def require_known_effects(header: CampaignHeader, own: Collection[str] = ()) -> 
 
 
 def require_known_laws(header: CampaignHeader) -> None:
-    """Refuse closed-loop tests whose control law, or a gain of it, nobody knows.
+    """Refuse closed-loop tests whose control law, or one of its gains, is unknown.
 
     Raises
     ------
     UserError
-        Naming the nearest law or gain.
+        If a law or gain is unknown; the message names the nearest known one.
     """
     if not header.laws:
         return
@@ -247,7 +247,7 @@ def _without_law(campaign: Campaign) -> list[Finding]:
         wanted = law_named(law).gain_names if law in law_names() else ()
         if law and (test.details.get("gains") or not wanted):
             continue
-        sentence = "its control law is not stated, so close-loop does not compare it"
+        sentence = "its control law is not stated, so close-loop does not compare this test"
         remedy = "write law: and gains: of this test"
         if law:
             sentence = f"the gains of law {law} are not stated, so the calibrated ones are taken"
@@ -285,7 +285,9 @@ def _too_short(loaded: LoadedConfig, campaign: Campaign) -> list[Finding]:
 
 
 def stages_without_data(loaded: LoadedConfig) -> dict[str, str]:
-    """Return stage -> campaign that it needs, itself or through other stages, and the configuration does not name.
+    """Return stage -> missing campaign, for stages that need one which the configuration does not name.
+
+    A stage also needs the campaigns of the stages that it depends on.
 
     Raises
     ------

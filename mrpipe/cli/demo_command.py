@@ -13,14 +13,14 @@ from mrpipe.cli.run_commands import run_stages
 
 @with_common_options("config", "campaign")
 def demo(options: CommonOptions) -> None:
-    """Run everything once on a virtual damper that hides an effect."""
+    """Run all stages on a virtual damper with an effect that is hidden from the estimators."""
     from mrpipe.artifacts import config_directory
 
     directory = options.run or Path("runs") / "demo"
     run_stages(replace(options, config=config_directory() / "demo.yaml", run=directory))
     if not options.json:
-        print(f"what this damper hides is written in {directory / 'campaigns' / 'bench.truth'}")
-        print(f"every further command works in this run, such as: mrpipe status {directory}")
+        print(f"the hidden effect of this damper is written in {directory / 'campaigns' / 'bench.truth'}")
+        print(f"further commands work in this run, for example: mrpipe status {directory}")
 
 
 def register(app: typer.Typer) -> None:

@@ -14,13 +14,13 @@ _HEAD = """\
 Every command with its arguments and options. `mrpipe COMMAND --help` prints the same. This page is written by
 `python -m mrpipe.cli.document > docs/command-line.md`.
 
-Exit status: 0 done; 1 a requested check failed; 2 the input is wrong, and one line says what and where; 130
-interrupted.
+Exit status: 0 done; 1 a check or a part of the command failed; 2 the input is wrong, and one line says which
+file, which key or row, what is wrong and what would be right; 130 interrupted.
 """
 _COMMON_HEAD = """
 ## Common options
 
-Most commands have these options. The table of a command lists only its own.
+Most commands have these options. The table of a command lists only its further arguments and options.
 
 """
 

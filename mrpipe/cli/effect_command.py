@@ -1,4 +1,4 @@
-"""`mrpipe check-effect FILE`: what is demanded of an effect file."""
+"""`mrpipe check-effect FILE`: checks an effect file against the rules for all effects."""
 
 from __future__ import annotations
 

@@ -21,7 +21,8 @@ def show(
         Path, typer.Argument(metavar="FILE", help="Campaign, run directory, artifact (.h5), JSON result or data file.")
     ],
     plot: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="Also draw the channels (or datasets) into this picture.")
+        Path | None,
+        typer.Option(metavar="PNG", help="Also draw the channels (or datasets) into this file (.png, .svg or .pdf)."),
     ] = None,
 ) -> None:
     """Show what a campaign, run directory, artifact, JSON result or data file holds."""
@@ -63,7 +64,7 @@ def check(
 ) -> None:
     """Check a configuration and its campaigns.
 
-    Prints findings on the measured data as `mrpipe show` does. The exit status is 1 where a finding is an error.
+    The findings on the measured data are those of `mrpipe show`. The exit status is 1 if a finding is an error.
     """
     from mrpipe.cli import checking
     from mrpipe.cli.output import print_json
@@ -145,19 +146,23 @@ def _shown(value: Any) -> str | None:
 def init(
     options: CommonOptions,
     directory: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Directory of the project; made if missing. It names the project.")
+        Path,
+        typer.Argument(
+            metavar="DIR",
+            help="Directory of the project. It is created if it is missing, and its name is the name of the project.",
+        ),
     ],
     source: Annotated[
         Path | None,
         typer.Option(
             "--from",
             metavar="FOLDER",
-            help="Folder of measured files: propose channels, units, signs and roles from headers and samples.",
+            help="Folder of measured files. Channels, units, signs and roles are proposed from headers and samples.",
         ),
     ] = None,
     rig: Annotated[
         str | None,
-        typer.Option(metavar="RIG", help="bench, frame or both. Default: bench, or what the files of --from hold."),
+        typer.Option(metavar="RIG", help="bench, frame or both. Default: bench; with --from, what the files contain."),
     ] = None,
 ) -> None:
     """Create a project for your own rig."""

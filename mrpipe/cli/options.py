@@ -16,7 +16,7 @@ from mrpipe.errors import UserError
 
 @dataclass(frozen=True)
 class CommonOptions:
-    """What the common options said."""
+    """Values of the common options as the user gave them; None where an option was not given."""
 
     config: Path | None = None
     run: Path | None = None
@@ -36,8 +36,8 @@ _COMMON: dict[str, tuple[Any, Any]] = {
             Path | None,
             typer.Option(
                 metavar="FILE",
-                help="Configuration file, or the name of one that comes with the program; also without --config. "
-                "Default: the one in ./configs, else thesis.",
+                help="Configuration file, or the name of a configuration that comes with the program. The word "
+                "--config may be left out. Default: the one in ./configs, else thesis.",
             ),
         ],
         None,
@@ -47,7 +47,8 @@ _COMMON: dict[str, tuple[Any, Any]] = {
             Path | None,
             typer.Option(
                 metavar="DIR",
-                help="Run directory. Default: runs/<name of the configuration, or of the campaign given>.",
+                help="Run directory. Default: runs/NAME, with the name of the configuration, or of the campaign of "
+                "--campaign.",
             ),
         ],
         None,
@@ -55,7 +56,7 @@ _COMMON: dict[str, tuple[Any, Any]] = {
     "overrides": (
         Annotated[
             list[str] | None,
-            typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Change one setting; may be given several times."),
+            typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Change one setting. May be given several times."),
         ],
         None,
     ),
@@ -64,7 +65,7 @@ _COMMON: dict[str, tuple[Any, Any]] = {
             list[Path] | None,
             typer.Option(
                 metavar="FILE",
-                help="YAML file with some settings, laid over the configuration; such as next-tests.yaml and "
+                help="YAML file with settings that replace those of the configuration, for example next-tests.yaml or "
                 "corrections.yaml, which close-loop writes. May be given several times.",
             ),
         ],
@@ -79,19 +80,28 @@ _COMMON: dict[str, tuple[Any, Any]] = {
     ),
     "jobs": (
         Annotated[
-            int | None, typer.Option(min=1, metavar="N", help="Processes that a stage may use. Default: one a core.")
+            int | None,
+            typer.Option(min=1, metavar="N", help="Number of processes that a stage may use. Default: one per core."),
         ],
         None,
     ),
-    "seed": (Annotated[int | None, typer.Option(min=0, metavar="N", help="Seed of all randomness.")], None),
-    "force": (Annotated[bool, typer.Option("--force", help="Build again even where nothing changed.")], False),
+    "seed": (Annotated[int | None, typer.Option(min=0, metavar="N", help="Seed of all random numbers.")], None),
+    "force": (
+        Annotated[bool, typer.Option("--force", help="Build the requested stages again, also if nothing has changed.")],
+        False,
+    ),
     "quiet": (Annotated[bool, typer.Option("--quiet", help="Print only errors and the result.")], False),
-    "json": (Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")], False),
+    "json": (
+        Annotated[
+            bool, typer.Option("--json", help="Print one JSON document on standard output, and nothing else there.")
+        ],
+        False,
+    ),
 }
 
 
 _POSITIONAL = Annotated[
-    Path | None, typer.Argument(metavar="CONFIG", help="Configuration, the same as --config.", show_default=False)
+    Path | None, typer.Argument(metavar="CONFIG", help="Configuration; the same as --config FILE.", show_default=False)
 ]
 
 

@@ -25,7 +25,7 @@ def print_json(content: Any) -> None:
 
 
 def print_summary(title: str, summary: Mapping[str, Any], warnings: Sequence[str] = ()) -> None:
-    """Print a stage's summary, a line an entry; long lists are shortened (use --json for all)."""
+    """Print the summary of a stage, one line per entry; long lists are shortened (--json prints all of them)."""
     print(title)
     for key, value in summary.items():
         for line in _lines(key, value, 1):
@@ -35,7 +35,7 @@ def print_summary(title: str, summary: Mapping[str, Any], warnings: Sequence[str
 
 
 def print_brief(title: str, lines: Sequence[str], warnings: Sequence[str] = ()) -> None:
-    """Print what a stage says of itself in a few lines; --json has all of its numbers."""
+    """Print the result of a stage in a few lines; --json prints all of its numbers."""
     print(title)
     for line in lines:
         print(f"  {line}")

@@ -30,12 +30,12 @@ def run(
 
 
 def run_stages(options: CommonOptions, until: str | None = None) -> None:
-    """Run the stages that a configuration lists and print what became of them.
+    """Run the stages that a configuration lists, and print the outcome of each.
 
     Raises
     ------
     CheckFailed
-        If a stage failed, after all has been printed.
+        If a stage failed; it is raised after all results have been printed.
     """
     from mrpipe.cli.checking import check_headers
     from mrpipe.cli.output import print_json
@@ -140,7 +140,8 @@ def _write_report(pipeline: Pipeline) -> list[Path]:
 def report(
     options: CommonOptions,
     directory: Annotated[
-        Path | None, typer.Argument(metavar="RUN", help="Run directory. Default: runs/<name of the config>.")
+        Path | None,
+        typer.Argument(metavar="RUN", help="Run directory. Default: runs/NAME, with the name of the configuration."),
     ] = None,
     summary: Annotated[bool, typer.Option("--summary", help="Also print the first screen of the report.")] = False,
 ) -> None:
@@ -205,11 +206,11 @@ def _config_of_run(options: CommonOptions) -> CommonOptions:
 def status(
     options: CommonOptions,
     directory: Annotated[
-        Path | None, typer.Argument(metavar="RUN", help="Run directory. Default: runs/<name of the config>.")
+        Path | None,
+        typer.Argument(metavar="RUN", help="Run directory. Default: runs/NAME, with the name of the configuration."),
     ] = None,
 ) -> None:
-    """Say which stages are stale, and why."""
-
+    """Show which stages are out of date, and why."""
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import load, pipeline_of
 

@@ -1,4 +1,4 @@
-"""From options to a pipeline in a locked run directory, and from outcomes to what is printed."""
+"""From the options of a command to a pipeline in a locked run directory."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def run_directory(options: CommonOptions, loaded: LoadedConfig) -> Path:
 
 
 def pipeline_of(options: CommonOptions, loaded: LoadedConfig, *, to_log: bool = True) -> Pipeline:
-    """Return the pipeline; nothing is locked or written yet but the log."""
+    """Return the pipeline; nothing is locked yet, and only the log is written (with `to_log`)."""
     import logging
 
     from mrpipe.pipeline.progress import LOGGER_NAME, make_logger
@@ -119,7 +119,7 @@ def pipeline_of(options: CommonOptions, loaded: LoadedConfig, *, to_log: bool = 
 
 
 def stage_runner(options: CommonOptions) -> StageRunner:
-    """Return what runs stages in another process: the same configuration, without the log file of the run."""
+    """Return the object that runs stages in another process: same configuration, without the log file of the run."""
     loaded = load(replace(options, quiet=True))
     pipeline = pipeline_of(options, loaded, to_log=False)
     pipeline.logger.setLevel(loaded.config.execution.log_level.upper())

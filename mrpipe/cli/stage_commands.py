@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _EXPORTS = ("controller", "damper", "frame", "forward", "inverse", "opensees")
 _ONE_DAMPER = frozenset({"controller", "damper", "frame"})
-"""Exports that contain one damper, its law or its place."""
+"""Exports that contain exactly one damper, its control law or its place in the structure."""
 _RIGS = ("bench", "frame", "closed-loop")
 
 
@@ -122,7 +122,7 @@ def _require_use(names: Sequence[str], pipeline: Pipeline, campaign: Path) -> No
         }
         wanted = " or ".join(kinds[item] for item in ("bench", "frame", "closed-loop") if item in used)
         raise UserError(
-            "--campaign", str(campaign), f"holds {kinds[given]}; {names[0]} reads {wanted}", "give another one"
+            "--campaign", str(campaign), f"holds {kinds[given]}; {names[0]} reads {wanted}", f"give {wanted}"
         )
 
 
@@ -159,7 +159,8 @@ def _plain_command(name: str) -> Callable[..., None]:
 def record(
     options: CommonOptions,
     rig: Annotated[
-        str | None, typer.Option(metavar="RIG", help="bench, frame or closed-loop. Default: all the config lists.")
+        str | None,
+        typer.Option(metavar="RIG", help="bench, frame or closed-loop. Default: all that the configuration lists."),
     ] = None,
 ) -> None:
     """Record a campaign in the virtual laboratory."""
@@ -196,18 +197,21 @@ def simulate(
     options: CommonOptions,
     law: Annotated[str | None, typer.Option(metavar="LAW", help=f"{', '.join(law_names())}; or all.")] = None,
     resonance: Annotated[
-        bool, typer.Option("--resonance", help="Also find the loop's own resonance and the response over frequency.")
+        bool,
+        typer.Option("--resonance", help="Also find the resonance of the closed loop and its response over frequency."),
     ] = False,
     damper: Annotated[
         str | None,
         typer.Option(
             metavar="DAMPER",
-            help="Damper in the structure: identified, traced (by close-loop), a set of configs/dampers, or a file. "
-            "With traced, the controller stays that of the identified damper.",
+            help="Damper in the structure: identified, traced (by close-loop), a parameter set of configs/dampers, or "
+            "a "
+            "file. With traced, the controller remains the one for the identified damper.",
         ),
     ] = None,
     gains: Annotated[
-        str | None, typer.Option(metavar="GAINS", help="calibrated, or design: the best ones that design found.")
+        str | None,
+        typer.Option(metavar="GAINS", help="calibrated, or design: the best gains that mrpipe design found."),
     ] = None,
 ) -> None:
     """Run the closed loop under a control law."""
@@ -246,8 +250,9 @@ def design(
         str | None,
         typer.Option(
             metavar="DAMPER",
-            help="Damper in the structure: identified, traced (by close-loop), a set of configs/dampers, or a file. "
-            "With traced, the result also says what the design without the tracing would lose.",
+            help="Damper in the structure: identified, traced (by close-loop), a parameter set of configs/dampers, or "
+            "a "
+            "file. With traced, the result also says how much worse the design without the tracing is.",
         ),
     ] = None,
 ) -> None:
@@ -271,25 +276,35 @@ def export(
     options: CommonOptions,
     what: Annotated[str, typer.Argument(metavar="WHAT", help=f"{', '.join(_EXPORTS)}; or all.")] = "controller",
     law: Annotated[
-        str | None, typer.Option(metavar="LAW", help="Control law, to controller/LAW. Default: the setting export.law.")
+        str | None,
+        typer.Option(
+            metavar="LAW",
+            help="Control law of the controller, written to controller/LAW. Default: the setting export.law.",
+        ),
     ] = None,
     damper: Annotated[
         str | None,
         typer.Option(
             metavar="DAMPER",
-            help="identified, traced (by close-loop), a set of configs/dampers, or a file. A controller is adapted to "
-            "this damper, whereas simulate --damper traced keeps that of the identified one.",
+            help="identified, traced (by close-loop), a parameter set of configs/dampers, or a file. The exported "
+            "controller is adapted to this damper; simulate --damper traced keeps the controller for the identified "
+            "damper.",
         ),
     ] = None,
     formats: Annotated[
         list[str] | None,
-        typer.Option("--format", metavar="FORMAT", help="c, json, matlab, onnx; repeatable. Default: all possible."),
+        typer.Option(
+            "--format",
+            metavar="FORMAT",
+            help="c, json, matlab or onnx. May be given several times. Default: every format that is possible.",
+        ),
     ] = None,
     gains: Annotated[
-        str | None, typer.Option(metavar="GAINS", help="calibrated, or design: the best ones that design found.")
+        str | None,
+        typer.Option(metavar="GAINS", help="calibrated, or design: the best gains that mrpipe design found."),
     ] = None,
 ) -> None:
-    """Write the calibrated controller or a model for other programs, with test vectors."""
+    """Write the calibrated controller or a model as code or data for other programs, with test vectors."""
     from mrpipe.artifacts.yaml_source import nearest
 
     if what not in (*_EXPORTS, "all"):

@@ -53,14 +53,14 @@ def explain(
 
     Parameters
     ----------
+    error
+        What pydantic found.
     model
         The model that was validated.
     source
         File, or `--set`.
     lines
         Path of keys -> line number in the file.
-    error
-        What pydantic found.
     """
     first, path = _finding(error)
     known_path = path

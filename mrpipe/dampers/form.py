@@ -73,10 +73,10 @@ class BaseForm:
         The steps read yield force or viscosity, so z depends on the laws of the drive.
     known
         A step adds a force to `EXTRA_FORCE` that no linear coefficient scales, such as that of an inner spring.
-    begins_with
-        Form whose fitted laws a coupled form reads first; empty for a simple hysteresis.
     family
         Physical family where several forms are variants of one, else the form's own name.
+    begins_with
+        Form whose fitted laws a coupled form reads first; empty for a simple hysteresis.
     hysteresis
         (values) -> yield displacement [m], gamma/(gamma + beta), exponent of Bouc-Wen's equation (2.2); None for forms
         that do not hold it.

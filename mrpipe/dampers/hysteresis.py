@@ -118,14 +118,14 @@ def advance_hysteresis(
     ----------
     zeta
         Before the increment, -1..1.
+    increment
+        Displacement of the step [m].
     yield_displacement
         x_y = z_max/A [m].
     gamma_share
         gamma/(gamma + beta).
     exponent
         n of (2.2).
-    increment
-        Displacement of the step [m].
     """
     if increment == 0.0:
         return zeta

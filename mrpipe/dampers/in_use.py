@@ -25,6 +25,8 @@ def held_force(chain: Chain, speed: float, drive: float, before: float, stroke_m
 
     Parameters
     ----------
+    chain
+        Steps of the damper.
     speed
         In both directions in turn [m/s].
     drive, before
@@ -33,8 +35,6 @@ def held_force(chain: Chain, speed: float, drive: float, before: float, stroke_m
         Half the largest peak-to-peak displacement [m].
     half_period_s
         Longest time in one direction.
-    chain
-        Steps of the damper.
     """
     half = min(half_period_s, 2.0 * stroke_m / speed)
     dt = min(STEP_S, half / 40.0)

@@ -181,12 +181,12 @@ def parameter_unit(name: str, drive_unit: str, form: BaseForm | None = None) -> 
 
     Parameters
     ----------
+    name
+        Of the result, for messages.
     drive_unit
         `A` or `V`.
     form
         Form that the parameter belongs to; forms of the library are searched where it is left out.
-    name
-        Of the result, for messages.
     """
     stem, _, suffix = name.rpartition("_")
     forms = list(base_forms().values()) if form is None else [form]
@@ -301,12 +301,12 @@ def read_damper(
 
     Parameters
     ----------
-    effect
-        (name, form, file) -> the effect without its numbers; see :func:`mrpipe.effects.damper.read_damper`.
     artifact
         Artifact that holds it.
     group
         Group inside the artifact.
+    effect
+        (name, form, file) -> the effect without its numbers; see :func:`mrpipe.effects.damper.read_damper`.
 
     Raises
     ------

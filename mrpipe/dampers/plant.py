@@ -372,12 +372,12 @@ def run_chain(
 
     Parameters
     ----------
+    chain
+        Steps of the damper.
     displacement, velocity, acceleration, drive
         Shape (n,); m, m/s, m/s^2, A or V.
     dt
         Sampling interval [s].
-    chain
-        Steps of the damper.
 
     Returns
     -------

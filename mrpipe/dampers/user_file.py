@@ -23,10 +23,10 @@ def module_of_file(path: Path, setting: str, remedy: str) -> ModuleType:
 
     Parameters
     ----------
-    setting, remedy
-        Where the file was named and what it has to define, for messages.
     path
         File to be loaded.
+    setting, remedy
+        Where the file was named and what it has to define, for messages.
 
     Raises
     ------

@@ -142,11 +142,11 @@ class Effect(Described):
         `damper` or `frame`.
     separated_by
         Other effect -> test that separates the two.
-    law_of_drive
-        It bends the drive, so that a law of the drive that levels off does much the same.
     refinements
         Richer forms of the same physics, too supple to name it by: once it is named, one of them takes the form's place
         where it is better on tests left out.
+    law_of_drive
+        It bends the drive, so that a law of the drive that levels off does much the same.
     """
 
     acts_on: str

@@ -1,1 +1,1 @@
-"""Fits of a damper to bench recordings: recordings laid end to end, the problem, and one engine that solves it."""
+"""Fits of a damper model to bench recordings: concatenated recordings, the fitting problem, and its solver."""

@@ -9,7 +9,19 @@ from mrpipe.fitting.recordings import Recordings
 
 
 def moving_average(columns: FloatArray, recordings: Recordings, window_share: float) -> FloatArray:
-    """Return rows averaged over a share of each test's period, centred; tests without a period are left alone."""
+    """Return rows after a centred moving average over a share of each test's period.
+
+    Tests without a period are not changed.
+
+    Parameters
+    ----------
+    columns
+        Rows of samples, shape (c, n) or (n,).
+    recordings
+        Tests that the n samples belong to.
+    window_share
+        Length of the window, as a share of the period.
+    """
     result = columns.copy()
     for test in range(recordings.tests):
         half = 0.5 * window_share * recordings.period_s[test] / recordings.dt[test]
@@ -18,7 +30,8 @@ def moving_average(columns: FloatArray, recordings: Recordings, window_share: fl
         piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
         values = columns[..., piece]
         length = values.shape[-1]
-        # integral of the straight-line signal between shifted limits, so that the window may be any fraction of samples
+        # the window need not be a whole number of samples: integral of the piecewise linear signal between shifted
+        # limits
         total = np.zeros((*values.shape[:-1], length))
         total[..., 1:] = np.cumsum(0.5 * (values[..., 1:] + values[..., :-1]), axis=-1)
         at = np.arange(length)

@@ -1,4 +1,4 @@
-"""The damper that the settings require: which forms are fitted, and which of them is chosen."""
+"""The damper model that the settings require: which base forms are fitted, and which of them is chosen."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def compare_and_choose(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> tuple[Comparison, JudgedFit]:
-    """Fit the forms that the settings name and choose one: the named form, or the best on tests left out.
+    """Fit the forms that the settings name, and choose one: the named form, or the best form on tests left out.
 
     Parameters
     ----------
@@ -30,12 +30,12 @@ def compare_and_choose(
     jobs
         Threads; the result does not depend on their number.
     progress
-        Called with the share done and a text.
+        Called with the share of the work that is done (0 to 1) and a text.
 
     Raises
     ------
     UserError
-        If a form is not known.
+        If no base form has one of the names.
     """
     by_choice = settings.form == BEST
     demanded = () if by_choice else (settings.form,)

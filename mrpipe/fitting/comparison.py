@@ -1,4 +1,4 @@
-"""Several base forms fitted to the same tests and judged on tests that no fit has seen."""
+"""Several base forms fitted to the same tests, and judged on tests that were not used in the fit."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ from mrpipe.signals.prepared import PreparedTest
 T = TypeVar("T")
 
 WORTHWHILE = 0.01
-"""Share of the error that a parameter at its bound must gain to be kept there."""
+"""A parameter at its bound is kept there only if this lowers the error by at least this share."""
 
 DRAFT_SAMPLES = 12_000
-"""Forms are ranked on about so many samples; only those that may win are fitted to all."""
+"""Number of samples on which forms are ranked. Only the best of them are then fitted to all samples."""
 
 MOST_FITTED = 5
 """Number of forms near the best that are fitted to all samples, in addition to the requested ones."""
 
 COUPLED_SAMPLES = 20_000
-"""Forms that are solved several times over are fitted on about so many samples of the motion."""
+"""Number of samples of the motion for coupled forms, whose fit is repeated several times."""
 
 CONTENDER = 1.3
-"""Forms that leave more than the best draft by this factor are not fitted to all samples."""
+"""Forms whose error on the draft exceeds the least one by this factor are not fitted to all samples."""
 
 
 _SETTINGS = DamperFitSettings()
-"""The defaults that the options share with the settings."""
+"""Source of the defaults, so that options and settings have the same ones."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +58,12 @@ class FitOptions:
     cycles, maximum_samples, raw_force
         See :func:`mrpipe.fitting.samples.bench_recordings`.
     offsets
-        An offset for each test; else one for all.
+        Whether each test has its own force offset; otherwise all tests share one.
     equal_tests
-        Weight each test by its own force.
+        Whether each test is weighted by its own RMS force.
     drive_law
-        `cross-validated` chooses the laws of the drive by leaving out whole levels; `polynomial` takes those of the
-        degrees below.
+        `cross-validated`: the laws of the drive are chosen by leaving out whole levels of drive. `polynomial`:
+        polynomials of the two degrees below.
     yield_order, viscosity_order
         Largest degrees of polynomials in the drive.
     """
@@ -90,10 +90,10 @@ class JudgedFit:
     tests
         Score of every test, in the order given.
     training, validation
-        Pooled figures; not a number where there are no tests of the role.
+        Scores pooled over the tests of the role; NaN if there are none.
     cross_validated_nrmse, left_out_nrmse
-        NRMSE over training tests left out in turn, pooled and of each test (of each stretch where there are few
-        tests); None and empty if not requested.
+        NRMSE on training tests that were left out in turn: pooled, and for each test (for each part of a test where
+        there are few tests). None and empty if not requested.
     """
 
     fit: FormFit
@@ -105,7 +105,7 @@ class JudgedFit:
 
     @property
     def typical_left_out_nrmse(self) -> float:
-        """Geometric mean of the NRMSE of tests left out: strong and weak tests count alike."""
+        """Geometric mean of the NRMSE of tests left out: tests with large and small forces have equal weight."""
         return float(np.exp(np.mean(np.log(self.left_out_nrmse)))) if self.left_out_nrmse else float("nan")
 
     @property
@@ -122,18 +122,18 @@ class JudgedFit:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison of forms found.
+    """Result of a comparison of base forms.
 
     Attributes
     ----------
     judged
         The forms that were fitted to all samples, in the order given.
     drafts
-        NRMSE of every form on a share of the samples.
+        NRMSE of every form on the draft, that is, on a share of the samples.
     laws
         The choice of the laws of the drive; None if it was not requested.
     ranked
-        The damper of every form on a share of the samples.
+        The damper model of every form, fitted to the draft.
     """
 
     judged: tuple[JudgedFit, ...]
@@ -145,9 +145,10 @@ class Comparison:
 def best_by_folds(judged: Sequence[JudgedFit]) -> JudgedFit:
     """Return the simplest form among those within one standard error of the best on tests left out.
 
-    Every test counts alike (logarithm of its NRMSE): pooled, the strongest tests alone would decide, and a damper that
-    is wrong by a fifth without drive is useless for control. Two forms err on the same tests, so the standard error is
-    that of their difference, test by test. Simplest: fewest parameters, and of those the fewest that are not linear.
+    Every test has equal weight, by the logarithm of its NRMSE. A pooled error would be decided by the tests with the
+    largest forces, but a damper model that is wrong by 20 % at zero drive is useless for control. The errors of two
+    forms on the same test are correlated, so the standard error is that of their difference, test by test. The simplest
+    form has the fewest parameters; among equals, the fewest nonlinear ones.
 
     Raises
     ------
@@ -192,24 +193,24 @@ def compare_forms(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Comparison:
-    """Rank every form on a share of the training samples, fit those that may win to all, and score them on all tests.
+    """Rank all forms on a share of the training samples, fit the best ones to all samples, and score them on all tests.
 
     Parameters
     ----------
-    folds
-        Above 1: cross-validate the fitted forms in so many parts.
-    keep
-        Names of forms that are fitted to all samples whatever their rank.
-    jobs
-        Threads; the result does not depend on their number.
-    options
-        How forms are fitted.
-    progress
-        Called with the share done and a text.
     forms
         Forms that are compared.
     tests
         Prepared tests.
+    options
+        How forms are fitted.
+    folds
+        Number of parts of the cross-validation of the fitted forms; 0 or 1: no cross-validation.
+    keep
+        Names of forms that are fitted to all samples, whatever their rank.
+    jobs
+        Threads; the result does not depend on their number.
+    progress
+        Called with the share done and a text.
     """
     training = [test for test in tests if test.role == "training"]
     unit = training[0].drive_unit or "A"
@@ -263,14 +264,14 @@ def _drafts(
     jobs: int,
     progress: Progress,
 ) -> dict[str, Fit]:
-    """Return every form fitted to a share of the samples; nothing where there is one form only."""
+    """Return every form fitted to a share of the samples; empty if there is only one form."""
     if len(forms) == 1:
         return {}
     small = thinned(recordings, DRAFT_SAMPLES)
 
     def draft(form: BaseForm) -> Fit:
         problem = form_problem(small, base_of(small, form, laws), offsets=options.offsets)
-        # one start is enough to rank: forms that may win are searched further on all samples
+        # one start is enough for the ranking: the best forms are searched further on all samples
         return best_fit(problem, starts=1)
 
     found = _each(draft, forms, jobs, lambda done, text: progress(0.4 * done, f"rank {text}"))
@@ -280,7 +281,7 @@ def _drafts(
 def _each(
     work: Callable[[BaseForm], T], forms: Sequence[BaseForm], jobs: int, progress: Callable[[float, str], None]
 ) -> list[T]:
-    """Return the result of `work` for every form, in order, on some threads: the compiled steps run side by side."""
+    """Return the result of `work` for every form, in order; the compiled steps run in parallel threads."""
     runner = Parallel(n_jobs=max(1, min(jobs, len(forms))), backend="threading", return_as="generator")
     results: list[T] = []
     for form, result in zip(forms, runner(delayed(work)(form) for form in forms), strict=True):
@@ -301,10 +302,10 @@ def judge(fit: FormFit, tests: Sequence[PreparedTest], *, raw_force: bool = Fals
 
 
 def cross_validate(found: FormFit, folds: int) -> tuple[float, tuple[float, ...]]:
-    """Return the NRMSE on what was left out in turn, pooled and of each test or stretch.
+    """Return the NRMSE on the tests left out in turn: pooled, and for each test or part of a test.
 
-    Whole tests are left out where there are enough of them, else parts of them. The model runs over all of the motion
-    each time; the forces left out are not compared in the fit.
+    Whole tests are left out if there are enough of them, otherwise parts of tests. The model always runs over the whole
+    motion; the forces left out are not compared in the fit.
     """
     problem = found.fit.problem
     recordings = problem.recordings
@@ -321,7 +322,7 @@ def cross_validate(found: FormFit, folds: int) -> tuple[float, tuple[float, ...]
         again = fit(rest, found.fit.theta, iterations=6, tolerance=1e-4)
         calculated = again.linear @ regressors(again.problem, again.theta)
         missed = recordings.force - calculated
-        # the offset of a test that was left out whole is that of the others
+        # a test that was left out as a whole has the mean offset of the other tests
         offsets = _offsets(again.problem, again.test_offsets)
         missed = missed - offsets[recordings.test]
         error += np.bincount(group[out], weights=missed[out] ** 2, minlength=len(error))
@@ -339,8 +340,9 @@ def _offsets(problem: Problem, offsets: FloatArray) -> FloatArray:
 def _settled_shape(found: FormFit, options: FitOptions, unit: str) -> FormFit:
     """Return the fit with gamma = beta where the data do not determine their ratio.
 
-    On many real loops the share of gamma runs to its bound and hardly improves the fit there. It is taken as the thesis
-    prints it (gamma = beta, share 0.5) unless that costs more than :data:`WORTHWHILE` of the error.
+    On many measured loops the share gamma / (gamma + beta) ends at its bound and hardly improves the fit. It is then
+    set to 0.5 (gamma = beta, as in Table 2.2 of the thesis), unless this raises the error by more than
+    :data:`WORTHWHILE`.
     """
     if "gamma_share" not in found.at_bound:
         return found

@@ -1,4 +1,4 @@
-"""A fit as a damper model: base form with its numbers, effects with theirs."""
+"""Conversion of a fit to a damper model: the base form and the effects with their fitted numbers."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ def damper_model(
     assumed_eta: float = ASSUMED_ETA,
     effect_files: Mapping[str, str] | None = None,
 ) -> DamperModel:
-    """Return the damper of a fit.
+    """Return the damper model of a fit.
 
     Parameters
     ----------
+    found
+        The fit.
     drive_unit
         `A` or `V`.
     effects
-        Take the effects along; the base form alone where False.
+        Whether the model contains the effects; otherwise it is the base form alone.
     assumed_eta
-        Rate of the lag [1/s] where the recordings do not determine it; infinite: no lag.
+        Rate of the lag of the drive [1/s] if the recordings do not determine it; infinite: no lag.
     effect_files
-        Effect -> the user's own file that defines it.
-    found
-        The fit.
+        Name of an effect -> the user's file that defines it.
     """
     base, scales = found.problem.base, found.problem.scales
     numbers: dict[str, float] = {}
@@ -64,6 +64,6 @@ def damper_model(
 
 
 def addition(term: Term, values: dict[str, float], drive_unit: str, file: str = "") -> Addition:
-    """Return an effect of a fit with its numbers, as a damper holds it."""
+    """Return an effect of a fit with its numbers, in the form in which a damper model holds it."""
     units = {item.name: item.unit.replace("drive", drive_unit) for item in term.form.parameters}
     return Addition(term.effect.name, term.form.name, values, units, term.effect.sensor, term.form.steps, file)

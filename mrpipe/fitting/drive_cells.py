@@ -1,4 +1,4 @@
-"""Sums over the samples of each test and level of drive, to which laws of the drive are fitted."""
+"""Sums over the samples of each test and level of drive. The laws of the drive are fitted to these sums."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from mrpipe.fitting.start import LEVEL_SHARE, drive_varies, mean_levels
 from mrpipe.fitting.weighting import centred, weighting
 
 BINS = 8
-"""A drive that varies is sorted into so many levels."""
+"""Number of levels into which a varying drive is sorted."""
 
 CELLS = 128
-"""Within each of which the law is taken as constant over so many parts of the whole range."""
+"""Number of parts of the whole range of the drive, within each of which a law is taken as constant."""
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Sums over the samples of each test and drive.
+    """Sums over the samples of each cell: one test at one part of the range of the drive.
 
     Attributes
     ----------
     drive
-        Mean effective drive over the limit, shape (k,).
+        Mean effective drive of each cell over the limit, shape (k,).
     level
-        Level of drive that each belongs to, shape (k,).
+        Level of drive of each cell, shape (k,).
     gram, right, power
-        Products of the signals of yield force and viscosity, with the force, and of the force with itself; shapes
-        (k, 2, 2), (k, 2), (k,).
+        Sums of the products of the two signals (of yield force and viscosity) with each other, with the force, and of
+        the squared force; shapes (k, 2, 2), (k, 2), (k,).
     limit
         Largest drive [A or V].
     """
@@ -54,9 +54,9 @@ class Cells:
 def cells_of(found: Fit) -> Cells:
     """Return the sums that laws are fitted to, from a fit of any form.
 
-    The offset of a test is one number for all its cells. At constant drive a test has one cell, and its means are
-    subtracted. Where the drive varies the mean of a law times a signal is not the law times the mean of the signal,
-    so the offset that the fit found is subtracted from the force instead.
+    The offset of a test is one number for all of its cells. At constant drive a test has one cell, and the means are
+    subtracted. If the drive varies, the mean of a law times a signal is not the law times the mean of the signal. The
+    fitted offset is then subtracted from the force instead.
     """
     problem = found.problem
     flat = LawShape("polynomial", 0)
@@ -65,7 +65,7 @@ def cells_of(found: Fit) -> Cells:
     w = weighting(problem)
     signals = regressors(plain, found.theta)[:2]
     own = regressors(problem, found.theta)
-    # what is neither yield force nor viscosity stays as the fit has it
+    # the parts other than yield force and viscosity keep their fitted values
     first = sum(law.count for law in problem.base.laws[:2])
     recordings, test = problem.recordings, problem.recordings.test[w.at]
     force = recordings.force - found.test_offsets[recordings.test] - found.linear[first:] @ own[first:]
@@ -84,7 +84,7 @@ def cells_of(found: Fit) -> Cells:
 
 
 def _one_cell(test: IntArray, key: IntArray) -> BoolArray:
-    """Return whether each sample belongs to a test that has one cell."""
+    """Return whether each sample belongs to a test with only one cell, shape (n,)."""
     pairs = np.unique(np.stack([test, key]), axis=1)
     return np.asarray(np.bincount(pairs[0])[test] == 1)
 

@@ -1,12 +1,13 @@
-"""Which law of the drive: chosen by leaving out whole levels of drive, because a damper works between its levels too.
+"""Choice of the laws of the drive by leaving out whole levels, because a damper also works between the tested levels.
 
-At given steps of the base form the force is linear in F_y(u) and c0(u). Sums of products of the signals over each level
-of drive therefore hold all that any law needs, and hundreds of fits take milliseconds.
+For given steps of the base form the force is linear in the yield force F_y(u) and the viscosity c0(u). Sums of products
+of the signals over each level of drive are therefore sufficient to fit any law, and hundreds of fits take milliseconds.
 
-A law is judged by its error on levels that its fit has not seen. Only levels inside the range are left out: the ends
-would require extrapolation, which no law of the drive supports. Of laws that predict alike the one with fewest numbers
-is taken. A law may have at most as many numbers as there are levels; one with as many numbers as levels cannot be
-judged in this way and is taken only where every simpler law misses the levels themselves.
+A law is judged by its error on levels that were not used in its fit. Only levels inside the range are left out, because
+the ends would require extrapolation, which no law of the drive supports. Of laws with similar errors the one with the
+fewest coefficients is taken. A law has at most as many coefficients as there are levels. A law with as many
+coefficients as levels cannot be judged in this way, and is taken only if every simpler law misses the levels
+themselves.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from mrpipe.fitting.drive_cells import Cells, cells_of
 from mrpipe.fitting.engine import Fit, bounded_solution
 
 SCALE_SHARES = (0.1, 0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.7, 2.5, 5.0)
-"""Scales of saturating laws that are tried, as shares of the largest drive."""
+"""Scales of saturating laws that are tried first, as shares of the largest drive."""
 
 FINER = (1.18, 1.09, 1.045, 1.02, 1.01, 1.005, 1.002, 1.001)
-"""Factors by which a scale is then moved either way."""
+"""Factors by which the best scale is then multiplied and divided."""
 
 YIELD_LAWS = (
     LawShape("polynomial", 0), LawShape("polynomial", 1), LawShape("tanh"), LawShape("langevin"),
@@ -38,17 +39,17 @@ VISCOSITY_LAWS = YIELD_LAWS[:7]
 
 @dataclass(frozen=True)
 class Judged:
-    """A pair of laws with its errors.
+    """A pair of laws, for yield force and viscosity, with its errors.
 
     Attributes
     ----------
     laws
         Shapes of yield force and viscosity.
     inside
-        Logarithm of the squared error over the squared force of each level, shape (levels,).
+        Logarithm of squared error over squared force for each level, by a fit to all levels, shape (levels,).
     left_out
-        The same of each inner level by fits that have not seen it, shape (levels - 2,); empty where it has more numbers
-        than the levels left support.
+        The same for each inner level, by a fit without this level, shape (levels - 2,); empty if the laws have more
+        coefficients than the remaining levels determine.
     """
 
     laws: tuple[LawShape, LawShape]
@@ -57,28 +58,29 @@ class Judged:
 
     @property
     def numbers(self) -> int:
-        """Numbers of both laws."""
+        """Number of coefficients of both laws."""
         return self.laws[0].numbers + self.laws[1].numbers
 
 
 @dataclass(frozen=True)
 class LawChoice:
-    """The laws that were chosen, and how far their predictions are known.
+    """The chosen laws, and the uncertainty of their predictions.
 
     Attributes
     ----------
     laws
         Shapes of yield force and viscosity.
     reason
-        Why, in a sentence.
+        Reason for the choice, a sentence.
     candidates
-        All laws of the yield force that were judged: name, typical error on levels left out (None where it cannot be
-        judged), typical error on the levels themselves.
+        All laws of the yield force that were judged: name, typical error on levels left out (None if it cannot be
+        judged), and typical error on the fitted levels.
     drives
-        Shape (d,) [A or V]: the levels, and drives between and a fifth beyond them.
+        Drives at which the laws are tabulated, shape (d,) [A or V]: the levels, drives between them, and up to 20 %
+        beyond.
     values, deviations
-        Value of each law and its standard deviation at these drives, shape (2, d); by fits without each level in turn
-        and by other laws that predict as well.
+        Value of each law and its standard deviation at these drives, shape (2, d). The deviation comes from fits that
+        leave out each level in turn, and from other laws with a similar error.
     """
 
     laws: tuple[LawShape, LawShape]
@@ -92,7 +94,7 @@ class LawChoice:
 def fit_laws(
     cells: Cells, laws: tuple[LawShape, LawShape], keep: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
-    """Fit two laws to the levels kept; return squared errors of all cells, coefficients, and the scales' shares."""
+    """Fit two laws to the kept levels; return squared errors of all cells, coefficients, and scales as shares."""
     weight = np.ones(len(cells.drive)) if keep is None else keep
     grids = [SCALE_SHARES if law.saturates else (1.0,) for law in laws]
     best = min(
@@ -131,8 +133,8 @@ def _at_scales(cells: Cells, laws: tuple[LawShape, LawShape], scales: tuple[floa
 
 
 def judge(cells: Cells, laws: tuple[LawShape, LawShape]) -> Judged:
-    """Return the errors of a pair of laws on the levels, seen and not seen by the fit."""
-    # every level counts alike: without this the strongest would decide alone
+    """Return the errors of a pair of laws on the fitted levels and on levels left out."""
+    # every level has equal weight: otherwise the level with the largest force would decide
     power = np.bincount(cells.level, weights=cells.power)
     alike = 1.0 / np.maximum(power, 1e-12 * power.max())[cells.level]
     inside = _by_level(cells, fit_laws(cells, laws, alike)[0])
@@ -150,18 +152,18 @@ def _by_level(cells: Cells, error: FloatArray) -> FloatArray:
 
 
 def _risk(item: Judged) -> FloatArray:
-    """Return what a law is judged by: its errors on inner levels left out, and on all levels as seen."""
+    """Return the errors by which a law is judged: on inner levels left out, and on all fitted levels."""
     return np.concatenate([item.left_out, item.inside])
 
 
 def _best(judged: Sequence[Judged]) -> Judged:
-    """Return the law with fewest numbers among those within one standard error of the best."""
+    """Return the law with the fewest coefficients among those within one standard error of the best."""
     best = min(judged, key=lambda item: float(np.mean(_risk(item))))
     close = []
     for item in judged:
         difference = _risk(item) - _risk(best)
         error = float(np.std(difference, ddof=1)) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
-        # an error that differs by less than a tenth of its square is alike, whatever its spread
+        # errors that differ by less than a tenth of their square count as equal, whatever their spread
         if float(np.mean(difference)) <= max(error, 0.1) and float(np.mean(difference)) < 0.5:
             close.append(item)
     return min(close, key=lambda item: (item.numbers, float(np.mean(_risk(item)))))
@@ -175,11 +177,12 @@ def choose_laws(
     Parameters
     ----------
     found
-        A fit of a base form to all training tests, with laws at least as rich as the levels support.
+        A fit of a base form to all training tests, with laws that have at least as many coefficients as the levels
+        determine.
     largest_yield_order, largest_viscosity_order
         Highest degree of polynomials.
     saturating
-        Consider laws that saturate.
+        Whether laws that saturate are considered too.
     """
     cells = cells_of(found)
     levels = cells.levels
@@ -216,7 +219,7 @@ def _pick(judged: Sequence[Judged], levels: int) -> Judged:
     others = [item for item in judged if not len(item.left_out)]
     if not others:
         return best
-    # a law that misses the very levels it was fitted to is refuted, whether or not a richer one can be judged
+    # a law that misses the levels it was fitted to is rejected, whether or not a richer law can be judged
     richest = min(others, key=lambda item: (float(np.round(np.mean(item.inside), 1)), item.numbers))
     missed = best.inside - richest.inside
     error = float(np.std(missed, ddof=1)) / np.sqrt(len(missed))
@@ -231,17 +234,20 @@ def _reason(chosen: tuple[LawShape, LawShape], judged: Sequence[Judged], levels:
     item = next(item for item in judged if item.laws[0] == chosen[0])
     names = f"yield force {chosen[0].name}, viscosity {chosen[1].name} in the drive"
     if levels == 1:
-        return f"{names}: the tests hold one level of drive"
+        return f"{names}: all tests have the same level of drive"
     if not len(item.left_out):
-        return f"{names}: {levels} levels of drive support no law that could be judged on a level left out"
+        return f"{names}: {levels} levels of drive are too few to judge a law on a level left out"
     error = _typical(item.left_out) or 0.0
-    return f"{names}: the fewest numbers among laws that predict levels left out alike (error {100.0 * error:.1f} %)"
+    return (
+        f"{names}: the fewest coefficients among laws that predict levels left out equally well "
+        f"(error {100.0 * error:.1f} %)"
+    )
 
 
 def _predictions(
     cells: Cells, chosen: tuple[LawShape, LawShape], others: Sequence[Judged]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return drives, values and standard deviations of both laws there."""
+    """Return drives, and the values and standard deviations of both laws at these drives."""
     at = np.unique(np.round([float(np.mean(cells.drive[cells.level == k])) for k in range(cells.levels)], 6))
     share = np.unique(np.concatenate([at, 0.5 * (at[1:] + at[:-1]), [at[-1] + 0.2 * max(at[-1], 0.0)]]))
 
@@ -275,13 +281,14 @@ def _alike(judged: Sequence[Judged], chosen: tuple[LawShape, LawShape]) -> list[
 
 
 def adequate_laws(found: Fit) -> tuple[LawShape, ...]:
-    """Return the laws with fewest numbers that cost nothing: what a search for missing effects starts from.
+    """Return the simplest laws that fit as well as the present ones, as the start of a search for missing effects.
 
-    A law that is too simple leaves a residual that some effect can imitate, so a law must fit the levels as well as the
-    one of the problem, within a twentieth of the noise (the problem is weighted by it) and 2 % of the residual. Among
-    laws with equally many numbers the one that predicts inner levels left out best is taken, and one that does not fall
-    where they are equal: it holds between the levels. Laws that saturate compete where a polynomial has as many numbers
-    as there are levels, because it then fits any levels; elsewhere saturation is left to the effects.
+    A law that is too simple leaves a residual that an effect can imitate. A law must therefore fit the levels as well
+    as the law of the problem, within 5 % of the noise (which sets the weights of the problem) plus 2 % of the residual.
+    Among laws with the same number of coefficients the one that best predicts inner levels left out is taken; if they
+    are equal, one that does not fall with the drive, because it is plausible between the levels. Laws that saturate
+    compete only if a polynomial has as many coefficients as there are levels, because such a polynomial fits any
+    levels. Otherwise saturation is left to the effects.
 
     Parameters
     ----------
@@ -309,7 +316,7 @@ def adequate_laws(found: Fit) -> tuple[LawShape, ...]:
 
 
 def law_values(choice: LawChoice, laws: Sequence[Law]) -> list[dict[str, float]]:
-    """Return a row for each drive of a choice: drive, values of the fitted laws and their standard deviations, SI."""
+    """Return one row per drive of a choice: drive, values of the fitted laws, and their standard deviations, in SI."""
     return [
         {
             "drive": float(drive),

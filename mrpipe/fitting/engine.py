@@ -1,4 +1,8 @@
-"""Fit of a base form with effects: simulate, project the linear coefficients out, search the few that are left."""
+"""Fit of a base form with effects: simulate, solve for the linear coefficients, search the nonlinear ones.
+
+The residual depends on the searched parameters only, after the linear coefficients are solved for at each trial
+(variable projection; Golub and Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432).
+"""
 
 from __future__ import annotations
 
@@ -28,10 +32,10 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.weighting import Weighting, centred, weighting
 
 COUPLING_PASSES = 6
-"""So often the laws that a coupled form reads are renewed at the end of a fit."""
+"""Number of times that the laws which a coupled form reads are updated at the end of a fit."""
 
 OLDEST_JACOBIAN = 3
-"""After so many steps the Jacobian is taken by differences again."""
+"""Number of steps after which the Jacobian is computed by finite differences again."""
 
 
 @dataclass(frozen=True)
@@ -40,20 +44,20 @@ class Fit:
 
     Attributes
     ----------
+    problem
+        Problem that was fitted.
     theta
-        Searched values as the search sees them.
+        Searched parameters in the coordinates of the search, see :meth:`Problem.encode`, shape (p,).
     linear
-        Coefficients: of the laws of the drive (in the basis of their shapes), then amplitudes.
+        Linear coefficients, shape (c,): of the laws of the drive (in the basis of their shapes), then amplitudes.
     test_offsets
         Offset of each test [N].
     cost
         Sum of squared weighted residuals.
     residual
-        Weighted residual, shape (n,), 0 where not compared.
+        Weighted residual, shape (n,); 0 at samples that are not compared.
     at_bound
         Names of searched parameters and amplitudes of terms at a bound.
-    problem
-        What was fitted.
     iterations
         Iterations of the search.
     """
@@ -74,17 +78,17 @@ class Fit:
 
     @property
     def laws(self) -> tuple[Law, ...]:
-        """Return the laws of the drive: yield force, viscosity and, where the form has one, a second part's force."""
+        """Return the laws of the drive: yield force, viscosity and, if present, the force of the second part."""
         return self.problem.base.laws_of(self.linear, self.base_values, self.problem.scales.drive)
 
     @property
     def term_values(self) -> list[dict[str, float]]:
-        """Return the values of each term with its amplitudes."""
+        """Return the parameter values of each term, amplitudes included."""
         return self._all_values()[1:]
 
     @property
     def base_values(self) -> dict[str, float]:
-        """Return the values of the base form with its amplitudes."""
+        """Return the parameter values of the base form, amplitudes included."""
         return self._all_values()[0]
 
     def _all_values(self) -> list[dict[str, float]]:
@@ -95,7 +99,7 @@ class Fit:
         return values
 
     def chain(self) -> Chain:
-        """Return the chain with these numbers."""
+        """Return the chain of steps with the fitted numbers."""
         return build_chain(self.steps())
 
     def steps(self) -> list[Step]:
@@ -108,7 +112,7 @@ class Fit:
 
 
 def chain_of(problem: Problem, theta: FloatArray) -> tuple[Chain, tuple[int, ...], list[int]]:
-    """Return chain, tapped places (rising) and, for each amplitude, which of the taps is its."""
+    """Return the chain, the tapped places in rising order, and for each amplitude the index of its tap."""
     values = problem.values(theta)
     steps = _with_taps(problem.base.steps(values[0], *problem.reference), problem.base.form.amplitude_steps, -1, 1)
     for index, (term, given) in enumerate(zip(problem.terms, values[1:], strict=True)):
@@ -126,7 +130,7 @@ def _with_taps(steps: list[Step], amplitude_steps: Mapping[str, int], index: int
 
 
 def regressors(problem: Problem, theta: FloatArray) -> FloatArray:
-    """Return the columns of all linear coefficients, shape (c, n), not weighted."""
+    """Return the regressors of all linear coefficients, shape (c, n), without weights."""
     chain, tapped, order = chain_of(problem, theta)
     wires = run_recordings(chain, problem.recordings, tapped)
     base, drive = problem.base, problem.scales.drive
@@ -157,18 +161,18 @@ def regressors(problem: Problem, theta: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Solved:
-    """A problem solved for its linear coefficients at given searched values.
+    """Solution of a problem for its linear coefficients, at given searched parameters.
 
     Attributes
     ----------
     residual
-        Weighted residual at the samples compared, shape (m,).
+        Weighted residual at the m samples that are compared, shape (m,).
     linear
         Coefficients.
     means
         Offset of each test present [N].
     at_bound
-        Which coefficients sit at a bound.
+        Whether each coefficient lies at a bound, shape (c,).
     """
 
     residual: FloatArray
@@ -183,10 +187,10 @@ class Solved:
 
 
 def solve(problem: Problem, theta: FloatArray, w: Weighting) -> Solved:
-    """Return the problem solved for its linear coefficients; a coupled form reads the laws of the reference."""
+    """Return the solution for the linear coefficients; a coupled form reads the laws of the problem's reference."""
     rows, means = centred(regressors(problem, theta), w)
     count = len(rows)
-    # a value that is not finite makes the mean of its test not finite
+    # one value that is not finite would make the mean of its test not finite
     if not np.all(np.isfinite(means)):
         wrong = np.full(len(w.at), 1e6)
         return Solved(wrong, np.zeros(count), np.zeros(len(w.sums)), np.ones(count, bool))
@@ -196,7 +200,7 @@ def solve(problem: Problem, theta: FloatArray, w: Weighting) -> Solved:
 
 
 def linear_bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """Return bounds of the linear coefficients: no law of the drive is negative, a known force has the factor 1."""
+    """Return bounds of the linear coefficients: laws of the drive are not negative, a known force has the factor 1."""
     known = int(problem.base.form.known)
     free = problem.base.columns - known
     bounds = [parameter.bounds(problem.scales) for _, parameter in problem.amplitudes]
@@ -207,10 +211,10 @@ def linear_bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
 def bounded_solution(
     gram: FloatArray, right: FloatArray, low: FloatArray, high: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Solve the normal equations within bounds by active sets; also return which coefficients sit at a bound.
+    """Solve the normal equations within bounds by an active-set method; also return which coefficients are at a bound.
 
-    What leaves its bounds is put on the bound and the rest solved again; a bound that the gradient points away from is
-    released (Lawson and Hanson 1974, Solving Least Squares Problems, chapter 23).
+    A coefficient that leaves its bounds is fixed at the bound, and the others are solved for again. A bound is released
+    if the gradient points away from it (Lawson and Hanson 1974, Solving Least Squares Problems, chapter 23).
     """
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     scaled = gram / np.outer(scale, scale)
@@ -238,10 +242,11 @@ def bounded_solution(
 
 
 def fit(problem: Problem, start: FloatArray, *, iterations: int = 15, tolerance: float = 2e-4) -> Fit:
-    """Fit from a start by Levenberg-Marquardt on the projected residual.
+    """Fit from a starting point by the Levenberg-Marquardt method on the projected residual.
 
-    The steps of a coupled form read the laws of the drive, which are themselves fitted. Post-yield forces determine the
-    laws whatever the path to yield is: the search is repeated with the laws that the one before gave, until they agree.
+    The steps of a coupled form read the laws of the drive, which are themselves fitted. The post-yield forces determine
+    these laws almost independently of the motion before yielding. The search is therefore repeated with the laws of the
+    search before, until they agree.
     """
     if not problem.base.form.coupled:
         return _search(problem, start, iterations, tolerance)
@@ -282,7 +287,8 @@ def _search(problem: Problem, start: FloatArray, iterations: int, tolerance: flo
             if tried.cost < cost:
                 moved = trial - theta
                 missed = tried.residual - found.residual - moved @ jacobian
-                # a run for every parameter is expensive: between two Jacobians by differences Broyden's update serves
+                # a simulation for every parameter is expensive: Broyden's update is used between two Jacobians by
+                # differences
                 jacobian += np.outer(moved / max(float(moved @ moved), 1e-300), missed)
                 theta, cost, improved, found = trial, tried.cost, True, tried
                 damping = max(damping * 0.2, 1e-9)
@@ -300,14 +306,14 @@ def _search(problem: Problem, start: FloatArray, iterations: int, tolerance: flo
 def jacobian_of(
     problem: Problem, theta: FloatArray, residual: FloatArray, w: Weighting, low: FloatArray, high: FloatArray
 ) -> FloatArray:
-    """Return the derivative of the projected residual by the searched values, shape (p, m), by differences."""
+    """Return the derivative of the projected residual with respect to theta, shape (p, m), by finite differences."""
     rows = np.empty((len(theta), len(residual)))
     for k in range(len(theta)):
         width = 1e-3 * max(1.0, 0.02 * (high[k] - low[k])) if problem.searched[k][1].logarithmic else 0.0
         if width == 0.0:
             width = max(2e-5, 2e-3 * abs(theta[k]))
         width = -width if theta[k] + width > high[k] else width
-        rows[k] = 0.0  # where the damper is unstable on both sides of a value, the value stays
+        rows[k] = 0.0  # if the damper is unstable on both sides of a value, the value is kept
         for side in (width, -width):
             moved = theta.copy()
             moved[k] += side
@@ -319,7 +325,7 @@ def jacobian_of(
 
 
 def finish(problem: Problem, theta: FloatArray, w: Weighting, found: Solved, iterations: int = 0) -> Fit:
-    """Return the fit at these searched values; the laws that a coupled form reads are then those of the fit."""
+    """Return the fit at these searched parameters; a coupled form then reads the laws of the fit itself."""
     if problem.base.form.coupled and np.any(found.linear):
         for _ in range(COUPLING_PASSES):
             laws = problem.base.laws_of(found.linear, problem.values(theta)[0], problem.scales.drive)
@@ -347,13 +353,13 @@ def finish(problem: Problem, theta: FloatArray, w: Weighting, found: Solved, ite
 
 
 def predict(found: Fit, recordings: Recordings) -> FloatArray:
-    """Return the force [N] of a fitted damper on other tests, free-run, without their offsets, shape (n,)."""
+    """Return the force [N] of a fitted damper on other tests, shape (n,), in a free run and without test offsets."""
     problem = replace(found.problem, recordings=recordings, root_weight=np.zeros(len(recordings.force)))
     return np.asarray(found.linear @ regressors(problem, found.theta))
 
 
 def start_of(problem: Problem, base: Mapping[str, float], terms: Sequence[Mapping[str, float]]) -> FloatArray:
-    """Return a start: base values, and values of each term; those left out take their first start."""
+    """Return a starting point from values of the base and of each term; parameters left out take their first start."""
     given = [base, *terms]
     values = []
     for index, parameter in problem.searched:

@@ -1,4 +1,4 @@
-"""One base form fitted to bench tests: searched from several starts, with covariance and what bounds it ran into."""
+"""One base form fitted to bench tests from several starts, with covariance and parameters at bounds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from mrpipe.fitting.weighting import centred, weighting
 
 NELDER_MEAD_ITERATIONS = 1000
 NELDER_MEAD_ERROR = 0.01
-"""The thesis' stopping rules (section 2.2): at most 1000 iterations, an RMS error known to 0.01 N."""
+"""Stopping rules of the thesis (section 2.2): at most 1000 iterations, RMS error accurate to 0.01 N."""
 
 
 @dataclass(frozen=True)
@@ -38,19 +38,19 @@ class FormFit:
     model
         The damper.
     training_nrmse
-        RMS error over RMS force at the samples of the fit, offsets of the tests taken out.
+        RMS error over RMS force at the samples of the fit, without the offsets of the tests [1].
     covariance
-        Shape (p, p), of the model's parameters.
+        Covariance of the parameters of the model, shape (p, p), in products of their units.
     names
-        Names of its rows.
+        Names of the rows of the covariance.
     correlation
-        Shape (p, p), from the curvature alone.
+        Correlation of the parameters, shape (p, p), from the curvature of the squared error alone.
     at_bound
         Searched parameters that ended at a bound.
     start_nrmse
-        What each start ended at, best first: the spread over starts.
+        NRMSE that each start ended at, the best first; it shows the spread over the starts.
     notes
-        What the user should know of how it was fitted.
+        Messages for the user on how the form was fitted.
     """
 
     fit: Fit
@@ -75,14 +75,14 @@ class FormFit:
         return {item.name: found[item.name] for item in self.fit.problem.base.parameters()}
 
     def standard_error(self, name: str) -> float:
-        """Return the standard error of a parameter in its own unit; not a number where it was not searched."""
+        """Return the standard error of a parameter in the unit of the parameter; NaN if it was not fitted."""
         if name not in self.names:
             return float("nan")
         place = self.names.index(name)
         return float(np.sqrt(max(self.covariance[place, place], 0.0)))
 
     def correlated(self, limit: float = 0.95) -> list[tuple[str, str, float]]:
-        """Return pairs of parameters whose correlation is above `limit` in size, the closest first."""
+        """Return pairs of parameters whose absolute correlation exceeds `limit`, the largest first."""
         pairs = [
             (self.names[row], self.names[column], float(self.correlation[row, column]))
             for row in range(len(self.names))
@@ -93,7 +93,7 @@ class FormFit:
 
 
 _SETTINGS = DamperFitSettings()
-"""The defaults that the options share with the settings."""
+"""Source of the defaults, so that options and settings have the same ones."""
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,14 @@ class FitMethod:
     Attributes
     ----------
     method
-        `least-squares` (Levenberg-Marquardt) or `nelder-mead` (restarted from where it ended until it gains nothing,
-        as in section 2.2 of the thesis).
+        `least-squares` (Levenberg-Marquardt) or `nelder-mead` (restarted from its result until the error no longer
+        falls, as in section 2.2 of the thesis).
     starts
-        How many starting points, the best at first sight, are followed to the end.
+        Number of starting points, the best ones after a few steps, whose search is completed.
     iterations
-        Most steps of the search from each start.
+        Largest number of steps of the search from each start.
     assumed_eta
-        Rate of the driver's lag [1/s] where the tests do not determine it.
+        Rate of the lag of the drive [1/s] if the tests do not determine it.
     """
 
     method: str = _SETTINGS.method
@@ -126,14 +126,14 @@ def form_problem(
 
     Parameters
     ----------
-    offsets
-        An offset for each test; else one for all.
-    weights
-        Factor on the error of each sample, shape (n,); 1 where left out.
     recordings
-        Tests laid end to end.
+        Concatenated tests.
     base
         Base form.
+    offsets
+        Whether each test has its own force offset; otherwise all tests share one.
+    weights
+        Factor on the error of each sample, shape (n,); 1 if None.
     """
     problem = first_problem(recordings, base)
     root = problem.root_weight if weights is None else problem.root_weight * weights
@@ -149,17 +149,17 @@ def fit_form(
     ----------
     problem
         See :func:`form_problem`.
-    warm
-        Parameters to start from in place of the form's own starts.
     method
         Optimiser.
     drive_unit
         A or V.
+    warm
+        Parameters to start from instead of the starts of the form.
 
     Raises
     ------
     DivergedError
-        If the model's force is not finite for some trial.
+        If the force of the model is not finite at the result.
     """
     begins = [start_of(problem, warm, [])] if warm is not None else _begins(problem, method)
     ends = []
@@ -206,9 +206,9 @@ def form_fit(found: Fit, method: FitMethod, drive_unit: str, start_nrmse: tuple[
 
 
 def parameter_names(found: Fit) -> tuple[tuple[str, ...], FloatArray]:
-    """Return the names of the model's parameters, and the matrix that yields them from searched and linear numbers.
+    """Return the names of the model parameters, and the matrix that maps searched and linear numbers to them.
 
-    It turns coefficients in the basis of the laws into the laws' own numbers; the rest it passes on.
+    The matrix converts coefficients in the basis of the laws to the numbers of the laws, and keeps all others.
     """
     base, problem = found.problem.base, found.problem
     names = [parameter.name for _, parameter in problem.searched]
@@ -224,7 +224,7 @@ def parameter_names(found: Fit) -> tuple[tuple[str, ...], FloatArray]:
 
 
 def block_diagonal(blocks: list[FloatArray]) -> FloatArray:
-    """Return square matrices along one diagonal."""
+    """Return the block-diagonal matrix of square matrices."""
     size = sum(len(block) for block in blocks)
     matrix = np.zeros((size, size))
     row = 0
@@ -235,7 +235,7 @@ def block_diagonal(blocks: list[FloatArray]) -> FloatArray:
 
 
 def nrmse_of(found: Fit) -> float:
-    """Return the weighted residual of a fit over the weighted force, both without the offset of each test."""
+    """Return RMS weighted residual over RMS weighted force of a fit, both without the offset of each test."""
     force = weighting(found.problem).target
     return float(np.sqrt(found.cost / max(float(force @ force), 1e-300)))
 
@@ -265,8 +265,8 @@ def _nelder_mead(problem: Problem, begin: FloatArray) -> Fit:
 def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return covariance and correlation of the model's parameters.
 
-    What a model leaves is not white noise, so the covariance is the sandwich over stretches of the recordings whose
-    errors are correlated; the correlation is that of the curvature alone.
+    The residual of a model is not white noise. The covariance is therefore the sandwich estimate over parts of the
+    recordings, within which errors are correlated. The correlation follows from the curvature alone.
     """
     problem = found.problem
     w = weighting(problem)
@@ -283,7 +283,7 @@ def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray
     free = columns
     if problem.base.form.known:
         free = np.delete(columns, problem.base.columns - 1, axis=0)
-    # rows are the derivatives of the model's force: the sign cancels in both products below
+    # the rows are derivatives of the model force, not of the residual: the sign cancels in both products below
     jacobian = np.linalg.inv(matrix).T @ np.vstack([*slopes, free])
     size = np.linalg.norm(jacobian, axis=1)
     size[size == 0.0] = 1.0

@@ -1,7 +1,8 @@
-"""One compiled loop over all tests that records what a fit needs of a chain: few columns, and the share of steps.
+"""One compiled loop over all tests that records the signals which a fit needs, and the forces of tapped steps.
 
 The steps are prepared and ended by the same functions as in :func:`mrpipe.dampers.plant.advance`. The loop over the
-steps is its own, because it looks between them: after the step of the coefficients and after each tapped step.
+steps is separate, because it records values between steps: after the step of the coefficients and after each tapped
+step.
 """
 
 from __future__ import annotations
@@ -41,9 +42,11 @@ from mrpipe.fitting.recordings import Recordings
 COLUMNS = 11
 CURRENT_AT, VELOCITY_AT, HYSTERESIS_AT, YIELD_AT, VISCOSITY_AT, FORCE_AT, WORK_AT, DISPLACEMENT_AT = range(8)
 SUM_VELOCITY_AT, PART_AT, KNOWN_AT = 8, 9, 10
-"""Rows of what :func:`run_recordings` returns: effective drive, velocity of the damper, z, factors by which effects
-change yield force and viscosity, force, work, displacement, velocity of the viscous element, second yielding part,
-force of the base form that no linear coefficient scales."""
+"""Rows of the result of :func:`run_recordings`: effective drive [A or V], velocity of the damper [m/s], hysteretic
+variable z [1], factors by which effects change yield force and viscosity [1], force [N], work [J], displacement [m],
+velocity of the viscous element [m/s], second yielding part [1], force of the base form that no linear coefficient
+scales [N].
+"""
 
 
 @njit(
@@ -134,11 +137,11 @@ def run_recordings(chain: Chain, recordings: Recordings, tapped: tuple[int, ...]
     Parameters
     ----------
     chain
-        With one step of :func:`mrpipe.dampers.drive.coefficients`.
+        Chain that contains one step of :func:`mrpipe.dampers.drive.coefficients`.
     recordings
         The tests.
     tapped
-        Places in the chain, rising: the force that each of these steps adds is recorded in a separate row.
+        Places in the chain, in rising order. The force that each of these steps adds is recorded in a separate row.
 
     Returns
     -------
@@ -184,14 +187,14 @@ def _filter_rows(
 
 
 def filter_parts(chain: Chain, parts: FloatArray, recordings: Recordings) -> FloatArray:
-    """Return parts of the force behind the filters of the force channel.
+    """Return parts of the force after the filters of the force channel, shape (c, n) [N].
 
     A filter is linear, so the measured force is the sum of the filtered parts.
 
     Parameters
     ----------
     chain
-        Its steps that filter the force are applied, each with a state of its own for each part and test.
+        Chain whose force-filter steps are applied, with a separate state for each part and test.
     parts
         Shape (c, n) [N].
     recordings

@@ -1,7 +1,7 @@
-"""Base forms that were fitted to the same tests before: their numbers are where a later fit begins.
+"""Base forms that were fitted to the same tests before; a later fit starts from their parameters.
 
 `identify-damper` fits every base form with equal weights; the tracing fits them with weights by noise. The optimum of
-the one fit is close to that of the other, so a search from there needs no grid of starting points.
+the first fit is close to that of the second, so a search from there needs no grid of starting points.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from mrpipe.fitting.engine import start_of
 from mrpipe.fitting.problem import Problem
 
 Known = Mapping[str, DamperModel]
-"""Base forms by name, as they were fitted to the same tests before."""
+"""Name -> base form as it was fitted to the same tests before."""
 
 FITTED, RANKED = "forms", "ranked"
 """Groups of `damper.h5`: base forms fitted to all samples, and all of them fitted to a share of the samples."""
 
 
 def read_known(artifact: Artifact) -> dict[str, DamperModel]:
-    """Return the base forms that a `damper.h5` holds, by name; those fitted to all samples where it has both."""
+    """Return name -> base form in a `damper.h5`; the one fitted to all samples if the file has both."""
     names = {name: f"{group}/{name}" for group in (RANKED, FITTED) for name in artifact.members(group)}
     return {name: read_damper(artifact, group) for name, group in names.items()}
 
@@ -33,7 +33,7 @@ def known_start(
     shared: Mapping[str, float] | None = None,
     terms: Sequence[Mapping[str, float]] = (),
 ) -> tuple[Problem, FloatArray] | None:
-    """Return the problem, and the start that a known fit of its base form gives; None where there is none.
+    """Return the problem, and the start from a known fit of its base form; None if there is no such fit.
 
     The searched parameters are taken by name: those of the form, the lag of the drive, and the scale of a law that
     saturates. A coupled form reads the known laws of the drive.
@@ -41,13 +41,13 @@ def known_start(
     Parameters
     ----------
     problem
-        What is to be fitted.
+        Problem to be fitted.
     known
         Base forms by name, fitted to the same tests.
     shared
-        Parameters whose values are taken from here instead.
+        Parameter -> value that replaces the known one.
     terms
-        Values of the effects of the problem; each begins at its first start where they are left out.
+        Start values of the effects of the problem; None: each effect begins at its first start.
     """
     form = problem.base.form
     model = (known or {}).get(form.name)

@@ -1,7 +1,7 @@
 """Steps of a chain as addresses of their machine code, for kernels that are called thousands of times.
 
-numba examines every function of a tuple at every call of a kernel, which takes 2 ms and holds the interpreter lock. An
-array of addresses costs nothing.
+If a kernel receives a tuple of functions, numba examines each of them at every call. This takes 2 ms and holds the
+interpreter lock. An array of addresses avoids it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def addresses_of(chain: Chain) -> IntArray:
 
 @cache
 def _address(function: Any) -> int:
-    """Return the address of a step's machine code; the cache keeps the function, and so its code, alive."""
+    """Return the address of the machine code of a step; the cache keeps the function and its code in memory."""
     compiled = function.get_compile_result(STEP_SIGNATURE)
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 

@@ -1,4 +1,4 @@
-"""What is fitted to what: the base form, the effects with it, the samples and their weights."""
+"""The fitting problem: base form, effects, samples and their weights."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ETA_FALL = shape("eta_fall", "1/s", "rate where the drive falls", "one", 2.0, 30
 
 @dataclass(frozen=True)
 class Base:
-    """The base form of a problem: a form of the library, the shapes of its laws of the drive, and the driver's lag.
+    """The base form of a problem: a form of the library, the shapes of its laws of the drive, and the lag of the drive.
 
     Attributes
     ----------
@@ -31,11 +31,11 @@ class Base:
     laws
         Shape of the law of each block of the form.
     lag_known
-        The drive varies within tests, so that measurements determine its lag.
+        Whether the drive varies within tests, so that the measurements determine its lag.
     lag_apart
-        The lag has another rate where the drive falls.
+        Whether the lag has a separate rate for a falling drive.
     held
-        Parameters that are not searched, and their values: references of the form, and what a caller fixes.
+        Parameter -> value of parameters that are not searched: references of the form, and those that a caller fixes.
     """
 
     form: BaseForm
@@ -51,11 +51,11 @@ class Base:
 
     @property
     def columns(self) -> int:
-        """Number of linear coefficients before the amplitudes: of all laws, and one for a known force."""
+        """Number of linear coefficients before the amplitudes: those of all laws, and one for a known force."""
         return sum(law.count for law in self.laws) + int(self.form.known)
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return what is searched."""
+        """Return the parameters that are searched."""
         found = [item for item in self.form.searched if item.name not in self.held]
         for block, law in zip(self.form.blocks, self.laws, strict=True):
             if law.saturates:
@@ -68,7 +68,7 @@ class Base:
         return tuple(found)
 
     def scale_shares(self, values: Mapping[str, float], drive: float) -> list[float]:
-        """Return the scale of each law over the drive limit; 1 for laws that do not saturate."""
+        """Return the scale of each law as a share of the drive limit; 1 for laws that do not saturate."""
         return [
             values[f"{block}_scale"] / drive if law.saturates else 1.0
             for block, law in zip(self.form.blocks, self.laws, strict=True)
@@ -83,7 +83,7 @@ class Base:
         return tuple(found)
 
     def steps(self, values: Mapping[str, float], *laws: Law) -> list[Step]:
-        """Return the steps with these laws of the drive."""
+        """Return the steps of the base form for these parameter values."""
         steps = [coefficients(*laws), *self.form.steps(values)]
         if self.lag_known:
             apart = "eta_fall" in values
@@ -106,7 +106,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is fitted to what.
+    """A fitting problem: a model, recordings, and the weights of their samples.
 
     Attributes
     ----------
@@ -115,17 +115,17 @@ class Problem:
     base
         The base form.
     terms
-        Effects fitted with it.
+        Effects that are fitted together with the base form.
     root_weight
         Square root of the weight of each sample, 0 where it is not compared, shape (n,) [1/N].
     scales
         Scales of bounds and starts.
     reference
-        Laws of the base form that effects scale with, and that coupled forms read.
+        Laws of the drive that effects are proportional to, and that coupled forms read.
     window_share
-        Moving average over this share of a period that the records went through.
+        Length of the moving average that the recorder applied, as a share of the period; 0: none.
     offsets
-        An offset for each test; else one for all.
+        Whether each test has its own force offset; otherwise all tests share one.
     """
 
     recordings: Recordings
@@ -143,7 +143,7 @@ class Problem:
 
     @property
     def searched(self) -> list[tuple[int, Parameter]]:
-        """Return (term index or -1 for the base, parameter) of all that is searched."""
+        """Return (index of the term, or -1 for the base; parameter) for all searched parameters."""
         found = [(-1, parameter) for parameter in self.base.parameters()]
         for index, term in enumerate(self.terms):
             found += [(index, parameter) for parameter in term.form.searched]
@@ -151,27 +151,27 @@ class Problem:
 
     @property
     def amplitudes(self) -> list[tuple[int, Parameter]]:
-        """Return (term index or -1 for the base, parameter) of all amplitudes."""
+        """Return (index of the term, or -1 for the base; parameter) for all amplitudes."""
         own = [(-1, item) for item in self.base.form.amplitudes]
         return own + [(index, item) for index, term in enumerate(self.terms) for item in term.form.amplitudes]
 
     def encode(self, values: Sequence[float]) -> FloatArray:
-        """Return searched values as the search sees them."""
+        """Return searched parameters in the coordinates of the search, shape (p,)."""
         pairs = zip(self.searched, values, strict=True)
         return np.array([np.log(v) if p.logarithmic else v / self.scales.of(p.scale) for (_, p), v in pairs])
 
     def decode(self, theta: FloatArray) -> list[float]:
-        """Return the values behind what the search sees."""
+        """Return the parameter values (SI) for coordinates of the search, shape (p,)."""
         pairs = zip(self.searched, theta, strict=True)
         return [float(np.exp(t)) if p.logarithmic else float(t * self.scales.of(p.scale)) for (_, p), t in pairs]
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return bounds as the search sees them."""
+        """Return lower and upper bounds in the coordinates of the search, shape (p,) each."""
         low, high = zip(*(p.bounds(self.scales) for _, p in self.searched), strict=True)
         return self.encode(low), self.encode(high)
 
     def values(self, theta: FloatArray) -> list[dict[str, float]]:
-        """Return values by name: of the base first, then of each term, amplitudes 1."""
+        """Return parameter -> value, for the base first and then for each term; amplitudes are 1."""
         found: list[dict[str, float]] = [{} for _ in range(len(self.terms) + 1)]
         found[0] |= self.base.held
         for (index, parameter), value in zip(self.searched, self.decode(theta), strict=True):

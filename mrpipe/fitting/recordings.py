@@ -1,4 +1,4 @@
-"""Recordings laid end to end for the tracing: displacement filtered without phase, force as it was measured."""
+"""Concatenated recordings for the tracing: displacement with zero-phase filter, force as it was measured."""
 
 from __future__ import annotations
 
@@ -17,41 +17,42 @@ from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.prepared import PreparedTest
 
 SETTLING_SHARE = 0.3
-"""Share of the peak-to-peak displacement travelled before forces are compared: the hysteresis begins unknown."""
+"""Forces are compared after this share of the peak-to-peak displacement, as the initial hysteresis is unknown."""
 
 STEADY_OFFSET_SHARE = 0.03
-"""Displacement offsets that spread by less than this share of the stroke are taken as one of the whole campaign."""
+"""Displacement offsets whose spread is below this share of the stroke are replaced by one common offset."""
 
 MOST_TESTS = 48
-"""Of campaigns with more training tests every second, third, ... is used."""
+"""Largest number of training tests; of larger campaigns every second, third, ... test is used."""
 
 MOST_SAMPLES = 50_000
-"""Of long campaigns only so many samples are used, the same time of every test."""
+"""Largest number of samples; of longer campaigns the same duration of every test is used."""
 
 MOST_JUDGED = 200_000
-"""Errors on validation tests are judged on up to so many samples: they are simulated once, not fitted."""
+"""Largest number of samples of validation tests; it is larger, because these are simulated once and not fitted."""
 
 JUMP_RATE_HZ = 500.0
-"""Minimum sampling rate of a test with drive steps: the drive is interpolated linearly, which smears steps."""
+"""Least sampling rate of a test with steps of the drive: linear interpolation of the drive smears steps."""
 
 FILTER_ORDER = 4
-"""Order of the low-pass of the displacement in each direction: a gentler one attenuates random motion up to its band's
-edge by several percent, which a hysteresis turns into twice the error."""
+"""Order of the low-pass of the displacement in each direction. A lower order attenuates random motion near the edge of
+its band by several percent, and the hysteresis doubles this error.
+"""
 
 ACCELERATION_HARMONICS = 25.0
-"""Least cut-off of a measured acceleration, in multiples of the frequency of the motion."""
+"""Lowest cut-off of a measured acceleration, in multiples of the frequency of the motion."""
 
 
 @dataclass(frozen=True)
 class Recordings:
-    """Several tests end to end.
+    """Several tests, concatenated.
 
     Attributes
     ----------
     displacement, velocity, acceleration, drive, force
-        Shape (n,); SI. The force carries the offset that was measured.
+        Signals, shape (n,) [m, m/s, m/s^2, A or V, N]. The force contains the measured offset.
     starts
-        Shape (tests + 1,): first sample of each test, and n.
+        Index of the first sample of each test, and n, shape (tests + 1,).
     dt
         Shape (tests,) [s].
     names
@@ -61,17 +62,18 @@ class Recordings:
     used
         Samples at which forces are compared, shape (n,).
     displacement_noise, velocity_noise, force_noise, force_rounding
-        Standard deviation of what the sensors add after filtering, shape (tests,); m, m/s, N.
+        Standard deviation of the sensor noise after filtering, and of the rounding of the force, shape (tests,); m,
+        m/s, N, N.
     force_offset
-        Offset that prepare found, shape (tests,) [N].
+        Offset that the stage prepare found, shape (tests,) [N].
     period_s
-        Period of the motion, shape (tests,); 0 where it is not periodic.
+        Period of the motion, shape (tests,) [s]; 0 if it is not periodic.
     cutoff_hz
-        Cut-off of the displacement, shape (tests,).
+        Cut-off frequency of the displacement, shape (tests,) [Hz].
     noise_band_hz
-        Band of the displacement's noise, shape (tests,): up to the cut-off where no other is known.
+        Upper end of the band of the displacement noise, shape (tests,) [Hz]; the cut-off if no other is known.
     noise_repeats
-        Share of the variance of the displacement's noise that repeats where the motion repeats, shape (tests,).
+        Share of the variance of the displacement noise that repeats from cycle to cycle, shape (tests,) [1].
     displacement_rounding, displacement_dither
         Step of a quantised displacement and the noise that was added before rounding, shape (tests,) [m]; the step is 0
         where the displacement is not quantised.
@@ -115,7 +117,7 @@ class Recordings:
 
     @property
     def motion_period_s(self) -> FloatArray:
-        """Period of the motion, also where it is not periodic: 2 pi RMS displacement over RMS velocity, (tests,)."""
+        """Mean period of the motion, also of random motion: 2 pi RMS displacement over RMS velocity, (tests,) [s]."""
         pieces = [slice(int(a), int(b)) for a, b in itertools.pairwise(self.starts)]
         sizes = [(np.std(self.displacement[piece]), np.std(self.velocity[piece])) for piece in pieces]
         lengths = np.diff(self.starts) * self.dt
@@ -123,19 +125,19 @@ class Recordings:
         return np.minimum(periods, lengths)
 
     def blocks(self, periods: float) -> IntArray:
-        """Return the block of each sample, shape (n,): parts of a test that last so many periods of its motion."""
+        """Return the index of the block of each sample, shape (n,); a block lasts `periods` periods of the motion."""
         length = np.maximum(1, np.round(periods * self.motion_period_s / self.dt).astype(np.int64))
         within = (np.arange(len(self.force)) - self.starts[self.test]) // length[self.test]
         return np.asarray(self.test * 100_000 + within)
 
     @property
     def force_rms(self) -> float:
-        """RMS of the offset-free force over the samples compared [N]."""
+        """RMS of the offset-free force over the samples that are compared [N]."""
         force = (self.force - self.force_offset[self.test])[self.used]
         return float(np.sqrt(np.mean(force**2)))
 
     def subset(self, tests: Sequence[int]) -> Recordings:
-        """Return some of the tests."""
+        """Return the recordings of some of the tests."""
         pieces = [slice(int(self.starts[k]), int(self.starts[k + 1])) for k in tests]
         lengths = [piece.stop - piece.start for piece in pieces]
         chosen = np.asarray(tests, dtype=np.int64)
@@ -170,7 +172,7 @@ class Recordings:
         )
 
     def scales(self) -> EffectScales:
-        """Return what bounds and starts of effects are multiples of."""
+        """Return the scales of the campaign; bounds and starts of effects are multiples of them."""
         starts = self.starts
         strokes = [0.5 * np.ptp(self.displacement[a:b]) for a, b in itertools.pairwise(starts)]
         lengths = np.diff(starts) * self.dt
@@ -193,24 +195,24 @@ def record_tests(
     longest_s: float = 60.0,
     most_samples: int = MOST_SAMPLES,
 ) -> Recordings:
-    """Lay prepared tests end to end.
+    """Concatenate prepared tests.
 
     Parameters
     ----------
     tests
         Prepared tests; their raw displacement and force are used.
     rate_hz
-        Tests are thinned to at most about this rate after the displacement has been filtered. Forces are picked, never
-        filtered. A test whose drive jumps keeps a higher rate.
+        Tests are decimated to about this rate after the displacement has been filtered. Forces are picked and never
+        filtered. A test with steps of the drive keeps a higher rate.
     cutoff_hz
-        Cut-off of the displacement; 0 chooses it for each test by criterion. A displacement from which the noise was
-        removed is not filtered again.
+        Cut-off frequency of the displacement; 0: chosen for each test from its spectrum. A displacement from which the
+        noise was removed is not filtered again.
     highest_cutoff_hz
-        Upper limit of the cut-offs that are chosen by criterion.
+        Upper limit of the cut-off frequencies that are chosen from spectra.
     longest_s
         Longer tests are cut to this length.
     most_samples
-        Of campaigns that hold more only so many are used, the same time of every test.
+        Largest number of samples; of longer campaigns the same duration of every test is used.
     """
     offsets = np.array([test.displacement_offset_m for test in tests])
     stroke = max(0.5 * float(np.ptp(test.displacement_m)) for test in tests)
@@ -265,14 +267,14 @@ def record_tests(
 
 
 def drive_jumps(test: PreparedTest, largest: float) -> bool:
-    """Return whether the drive of a test changes by a tenth of the campaign's largest from one sample to the next."""
+    """Return whether the drive of a test changes by 10 % of `largest` from one sample to the next."""
     return float(np.max(np.abs(np.diff(test.drive)))) > 0.1 * largest > 0.0
 
 
 def spread_tests(tests: Sequence[PreparedTest], most: int = MOST_TESTS) -> list[PreparedTest]:
-    """Return the tests, or every second, third, ... of a campaign of very many; repeats are all kept.
+    """Return all tests, or every second, third, ... test of a large campaign; repeats are all kept.
 
-    A few seconds of each of a hundred tests tell less of slow effects than twice as long of half of them.
+    A few seconds of each of 100 tests contain less information on slow effects than twice the time of 50 tests.
     """
     kept = [test for test in tests if test.role == "repeat"]
     others = [test for test in tests if test.role != "repeat"]
@@ -282,7 +284,7 @@ def spread_tests(tests: Sequence[PreparedTest], most: int = MOST_TESTS) -> list[
 
 
 def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[PreparedTest]:
-    """Return the tests, long ones cut into pieces where they are too few to leave some out in turn."""
+    """Return the tests; long tests are cut into pieces if there are too few tests for a cross-validation."""
     found = list(tests)
     while 0 < len(found) < fewest:
         longest = max(range(len(found)), key=lambda k: len(found[k].force_n))
@@ -309,7 +311,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
     smooth = raw if test.motion_band_hz > 0.0 else butterworth_lowpass(raw, cutoff, rate, order=FILTER_ORDER)
     velocity, acceleration = spline_derivatives(smooth, 1.0 / rate)
     if _acceleration_was_measured(test):
-        # an accelerometer is far quieter than a displacement differentiated twice
+        # the noise of an accelerometer is far smaller than that of a displacement differentiated twice
         acceleration = butterworth_lowpass(
             test.acceleration_m_s2, max(1.5 * cutoff, ACCELERATION_HARMONICS * test.motion_frequency_hz), rate
         )

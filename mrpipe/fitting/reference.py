@@ -1,8 +1,8 @@
-"""The laws of the drive that effects scale with: those of the fit itself.
+"""The laws of the drive that effects are proportional to: those of the fit itself.
 
-An effect that changes the yield force by a share reads the yield force of the reference laws, because the laws of the
-base form are solved for afterwards. If the reference is not the law that the fit finds, the share means another force
-at each level of the drive, and the damper that is written, which has only the fitted laws, differs from the fit.
+An effect that changes the yield force by a share reads the yield force from reference laws, because the laws of the
+base form are solved for afterwards. If the reference differs from the fitted law, the share stands for another force at
+each level of the drive. The damper that is written has only the fitted laws, and would then differ from the fit.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from mrpipe.dampers.laws import Law, constant_law
 from mrpipe.fitting.engine import Fit, fit
 
 PASSES = 3
-"""Numerical technique: fits, at most, until reference and fitted laws agree."""
+"""Numerical technique: largest number of fits until reference and fitted laws agree."""
 
 SAME = 0.01
 """Numerical technique: difference, as a share of the largest value, up to which laws agree."""
@@ -25,7 +25,7 @@ LEVELS = 20
 
 
 def own_laws(found: Fit) -> tuple[Law, ...]:
-    """Return the fitted laws as reference of effects; a viscosity that is zero everywhere is raised above it."""
+    """Return the fitted laws as reference of effects; a viscosity of zero is replaced by a small positive one."""
     forces, viscosity, *rest = found.laws
     drive = np.linspace(0.0, found.problem.scales.drive, LEVELS)
     if float(np.mean(viscosity(drive))) <= 0.0 and not found.problem.base.form.coupled:
@@ -34,14 +34,14 @@ def own_laws(found: Fit) -> tuple[Law, ...]:
 
 
 def with_own_laws(found: Fit, *, iterations: int = 6) -> Fit:
-    """Return a fit whose effects scale with its own laws of the drive.
+    """Return a fit whose effects are proportional to the fitted laws of the drive.
 
     Parameters
     ----------
     found
         Fit with or without effects.
     iterations
-        Iterations of each search.
+        Largest number of iterations of each search.
     """
     if found.problem.base.form.coupled:
         return found

@@ -14,23 +14,24 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.signals.spectra import cutoff_by_criterion
 
 SETTLING_SHARE = 0.25
-"""Share of a test's peak-to-peak displacement that the rod must have travelled before its force is compared.
+"""Forces are compared after the rod has travelled this share of the peak-to-peak displacement.
 
-A recording may begin anywhere on the loop while the model begins at rest; by then the hysteresis has forgotten it.
+A recording may begin anywhere on the loop, but the model begins at rest; after this path the initial state of the
+hysteresis has no effect.
 """
 
 BLOCKS = 40
-"""A campaign is split into about this many stretches; errors within a stretch are correlated."""
+"""A campaign is divided into about this many parts; errors within a part are correlated."""
 
 
 def settled(displacement: FloatArray) -> BoolArray:
-    """Return where the model has forgotten how it began, shape (n,)."""
+    """Return the samples at which the initial state of the model no longer has an effect, shape (n,) of bool."""
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(displacement)))])
     return np.asarray(path >= SETTLING_SHARE * np.ptp(displacement), dtype=np.bool_)
 
 
 def fit_window(test: PreparedTest, cycles: int) -> slice:
-    """Return the first `cycles` steady cycles of a periodic test, with half a cycle to settle; else all of it."""
+    """Return the first `cycles` steady cycles of a periodic test plus half a cycle to settle, or else all samples."""
     if cycles <= 0 or test.excitation != "periodic" or len(test.cycles) < 2:
         return slice(None)
     length = int(test.cycles[1] - test.cycles[0])
@@ -41,18 +42,18 @@ def fit_window(test: PreparedTest, cycles: int) -> slice:
 def bench_recordings(
     tests: Sequence[PreparedTest], *, cycles: int = 0, maximum_samples: int = 30_000, raw_force: bool = False
 ) -> Recordings:
-    """Lay windows of prepared tests end to end.
+    """Concatenate windows of prepared tests.
 
     Parameters
     ----------
     tests
-        Prepared tests, all to be fitted.
+        Prepared tests that are fitted.
     cycles
-        Steady cycles of each periodic test; 0 takes whole tests.
+        Number of steady cycles of each periodic test; 0: whole tests.
     maximum_samples
-        Forces are compared at no more than about so many samples, evenly spread; the model always runs at full rate.
+        Largest number of samples, evenly spread, at which forces are compared; the model always runs at the full rate.
     raw_force
-        Compare with the unfiltered force.
+        Whether the unfiltered force is compared.
     """
     windows = [fit_window(test, cycles) for test in tests]
 
@@ -94,7 +95,7 @@ def bench_recordings(
 
 
 def thinned(recordings: Recordings, most: int) -> Recordings:
-    """Return every k-th sample of all tests, so that about `most` are left: enough to rank forms."""
+    """Return every k-th sample of all tests, about `most` in total, which is sufficient to rank forms."""
     stride = max(1, -(-len(recordings.force) // most))
     if stride == 1:
         return recordings
@@ -104,7 +105,7 @@ def thinned(recordings: Recordings, most: int) -> Recordings:
     ]
     index = np.concatenate(pieces)
     usable = recordings.used.copy()
-    # where only every k-th sample is compared, those in between count as usable too
+    # if only every k-th sample is compared, the samples in between count as usable too
     for test in range(recordings.tests):
         inside = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
         compared = np.flatnonzero(recordings.used[inside])
@@ -125,7 +126,7 @@ def thinned(recordings: Recordings, most: int) -> Recordings:
 
 
 def blocks_of(recordings: Recordings) -> IntArray:
-    """Return the stretch (one of some forty) that each sample belongs to, shape (n,)."""
+    """Return the index of the part of the campaign (one of about 40) of each sample, shape (n,)."""
     pieces = max(1, round(BLOCKS / recordings.tests))
     block = np.zeros(len(recordings.force), dtype=np.int64)
     for test in range(recordings.tests):
@@ -136,10 +137,11 @@ def blocks_of(recordings: Recordings) -> IntArray:
 
 
 def smooth_motion(tests: Sequence[PreparedTest]) -> list[PreparedTest]:
-    """Return the tests with the displacement of periodic ones low-passed where it sinks into its noise.
+    """Return the tests; the displacement of periodic tests is low-passed where noise exceeds its spectrum.
 
-    Hysteresis adds up path, and at a reversal a yielding damper turns micrometres of noise into newtons: left in, they
-    shorten the yield displacement and bend the share of gamma. The filter has no phase; random motion stays as it is.
+    The hysteresis depends on the path, and at a reversal micrometres of displacement noise cause newtons of force.
+    Without the filter, the noise reduces the fitted yield displacement and biases the share of gamma. The filter has
+    zero phase; random motion is not filtered.
     """
     smoothed = []
     for test in tests:

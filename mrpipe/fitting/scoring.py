@@ -1,4 +1,4 @@
-"""How well a damper does on tests: errors as every stage of the bench reports them."""
+"""Errors of a damper model on tests, as every stage of the bench reports them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from mrpipe.signals.prepared import PreparedTest
 
 @dataclass(frozen=True)
 class TestScore:
-    """One test: sums from which pooled figures follow, and the figures of the test.
+    """Errors on one test, as sums from which pooled errors follow.
 
     Attributes
     ----------
     name, role
         The test.
     samples
-        How many were compared.
+        Number of samples that were compared.
     squared_error, squared_force, force_sum
         Sums over the samples [N^2, N^2, N].
     """
@@ -44,7 +44,7 @@ class TestScore:
 
 @dataclass(frozen=True)
 class PooledScore:
-    """Figures pooled over tests: NRMSE, fit 100 (1 - |f - fh|/|f - mean f|) and R^2."""
+    """Errors pooled over tests: NRMSE [1], fit 100 (1 - |f - fh|/|f - mean f|) [%] and R^2 [1]."""
 
     nrmse: float
     fit_percent: float
@@ -52,7 +52,7 @@ class PooledScore:
 
 
 def score_tests(model: DamperModel, tests: Sequence[PreparedTest], *, raw_force: bool = False) -> tuple[TestScore, ...]:
-    """Run the damper over whole tests and compare forces once the model has settled."""
+    """Run the damper over whole tests, and compare forces after the model has settled."""
     scores = []
     for test in tests:
         predicted = model.force(test.displacement_m, test.velocity_m_s, test.acceleration_m_s2, test.drive, test.dt)
@@ -76,7 +76,7 @@ def score(test: PreparedTest, predicted: FloatArray, *, raw_force: bool = False)
 
 
 def pool(scores: Sequence[TestScore]) -> PooledScore:
-    """Return the pooled figures; not a number where there are no tests."""
+    """Return the pooled errors; NaN if there are no tests."""
     if not scores:
         return PooledScore(float("nan"), float("nan"), float("nan"))
     error = sum(item.squared_error for item in scores)
@@ -89,7 +89,7 @@ def pool(scores: Sequence[TestScore]) -> PooledScore:
 
 @dataclass(frozen=True)
 class Loop:
-    """One test to be drawn: name, displacement [m], velocity [m/s], measured and modelled force [N], shape (n,)."""
+    """One test for a figure: name, displacement [m], velocity [m/s], measured and modelled force [N], shape (n,)."""
 
     name: str
     displacement: FloatArray
@@ -99,7 +99,7 @@ class Loop:
 
 
 def shown_loops(model: DamperModel, tests: Sequence[PreparedTest], count: int = 4) -> list[Loop]:
-    """Return a few validation tests (all tests where there are none), spread over the drive, the last part of each."""
+    """Return the last part of a few validation tests, spread over the drive; of any tests if none validates."""
     held_out = [test for test in tests if test.role == "validation"] or list(tests)
     held_out.sort(key=lambda test: float(np.mean(np.abs(test.drive))))
     places = np.unique(np.linspace(0, len(held_out) - 1, count).round().astype(int))
@@ -123,7 +123,7 @@ def _last_part(test: PreparedTest) -> slice:
 def yield_curves(
     models: Sequence[tuple[str, DamperModel]], tests: Sequence[PreparedTest]
 ) -> tuple[FloatArray, list[tuple[str, FloatArray]]]:
-    """Return drives, shape (60,), and for each model its post-yield force [N] there at half the largest speed."""
+    """Return drives, shape (60,), and name -> post-yield force [N] of each model at half the largest speed."""
     speed = 0.5 * max(float(np.abs(test.velocity_m_s).max()) for test in tests)
     drive = np.linspace(0.0, models[0][1].drive_limit, 60)
     return drive, [(name, model.quasi_static_force(speed, drive)) for name, model in models]

@@ -38,13 +38,13 @@ WIDEST_LEVEL = 0.1
 """Numerical technique: ... and no interval of its levels is wider than this share of the largest drive."""
 
 MOST_STARTS = 36
-"""Of more combinations of the parameters' starts, this many are tried, evenly picked."""
+"""Largest number of combinations of the starts of parameters; of more combinations, this many are picked evenly."""
 
 MORE_POINTS = 3
-"""So many times more points than fits are followed for a few steps."""
+"""Number of points that are followed for a few steps, for each fit that is completed."""
 
 BEGUN_STEPS = 3
-"""Steps after which the points that promise most are chosen."""
+"""Number of steps after which the best points are chosen."""
 
 
 def tests_of_varying_drive(recordings: Recordings) -> BoolArray:
@@ -91,7 +91,7 @@ def _levels_of_steps(drive: FloatArray) -> int:
 
 
 def polynomial_laws(form: BaseForm, levels: int, yield_order: int, viscosity_order: int) -> tuple[LawShape, ...]:
-    """Return polynomial laws of these degrees, lowered to what the levels of drive determine."""
+    """Return polynomial laws of these degrees, or of the largest degrees that the levels of drive determine."""
     orders = {"c0": viscosity_order}
     return tuple(LawShape("polynomial", min(orders.get(block, yield_order), levels - 1)) for block in form.blocks)
 
@@ -99,18 +99,18 @@ def polynomial_laws(form: BaseForm, levels: int, yield_order: int, viscosity_ord
 def base_of(
     recordings: Recordings, form: BaseForm, laws: Sequence[LawShape], held: Mapping[str, float] | None = None
 ) -> Base:
-    """Return the base of a problem: a form with its laws, its references fixed by the scales of the recordings.
+    """Return the base of a problem: a form with its laws; the scales of the recordings fix its reference values.
 
     Parameters
     ----------
+    recordings
+        Concatenated tests.
+    form
+        Form of the damper.
     laws
         One for each block of the form; the first one serves further blocks.
     held
         Parameters that are not searched.
-    recordings
-        Tests laid end to end.
-    form
-        Form of the damper.
     """
     shapes = for_blocks(laws, len(form.blocks))
     fixed = {**form.constants(recordings.scales()), **(held or {})}
@@ -118,7 +118,7 @@ def base_of(
 
 
 def first_reference(base: Base, recordings: Recordings) -> tuple[Law, ...]:
-    """Return laws of the right size before anything is fitted: constant in the drive."""
+    """Return laws of the correct order of magnitude before anything is fitted; they are constant in the drive."""
     scales = recordings.scales()
     viscosity = constant_law(0.1 * scales.force / max(scales.speed, 1e-9))
     return tuple(viscosity if block == "c0" else constant_law(scales.force) for block in base.form.blocks)
@@ -127,7 +127,7 @@ def first_reference(base: Base, recordings: Recordings) -> tuple[Law, ...]:
 def first_problem(recordings: Recordings, base: Base) -> Problem:
     """Return the unweighted problem with no effect.
 
-    The laws that a coupled form reads are those of a simple hysteresis, because its post-yield force is much the same,
+    The laws that a coupled form reads are those of a fitted simple hysteresis, because its post-yield force is similar,
     or those of the form that it names (`begins_with`), fitted to the same tests.
     """
     scales = recordings.scales()
@@ -154,7 +154,7 @@ def start_points(problem: Problem) -> list[FloatArray]:
 
 
 def best_starts(problem: Problem, count: int) -> list[FloatArray]:
-    """Return the `count` starting points that leave least, the best first."""
+    """Return the `count` starting points with the smallest error, the best first."""
     w = weighting(problem)
     points = start_points(problem)
     costs = [solve(problem, point, w).cost for point in points]
@@ -162,12 +162,12 @@ def best_starts(problem: Problem, count: int) -> list[FloatArray]:
 
 
 def shared_values(found: Fit) -> dict[str, float]:
-    """Return the numbers of a base form that every base form has: those of the lag of the drive."""
+    """Return the parameters of a base form that all base forms share: those of the lag of the drive."""
     return {name: value for name, value in found.base_values.items() if name.startswith("eta")}
 
 
 def own_start(problem: Problem, found: Fit) -> FloatArray:
-    """Return the start that leaves least among the base form's own ones, with the terms and the lag of a fit.
+    """Return the best start of the base form, together with the terms and the lag of a fit.
 
     Parameters
     ----------
@@ -179,16 +179,16 @@ def own_start(problem: Problem, found: Fit) -> FloatArray:
     bare = replace(problem, terms=())
     shared = shared_values(found)
     points = [start_of(problem, bare.values(point)[0] | shared, found.term_values) for point in start_points(bare)]
-    # starts that differ in the lag alone are one start here
+    # starts that differ only in the lag are the same start here
     points = list({tuple(point): point for point in points}.values())
     w = weighting(problem)
     return min(points, key=lambda point: solve(problem, point, w).cost)
 
 
 def followed(problem: Problem, points: Sequence[FloatArray], starts: int, iterations: int) -> list[Fit]:
-    """Return fits from the points that promise most after a few steps, the best first.
+    """Return fits from the points that are best after a few steps, the best fit first.
 
-    What a point costs before the first step says little where two parts of a form can take each other's place.
+    The error before the first step is a poor measure if two parts of a form can replace each other.
     """
     if problem.base.form.coupled:
         # every step of a coupled form costs several searches
@@ -200,7 +200,7 @@ def followed(problem: Problem, points: Sequence[FloatArray], starts: int, iterat
 
 
 def best_fit(problem: Problem, *, starts: int = 2, iterations: int = 12, known: Known | None = None) -> Fit:
-    """Fit from the known fit of the base form, if there is one, else from the starting points that promise most."""
+    """Fit from the known fit of the base form, if there is one, else from the best starting points."""
     begun = known_start(problem, known)
     if begun is not None:
         return fit(*begun, iterations=iterations)
@@ -208,7 +208,7 @@ def best_fit(problem: Problem, *, starts: int = 2, iterations: int = 12, known: 
 
 
 def with_form(found: Fit, form: BaseForm) -> Problem:
-    """Return the problem of a fit with another base form, its laws and weights as they are."""
+    """Return the problem of a fit with another base form, and with the same laws and weights."""
     problem = found.problem
     base = problem.base
     held = form.constants(problem.scales)
@@ -220,7 +220,7 @@ def with_form(found: Fit, form: BaseForm) -> Problem:
 def fit_with_form(
     found: Fit, form: BaseForm, *, starts: int = 2, iterations: int = 12, known: Known | None = None
 ) -> Fit:
-    """Return the fit with another base form; the terms start where they are.
+    """Return the fit with another base form; the terms start at their fitted values.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def fit_with_form(
     starts, iterations
         See :func:`followed`.
     known
-        Where the search begins: at the known fit of the form, or at the form's own starts if there is none.
+        Known fits, from which the search begins; without one it begins at the starts of the form.
     """
     problem = with_form(found, form)
     shared = {name: value for name, value in found.base_values.items() if name in ("eta", "eta_fall")}

@@ -1,4 +1,4 @@
-"""What a fit found, as tables and plain numbers."""
+"""Results of a fit, as tables and plain numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mrpipe.fitting.start import distinct_levels
 
 
 def parameter_table(fit: FormFit) -> dict[str, dict[str, Any]]:
-    """Return name -> value, unit, standard error (None for what was not fitted) and whether it ended at a bound."""
+    """Return parameter -> value, unit, standard error (None if not fitted), and whether it ended at a bound."""
     rows: dict[str, dict[str, Any]] = {}
     for name, value in fit.model.parameters.items():
         error = fit.standard_error(name)
@@ -61,12 +61,12 @@ def thesis_table(fit: FormFit, A: float) -> dict[str, dict[str, Any]]:
 
 
 def number_or_none(value: float) -> float | None:
-    """Return the number, None where it is none (no test of the role): JSON knows no NaN."""
+    """Return the number, or None for NaN (no test of the role), because JSON has no NaN."""
     return float(value) if np.isfinite(value) else None
 
 
 def comparison_rows(judged: Sequence[JudgedFit]) -> list[dict[str, Any]]:
-    """Return a row a form, the one with the smallest validation error first."""
+    """Return one row per form, the form with the smallest validation error first."""
     rows = [
         {
             "form": item.fit.form.name,
@@ -94,7 +94,7 @@ def _judged_error(row: dict[str, Any]) -> float:
 
 
 def correlation_rows(fit: FormFit, limit: float = 0.95) -> list[dict[str, Any]]:
-    """Return pairs of parameters that the data hardly separate (correlation above `limit`)."""
+    """Return pairs of parameters that the data hardly separate (absolute correlation above `limit`)."""
     return [
         {"parameters": [first, second], "correlation": correlation}
         for first, second, correlation in fit.correlated(limit)
@@ -102,7 +102,7 @@ def correlation_rows(fit: FormFit, limit: float = 0.95) -> list[dict[str, Any]]:
 
 
 def test_rows(judged: JudgedFit) -> list[dict[str, Any]]:
-    """Return a row a test: name, role, NRMSE and RMS error."""
+    """Return one row per test: name, role, NRMSE [1] and RMS error [N]."""
     return [
         {
             "name": score.name,
@@ -116,7 +116,7 @@ def test_rows(judged: JudgedFit) -> list[dict[str, Any]]:
 
 
 def findings(fit: FormFit) -> list[str]:
-    """Return what the user should know of a fit, a line each."""
+    """Return findings on a fit for the user, one line each."""
     lines = []
     problem = fit.fit.problem
     if not problem.base.lag_known:
@@ -127,20 +127,22 @@ def findings(fit: FormFit) -> list[str]:
     lines += [f"{fit.form.name}: {note}" for note in fit.notes]
     # a parameter that a note mentions needs no separate line
     silent = [name for name in fit.at_bound if not any(name in note for note in fit.notes)]
-    lines += [f"{fit.form.name}: {name} ended at its bound, the data do not determine it" for name in silent]
+    lines += [f"{fit.form.name}: {name} ended at its bound, because the data do not determine it" for name in silent]
     levels = distinct_levels(problem.recordings)
     if levels < 4:
         count = "1 level" if levels == 1 else f"{levels} levels"
-        lines.append(f"{count} of drive: the yield force is {problem.base.laws[0].name} in it")
+        lines.append(f"{count} of drive: as a function of the drive the yield force is {problem.base.laws[0].name}")
     drive = np.linspace(0.0, problem.scales.drive, 50)
     strength = fit.model.yield_force(drive)
     if np.any(np.diff(strength) < -0.02 * np.max(np.abs(strength))):
-        lines.append("the yield force falls with the drive somewhere on its range: an inverse is not unique there")
+        lines.append(
+            "the yield force falls with the drive in a part of the range, so that the inverse is not unique there"
+        )
     return lines
 
 
 def law_summary(comparison: Comparison, chosen: JudgedFit) -> dict[str, Any] | None:
-    """Return the laws of the drive, why they were chosen, and their predictions with deviations; None if not asked."""
+    """Return the laws of the drive, the reason for the choice, and their predictions; None if none were chosen."""
     choice = comparison.laws
     if choice is None:
         return None
@@ -157,7 +159,7 @@ def law_summary(comparison: Comparison, chosen: JudgedFit) -> dict[str, Any] | N
 
 
 def rank_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return a row for each form that was ranked: its error on the share of the samples, and whether it was fitted."""
+    """Return one row per ranked form: its error on a share of the samples, and whether it was fitted to all."""
     fitted = {item.fit.form.name for item in comparison.judged}
     rows = [{"form": name, "draft_nrmse": error, "fitted": name in fitted} for name, error in comparison.drafts.items()]
     return sorted(rows, key=lambda row: float(row["draft_nrmse"]))

@@ -1,7 +1,7 @@
-"""Weights of the samples that a fit compares, and rows that are weighted and centred with them in one compiled loop.
+"""Weights of the samples that a fit compares, and compiled weighting and centring of rows.
 
-Each test has an offset. The best offset makes the weighted mean of the residual zero, so that an offset is projected
-out of a row by taking the weighted mean of each test off.
+Each test has an offset. With the best offset the weighted mean of the residual is zero. An offset is therefore
+projected out of a row by subtracting the weighted mean of each test.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ class Weighting:
     Attributes
     ----------
     at
-        Places of the samples compared, shape (m,).
+        Indices of the samples that are compared, shape (m,).
     root
         Square roots of their weights, shape (m,) [1/N].
     starts
-        Where each test begins among them, and their number, shape (tests + 1,).
+        Position of the first sample of each test among them, and m, shape (tests + 1,).
     sums
         Sum of the weights of each test, shape (tests,) [1/N^2].
     test
-        Test of each sample compared, shape (m,).
+        Index of the test of each of these samples, shape (m,).
     samples
         Number of all samples, n.
     target
-        Weighted force without its weighted mean in each test, shape (m,).
+        Weighted force minus its weighted mean in each test, shape (m,) [1].
     target_means
         Weighted mean of the force in each test, shape (tests,) [N].
     """
@@ -50,7 +50,7 @@ class Weighting:
 
 
 def weighting(problem: Problem) -> Weighting:
-    """Return the samples that a problem compares, their weights, and the measured force at them."""
+    """Return the samples that a problem compares, with their weights and the measured force."""
     at = np.flatnonzero(problem.root_weight)
     root = np.ascontiguousarray(problem.root_weight[at])
     test = problem.recordings.test[at] if problem.offsets else np.zeros(len(at), dtype=np.int64)
@@ -78,10 +78,10 @@ def centred(columns: FloatArray, w: Weighting) -> tuple[FloatArray, FloatArray]:
     Raises
     ------
     ValueError
-        If the rows are not at all samples: compiled code does not examine its bounds.
+        If the rows do not have n samples. The compiled code does not check array bounds.
     """
     if columns.shape[1] != w.samples:
-        raise ValueError(f"the rows have {columns.shape[1]} samples, the weighting is of {w.samples}")
+        raise ValueError(f"the rows have {columns.shape[1]} samples, but the weighting is for {w.samples} samples")
     return _centred(columns, w.at, w.root, w.starts, w.sums)
 
 

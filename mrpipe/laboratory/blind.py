@@ -75,10 +75,10 @@ def record_blind(
         Machine and sensors.
     vary
         Log-normal spread of the damper's numbers about its set.
-    declared
-        Effects that campaign.yaml names.
     damper
         The true damper.
+    declared
+        Effects that campaign.yaml names.
 
     Raises
     ------

@@ -145,8 +145,12 @@ def run_structure(
         inputs linear within the step `h` [s].
     w, drift_rows
         Damper's connectivity, shape (d,), and drift of each storey, shape (floors, d).
+    floors
+        Number of floors.
     ground
         Ground acceleration on the fine clock, shape (m,) [m/s2].
+    h
+        Time step [s].
     every
         Fine steps a recorded sample.
     storey_codes, storey_values
@@ -159,10 +163,6 @@ def run_structure(
         Of :class:`~mrpipe.control.controller.Controller`.
     sensor_noise
         What the controller's sensors add, shape (ticks, 4 + floors), in the order of its measurements.
-    floors
-        Number of floors.
-    h
-        Time step [s].
 
     Returns
     -------

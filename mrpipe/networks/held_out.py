@@ -25,14 +25,14 @@ class TrainingData:
 
     Attributes
     ----------
+    spec
+        Features and target.
     fit_rows, held_rows, every_row
         Feature rows and targets, SI: to be fitted, held out, and of all records.
     scaling
         Their normalisation, from all training records.
     held_out
         Names of the held-out records.
-    spec
-        Features and target.
     """
 
     spec: FeatureSpec

@@ -41,22 +41,22 @@ class Manifest:
 
     Attributes
     ----------
-    outputs
-        File, relative to the run directory -> digest: artifacts, and the stage's part of the report.
-    skipped
-        Why the stage was skipped or has failed; empty if it ran.
-    failed
-        What went wrong, in one line: of the whole stage where `skipped` says the same, else of a part of it.
     stage
         Name of the stage.
     key
         What its result depends on.
+    outputs
+        File, relative to the run directory -> digest: artifacts, and the stage's part of the report.
     summary
         Summary that the stage printed.
     warnings
         Warnings of the stage.
+    skipped
+        Why the stage was skipped or has failed; empty if it ran.
     seconds
         Wall time.
+    failed
+        What went wrong, in one line: of the whole stage where `skipped` says the same, else of a part of it.
     """
 
     stage: str

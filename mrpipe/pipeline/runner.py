@@ -35,17 +35,17 @@ class Pipeline:
         Name -> stage, in order.
     run_directory
         Where artifacts, manifests, log, figures, tables and report go.
+    logger
+        Takes the log lines.
     jobs
         Processes to use.
-    keep_going
-        A stage that fails does not end the run: stages that need it are skipped, all others are built.
+    quiet
+        Show no progress.
     campaign_given
         The user named a campaign on the command line. Data of the virtual laboratory are then used only if a stage
         requires them, or if they exist already.
-    logger
-        Takes the log lines.
-    quiet
-        Show no progress.
+    keep_going
+        A stage that fails does not end the run: stages that need it are skipped, all others are built.
     force
         Stages that are built even where nothing changed.
     outcomes

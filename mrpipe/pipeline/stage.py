@@ -27,6 +27,8 @@ class StageContext:
 
     Attributes
     ----------
+    stage
+        Name of the stage.
     settings
         Attribute access to the declared sections: `context.settings.prepare.cutoff_hz`. Others raise LookupError.
     inputs
@@ -36,6 +38,8 @@ class StageContext:
         The run directory; outputs are named relative to it.
     rng
         Generator seeded from the run's seed and the stage's name.
+    seed
+        Of the run.
     jobs
         How many processes may be used (does not change results).
     progress
@@ -44,10 +48,6 @@ class StageContext:
         The stage's part of the report.
     log
         Log lines of the run.
-    stage
-        Name of the stage.
-    seed
-        Of the run.
     provenance
         Written into every artifact.
     warnings
@@ -124,13 +124,13 @@ class Stage:
         Dotted names of the settings read: whole sections (`prepare`) or single ones (`simulate.excitation`).
     outputs
         Files (or directories) written, relative to the run directory; the first is the stage's artifact.
-    public_data
-        Folders of the public measurements ($MRPIPE_DATA) that the stage reads; they count by content.
     after
         Stages (or families of stages) that `mrpipe run` and `status` list before this one, in addition to those whose
         results it reads.
     family
         Command that this stage is one choice of (`simulate` for `simulate-vd`). Empty: the stage is a command itself.
+    public_data
+        Folders of the public measurements ($MRPIPE_DATA) that the stage reads; they count by content.
     check
         Checks the declared settings before anything is built for the stage; raises UserError if they are wrong.
     """

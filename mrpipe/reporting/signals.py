@@ -58,10 +58,10 @@ def prepared_history(
         Shape (n,).
     before, after
         Channel -> shape (n,); channels of `after` alone (velocity) are drawn without a measured curve.
-    cycles
-        Start indices of the steady cycles and the end of the last one; may be empty.
     units
         Channel -> unit.
+    cycles
+        Start indices of the steady cycles and the end of the last one; may be empty.
     """
     names = list(after)
     figure, axes = figure_with_axes(len(names), 1, height=1.5)

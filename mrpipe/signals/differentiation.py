@@ -45,16 +45,16 @@ def savitzky_golay(
 
     Parameters
     ----------
-    window_s
-        Length of the window [s]; widened to degree + 2 samples where shorter, and cut to the record.
-    derivative
-        1 for velocity, 2 for acceleration.
     values
         Shape (n,).
     dt
         Sampling interval [s].
+    window_s
+        Length of the window [s]; widened to degree + 2 samples where shorter, and cut to the record.
     degree
         Of the polynomial.
+    derivative
+        1 for velocity, 2 for acceleration.
     """
     longest = values.size - 1 + values.size % 2
     length = min(max(round(window_s / dt) | 1, (degree + 2) | 1), longest)

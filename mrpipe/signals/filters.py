@@ -39,13 +39,13 @@ def butterworth_lowpass(
         Shape (n,).
     cutoff_hz
         Frequency of half power (-3 dB), for either phase; see :func:`usable_cutoff`.
-    phase
-        `zero` filters forwards and backwards (the design is widened so that half power stays at the cut-off); `causal`
-        filters forwards only, and is late (errata D: 11 ms at 20 Hz, 2.2 ms at 100 Hz).
     sampling_rate_hz
         Of the values.
     order
         Of the filter.
+    phase
+        `zero` filters forwards and backwards (the design is widened so that half power stays at the cut-off); `causal`
+        filters forwards only, and is late (errata D: 11 ms at 20 Hz, 2.2 ms at 100 Hz).
 
     Returns
     -------

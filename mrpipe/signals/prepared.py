@@ -21,13 +21,25 @@ class PreparedTest:
         As in campaign.yaml (training, validation, repeat).
     sampling_rate_hz
         Working rate.
+    time_s
+        Clock, shape (n,) [s].
+    displacement_m
+        Filtered, without offset, shape (n,).
+    velocity_m_s
+        Shape (n,).
+    acceleration_m_s2
+        Shape (n,).
     drive
         Coil current [A] or voltage [V], see `drive_unit`.
+    force_n
+        Filtered, without offset, shape (n,).
     force_raw_n, displacement_raw_m
         Offset-free but unfiltered, for estimators that bring their own noise model.
     cycles
         Start indices of the steady cycles at upward zero crossings of displacement, with the end of the last one;
         empty where the motion is not periodic.
+    drive_unit
+        A or V.
     excitation
         `periodic` or `random`.
     drive_is_set_point
@@ -46,18 +58,6 @@ class PreparedTest:
     recorded_step_m, recorded_dither_m
         Step of the displacement as recorded, and its noise before rounding, if the noise was removed since; 0 if it was
         not. Not written to the artifact.
-    time_s
-        Clock, shape (n,) [s].
-    displacement_m
-        Filtered, without offset, shape (n,).
-    velocity_m_s
-        Shape (n,).
-    acceleration_m_s2
-        Shape (n,).
-    force_n
-        Filtered, without offset, shape (n,).
-    drive_unit
-        A or V.
     """
 
     name: str

@@ -55,10 +55,10 @@ class LoopOptions:
         Lag of the current driver in addition to that of the damper's model; 0: none.
     noise
         Of the sensors.
-    fault
-        Of the sensors; None: none.
     record_rate_hz
         Rate of the histories in the response.
+    fault
+        Of the sensors; None: none.
     """
 
     plant_rate_hz: float = _SETTINGS.plant_rate_hz

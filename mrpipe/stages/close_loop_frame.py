@@ -78,7 +78,7 @@ def _write(context: StageContext, traced: StructureTracing) -> None:
 def _stage(*inputs: str) -> Stage:
     return Stage(
         name="close-loop",
-        summary="Trace the residual of a structure to a missing effect, add it, and judge it before and after.",
+        summary="Trace the residual of a structure to a missing effect, add it, and report the error before and after.",
         run=_run,
         inputs=inputs,
         settings=("close_loop",),

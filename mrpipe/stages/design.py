@@ -92,7 +92,7 @@ def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, Dam
 
 STAGE = Stage(
     name="design",
-    summary="Find the law and gains with the smallest largest response over frequency and amplitude.",
+    summary="Find the control law and gains whose largest response over frequency and amplitude is smallest.",
     run=_run,
     inputs=("identify-frame", "calibrate"),
     conditional_inputs=LOOP_INPUTS,

@@ -44,7 +44,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 VARIANTS = (
     Stage(
         name="design",
-        summary="Find the gains of several dampers with the smallest largest response over frequency and amplitude.",
+        summary="Find the gains of several dampers whose largest response over frequency and amplitude is smallest.",
         run=_run,
         inputs=("identify-frame", "calibrate"),
         after=("simulate",),

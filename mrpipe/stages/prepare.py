@@ -47,7 +47,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 STAGE = Stage(
     name="prepare",
-    summary="Filter, remove offsets, differentiate, find the steady cycles.",
+    summary="Filter the measured tests, remove offsets, differentiate, and find the steady cycles.",
     run=_run,
     inputs=("campaign:bench",),
     after=("record-frame",),

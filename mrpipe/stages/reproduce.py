@@ -81,7 +81,7 @@ def _case_options(context: StageContext) -> CaseOptions:
 
 STAGE = Stage(
     name="reproduce",
-    summary="Recompute the results of the thesis and say which hold.",
+    summary="Recompute the results of the thesis, and give a verdict for each.",
     run=_run,
     conditional_inputs=tuple(("reproduce.source", "run", name) for name in READ),
     settings=("reproduce", "simulate", "benchmark"),

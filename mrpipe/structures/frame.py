@@ -24,12 +24,12 @@ class Frame:
         For tables.
     influence
         Displacement of each degree of freedom when the ground moves by 1 m, r, shape (n,) [1]; None: ones.
-    influence_y
-        The same for ground motion in the second direction; None: the structure has one direction.
     degrees_of_freedom
         Names of the degrees of freedom, length n; empty: `floor 1` and so on.
     modal_coordinates
         How many of the last coordinates are amplitudes of modes, as after a Craig-Bampton reduction.
+    influence_y
+        The same for ground motion in the second direction; None: the structure has one direction.
     """
 
     mass: FloatArray

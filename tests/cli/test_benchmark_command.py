@@ -118,7 +118,7 @@ def test_table_puts_the_thesis_beside_ours() -> None:
     row = next(line for line in text.splitlines() if line.startswith("J1"))
     assert row.split() == ["J1", "0.5", "[0.63]", "0.7"]
     assert "kobe (surrogate model)" in text
-    assert "why ours differ: reasons" in text
+    assert "why the values differ from the thesis: reasons" in text
 
 
 @pytest.mark.property

@@ -68,10 +68,10 @@ class StructuralEffect(Described):
     ----------
     acts_on
         Where it acts.
-    places
-        `all`: every storey with its own amplitude; `one`: the place is searched for.
     forms
         One or several functional shapes.
+    places
+        `all`: every storey with its own amplitude; `one`: the place is searched for.
     separated_by
         Other effect -> test that separates the two.
     """

@@ -29,8 +29,6 @@ class Routine:
 
     Attributes
     ----------
-    python
-        The function itself.
     name
         Unique name in the target.
     tree
@@ -41,6 +39,8 @@ class Routine:
         Names of numbers of its module -> value.
     calls
         Names of other routines in its text -> routine.
+    python
+        The function itself.
     written
         Arrays among the arguments that it (or what it calls) changes.
     measured

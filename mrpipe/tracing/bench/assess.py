@@ -1,6 +1,6 @@
-"""Results for the chosen effects: names with probabilities, further terms, and the verdict on the validation tests.
+"""From the chosen effects to names with probabilities, further terms, and the verdict on the validation tests.
 
-An effect is named only if it is more likely there than not. The others stay in the model as further terms.
+An effect is named only if it is more likely present than absent. The others remain in the model as further terms.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mrpipe.tracing.options import NamingRules, TracingOptions
 
 @dataclass(frozen=True)
 class Case:
-    """What does not change while the names are decided.
+    """Data that do not change while the names are decided.
 
     Attributes
     ----------
@@ -36,9 +36,9 @@ class Case:
     options
         Of the tracing.
     ordered
-        The tests with what was found wrong with them.
+        The tests, sorted, with the faults that were found in them.
     declared
-        How many terms the campaign declares: they come first and are part of the baseline.
+        Number of terms that the campaign declares. They come first and are part of the baseline.
     offsets
         Offset that differs between tests; None if there is none.
     jobs
@@ -64,13 +64,13 @@ class Assessment:
     named
         The named terms of the model with their evidence, in their order.
     causes
-        What is named, with probabilities: the named terms, and an offset between tests.
+        What the verdict names, with probabilities: the named terms, and an offset between tests.
     further
-        Terms whose cause is not proven.
+        Terms of the model whose cause is not proven.
     missing
         Whether the residual of the training tests holds more than noise.
     found, alone
-        Errors on the validation tests: of the whole model, and without the further terms.
+        Errors on the validation tests of the whole model, and of the model without further terms.
     judgement
         Verdict on the named effects alone: further terms do not explain anything.
     """
@@ -105,15 +105,16 @@ def assess(
     selection
         Named effects with their fit, and further terms.
     case
-        Everything else.
+        Data that do not change.
     gains
-        Of the named effects on tests that were left out.
+        Gains of the named effects on tests that were left out.
     reason
         Why nothing is named; empty if something is.
     rng
         Source of randomness.
     several
-        Whether effects were named together that are further terms now: the others remain as uncertain as before.
+        Whether several effects were named together before some of them became further terms; the remaining ones keep
+        the lower probability of several effects.
     """
     options, baseline, offsets = case.options, case.choice.baseline, case.offsets
     proven = selection.with_named_alone
@@ -142,11 +143,11 @@ def assess(
 def with_likely_names(
     selection: Selection, case: Case, gains: Sequence[Gain | None], reason: str, rng: np.random.Generator
 ) -> tuple[Selection, Assessment]:
-    """Return the selection with the names that are more likely there than absent, and its assessment.
+    """Return the selection with the names that are more likely present than absent, and its assessment.
 
-    A name that is too unlikely goes, and its effect becomes a further term. That changes the probabilities of the other
-    names, so that they are assessed again until every one is likely enough. Further terms that do not lower the error
-    on the validation tests are left out.
+    An effect whose probability is too low loses its name and becomes a further term. This changes the probabilities of
+    the other names, so that they are assessed again until every probability is high enough. Further terms that do not
+    lower the error on the validation tests are left out.
 
     Parameters
     ----------
@@ -174,12 +175,12 @@ def with_likely_names(
 
 
 def _unlikely(found: Assessment, rules: NamingRules) -> tuple[int, ...]:
-    """Return the places of the named terms that are less likely there than `least_probability`."""
+    """Return the indices of the named terms whose probability is below `least_probability`."""
     return tuple(k for k in range(len(found.named)) if found.causes[k].confidence < rules.least_probability)
 
 
 def _unlikely_reason(doubts: Sequence[Named]) -> str:
-    """Return why nothing is named, where every name is too unlikely."""
+    """Return why nothing is named, if the probability of every name is too low."""
     names = ", ".join(f"{item.effect.name} (probability {item.confidence:.2f})" for item in doubts)
     said = "lowers the error, but is" if len(doubts) == 1 else "lower the error, but each of them is"
     return f"no effect is named: {names} {said} more likely absent than present"

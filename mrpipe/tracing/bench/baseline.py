@@ -1,4 +1,4 @@
-"""The baseline: the declared model with its declared effects, its weights, the noise floor, and the ladder of forms."""
+"""The baseline: the declared model, its weights, the noise floor, and fits of the base forms that are always listed."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, force_deviation, 
 from mrpipe.tracing.rules import NoiseRules
 
 LISTED_FORMS = ("bouc-wen", "bouc-wen-n", "dahl", "yielding-part")
-"""Base forms whose errors are always listed."""
+"""Base forms whose errors are always listed in the result."""
 
 DEFAULT_OF_FAMILY = {"rate-dependent-yield": "yielding-part"}
-"""The form that stands for a family where the settings name the family."""
+"""Family of base forms -> form that is used if the settings name the family."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Baseline:
     fit
         The fit; its problem holds the declared effects.
     noise
-        Mean square of the weighted residual that noise alone would leave.
+        Mean square of the weighted residual that noise alone causes.
     deviation
         Standard deviation of the force that noise explains [N], shape (n,).
     scale
-        By how much the noise exceeds what the channels show.
+        Factors by which the noise exceeds the white noise of the channels.
     model_error
-        Whether the weights follow from the error of the model, because it exceeds the noise.
+        Whether the weights follow from the expected error of the model, because it exceeds the noise.
     """
 
     fit: Fit
@@ -54,14 +54,14 @@ class Baseline:
 
 
 def form_name(model: str) -> str:
-    """Return the name of the base form that the setting `model` stands for."""
+    """Return the name of the base form that the setting `model` refers to."""
     return DEFAULT_OF_FAMILY.get(model, model)
 
 
 def declared_base(
     recordings: Recordings, name: str, yield_order: int, viscosity_order: int, form_files: Sequence[Path] = ()
 ) -> Base:
-    """Return the declared form with laws of the drive that its levels determine.
+    """Return the declared form with laws of the drive that the levels of drive determine.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ def fit_baseline(
     base
         Declared form.
     declared
-        Effects that belong to the baseline; each in the form that fits best.
+        Effects that belong to the baseline; each is taken in the form that fits best.
     model_error_share
-        Expected model error as a share of the RMS force: on real recordings it exceeds the sensors' noise.
+        Expected model error, as a share of the RMS force; on real recordings it exceeds the sensor noise.
     rules
         Thresholds of the noise; their defaults if None.
     known
-        Base forms as they were fitted to the same tests before: where the search begins.
+        Base forms that were fitted to the same tests before; the search starts from them.
     """
     rules = rules or NoiseRules()
     problem = first_problem(recordings, base)
@@ -124,7 +124,7 @@ def fit_baseline(
         found = _weighted(found, recordings, model_error_share, rules)
     scale = noise_scale(found, rules)
     if scale != AS_SHOWN:
-        # noise that only repeated motion shows counts in the weights as well
+        # noise that is visible only in repeated motion is part of the weights, too
         found = _weighted(found, recordings, model_error_share, rules, scale)
         scale = noise_scale(found, rules)
     deviation = force_deviation(found, recordings, model_error_share, scale, rules)
@@ -150,7 +150,7 @@ def _with_declared(before: Fit, effect: Effect) -> Fit:
 
 
 def noise_level_of(found: Fit, scale: NoiseScale) -> float:
-    """Return the mean square of the weighted residual that noise leaves."""
+    """Return the mean square of the weighted residual that noise alone causes."""
     root = found.problem.root_weight
     used = root > 0.0
     return float(np.mean((root[used] * sensor_deviation(found, found.problem.recordings, scale)[used]) ** 2))

@@ -1,4 +1,4 @@
-"""The recoverable part of a residual: boosted trees on lagged states, judged on samples they have not seen."""
+"""The recoverable part of a residual: boosted trees on lagged states, judged on samples left out of the training."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from mrpipe.tracing.bench.crossvalidation import folds_of
 from mrpipe.tracing.bench.residual_structure import states_of
 
 LAGS = (0.015, 0.045, 0.15, 0.45)
-"""Numerical technique: lags of the states that the flexible model sees, in periods of the middle training test."""
+"""Numerical technique: lags of the states that the flexible model reads, in periods of the median training test."""
 
 MOST_ROWS = 15_000
-"""Numerical technique: samples that the flexible model is trained on."""
+"""Numerical technique: largest number of samples that the flexible model is trained on."""
 
 PIECES = 8
-"""Numerical technique: pieces of a validation record; each is predicted by a model that has not seen it."""
+"""Numerical technique: pieces of a validation record; each is predicted by a model that was trained without it."""
 
 PARTS = 4
 """Numerical technique: parts of the cross-fitting: pieces 0, 4, then 1, 5, ... are left out together."""
@@ -32,18 +32,18 @@ DRAWS = 200
 
 @dataclass(frozen=True)
 class Ceiling:
-    """Residual of a flexible model that has learnt from every validation condition.
+    """Residual of a flexible model that was trained on a part of every validation record.
 
     Attributes
     ----------
-    error
-        Measured less predicted force [N], shape (n,), of pieces left out.
-    piece
-        Piece of each sample, shape (n,).
     recordings
         Validation tests.
     measured
         Measured force without offset [N], shape (n,).
+    error
+        Measured minus predicted force [N] of pieces left out, shape (n,).
+    piece
+        Index of the piece of each sample, shape (n,).
     """
 
     recordings: Recordings
@@ -69,22 +69,22 @@ def cross_fitted(
     found: Fit, training: Recordings, residual: FloatArray, validation: Recordings, measured: FloatArray,
     simulated: FloatArray, *, seed: int = 0, iterations: int = 60,
 ) -> Ceiling:  # fmt: skip
-    """Return the residual of a flexible model on pieces of the validation records that it has not seen.
+    """Return the residual of a flexible model on pieces of the validation records that were left out of its training.
 
-    It learns from the training tests and from the other pieces of the same record: first a gain, a lag and an offset
-    of that record, then trees on the simulated states. It therefore learns every validation condition, unlike a model
-    of the training tests.
+    The model is trained on the training tests and on the other pieces of the same record: first a gain, a lag and an
+    offset of that record, then trees on the simulated states. Unlike a model of the training tests alone, it can
+    therefore represent every validation condition.
 
     Parameters
     ----------
     found
-        The fit whose simulated states the trees see.
-    residual
-        Measured less simulated force of the training tests [N], shape (n,), 0 where not compared.
-    validation, measured, simulated
-        Validation tests, their offset-free force and the simulated one [N], shape (m,).
+        The fit whose simulated states are the inputs of the trees.
     training
         Training tests.
+    residual
+        Measured minus simulated force of the training tests [N], shape (n,); 0 at samples that are not compared.
+    validation, measured, simulated
+        Validation tests, their offset-free force and the simulated one [N], shape (m,).
     seed
         Of the trees.
     iterations
@@ -113,14 +113,14 @@ def cross_fitted(
         left[judged] = rest[judged] - trees.predict(states[judged])
     for test in range(validation.tests):
         own = validation.test == test
-        # where nothing can be learnt, a flexible model increases the error
+        # if the residual has no structure, a flexible model increases the error
         options = (target[own], plain[own], left[own])
         left[own] = min(options, key=lambda item: float(item @ item))
     return Ceiling(validation, measured, left, piece)
 
 
 def _record_columns(recordings: Recordings, simulated: FloatArray) -> FloatArray:
-    """Return force, its rate and one, each of about unit size: gain, lag and offset of a record."""
+    """Return force, rate of the force, and one, each scaled to about 1: regressors of gain, lag and offset."""
     rate = np.zeros(len(simulated))
     for test in range(recordings.tests):
         own = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
@@ -130,7 +130,7 @@ def _record_columns(recordings: Recordings, simulated: FloatArray) -> FloatArray
 
 
 def _without_record_fit(recordings: Recordings, columns: FloatArray, target: FloatArray, seen: BoolArray) -> FloatArray:
-    """Return the target less a linear fit of each record to its samples that are seen."""
+    """Return the target minus a linear fit of each record to its samples that are not left out."""
     rest = target.copy()
     for test in range(recordings.tests):
         inside = recordings.test == test
@@ -147,10 +147,10 @@ def _pieces(recordings: Recordings) -> IntArray:
 
 
 def lagged_states(found: Fit, recordings: Recordings) -> FloatArray:
-    """Return states of the simulated damper and their past, shape (n, features); no measured force among them."""
+    """Return states of the simulated damper and their past, shape (n, features), without the measured force."""
     values = states_of(found, recordings).values
     columns = [values[name] for name in values if name != "direction"]
-    # the same times in all tests, because delays of a rig do not depend on the motion
+    # the lags are the same times in all tests, because delays of a rig do not depend on the motion
     period = float(np.median(found.problem.recordings.motion_period_s))
     for lag in LAGS:
         shift = np.round(lag * period / recordings.dt).astype(np.int64)[recordings.test]
@@ -168,16 +168,16 @@ def flexible_residual(
     seed: int = 0,
     iterations: int = 100,
 ) -> FloatArray:
-    """Return what a flexible model, fitted to the residual [N] of the training tests, predicts on the validation tests.
+    """Return the prediction on validation tests of a flexible model that is fitted to the training residual [N].
 
     Parameters
     ----------
     found
-        The fit whose residual it is; its simulated states are what the trees see.
-    residual
-        Residual force of the training tests [N], shape (n,), 0 where not compared.
+        The fit whose residual it is; its simulated states are the inputs of the trees.
     training
         Training tests.
+    residual
+        Residual force of the training tests [N], shape (n,); 0 at samples that are not compared.
     validation
         Validation tests.
     seed
@@ -214,7 +214,7 @@ def _trees(seed: int, iterations: int) -> HistGradientBoostingRegressor:
 
 
 def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations: int = 80) -> float:
-    """Return the mean square of a fit's weighted residual after a flexible model, on whole tests left out."""
+    """Return the mean square of the weighted residual minus a flexible model, on whole tests left out."""
     problem = found.problem
     used = problem.root_weight > 0.0
     features, target = lagged_states(found, problem.recordings), found.residual

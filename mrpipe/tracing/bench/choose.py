@@ -1,4 +1,8 @@
-"""From the baseline to a base form and effects: one race with weights by noise, and where needed one by force."""
+"""From the baseline to a base form and effects, by comparison of models (the race).
+
+The first race has weights by the noise of the sensors. If the error of all models exceeds this noise, a second race has
+weights by the force.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +33,10 @@ from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
 
 ROUNDED_FORM = "yielding-part"
-"""The filter of the records is judged with this base form, because a rounded yield rounds the corners of a loop too."""
+"""Base form with which the filter of the recorder is judged, because a rounded yield rounds the loops too."""
 
 PROMOTED = 3
-"""Numerical technique: candidates of a round that are fitted to all training tests; the others keep the draft ..."""
+"""Numerical technique: candidates of a round that are fitted to all training tests (others: draft only) ..."""
 
 PROMOTED_STEPS = 6
 """Numerical technique: ... and iterations of these fits."""
@@ -40,16 +44,16 @@ PROMOTED_STEPS = 6
 
 @dataclass(frozen=True)
 class Choice:
-    """What was chosen.
+    """Result of the choice of a model.
 
     Attributes
     ----------
     baseline
-        Baseline with the weights that were used.
+        Baseline, with the weights that were used.
     selection
         Base form and effects, fitted to all training tests.
     race
-        The models that competed; None where nothing is missing.
+        The models that were compared; None if nothing is missing.
     """
 
     baseline: Baseline
@@ -88,15 +92,15 @@ def choose_model(
     declared
         Effects that belong to the baseline.
     options
-        How it is traced.
+        Options of the tracing.
     known
-        Base forms as they were fitted to the same tests before: where the search of each begins.
+        Base forms that were fitted to the same tests before; the search of each starts from them.
     rng
         Source of randomness.
     jobs
         Threads.
     progress
-        Called with the share done and a text.
+        Called with the share of the work that is done (0 to 1) and a text.
     """
     baseline, floor, weighed = first, options.model_error_share, False
     if floor > 0.0:
@@ -106,7 +110,7 @@ def choose_model(
         selection = choice.selection
         quieter = None if weighed or floor > 0.0 or choice.race is None else _quieter(choice, options.rules)
         if quieter is not None:
-            # what an effect changes from cycle to cycle looked like noise until the effect was found
+            # changes from cycle to cycle that an effect causes looked like noise until the effect was found
             baseline, weighed = quieter, True
             continue
         if choice.race is not None:
@@ -119,7 +123,7 @@ def choose_model(
         if _near_the_noise(selection, baseline.noise, len(declared), options, rng, jobs):
             baseline, selection = _with_noise_of(selection.chosen, baseline, selection, options.rules.noise)
             return replace(choice, baseline=baseline, selection=replace(selection, extension=extension()))
-        # what remains on the force's own scale becomes the yardstick of a second race
+        # a second race judges by the error relative to the force
         chosen = selection.chosen
         used = chosen.problem.root_weight > 0.0
         left = chosen.residual[used] / chosen.problem.root_weight[used]
@@ -134,12 +138,14 @@ def choose_model(
 def _near_the_noise(
     selection: Selection, noise: float, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
 ) -> bool:
-    """Return whether the sensors' noise is the measure, for what was chosen or for a richer form of the same effect."""
+    """Return whether the error is of the size of the noise, with the chosen effects or a richer form of the same
+    effect.
+    """
     plain = selection.chosen.chi_square / max(noise, 1e-12)
     rules = options.rules.model_error
     if plain < rules.chi_square:
         return True
-    # the right effect in too plain a form may leave as much as a wrong base form does
+    # the right effect in too simple a form may leave as large an error as a wrong base form
     refined = with_richer_forms(
         selection,
         declared,
@@ -163,10 +169,10 @@ def _raced(
     jobs: int,
     progress: Progress,
 ) -> tuple[Choice, Callable[[], Fit | None]]:
-    """Run the race and fit its winner to all training tests; `weighed` if the weights are those of a winner already.
+    """Run the race and fit its winner to all training tests; `weighed`: the weights follow from an earlier winner.
 
-    The function that is returned with the choice fits the winner with further terms. It is expensive, and it is called
-    only if the race is not run again.
+    The function that is returned with the choice fits the winner with further terms. It takes long, and it is called
+    only if the race is not repeated.
     """
     rules = options.rules.selection_by_force if model_error else options.rules.selection
     least = options.rules.selection.nothing_missing
@@ -208,7 +214,7 @@ def _raced(
 def _extension(
     found: Race, winner: Model, selection: Selection, search: Callable[[Fit], Selection], rules: TracingRules
 ) -> Fit | None:
-    """Return the winner with further terms, fitted to all training tests; None where there are none.
+    """Return the winner with further terms, fitted to all training tests; None if there are none.
 
     Further terms improve the model although their cause is not proven.
     """
@@ -224,14 +230,14 @@ def _extension(
 
 
 def promoted(found: Race, winner: Model, base: Fit) -> Selection:
-    """Return the winner of a race with its rivals, fitted to all training tests.
+    """Return the winner of a race with its candidates, fitted to all training tests.
 
     Parameters
     ----------
     found
         The race.
     winner
-        Its chosen model.
+        Model that won the race.
     base
         Fit of the declared form to all training tests.
     """
@@ -274,9 +280,9 @@ def _on_all(
 def _with_noise_of(
     chosen: Fit, baseline: Baseline, selection: Selection, rules: NoiseRules
 ) -> tuple[Baseline, Selection]:
-    """Take the noise from the chosen fit: a poor model's errors do not all cancel between repeats.
+    """Estimate the noise from the chosen fit, because errors of a poor model do not cancel between repeats.
 
-    What the chosen model leaves is an upper bound of the noise.
+    The residual of the chosen model is an upper bound of the noise.
     """
     scale = noise_scale(chosen, rules)
     noise = noise_level_of(chosen, scale)
@@ -289,10 +295,10 @@ def _with_noise_of(
 
 
 def _noise_of_motion(baseline: Baseline) -> bool:
-    """Return whether most of the noise is that of the displacement, passed through the stiffness of the model.
+    """Return whether most of the noise of the force is noise of the displacement times the stiffness of the model.
 
-    A stiff base form turns the noise of the displacement into much force. Another form of the same damper may not, so
-    that such noise does not show that nothing is missing.
+    A stiff base form converts noise of the displacement to a large force. Another form of the same damper may not. Such
+    noise therefore does not show that nothing is missing.
     """
     force, motion = noise_variances(baseline.fit, baseline.fit.problem.recordings)
     used = baseline.fit.problem.recordings.used
@@ -302,10 +308,10 @@ def _noise_of_motion(baseline: Baseline) -> bool:
 def _with_noise_of_best(
     baseline: Baseline, singles: Mapping[str, Fit], rules: TracingRules
 ) -> tuple[Baseline, dict[str, Fit]]:
-    """Return baseline and base forms with weights and noise by the best base form, if it is clearly better.
+    """Return baseline and base forms with weights and noise from the best base form, if it is clearly better.
 
-    The noise of the displacement becomes noise of the force by the slope of the model, and repeated cycles show noise
-    only after a good model is subtracted.
+    The slope of the model converts noise of the displacement to noise of the force, and repeated cycles show noise only
+    after a good model has been subtracted.
     """
     base = baseline.fit
     best = min(singles.values(), key=lambda item: item.chi_square)
@@ -327,7 +333,7 @@ def _with_noise_of_best(
 
 
 def _weighed_by(baseline: Baseline, found: Fit, scale: NoiseScale, rules: NoiseRules) -> Baseline:
-    """Return the baseline with the weights and the noise that follow from another fit to all training tests."""
+    """Return the baseline with weights and noise from another fit to all training tests."""
     problem = baseline.fit.problem
     root = problem.recordings.used / force_deviation(found, problem.recordings, 0.0, scale, rules)
     noise = noise_level_of(replace(found, problem=replace(found.problem, root_weight=root)), scale)
@@ -336,14 +342,14 @@ def _weighed_by(baseline: Baseline, found: Fit, scale: NoiseScale, rules: NoiseR
 
 
 def _with_scale(baseline: Baseline, choice: Choice, rules: NoiseRules) -> Baseline:
-    """Return a baseline whose noise is that which the best model known shows, where this is less."""
+    """Return a baseline with the noise that the best known model shows, if this is less."""
     scale = noise_scale(choice.selection.chosen, rules)
     noise = noise_level_of(baseline.fit, scale)
     return replace(baseline, noise=noise, scale=scale) if noise < baseline.noise else baseline
 
 
 def _quieter(choice: Choice, rules: TracingRules) -> Baseline | None:
-    """Return the baseline weighed by the noise of the chosen model, if that is clearly less; else None."""
+    """Return the baseline weighted by the noise of the chosen model, if that is clearly less; else None."""
     chosen = choice.selection.chosen
     scale = noise_scale(chosen, rules.noise)
     noise = noise_level_of(chosen, scale)
@@ -353,7 +359,7 @@ def _quieter(choice: Choice, rules: TracingRules) -> Baseline | None:
 
 
 def _without_nuisances(baseline: Baseline, options: TracingOptions, known: Known | None) -> Baseline:
-    """Return the baseline with a drive lag that falls otherwise than it rises, and with the records' filter, if any."""
+    """Return the baseline with separate lags for a rising and a falling drive, and with the filter of the recorder."""
     found = with_lag_apart(baseline.fit, options.rules.nuisances)
     if options.observation_filter and bool(np.all(found.problem.recordings.period_s > 0.0)):
         share = observation_window(
@@ -365,11 +371,11 @@ def _without_nuisances(baseline: Baseline, options: TracingOptions, known: Known
 
 
 def judged_by_trees(selection: Selection, rules: ModelErrorRules) -> Selection:
-    """Judge shares by what a flexible model can recover, where the sensors' noise is far below any model's error."""
+    """Judge shares by what a flexible model can recover, if sensor noise is far below the error of any model."""
     fits = [selection.base, selection.chosen]
     reached = [flexible_chi_square(item) for item in fits[: 1 if fits[0] is fits[1] else 2]]
     floor = max(selection.noise, min(*reached, selection.chosen.chi_square, selection.base.chi_square))
     if floor > (1.0 - rules.flexible_share) * selection.base.chi_square:
-        # the trees learn nothing that holds on other tests: repeats and sensors are the better measure
+        # the trees find no structure that holds on other tests: repeats and sensors are the better measure
         return selection
     return selection.with_floor(floor)

@@ -1,7 +1,8 @@
-"""What is chosen, with the filter of the displacement and the rate of the fits that the chosen model itself prefers.
+"""Choice of a model, of the filter of the displacement, and of the rate of the fits.
 
 Before a model is chosen, simple base forms judge the filter, and the rate is given. Both can hide what the models lack.
-The chosen model judges them again, and everything is chosen again where another filter or rate leaves clearly less.
+Filter and rate are therefore judged again with the chosen model. If another filter or rate gives a clearly smaller
+error, everything is chosen again.
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ ITERATIONS = 15
 
 @dataclass(frozen=True)
 class Bench:
-    """What a tracing has at hand.
+    """Inputs of a tracing.
 
     Attributes
     ----------
     tests
         Training tests.
     effects, declared
-        The library, and the effects that belong to the baseline.
+        Effects of the library, and the effects that belong to the baseline.
     rng
         Source of randomness.
     jobs
@@ -46,7 +47,7 @@ class Bench:
     progress
         Called with the share done and a text.
     known
-        Base forms as they were fitted to the same tests before: where the search of each begins.
+        Base forms that were fitted to the same tests before; the search of each starts from them.
     """
 
     tests: Sequence[PreparedTest]
@@ -60,18 +61,18 @@ class Bench:
 
 @dataclass(frozen=True)
 class Start:
-    """Training tests as they are fitted, and the declared model on them.
+    """Training tests in the form in which they are fitted, and the fit of the declared model.
 
     Attributes
     ----------
     options
-        How it is traced, with the rate of the fits.
+        Options of the tracing, with the rate of the fits.
     filter
-        How the displacement is freed of noise.
+        Filter that removes noise from the displacement.
     training
-        The tests, end to end.
+        The tests, concatenated.
     able, reasons
-        Effects that these tests can show, and for each other one why they cannot.
+        Effects that these tests can show, and for every other effect the reason why they cannot.
     first
         Fit of the declared model.
     """
@@ -86,7 +87,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Chosen(Start):
-    """The same with what was chosen.
+    """The same, with the chosen base form and effects.
 
     Attributes
     ----------
@@ -103,9 +104,10 @@ class Chosen(Start):
 
 
 def begin(bench: Bench, options: TracingOptions) -> Start:
-    """Return the training tests with the declared model, and their displacement freed of noise.
+    """Return the training tests, with noise removed from the displacement, and the fit of the declared model.
 
-    The noise that all tests share is removed, or a low-pass is chosen for each test: simple base forms judge.
+    Either the noise that all tests share is removed, or a low-pass is chosen for each test. The error of simple base
+    forms decides.
     """
     way = MotionFilter()
     if options.displacement_cutoff_hz == 0.0:
@@ -122,7 +124,7 @@ def begin(bench: Bench, options: TracingOptions) -> Start:
 
 
 def choose(bench: Bench, begun: Start) -> Chosen:
-    """Return base form and effects, chosen again if another filter or rate leaves clearly less.
+    """Return base form and effects, chosen again if another filter or rate gives a clearly smaller error.
 
     Parameters
     ----------
@@ -137,7 +139,7 @@ def choose(bench: Bench, begun: Start) -> Chosen:
     if faster is not options:
         samples = round(MOST_SAMPLES * faster.fit_rate_hz / options.fit_rate_hz)
         again = _at(bench, faster, _better_filter(bench, found, faster), samples)
-        # a higher rate makes a model more accurate; it does not show that one more effect is there or one is missing
+        # a higher rate makes a model more accurate; it is no evidence for one effect more or one effect less
         if again.names == found.names or (
             len(again.names) == len(found.names) and _leaves_less(again, found, options.rules.nuisances.rate_gain)
         ):
@@ -157,7 +159,7 @@ def _at(
     samples: int = MOST_SAMPLES,
     names: Set[str] | None = None,
 ) -> Chosen:
-    """Return what is chosen with a rate and a filter; `names` limits the effects that are tried."""
+    """Return the choice with a given rate and filter; `names` limits the effects that are tried."""
     training = recorded(bench.tests, way, options, most_samples=samples)
     begun = _started(bench, options, way, training)
     if names is not None:
@@ -186,7 +188,7 @@ def _choose(bench: Bench, begun: Start) -> Chosen:
 
 
 def _better_filter(bench: Bench, found: Chosen, options: TracingOptions) -> MotionFilter:
-    """Return the filter with which the chosen model leaves clearly less, else the present one."""
+    """Return the filter with which the error of the chosen model is clearly smaller, else the present one."""
     if options.displacement_cutoff_hz > 0.0:
         return found.filter
     return better_filter(
@@ -201,16 +203,17 @@ def _better_filter(bench: Bench, found: Chosen, options: TracingOptions) -> Moti
 
 
 def validation_of(bench: Bench, begun: Start, unseen: Sequence[PreparedTest]) -> Recordings:
-    """Return the validation tests end to end, their displacement filtered as that of the training tests.
+    """Return the validation tests, concatenated, with the displacement filtered like that of the training tests.
 
-    A low-pass is no lower than the chosen model needs. Noise is removed with the density that the training tests show.
+    The cut-off of a low-pass is the highest one that does not raise the error of the chosen model. Shared noise is
+    removed with the spectral density that the training tests show.
 
     Parameters
     ----------
     bench
         What the tracing has at hand.
     begun
-        How the training tests are filtered; with the choice, if it has been made.
+        Training tests and their filter; with the choice, if it has been made.
     unseen
         Validation tests.
     """
@@ -230,10 +233,10 @@ def validation_of(bench: Bench, begun: Start, unseen: Sequence[PreparedTest]) ->
 
 
 def _at_better_rate(bench: Bench, found: Chosen) -> TracingOptions:
-    """Return the options with the rate at which the chosen model leaves clearly less, else the options themselves."""
+    """Return the options with the rate at which the error of the chosen model is clearly smaller, else unchanged."""
     choice, options = found.choice, found.options
     chosen, rules = choice.selection.chosen, options.rules
-    # where the model's error is the measure, it does not show whether something remains
+    # if weights follow from the error of the model, they do not show whether a structure remains
     near = chosen.chi_square < (1.0 + rules.refinement.worth_a_try) * choice.selection.noise
     if near and not choice.baseline.model_error:
         return options
@@ -249,14 +252,14 @@ def _at_better_rate(bench: Bench, found: Chosen) -> TracingOptions:
 
 
 def _leaves_less(again: Chosen, found: Chosen, gain: float) -> bool:
-    """Return whether what was chosen at a higher rate leaves clearly less there than what was chosen before.
+    """Return whether the choice at a higher rate has a clearly smaller error there than the choice before.
 
-    A reversal that takes a few samples of the lower rate can look like a delay between the channels.
+    A reversal that lasts a few samples of the lower rate can look like a delay between the channels.
 
     Parameters
     ----------
     again, found
-        Chosen at the higher and at the lower rate.
+        Choices at the higher and at the lower rate.
     gain
         Share by which the RMS of the residual must be lower.
     """
@@ -268,7 +271,7 @@ def _leaves_less(again: Chosen, found: Chosen, gain: float) -> bool:
 def recorded(
     tests: Sequence[PreparedTest], way: MotionFilter, options: TracingOptions, *, most_samples: int = MOST_SAMPLES
 ) -> Recordings:
-    """Return tests end to end, with the displacement freed of noise in a given way."""
+    """Return concatenated tests, with noise removed from the displacement in a given way."""
     return record_tests(
         way.applied(tests),
         rate_hz=options.fit_rate_hz,

@@ -1,4 +1,4 @@
-"""Faults of sensors and time base that were named, as numbers that `prepare` takes out of the channels."""
+"""Named faults of sensors and of the time base, as corrections that the stage `prepare` applies to the channels."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ GRID = 50
 
 @dataclass(frozen=True)
 class Corrections(KnownFaults):
-    """What to take out of the channels: the faults that `prepare` knows, and the displacement's time.
+    """Corrections of the channels: the faults that `prepare` can correct, and the delay of the displacement.
 
     Attributes
     ----------
     displacement_late_s
-        By how much the displacement is recorded later than force and drive (`prepare.displacement_late_s`).
+        Delay [s] of the recorded displacement relative to force and drive (`prepare.displacement_late_s`).
     """
 
     displacement_late_s: float = 0.0
 
     @property
     def any(self) -> bool:
-        """Whether there is anything to take out."""
+        """Whether there is anything to correct."""
         return self != Corrections()
 
     def settings(self, present: Corrections) -> dict[str, Any]:
-        """Return the section `prepare` that has these on top of those present already."""
+        """Return the section `prepare` with these corrections added to the present ones."""
         total = asdict(present + self)
         late = total.pop("displacement_late_s")
         return {"displacement_late_s": late, "corrections": {key: value for key, value in total.items() if value}}
 
     def __add__(self, other: Corrections) -> Corrections:
-        """Return both together; the lag is that of `other` where it has one."""
+        """Return the sum of both; the delay is that of `other` if it has one."""
         numbers = {
             name: getattr(self, name) + getattr(other, name)
             for name in (
@@ -60,10 +60,10 @@ def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Correction
 
     Parameters
     ----------
-    tests
-        All prepared tests, so that those the tracing left out have their offset too.
     traced
         The tracing.
+    tests
+        All prepared tests, so that tests which the tracing left out are corrected too.
     """
     found = Corrections()
     chosen = traced.selection.chosen
@@ -99,16 +99,16 @@ def corrections_of(traced: Tracing, tests: Sequence[PreparedTest]) -> Correction
 
 
 def _line_of(values: Mapping[str, float], longest_s: float) -> float:
-    """Return the slope of the line nearest to a zero that warms up [N/s]: prepare removes lines.
+    """Return the slope [N/s] of the line nearest to the drift of a zero that warms up, because prepare removes lines.
 
-    The constant part is an offset of each test, which prepare finds by itself.
+    The constant part is an offset of each test, which prepare determines itself.
     """
     time = np.linspace(0.0, longest_s, GRID)
     return float(np.polyfit(time, values["rise"] * (1.0 - np.exp(-time / values["warming_time"])), 1)[0])
 
 
 def _parabola_of(values: Mapping[str, float], largest_drive: float) -> tuple[float, float]:
-    """Return the coefficients of drive and squared drive nearest to a power of the drive: prepare removes these."""
+    """Return the coefficients of drive and squared drive nearest to a power of the drive, as prepare removes them."""
     drive = np.linspace(0.0, largest_drive, GRID)
     columns = np.stack([drive, drive**2], axis=1)
     linear, square = np.linalg.lstsq(columns, values["rate"] * drive ** values["power"], rcond=None)[0]
@@ -116,7 +116,7 @@ def _parabola_of(values: Mapping[str, float], largest_drive: float) -> tuple[flo
 
 
 def _offsets(traced: Tracing, tests: Sequence[PreparedTest]) -> dict[str, float]:
-    """Return by how much the offset of each test departs from that of the campaign, which prepare finds by itself."""
+    """Return test -> offset [N] minus the common offset of the campaign, which prepare determines itself."""
     recordings = record_tests(tests, rate_hz=250.0)
     left = recordings.force - predict(traced.selection.chosen, recordings)
     used = recordings.used

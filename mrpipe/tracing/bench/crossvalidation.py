@@ -1,4 +1,4 @@
-"""Is an effect worth having: error on whole training tests left out, with a block bootstrap; intervals."""
+"""Gain of an effect on whole training tests left out, with a block bootstrap; intervals of parameters."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ BEYOND = 0.01
 
 @dataclass(frozen=True)
 class Gain:
-    """What an effect gains on tests that its fit has not seen.
+    """Reduction of the error by an effect, on tests left out of its fit.
 
     Attributes
     ----------
     share
-        Share of the squared error that goes, cross-validated.
+        Share of the squared error that the effect removes, cross-validated.
     interval
-        95 % interval of it by block bootstrap.
+        95 % interval of the share, by block bootstrap.
     """
 
     share: float
@@ -36,15 +36,15 @@ class Gain:
 
     @property
     def significant(self) -> bool:
-        """Whether the interval lies above nothing."""
+        """Whether the interval lies above zero."""
         return self.interval[0] > 0.0
 
 
 def folds_of(recordings: Recordings, folds: int) -> list[list[int]]:
-    """Return the tests of each fold: every k-th in the order of drive level, then stroke.
+    """Return the tests of each fold: every k-th test in the order of drive level, then stroke.
 
-    A campaign steps through its drive levels in turn. Folds in the order of the campaign could leave out all tests of
-    one level, and the other levels do not determine it.
+    A campaign usually steps through its drive levels. Folds in the order of the campaign could leave out all tests of
+    one level, and the other levels do not determine the force at this level.
     """
     keys = [
         (round(float(np.mean(np.abs(recordings.drive[part]))), 2), float(np.ptp(recordings.displacement[part])))
@@ -55,10 +55,10 @@ def folds_of(recordings: Recordings, folds: int) -> list[list[int]]:
 
 
 def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
-    """Return the weighted residual of every training test by a fit that has not seen it, shape (n,).
+    """Return the weighted residual of every training test by a fit without this test, shape (n,).
 
-    Zero where motion or drive go beyond all that the fit has seen: an end stop that one test alone touches cannot be
-    found in the others, so their prediction does not refute it.
+    It is zero where motion or drive exceed the range of the fitted tests. An end stop that only one test reaches, for
+    example, cannot be found from the other tests, so their prediction does not refute it.
     """
     problem = found.problem
     recordings = problem.recordings
@@ -87,7 +87,7 @@ def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
 
 
 def seen_by(known: Recordings, other: Recordings) -> BoolArray:
-    """Return where motion and drive of `other` lie within what `known` has, shape (n of other,)."""
+    """Return the samples of `other` whose motion and drive lie in the range of `known`, shape (n of other,) of bool."""
     inside = np.ones(len(other.force), dtype=np.bool_)
     for name in ("displacement", "velocity", "drive"):
         have, ask = getattr(known, name), getattr(other, name)
@@ -97,7 +97,7 @@ def seen_by(known: Recordings, other: Recordings) -> BoolArray:
 
 
 def _without_offsets(error: FloatArray, test: IntArray, root_weight: FloatArray) -> FloatArray:
-    """Return the weighted error without each test's mean, which is a sensor's offset."""
+    """Return the weighted error without the mean of each test, which is the offset of a sensor."""
     weight = root_weight**2
     sums = np.bincount(test, weights=weight)
     means = np.bincount(test, weights=weight * error) / np.maximum(sums, 1e-300)
@@ -105,7 +105,7 @@ def _without_offsets(error: FloatArray, test: IntArray, root_weight: FloatArray)
 
 
 def gain_of(before: FloatArray, after: FloatArray, problem: Problem, *, draws: int, rng: np.random.Generator) -> Gain:
-    """Return the share of the left-out squared error that goes from `before` to `after`, with its interval."""
+    """Return the share by which the left-out squared error falls from `before` to `after`, with its interval."""
     block = np.unique(problem.recordings.blocks(BLOCK), return_inverse=True)[1]
     first = np.bincount(block, weights=before**2)
     second = np.bincount(block, weights=after**2)
@@ -118,9 +118,9 @@ def gain_of(before: FloatArray, after: FloatArray, problem: Problem, *, draws: i
 def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
     """Return 95 % intervals of every parameter of the effects, by a jackknife over whole tests.
 
-    What a model does not describe persists within a test, so the samples of a test do not count as separate evidence.
-    Each test is left out in turn, with the Jacobian of the fit to all of them (one step of Gauss-Newton), and the
-    spread of the values is that of the jackknife: Cameron and Miller 2015, Journal of Human Resources 50, 317-372, CV3.
+    Errors of a model persist within a test, so the samples of one test are not independent. Each test is left out in
+    turn, with the Jacobian of the fit to all tests (one Gauss-Newton step). The spread of the resulting values is the
+    jackknife estimate: Cameron and Miller 2015, Journal of Human Resources 50, 317-372, CV3.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
 
     Returns
     -------
-    For each term: parameter -> lower and upper end, SI.
+    For each term: parameter -> lower and upper end, in SI.
     """
     problem = found.problem
     w = weighting(problem)

@@ -1,10 +1,11 @@
-"""How the displacement is freed of noise: the noise that all tests share is removed, or a low-pass is chosen.
+"""Removal of noise from the displacement: the noise that all tests share is removed, or a low-pass is chosen.
 
-The tests of a campaign show the noise of the sensor wherever some of them hold no motion
-(:mod:`mrpipe.signals.shared_noise`). Where they do not, a spectrum only shows where a displacement sinks into its white
-noise. It cannot separate motion from hum of the mains, and it does not show what the remaining noise does to a force
-that follows velocity or acceleration. Therefore the error of models decides. Before a model is chosen, simple base
-forms judge. They can prefer a limit that hides what they lack, so the chosen model judges again.
+The tests of a campaign show the noise of the sensor at frequencies at which some of them have no motion
+(:mod:`mrpipe.signals.shared_noise`). Otherwise a spectrum only shows the frequency above which white noise exceeds the
+displacement. It cannot separate motion from hum of the mains, and it does not show how the remaining noise affects a
+force that depends on velocity or acceleration. Therefore the error of models decides. Before a model is chosen, the
+error of simple base forms is used. They can prefer a limit that hides what they lack, so the decision is made again
+with the chosen model.
 """
 
 from __future__ import annotations
@@ -27,20 +28,21 @@ from mrpipe.tracing.bench.select import draft_tests
 from mrpipe.tracing.rules import NuisanceRules
 
 FORMS = ("bouc-wen", "bingham", "hyperbolic-tangent", "hysteretic-sigmoid")
-"""Numerical technique: base forms that judge the filter: one each that reads displacement, velocity, both, and
-acceleration."""
+"""Numerical technique: base forms by whose error the filter is judged. They depend on displacement, on velocity, on
+both, and on acceleration.
+"""
 
 RATIO = 2.0
-"""Numerical technique: ratio of successive limits that simple base forms judge."""
+"""Numerical technique: ratio of successive limits that are tried with simple base forms."""
 
 FINE_RATIO = 1.4
-"""Numerical technique: ratio of successive limits that the chosen model judges."""
+"""Numerical technique: ratio of successive limits that are tried with the chosen model."""
 
 FINE_ITERATIONS = 3
 """Numerical technique: iterations of each fit of the chosen model."""
 
 HARMONICS = 4.0
-"""Numerical technique: the lowest limit in multiples of the frequency of the motion."""
+"""Numerical technique: the lowest limit, in multiples of the frequency of the motion."""
 
 ITERATIONS = 6
 """Numerical technique: iterations of each fit."""
@@ -48,14 +50,15 @@ ITERATIONS = 6
 
 @dataclass(frozen=True, eq=False)
 class MotionFilter:
-    """How the displacement of tests is freed of noise.
+    """Filter that removes noise from the displacement of tests.
 
     Attributes
     ----------
     limit_hz
-        Upper limit of the cut-offs of low-passes; infinite where the criterion alone decides.
+        Upper limit of the cut-off frequencies of the low-passes [Hz]; infinite: no limit beyond the criterion of the
+        spectra.
     noise
-        Noise of the displacement sensor that is removed from the tests; None if they are low-passed.
+        Noise of the displacement sensor that is removed from the tests; None if a low-pass is used.
     """
 
     limit_hz: float = np.inf
@@ -63,11 +66,11 @@ class MotionFilter:
 
     @property
     def kind(self) -> tuple[float, bool]:
-        """What it does: the limit, and whether noise is removed."""
+        """Kind of the filter: the limit [Hz], and whether shared noise is removed."""
         return self.limit_hz, self.noise is not None
 
     def applied(self, tests: Sequence[PreparedTest]) -> Sequence[PreparedTest]:
-        """Return the tests without the noise that is removed from them."""
+        """Return the tests after removal of the shared noise."""
         return tests if self.noise is None else quiet_motion(tests, self.noise)
 
 
@@ -75,7 +78,7 @@ class Judging(Protocol):
     """Error of simple base forms on recordings, as a share of the scale of the force."""
 
     def __call__(self, tests: Sequence[PreparedTest], highest_cutoff_hz: float) -> float:
-        """Return the error of the best of them with cut-offs up to a limit [Hz]."""
+        """Return the error [1] of the best base form with cut-off frequencies up to a limit [Hz]."""
 
 
 def simple_error(
@@ -87,20 +90,20 @@ def simple_error(
     viscosity_order: int,
     known: Known | None = None,
 ) -> float:
-    """Return the RMS of what the best of a few simple base forms leaves, as a share of the scale of the force.
+    """Return the RMS residual of the best of a few simple base forms, as a share of the scale of the force.
 
     Parameters
     ----------
     tests
         Training tests.
     highest_cutoff_hz
-        Upper limit of the cut-offs of the displacement [Hz].
+        Upper limit of the cut-off frequencies of the displacement [Hz].
     rate_hz
         Rate at which models are fitted [Hz].
     yield_order, viscosity_order
         Degrees of the laws of the drive.
     known
-        Base forms as they were fitted to the same tests before: where the search of each begins.
+        Base forms that were fitted to the same tests before; the search of each starts from them.
     """
     recordings = record_tests(tests, rate_hz=rate_hz, highest_cutoff_hz=highest_cutoff_hz)
     return min(_left(recordings, name, yield_order, viscosity_order, known) for name in FORMS)
@@ -114,19 +117,19 @@ def best_filter(
     rules: NuisanceRules | None = None,
     jobs: int = 1,
 ) -> MotionFilter:
-    """Return how the displacement is freed of noise before a model is chosen.
+    """Return the filter of the displacement that is used before a model is chosen.
 
-    Removing the noise that all tests share is preferred, unless a low-pass leaves much less, as where all tests hold
-    the same random motion, which then looks like noise.
+    Removal of the noise that all tests share is preferred, unless the error with a low-pass is much smaller. This
+    happens if all tests have the same random motion, which then looks like noise.
 
     Parameters
     ----------
     tests
         Training tests.
     automatic
-        The same tests with cut-offs by criterion.
+        The same tests, with cut-off frequencies chosen from their spectra.
     judging
-        Error of simple models on filtered tests.
+        Function that returns the error of simple base forms on filtered tests.
     rules
         Decision thresholds; their defaults if None.
     jobs
@@ -159,14 +162,14 @@ def better_filter(
     rules: NuisanceRules | None = None,
     jobs: int = 1,
 ) -> MotionFilter:
-    """Return the filter with which a chosen model leaves clearly less than with the present one; else that one.
+    """Return the filter with which the error of a chosen model is clearly smaller, else the present one.
 
     Parameters
     ----------
     found
         Chosen model, fitted to the training tests.
     tests, automatic
-        Training tests, and the same with cut-offs by criterion.
+        Training tests, and the same tests with cut-off frequencies chosen from their spectra.
     present
         Present filter.
     rate_hz
@@ -195,10 +198,10 @@ def loosest_limit(
     rules: NuisanceRules | None = None,
     jobs: int = 1,
 ) -> float:
-    """Return the highest limit [Hz] with which a chosen model leaves no more than with the present one.
+    """Return the highest limit [Hz] with which the error of a chosen model does not exceed that with the present one.
 
-    Validation tests may hold faster motion than the training tests. A limit that makes no difference in the training
-    tests, because simple base forms chose it, would take a part of that motion away.
+    Validation tests may contain faster motion than the training tests. A limit that does not matter in the training
+    tests could remove a part of that motion.
 
     Parameters
     ----------
@@ -218,7 +221,7 @@ def loosest_limit(
 def _errors(
     found: Fit, tests: Sequence[PreparedTest], ways: Sequence[MotionFilter], rate_hz: float, jobs: int
 ) -> dict[MotionFilter, float]:
-    """Return filter -> RMS of the residual of a chosen model, as a share of the scale of the force."""
+    """Return filter -> RMS residual of a chosen model, as a share of the scale of the force."""
 
     def left(way: MotionFilter) -> float:
         recordings = record_tests(way.applied(tests), rate_hz=rate_hz, highest_cutoff_hz=way.limit_hz)
@@ -231,7 +234,7 @@ def _errors(
 
 
 def _removals(tests: Sequence[PreparedTest]) -> list[MotionFilter]:
-    """Return the filter that removes the noise which all tests share, where such noise can be seen."""
+    """Return the filter that removes the noise which all tests share, if the tests show such noise."""
     noise = shared_noise(tests)
     return [] if noise is None else [MotionFilter(np.inf, noise)]
 
@@ -252,7 +255,7 @@ def _lowest(recordings: Recordings) -> float:
 
 
 def _left(recordings: Recordings, name: str, yield_order: int, viscosity_order: int, known: Known | None) -> float:
-    """Return the RMS of the residual of a base form, as a share of the scale of the force."""
+    """Return the RMS residual of a base form, as a share of the scale of the force."""
     form = base_form(name)
     laws = polynomial_laws(form, distinct_levels(recordings), yield_order, viscosity_order)
     problem = first_problem(recordings, base_of(recordings, form, laws))

@@ -1,4 +1,4 @@
-"""Laws of the drive chosen again once base form and effects are known."""
+"""Second choice of the laws of the drive, after base form and effects are known."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from mrpipe.tracing.bench.select import Selection
 
 
 def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int) -> Selection:
-    """Return the selection whose chosen fit has the laws of the drive that its base form and effects leave room for.
+    """Return the selection with laws of the drive that are chosen for its base form and effects.
 
-    The baseline takes the simplest laws that cost nothing while something is missing. What is missing can hide the
-    true law, so the laws are chosen again with the chosen model. They are kept where the fit improves by a material
-    share of the noise.
+    The baseline has the simplest laws with which the fit is as good as with any other. A missing effect can hide the
+    true law, so the laws are chosen again with the chosen model. New laws are taken if the fit improves by a
+    significant share of the noise.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int
 
 
 def with_adequate_laws(found: Fit, yield_order: int, viscosity_order: int) -> Fit:
-    """Return the fit with the simplest laws of the drive that fit as well as the richest ones.
+    """Return the fit with the simplest laws of the drive that fit as well as those with the most coefficients.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def with_adequate_laws(found: Fit, yield_order: int, viscosity_order: int) -> Fi
 
 
 def _with_polynomials(found: Fit, yield_order: int, viscosity_order: int) -> Base:
-    """Return the base of a fit with polynomials of these degrees, lowered to what the levels of drive determine."""
+    """Return the base of a fit with polynomials of these degrees, or of those that the levels of drive determine."""
     base, levels = found.problem.base, distinct_levels(found.problem.recordings)
     return replace(base, laws=polynomial_laws(base.form, levels, yield_order, viscosity_order))
 
@@ -70,19 +70,19 @@ def _with_laws(found: Fit, base: Base) -> Fit:
 
 
 def with_final_laws(selection: Selection, least_gain: float) -> Selection:
-    """Return the selection whose chosen fit has the laws of the drive that predict best, whatever their kind.
+    """Return the selection with the laws of the drive that predict best, of any kind.
 
-    While effects are searched, the laws are polynomials of low degree, because a flexible law, or one that saturates,
-    would hide what bends the drive. Once the names are final, this reason is gone. Laws take the place of the present
-    ones where the fit improves by a material share of the noise, and where they predict inner levels of the drive that
-    their fit has not seen at least as well.
+    While effects are searched, the laws are polynomials of low degree, because a flexible or saturating law would hide
+    an effect that changes the drive. This reason no longer applies once the names are final. Other laws replace the
+    present ones if the fit improves by a significant share of the noise, and if they predict inner levels of drive left
+    out of their fit at least as well.
 
     Parameters
     ----------
     selection
         Chosen model with its final names.
     least_gain
-        Least share of the squared residual by which other laws must lower it.
+        Least share by which other laws must lower the squared residual.
     """
     chosen = selection.chosen
     least = selection.nothing_missing * selection.noise
@@ -98,7 +98,7 @@ def with_final_laws(selection: Selection, least_gain: float) -> Selection:
 
 
 def _with_chosen(selection: Selection, found: Fit) -> Selection:
-    """Return the selection with a fit in place of the chosen one, also where this is the one without effects."""
+    """Return the selection with another fit instead of the chosen one, also if no effect was chosen."""
     if selection.chosen is selection.without_effects:
         return replace(selection, chosen=found, ground=found)
     return replace(selection, chosen=found)
@@ -113,13 +113,13 @@ def _predicts_levels(cells: Cells, found: Fit, other: Fit) -> bool:
 
 
 def _richest(found: Fit) -> tuple[Fit, Cells]:
-    """Return the fit with the polynomials of highest degree that the levels determine, and its sums over the levels."""
+    """Return the fit with the polynomials of highest degree that the levels determine, and its sums over the cells."""
     rich = _with_laws(found, _with_polynomials(found, LARGEST_ORDER, max(law.order for law in VISCOSITY_LAWS)))
     return rich, cells_of(rich)
 
 
 def _with_best_laws(rich: Fit, cells: Cells, noise: float) -> Iterator[Fit]:
-    """Yield the fit with the laws of least information criterion by the sums over the levels, if any can be judged."""
+    """Yield the fit with the laws whose information criterion, from the sums over the cells, is least, if any exist."""
     base = rich.problem.base
     bends = any(term.effect.law_of_drive for term in rich.problem.terms)
     pairs = [
@@ -136,11 +136,11 @@ def _with_best_laws(rich: Fit, cells: Cells, noise: float) -> Iterator[Fit]:
 
 
 def _information(found: Fit, noise: float) -> float:
-    """Return the weighted squares of a fit, raised by what the numbers of its laws cost."""
+    """Return the weighted sum of squares of a fit plus the penalty for the coefficients of its laws."""
     samples = np.count_nonzero(found.problem.root_weight)
     return found.chi_square * samples + _price(found, noise) * sum(law.numbers for law in found.problem.base.laws)
 
 
 def _price(found: Fit, noise: float) -> float:
-    """Return what one number costs by the Bayesian information criterion, in units of the weighted squares."""
+    """Return the penalty for one coefficient by the Bayesian information criterion, in units of the sum of squares."""
     return noise * float(np.log(max(int(np.count_nonzero(found.problem.root_weight)), 2)))

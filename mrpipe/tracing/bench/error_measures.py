@@ -21,12 +21,12 @@ class Score:
 
 @dataclass(frozen=True)
 class Judged:
-    """What is judged of validation tests.
+    """Part of the validation tests on which errors are judged.
 
     Attributes
     ----------
     recordings
-        The validation tests; what offsets are estimated from is not among the samples compared.
+        The validation tests; samples from which offsets are estimated are not compared.
     measured
         Offset-free measured force [N], shape (n,).
     offsets
@@ -48,8 +48,8 @@ def judged_part(recordings: Recordings, simulated: FloatArray, offset: float | N
     simulated
         Force of the final model [N], shape (n,).
     offset
-        Offset of the campaign [N], from the training tests. None if every test has its own: then it is the mean
-        difference over the first part of the record, and that part is not judged.
+        Offset of the campaign [N], from the training tests. None: every test has a separate offset, the mean difference
+        over the first part of the record, and that part is not judged.
     first
         Samples of the first parts, shape (n,).
     """
@@ -66,17 +66,18 @@ def judged_part(recordings: Recordings, simulated: FloatArray, offset: float | N
 def campaign_offset(
     recordings: Recordings, residual: FloatArray, offsets: FloatArray, first: BoolArray
 ) -> float | None:
-    """Return the offset that all training tests share [N], or None if an estimate for each test is nearer.
+    """Return the common offset of all training tests [N], or None if a separate estimate for each test is more
+    accurate.
 
-    Both are judged on the training tests: the offset of a test's later part is predicted from its first part, or from
-    all tests together.
+    Both are judged on the training tests: the offset of the later part of a test is predicted from its first part, or
+    from all tests together.
 
     Parameters
     ----------
     recordings
         Training tests.
     residual
-        Measured less simulated force without offsets [N], shape (n,).
+        Measured minus simulated force without offsets [N], shape (n,).
     offsets
         Offset of each test [N].
     first
@@ -96,7 +97,7 @@ def _means(recordings: Recordings, values: FloatArray, part: BoolArray) -> Float
 
 
 def score(recordings: Recordings, measured: FloatArray, simulated: FloatArray) -> Score:
-    """Return the errors over the samples compared; each test is weighed by its length."""
+    """Return the errors over the samples that are compared; each test is weighted by its duration."""
     used = recordings.used
     error = measured - simulated
     by_test = {}

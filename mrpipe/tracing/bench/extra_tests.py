@@ -1,4 +1,4 @@
-"""Which further bench tests would tell rivals apart, sized for the campaign at hand."""
+"""Proposals of further bench tests that would separate rival effects, with amplitudes that suit the campaign."""
 
 from __future__ import annotations
 
@@ -32,14 +32,15 @@ _IN_DOUBT: tuple[TestKind, ...] = ("speeds", "steps", "amplitudes")
 
 @dataclass(frozen=True)
 class ExtraTests:
-    """Tests worth making.
+    """Proposed tests.
 
     Attributes
     ----------
     tests
-        As `laboratory.bench.tests` takes them.
+        Tests in the form of the setting `laboratory.bench.tests`.
     reasons
-        A line for each thing they decide: what (`accumulator or inertia`), kind, the names of the tests.
+        One entry per open question: the question (`accumulator or inertia`), the kind of test, and the names of the
+        tests.
     """
 
     tests: tuple[dict[str, Any], ...] = ()
@@ -48,16 +49,16 @@ class ExtraTests:
 
 @dataclass(frozen=True)
 class Range:
-    """What the campaign's motions span; the tests stay within it.
+    """Range of the motions of the campaign.
 
     Attributes
     ----------
     stroke_m, speed_m_s, drive
-        Largest displacement, speed, and drive (A or V).
+        Largest displacement [m], speed [m/s], and drive [A or V].
     frequency_hz
-        Its usual frequency.
+        Usual frequency of the motion [Hz].
     duration_s
-        Its usual length of a test.
+        Usual duration of a test [s].
     """
 
     stroke_m: float
@@ -68,7 +69,7 @@ class Range:
 
 
 def range_of(recordings: Recordings) -> Range:
-    """Return what the tests of a campaign span."""
+    """Return the range of the motions of a campaign."""
     scales = recordings.scales()
     periods = recordings.period_s[recordings.period_s > 0.0]
     frequency = 1.0 / float(np.median(periods)) if len(periods) else scales.speed / (2.0 * np.pi * scales.stroke)
@@ -77,7 +78,7 @@ def range_of(recordings: Recordings) -> Range:
 
 
 def kinds_between(one: str, other: str, library: Mapping[str, Effect]) -> tuple[TestKind, ...]:
-    """Return the kinds of test that separate two effects, as either of them says; general ones where neither does."""
+    """Return the kinds of test that separate two effects, as one of them states; general kinds if neither does."""
     for name, rival in ((one, other), (other, one)):
         separation = library[name].separated_by.get(rival) if name in library else None
         if separation is not None and separation.kinds:
@@ -86,15 +87,15 @@ def kinds_between(one: str, other: str, library: Mapping[str, Effect]) -> tuple[
 
 
 def wanted_tests(summary: Mapping[str, Any], library: Mapping[str, Effect], recordings: Recordings) -> ExtraTests:
-    """Return the tests that would decide what a verdict leaves open.
+    """Return the tests that would answer the open questions of a verdict.
 
     Parameters
     ----------
     summary
-        What `close-loop --json` prints: rivals of each effect, what an unknown residual depends on, and the effects
-        that the campaign cannot show.
+        The document that `close-loop --json` prints: rivals of each effect, the states that an unknown residual depends
+        on, and the effects that the campaign cannot show.
     library
-        Effects by name: what separates them, and what they need.
+        Name -> effect, with the tests that separate it from others and the tests that it needs.
     recordings
         Training tests.
     """
@@ -130,7 +131,7 @@ def _test(name: str, motion: str, amplitude: float, frequency: float, duration: 
         "amplitude_m": float(f"{amplitude:.3g}"),
         "frequency_hz": float(f"{frequency:.3g}"),
         "duration_s": float(f"{max(duration, 2.5 / frequency):.3g}"),
-        # the rig stays what it is
+        # the rig is the same
         "later": True,
     }
     return made | {key: float(f"{value:.3g}") if isinstance(value, float) else value for key, value in more.items()}
@@ -138,7 +139,7 @@ def _test(name: str, motion: str, amplitude: float, frequency: float, duration: 
 
 def _speeds(span: Range) -> list[dict[str, Any]]:
     amplitude = 0.8 * span.stroke_m
-    # beyond the largest speed so far too: a bend that looks like another within it does not outside
+    # also beyond the largest speed so far: two curves that look alike within the range differ beyond it
     speeds = span.speed_m_s * np.geomspace(0.03, 1.5, 5)
     return [
         _test(

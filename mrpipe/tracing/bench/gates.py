@@ -1,4 +1,4 @@
-"""Gates of the tracing: does the base predict at all, is anything missing, what do the validation tests say."""
+"""Gates of the tracing: whether the base predicts at all, whether anything is missing, what validation shows."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def validated(
 
 
 def never_yields(found: Fit, rules: ValidationRules) -> bool:
-    """Return whether the hysteresis stays elastic in all tests, so that no effect can be separated from it."""
+    """Return whether the damper never yields in all tests, so that no effect can be separated from its hysteresis."""
     wires = run_recordings(chain_of(found.problem, found.theta)[0], found.problem.recordings)
     reached = np.abs(wires[HYSTERESIS_AT][found.problem.recordings.used])
     return bool(np.max(reached, initial=0.0) < rules.yielded)
@@ -57,14 +57,14 @@ def predicts(
     faults: Mapping[str, Finding],
     jobs: int,
 ) -> bool:
-    """Return whether a model predicts the comparable part of the validation tests at all.
+    """Return whether the error of a model on the comparable part of the validation tests is below a coarse limit.
 
     Parameters
     ----------
     found
-        The validation tests, with the model as what was chosen.
+        Errors on the validation tests, with the model in the place of the chosen one.
     model
-        Base form without effects.
+        Fit of a base form without effects.
     training
         Training tests.
     options
@@ -95,8 +95,8 @@ def refusal_of(
 ) -> str:
     """Return why nothing is traced; empty if the declared base form or another one predicts the validation tests.
 
-    A declared form that fails does not show that the validation tests differ: the damper may have another form. The
-    other form is the one that fits the training tests best.
+    If the declared form fails, the damper may have another form; the failure alone does not show that the validation
+    tests differ. The form that fits the training tests best is then tried.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def refusal_of(
     jobs
         Processes; the result does not depend on their number.
     known
-        Base forms as they were fitted to the same tests before.
+        Base forms that were fitted to the same tests before.
     """
     if never_yields(first.fit, options.rules.validation):
         return "the damper does not yield within the stroke of the training tests"
@@ -164,7 +164,7 @@ def structured(
     """Return whether the residual of the training tests holds more than noise."""
     if named or not selection.structured or baseline.scale.repeats:
         return selection.structured
-    # without repeats coloured noise looks like an excess: it is one only where something can be learnt of it
+    # without repeats coloured noise looks like a structure; it counts as one only if a flexible model can predict it
     base = selection.base
     learnt = flexible_chi_square(base) < (1.0 - options.rules.model_error.flexible_share) * base.chi_square
     return learnt or structure_p_value(base.residual, states_of(base, training)) < options.rules.validation.whiteness
@@ -188,19 +188,19 @@ def held(
     judgement
         The verdict on the validation tests.
     rules
-        They hold the probabilities.
+        Rules that contain the calibrated probabilities.
     several
         Whether the effect is named together with others.
     beyond
-        Whether a structured residual far above the noise remains, although no flexible model learns it.
+        Whether a structured residual far above the noise remains, although no flexible model reproduces it.
     chosen
-        Whether it was chosen among the effects of the library; offsets of tests are measured, not chosen.
+        Whether the effect was chosen from the library; offsets of tests are measured and not chosen.
 
     Notes
     -----
-    The evidence is lowered by the share that is not recovered on the validation tests. An effect that explains only
-    part of what is missing, or leaves a structured residual far above the noise, may stand for one that the library
-    lacks, so that its probability is another one.
+    The evidence is reduced by the share that is not recovered on the validation tests. An effect that explains only
+    part of what is missing, or that leaves a structured residual far above the noise, may stand for an effect that the
+    library lacks. Other calibrated probabilities apply to such an effect.
     """
     kind = judgement.verdict.kind
     evidence = item.confidence * (1.0 if kind == "explained" else judgement.evidence.share)

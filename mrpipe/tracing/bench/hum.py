@@ -1,8 +1,8 @@
 """Hum of the mains in the force channel.
 
 Cycles of a motion whose period is a multiple of that of the mains repeat the hum, so that their difference does not
-show it. It shows in what a model leaves: as a line at a frequency of the mains, in nearly every test, whatever the
-frequency of the motion.
+show it. It is visible in the residual of a model: as a spectral line at a frequency of the mains, in nearly every test,
+whatever the frequency of the motion.
 """
 
 from __future__ import annotations
@@ -15,25 +15,26 @@ from mrpipe.signals.shared_noise import MAINS_HZ
 from mrpipe.tracing.rules import NoiseRules
 
 HARMONICS = (1, 2, 3)
-"""Numerical technique: multiples of them that are looked for."""
+"""Numerical technique: harmonics of these frequencies that are searched."""
 
 LEAST_CYCLES = 20.0
-"""Numerical technique: shorter records, in periods of the mains, are left out."""
+"""Numerical technique: least duration of a record, in periods of the mains; shorter ones are left out."""
 
 HIGHEST_MOTION = 0.1
-"""Numerical technique: a motion with a higher frequency, as a share of the line's, has strong harmonics there, so that
-its test is left out."""
+"""Numerical technique: highest frequency of the motion, as a share of the frequency of the line. Tests with faster
+motion are left out, because its harmonics are strong there.
+"""
 
 
 def hum_variance(residual: FloatArray, recordings: Recordings, rules: NoiseRules) -> float:
-    """Return the variance of the hum of the mains in what a model leaves of the force [N^2]; 0 if there is none.
+    """Return the variance of the hum of the mains in the residual of a model [N^2]; 0 if there is none.
 
     Parameters
     ----------
     residual
-        Measured less simulated force [N], shape (n,); zero where it is not compared.
+        Measured minus simulated force [N], shape (n,); zero at samples that are not compared.
     recordings
-        Tests that it belongs to.
+        Tests of the residual.
     rules
         Decision thresholds.
     """
@@ -41,7 +42,7 @@ def hum_variance(residual: FloatArray, recordings: Recordings, rules: NoiseRules
 
 
 def _line(residual: FloatArray, recordings: Recordings, frequency_hz: float, rules: NoiseRules) -> float:
-    """Return the variance of a line that nearly all tests share [N^2]; 0 if they do not."""
+    """Return the variance of a spectral line that nearly all tests share [N^2]; 0 if there is none."""
     excess = []
     for test in range(recordings.tests):
         used = np.flatnonzero(recordings.used & (recordings.test == test))

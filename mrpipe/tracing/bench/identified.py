@@ -1,4 +1,4 @@
-"""The declared model of a tracing compared with the damper that `identify-damper` chose: one damper, two fits."""
+"""Comparison of the declared model of a tracing with the damper model that `identify-damper` chose."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ DRIVES = (0.0, 0.5, 1.0)
 """Numerical technique: drives, as shares of the largest one, at which the laws of both dampers are listed."""
 
 OTHER_FIT = (
-    "close-loop begins at the numbers of identify-damper and fits the form again. It weights each sample by what is "
-    "expected of the error there, filters the displacement as the base forms prefer, and takes the simplest laws of "
-    "the drive that cost nothing. identify-damper weights all samples alike and chooses the laws by levels of drive "
-    "left out."
+    "close-loop starts from the parameters of identify-damper and fits the form again. It weights each sample "
+    "by the expected error at this sample, it chooses the filter of the displacement by the error of base forms, and "
+    "it takes the simplest laws of the drive that fit as well as others. identify-damper gives all samples the same "
+    "weight and chooses the laws by levels of drive left out."
 )
-"""Why the two dampers differ where they are of one form."""
+"""Reason why the two models differ although they have the same form."""
 
 
 def compared_with_identified(chosen: DamperModel, known: Known, traced: Tracing) -> dict[str, Any]:
-    """Return how the damper of `identify-damper` and the declared model of the tracing compare, for JSON.
+    """Return the comparison of the damper of `identify-damper` with the declared model of the tracing, for JSON.
 
     Parameters
     ----------
     chosen
-        The damper that `identify-damper` chose.
+        The damper model that `identify-damper` chose.
     known
         All base forms that it fitted.
     traced
@@ -37,9 +37,9 @@ def compared_with_identified(chosen: DamperModel, known: Known, traced: Tracing)
 
     Returns
     -------
-    `form` and `nrmse` (on the samples of which `before` holds the error), `forms` that began at their fits, `why` the
-    two differ; `parameters` and laws of the declared form with the `value` of `identify-damper` and that of `before`,
-    where it fitted that form.
+    `form`; `nrmse` on the same samples as `before`; `forms`, whose fits started from those of `identify-damper`; `why`
+    the two models differ; and, if `identify-damper` fitted the declared form, its `parameters` and `laws` with the
+    `value` of `identify-damper` and that of `before`.
     """
     base, judged = traced.selection.base, traced.validation
     name = base.problem.base.name

@@ -1,4 +1,4 @@
-"""The class of a verdict, decided by rule from errors on the validation tests."""
+"""The class of a verdict, which fixed rules derive from errors on the validation tests."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Condition:
     name
         Name of the test.
     before, after
-        Of the model without and with what was found.
+        NRMSE of the model without and with the effects that were found.
     floor
-        Of noise alone.
+        NRMSE of noise alone.
     ceiling, ceiling_upper
-        Of a flexible model that could learn this test, and the upper end of its 95 % interval.
+        NRMSE of a flexible model that was trained on a part of this test, and the upper end of its 95 % interval.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Condition:
     ceiling_upper: float
 
     def explained(self, rules: ValidationRules) -> bool:
-        """Return whether no more than noise, or than a flexible model leaves, is left on this test."""
+        """Return whether the error on this test does not exceed that of noise or that of a flexible model."""
         if self.after <= max(rules.within_floors * self.floor, self.ceiling_upper):
             return True
         return recovered(self.before, self.after, self.ceiling) >= rules.ceiling_share
@@ -41,7 +41,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What decides the class; errors are NRMSE pooled over the comparable part of the validation tests.
+    """Data that decide the class; errors are NRMSE pooled over the comparable part of the validation tests.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Evidence:
     base_changed
         Whether another base form than the declared one is taken.
     events, disturbance
-        Of single events, and of a force that grows with the speed, which do not repeat when motion and drive repeat.
+        NRMSE of single events, and of a force that grows with the speed; neither repeats when motion and drive repeat.
     """
 
     before: float
@@ -73,7 +73,7 @@ class Evidence:
     def unrepeatable(self, rules: ValidationRules) -> bool:
         """Return whether most of the error beyond noise is due to forces that do not repeat.
 
-        No model of motion and drive can learn such forces, so its ceiling does not show that nothing is missing.
+        No model of motion and drive can predict such forces, so a ceiling does not show that nothing is missing.
         """
         excess = self.after**2 - self.floor**2
         unrepeated = self.events**2 + self.disturbance**2
@@ -81,12 +81,12 @@ class Evidence:
 
     @property
     def share(self) -> float:
-        """Share of the recoverable squared error that is removed, 0 to 1."""
+        """Share of the recoverable squared error that the named effects remove, 0 to 1."""
         return recovered(self.before, self.after, self.ceiling)
 
 
 def recovered(before: float, after: float, ceiling: float) -> float:
-    """Return the share of the squared error beyond a ceiling that goes from `before` to `after`, 0 to 1."""
+    """Return the share by which the squared error beyond a ceiling falls from `before` to `after`, 0 to 1."""
     able = before**2 - min(ceiling, after) ** 2
     return float(min(1.0, max(0.0, (before**2 - after**2) / able))) if able > 0.0 else 0.0
 
@@ -104,7 +104,7 @@ def classify(evidence: Evidence, rules: ValidationRules) -> VerdictClass:
     explained = reached(evidence, rules)
     if evidence.base_changed and not evidence.effects:
         accounts = evidence.share >= rules.accounts and not evidence.unrepeatable(rules)
-        # a ceiling far above the noise shows what flexible models learn from motion and drive, not that nothing is left
+        # a ceiling far above the noise only shows the limit of flexible models of motion and drive
         beyond = evidence.structured and evidence.after > rules.noise_floors * evidence.floor
         return "base form" if (explained or accounts) and not beyond else "unknown"
     return "explained" if explained else "partly explained"

@@ -1,9 +1,9 @@
-"""Laws of the drive that compete with an effect which bends the drive.
+"""Laws of the drive that compete with an effect which limits the drive.
 
-A yield force that levels off with the drive is a law of the base form, as every magnetic circuit has. A driver or a
-core that saturates bends the drive itself, so that the viscosity levels off too. While something is missing, the laws
-are polynomials, and an effect that bends the drive takes the place of a law that they cannot follow. Therefore the
-effect is proven only if it predicts tests that were left out better than a law that saturates.
+Every magnetic circuit has a yield force that levels off with the drive; this is a law of the base form. A driver or a
+core that saturates limits the drive itself, so that the viscosity levels off too. While effects are searched, the laws
+are polynomials. An effect that limits the drive can then replace a law that polynomials cannot represent. Therefore the
+effect counts as proven only if it predicts tests left out better than a saturating law does.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ LAWS = tuple(law for law in YIELD_LAWS if law.saturates)
 def without_laws_of_drive(
     selection: Selection, gains: Sequence[Gain | None], declared: int, unseen: Unseen, jobs: int = 1
 ) -> tuple[Selection, list[Gain | None], str]:
-    """Return the selection, its gains, and why an effect is not named where a law of the drive predicts as well.
+    """Return the selection, its gains, and why an effect is not named if a law of the drive predicts as well.
 
-    The law then takes the place of the effect. The reason is empty where effects remain or none had to go.
+    The law then replaces the effect. The reason is empty if effects remain, or if no effect was replaced.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def without_laws_of_drive(
     gains
         Of the named effects on tests that were left out.
     declared
-        How many terms the campaign declares: they are part of every model.
+        Number of terms that the campaign declares; they are part of every model.
     unseen
         Comparison on tests that were left out.
     jobs
@@ -76,7 +76,7 @@ def without_laws_of_drive(
 
 
 def best_law(found: Fit, place: int) -> Fit:
-    """Return the fit without one of its terms, with the law of the yield force that saturates and fits best.
+    """Return the fit without one of its terms, with the best saturating law of the yield force.
 
     Parameters
     ----------

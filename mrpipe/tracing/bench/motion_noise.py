@@ -1,4 +1,4 @@
-"""Draws of the noise of a displacement channel: white noise in its band, and rounding that follows the motion."""
+"""Random draws of the noise of a displacement channel: white noise in its band, and rounding errors."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ ROUNDING_TERMS = 6
 """Numerical technique: terms of the series of the rounding error."""
 
 FEWEST_ROUNDED = 16
-"""Numerical technique: shorter tests are not interpolated."""
+"""Numerical technique: tests with fewer samples are not interpolated."""
 
 
 def noisy_motion(recordings: Recordings, rng: np.random.Generator) -> Recordings:
-    """Return the tests with one more draw of the noise of the displacement in their motion.
+    """Return the tests with one random draw of displacement noise added to their motion.
 
     Parameters
     ----------
@@ -45,12 +45,13 @@ def noisy_motion(recordings: Recordings, rng: np.random.Generator) -> Recordings
 
 
 def rounding_error(recordings: Recordings, test: int, rng: np.random.Generator) -> tuple[FloatArray, float]:
-    """Return an error of one test's displacement due to rounding [m], shape (n,), and the share of noise without it.
+    """Return the rounding error of the displacement of one test [m], shape (n,), and the share of noise without it.
 
     Rounding to steps q looks like white noise only while the motion passes many steps from sample to sample. Near a
-    reversal it follows the motion, x + e(x), so that a low-pass does not remove it. Noise sigma before rounding makes
-    its mean smooth (Widrow and Kollar, Quantization Noise, 2008): e(x) is the sum over k of
-    (-1)^k q / (pi k) exp(-2 (pi k sigma / q)^2) sin(2 pi k x / q). Where the steps begin is not known, and drawn.
+    reversal the error is a function of the motion, x + e(x), so that a low-pass does not remove it. Noise with standard
+    deviation sigma before rounding smooths its mean (Widrow and Kollar, Quantization Noise, 2008): e(x) is the sum over
+    k of (-1)^k q / (pi k) exp(-2 (pi k sigma / q)^2) sin(2 pi k x / q). The phase of the steps is not known and is
+    drawn at random.
 
     Parameters
     ----------
@@ -59,14 +60,14 @@ def rounding_error(recordings: Recordings, test: int, rng: np.random.Generator) 
     test
         Index of the test.
     rng
-        Draws where the steps begin.
+        Random generator for the phase of the steps.
     """
     piece = slice(int(recordings.starts[test]), int(recordings.starts[test + 1]))
     step, dither = float(recordings.displacement_rounding[test]), float(recordings.displacement_dither[test])
     motion, dt = recordings.displacement[piece], float(recordings.dt[test])
     if not step > 0.0 or len(motion) < FEWEST_ROUNDED:
         return np.zeros(len(motion)), 1.0
-    # the record has more samples than the fit: rounding of those between them is averaged by the filter
+    # the record has more samples than the fit: the filter averages the rounding errors of the samples in between
     stride = max(1, round(dt / float(recordings.recorded_dt[test])))
     fine = np.arange((len(motion) - 1) * stride + 1) / stride
     place = 2.0 * np.pi * (CubicSpline(np.arange(len(motion)), motion)(fine) / step + rng.random())

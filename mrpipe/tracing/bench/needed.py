@@ -1,8 +1,8 @@
-"""Which of several effects are needed: not one that another form of the others makes superfluous.
+"""Which of several effects are needed, and which are superfluous with another form of the others.
 
-The search adds effects in their plain forms, to a base form with simple laws of the drive. A second effect may then
-only correct the form of the first one, the laws, or the base form. Before it is named, the richer forms of the other
-effects, the richer laws and the best rival base forms are tried without it.
+The search adds effects in simple forms, to a base form with simple laws of the drive. A second effect may then only
+correct the form of the first effect, the laws, or the base form. Before it is named, richer forms of the other effects,
+richer laws and the best rival base forms are tried without it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mrpipe.tracing.bench.rivals import Orders, best_rival, taken
 from mrpipe.tracing.bench.select import Selection, draft
 
 ITERATIONS = 15
-"""Numerical technique: most steps of a fit without one of the effects."""
+"""Numerical technique: largest number of steps of a fit without one of the effects."""
 
 
 def without_superfluous(
@@ -33,13 +33,13 @@ def without_superfluous(
     selection
         Named effects with their fit.
     declared
-        How many terms the campaign declares: they belong to the baseline and are never dropped.
-    orders
-        Largest degrees of the laws of the drive.
+        Number of terms that the campaign declares; they belong to the baseline and are never dropped.
     lead
         An effect is dropped if the fit without it has at most this multiple of the chi-square of the fit with it.
+    orders
+        Largest degrees of the laws of the drive.
     race
-        The models that competed; None if no other base form is tried.
+        The models that were compared; None if no other base form is tried.
     jobs
         Threads.
     """
@@ -59,13 +59,13 @@ def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: 
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         without = pool.map(lambda k: _without(small, k, named, orders), named)
         place, best = min(zip(named, without, strict=True), key=lambda item: item[1].chi_square)
-    # richer forms only lower the error of the full model, so most pairs are confirmed without them
+    # richer forms of the full model only lower its error, so most pairs are confirmed without fitting them
     if best.chi_square > lead * small.chi_square:
         return None
     full = with_best_forms(small, named, jobs=jobs)
     if best.chi_square > lead * full.chi_square:
         return None
-    # a share of the tests has ranked them, all tests decide
+    # they were ranked on a share of the tests; all tests decide
     full, best = (on_all_tests(item, kept.chosen.problem) for item in (full, best))
     if best.chi_square > lead * full.chi_square:
         return None
@@ -74,7 +74,7 @@ def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: 
         kept,
         chosen=best,
         proven=kept.proven - 1,
-        # a round that compares what remains with its rivals, the first one even where its winner was dropped
+        # a round that compares the remaining effects with their rivals; the first round even if its winner was dropped
         rounds=kept.rounds[: place - declared] or kept.rounds[:1],
         extension=in_order(full, [*others, place]),
     )

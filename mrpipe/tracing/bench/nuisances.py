@@ -1,4 +1,4 @@
-"""Artefacts of the measurement: gains of single records and sessions, and a moving average of the records."""
+"""Artefacts of the measurement: gains of single records and of sessions, and a moving average by the recorder."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from mrpipe.tracing.bench.residual_structure import BLOCK
 from mrpipe.tracing.rules import NuisanceRules, ValidationRules
 
 WINDOW_SHARES = (0.05, 0.1, 0.15)
-"""Numerical technique: lengths of a moving average that are tried first, in shares of a period."""
+"""Numerical technique: lengths of a moving average that are tried first, as shares of a period."""
 
 FIRST_STEP, LEAST_WINDOW = 0.02, 0.005
-"""Numerical technique: first step of the search for its length, and the shortest length, in shares of a period."""
+"""Numerical technique: first step of the search for the length, and the shortest length, as shares of a period."""
 
 
 @dataclass(frozen=True)
 class RecordGain:
-    """Factor that brings the simulated force of one test nearest to the measured one, with its 95 % interval."""
+    """Factor on the simulated force of one test that minimises the error, with its 95 % interval."""
 
     value: float
     interval: tuple[float, float]
@@ -54,9 +54,9 @@ def record_gains(
     measured, simulated
         Offset-free force [N], shape (n,).
     part
-        Samples that are used, shape (n,); by default all that are compared.
+        Samples that are used, shape (n,) of bool; None: all samples that are compared.
     least
-        Difference from 1 that is reported.
+        Least difference from 1 that is reported.
     """
     found = {}
     blocks = recordings.blocks(BLOCK)
@@ -81,13 +81,13 @@ class SessionGain:
     Attributes
     ----------
     value, interval
-        From the first part of each record; 95 % interval by the spread over the records.
+        Gain, from the first part of each record, and its 95 % interval from the spread over the records.
     tests
-        The records that it applies to.
+        Names of the records that it applies to.
     spread_in_training
         Standard deviation of the gains of the training tests.
     without, with_it
-        NRMSE over the rest of all validation records, which the estimate has not seen.
+        NRMSE without and with the gain, over the rest of all validation records, which the estimate has not used.
     first_part
         Share of each record from which the gain is estimated.
     """
@@ -125,8 +125,8 @@ def session_gain(
 ) -> SessionGain | None:
     """Return the gain that validation records of one session share, or None if none is confirmed.
 
-    It is confirmed if enough records deviate to the same side by more than the spread of the training tests' gains, and
-    their gains agree.
+    It is confirmed if enough records deviate in the same direction by more than the spread of the gains of the training
+    tests, and if their gains agree.
 
     Parameters
     ----------
@@ -135,8 +135,8 @@ def session_gain(
     training
         Gains of the training tests, by the same model.
     levels
-        Mean drive of each training test. A record at another drive is skipped, because its gain depends on how the
-        model interpolates between the levels. All records are used if None.
+        Mean drive of each training test [A or V]. A record at another drive is skipped, because its gain depends on the
+        interpolation of the model between the levels. None: all records are used.
     rules, validation
         Decision thresholds; their defaults if None.
     """
@@ -214,10 +214,11 @@ def _strange_to(recordings: Recordings, levels: FloatArray, share: float) -> set
 def observation_window(
     found: Fit, shares: Sequence[float] = WINDOW_SHARES, rules: NuisanceRules | None = None, *, jobs: int = 1
 ) -> tuple[float, Fit]:
-    """Return the length of a moving average of the records (as share of each test's period), and the fit with it.
+    """Return the length of a moving average by the recorder (as a share of the period), and the fit with it.
 
     The share is 0 and the fit is unchanged if no moving average lowers the error enough. Displacement and force went
-    through the same filter. It is visible because the force of the filtered motion is not the filtered force.
+    through the same filter. The filter is visible, because the force of the filtered motion differs from the filtered
+    force.
     """
     least = (rules or NuisanceRules()).least_gain
     given = len(shares) == 1
@@ -239,7 +240,7 @@ def observation_window(
 
 
 def with_lag_apart(found: Fit, rules: NuisanceRules | None = None) -> Fit:
-    """Return the fit with a separate lag for the falling drive, or the same fit if that does not lower the error."""
+    """Return the fit with a separate lag for a falling drive, or the same fit if the error hardly falls."""
     least = (rules or NuisanceRules()).least_gain
     base = found.problem.base
     if not base.lag_known or base.lag_apart:

@@ -1,4 +1,4 @@
-"""Tests that contradict the others or hold a fault are named before anything is fitted, and left out of the fit."""
+"""Tests that contradict the others or contain a fault; they are named before anything is fitted, and left out."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.rules import ValidationRules
 
 SAME_RECORD = "same-record"
-"""Finding for tests that hold the same samples: the second of them is not independent."""
+"""Name of the finding for tests with the same samples: the second one is not independent."""
 
 DEAD_CHANNEL = "dead-channel"
-"""Finding for a channel that has the same value in all samples of a test."""
+"""Name of the finding for a channel with the same value in all samples of a test."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class SortedTests:
     Attributes
     ----------
     tests
-        Tests that are used: without harmed training tests, and without validation tests that repeat another record.
+        Tests that are used: without faulty training tests, and without validation tests that repeat another record.
     findings
-        What the comparison has found.
+        Findings of the comparison.
     left_out
         Names of the tests that are not used.
     """
@@ -40,7 +40,7 @@ class SortedTests:
 
     @property
     def faults(self) -> dict[str, Finding]:
-        """Return the first finding of every validation test that is used in spite of it."""
+        """Return name -> first finding, for validation tests that are used in spite of a finding."""
         used = {test.name for test in self.tests if test.role == "validation"}
         found: dict[str, Finding] = {}
         for item in self.findings:
@@ -60,15 +60,15 @@ class SortedTests:
 
 
 def sort_tests(tests: Sequence[PreparedTest], rules: ValidationRules | None = None) -> SortedTests:
-    """Compare the tests with each other and leave harmed ones out of the fit.
+    """Compare the tests with each other, and leave faulty ones out of the fit.
 
-    A harmed validation test stays: its error is reported, and the verdict names it. A validation test that holds the
-    samples of another test is left out, because the fit may have seen it.
+    A faulty validation test is kept: its error is reported, and the verdict names it. A validation test with the
+    samples of another test is left out, because the fit may have used these samples.
 
     Raises
     ------
     UserError
-        If a channel is dead in every test.
+        If a channel has a constant value in every test.
     """
     fewest_training = (rules or ValidationRules()).fewest_training
     findings = compare_tests([_arrays(test) for test in tests])

@@ -25,7 +25,7 @@ class OffsetFinding:
     confidence: float
 
     def named(self) -> Named:
-        """Return it as an effect of the verdict."""
+        """Return the finding as an effect of the verdict."""
         table = {"spread": Estimate(self.spread_n, "N", Interval(*self.interval))}
         return Named(self.effect, "per-test", table, self.confidence)
 
@@ -40,7 +40,7 @@ def offset_between_tests(
     found
         The final fit, with an offset for each test.
     effect
-        The effect `offset` of the library; None if it is not considered.
+        The effect `offset` of the library; None: it is not considered.
     least_ratio
         Least spread of the offsets, in multiples of the RMS residual force.
     rules

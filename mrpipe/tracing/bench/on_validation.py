@@ -1,4 +1,4 @@
-"""Errors on the validation tests before and after, their comparable part, and the verdict that follows."""
+"""Errors on the validation tests before and after, their comparable part, and the resulting verdict."""
 
 from __future__ import annotations
 
@@ -30,13 +30,14 @@ class OnValidation:
     Attributes
     ----------
     recordings
-        The validation tests; the samples compared are those that nothing was fitted to.
+        The validation tests; only samples that nothing was fitted to are compared.
     recorded
-        The same with all samples: gains of a session are estimated from the first parts, which are not compared.
+        The same tests with all samples, because gains of a session are estimated from the first parts, which are not
+        compared.
     measured
         Offset-free measured force.
     before, after
-        Simulated force of the base and of the final model.
+        Simulated force of the base model and of the final model.
     floor
         Standard deviation of the force that noise explains.
     noise_components
@@ -45,9 +46,9 @@ class OnValidation:
     own_offsets
         Whether every test has its own offset.
     gains
-        Gain of each test by the final model.
+        Gain of each test, relative to the final model.
     scale
-        Noise in repeated training motion, and the force that does not repeat there and is not noise.
+        Noise in repeated training motion, and the part of the force that does not repeat and is not noise.
     """
 
     recordings: Recordings
@@ -63,7 +64,7 @@ class OnValidation:
 
     @property
     def score_before(self) -> Score:
-        """Errors of the base."""
+        """Errors of the base model."""
         return score(self.recordings, self.measured, self.before)
 
     @property
@@ -72,12 +73,12 @@ class OnValidation:
         return score(self.recordings, self.measured, self.after)
 
     def nrmse(self, simulated: FloatArray, part: BoolArray | None = None) -> float:
-        """Return the NRMSE over a part of the samples compared."""
+        """Return the NRMSE over a part of the samples that are compared."""
         used = self.recordings.used if part is None else part & self.recordings.used
         return _rms((self.measured - simulated)[used]) / max(_rms(self.measured[used]), 1e-12)
 
     def floor_nrmse(self, part: BoolArray | None = None) -> float:
-        """Return the NRMSE that noise leaves."""
+        """Return the NRMSE that noise alone causes."""
         used = self.recordings.used if part is None else part & self.recordings.used
         return _rms(self.floor[used]) / max(_rms(self.measured[used]), 1e-12)
 
@@ -101,14 +102,10 @@ def on_validation(
     own_offsets: bool = False,
     record_gain: bool = False,
 ) -> OnValidation:
-    """Simulate the validation tests by base and final model.
+    """Simulate the validation tests with the base model and with the final model.
 
     Parameters
     ----------
-    own_offsets
-        Whether the offsets of the tests are a finding: the base is then judged with one offset for all.
-    record_gain
-        Whether every record gets a gain, from its first part; the errors are those of the rest.
     base
         Fit of the base model.
     chosen
@@ -121,6 +118,10 @@ def on_validation(
         Validation tests.
     rules
         Decision thresholds.
+    own_offsets
+        Whether the offsets of the tests are a finding; the base model is then judged with one offset for all tests.
+    record_gain
+        Whether a gain of every record is estimated from its first part; errors are then those of the rest.
     """
     before, after = predict(base, validation), predict(chosen, validation)
     first = first_parts(validation, rules.first_part)
@@ -158,10 +159,10 @@ def on_validation(
 
 
 def _share_of_residual(recordings: Recordings, residual: FloatArray, variance: FloatArray) -> FloatArray:
-    """Return a factor, at most 1, on the variance of each sample's noise, one for each test, shape (n,).
+    """Return a factor, at most 1, on the noise variance of each sample, the same within a test, shape (n,).
 
-    Noise is no larger than what the final model leaves. The noise of a displacement, passed through a damper that
-    follows velocity or acceleration, is known to a factor only.
+    The noise cannot exceed the residual of the final model. The noise of a displacement, passed through a damper whose
+    force depends on velocity or acceleration, is known only up to a factor.
     """
     used, test = recordings.used, recordings.test
     left = np.bincount(test[used], weights=residual[used] ** 2, minlength=recordings.tests)
@@ -171,7 +172,7 @@ def _share_of_residual(recordings: Recordings, residual: FloatArray, variance: F
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict with what it rests on."""
+    """The verdict and the data that it is based on."""
 
     verdict: Verdict
     evidence: Evidence
@@ -200,20 +201,6 @@ def judge(
 
     Parameters
     ----------
-    names
-        Effects that are named.
-    base_taken
-        Name of the base form that is taken instead of the declared one; empty if it is the declared one.
-    structured
-        Whether the residual of the training tests holds more than noise.
-    reason
-        Why nothing is named, where nothing is.
-    faults
-        Known faults of validation tests.
-    folds
-        Of the cross-validation on training tests.
-    session
-        Gain that several validation tests share; None if there is none.
     found
         Both models on the validation tests.
     base
@@ -224,6 +211,20 @@ def judge(
         Training tests.
     rules
         Decision thresholds.
+    names
+        Effects that are named.
+    base_taken
+        Name of the base form that replaces the declared one; empty if none does.
+    structured
+        Whether the residual of the training tests holds more than noise.
+    reason
+        Why nothing is named; empty if something is.
+    faults
+        Known faults of validation tests.
+    folds
+        Number of folds of the cross-validation on training tests.
+    session
+        Gain that several validation tests share; None if there is none.
     jobs
         Processes; the result does not depend on their number.
     """
@@ -268,7 +269,7 @@ def judge(
 
 
 def ceilings_of(found: OnValidation, base: Fit, chosen: Fit, training: Recordings) -> list[Ceiling]:
-    """Return what flexible models leave that start from the base and from the final model."""
+    """Return the residuals of flexible models that are added to the base model and to the final model."""
     result = []
     for fitted, simulated in ((base, found.before), (chosen, found.after)):
         root = fitted.problem.root_weight
@@ -345,7 +346,7 @@ def _unrepeated(evidence: Evidence) -> str:
 
 
 def open_tests(judgement: Judgement, rules: ValidationRules) -> tuple[str, ...]:
-    """Return the validation tests on which something remains, the worst first."""
+    """Return the names of the validation tests with an unexplained error, the worst first."""
     return worst(judgement.evidence.conditions, rules)
 
 

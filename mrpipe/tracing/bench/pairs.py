@@ -1,7 +1,7 @@
-"""Play under a rounded yield: two causes that hide each other when one is searched after the other.
+"""Play together with a rounded yield: two effects that hide each other if they are searched one after the other.
 
-Both make the force late at a reversal. A rounded yield that is fitted without the play takes so wrong a shape that no
-small play improves it. Therefore play is also tried together with the starting points of the base form.
+Both delay the force at a reversal. If a rounded yield is fitted without play, its shape becomes so wrong that a small
+play does not improve the fit. Therefore play is also tried together with the starting points of the base form.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mrpipe.fitting.problem import Term
 from mrpipe.fitting.start import best_starts, shared_values
 
 GAPS = (0.01, 0.03, 0.08)
-"""Numerical technique: starts of the gap, as shares of the stroke."""
+"""Numerical technique: starting values of the gap, as shares of the stroke."""
 
 FORM_STARTS = 3
 """Numerical technique: number of starting points of the base form, in addition to its fitted one."""
@@ -26,14 +26,14 @@ FOLLOWED = 3
 
 
 def with_play(found: Fit, effects: Mapping[str, Effect]) -> list[Fit]:
-    """Return fits of the base form of `found` with its effects and play, from several starting points.
+    """Return fits of the base form of `found` with its effects and with play, from several starting points.
 
     Parameters
     ----------
     found
-        Best model on a share of the tests.
+        Best model on a share of the tests (the draft).
     effects
-        The effects considered; without `backlash` nothing is tried.
+        Effects that are considered; without `backlash` the result is empty.
     """
     play = effects.get("backlash")
     problem = found.problem

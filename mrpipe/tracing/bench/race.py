@@ -1,8 +1,8 @@
-"""The race of models: every base form alone and with the effects that it needs, compared on all training tests.
+"""The race: a comparison of all base forms, without effects and with the effects that they need, on all training tests.
 
-Another base form and a missing effect can leave the same residual under the declared form. Therefore no effect is
-judged under one base form alone. The models are fitted to a share of the tests, the draft, because there are many of
-them, and they are compared on all training tests: on most samples a model then predicts what it was not fitted to.
+A wrong base form and a missing effect can cause the same residual. Therefore no effect is judged under one base form
+alone. There are many models, so they are fitted to a share of the tests, the draft, and then compared on all training
+tests. Most samples of this comparison were not used in the fit.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ LEADERS = 3
 """Numerical technique: base forms, in addition to the declared one, under which effects are searched."""
 
 SCREENED = 8
-"""Numerical technique: base forms that are followed with the effects of another form."""
+"""Numerical technique: number of base forms that are fitted further with the effects of another form."""
 
 COMPARED = 60
-"""Numerical technique: models, the best ones on the draft, that are compared on all training tests."""
+"""Numerical technique: number of models, the best ones on the draft, that are compared on all training tests."""
 
 LISTED_STEPS = 3
-"""Numerical technique: iterations of fits that are only listed; they begin at the fit to the draft."""
+"""Numerical technique: iterations of fits that are only listed; they start from the fit to the draft."""
 
 Search = Callable[[Fit], Selection]
 
@@ -51,7 +51,7 @@ class Model:
     fit
         The fit on the draft.
     squares
-        Weighted squared error on each training test, shape (tests,), an offset of each test removed.
+        Weighted squared error on each training test, without the offset of the test, shape (tests,).
     """
 
     fit: Fit
@@ -74,7 +74,7 @@ class Model:
 
 
 def claims_of(problem: Problem) -> int:
-    """Return the number of fitted numbers, and three for each effect."""
+    """Return the number of fitted numbers, plus three for each effect: a penalty for complexity."""
     return len(problem.searched) + len(problem.amplitudes) + problem.base.columns + 3 * len(problem.terms)
 
 
@@ -85,19 +85,19 @@ class Race:
     Attributes
     ----------
     models
-        The models compared.
+        The models that are compared.
     declared
         Name of the declared base form.
     own
         Names of the effects that belong to the baseline.
     searches
-        Selection of effects under each base form that was searched, on the draft.
+        Base form -> selection of effects under this form, on the draft.
     counts
-        Number of samples compared in each training test, shape (tests,).
+        Number of samples that are compared in each training test, shape (tests,).
     noise
         Mean squared weighted residual that noise leaves.
     coupled
-        Names of the base forms whose steps read the laws of the drive; these laws are held during the race.
+        Names of the base forms whose steps read the laws of the drive; these laws are kept fixed during the race.
     rules
         Decision thresholds.
     """
@@ -112,12 +112,12 @@ class Race:
     rules: RaceRules = field(default_factory=RaceRules)
 
     def costs(self, weights: FloatArray | None = None) -> FloatArray:
-        """Return what each model leaves beyond what is sufficient, raised by its claims, shape (models,).
+        """Return the cost of each model, shape (models,): excess of its error over a sufficient one, times its penalty.
 
         Parameters
         ----------
         weights
-            How often each training test counts, shape (tests,); once if None.
+            Weight of each training test, shape (tests,); None: 1.
         """
         w = np.ones(len(self.counts)) if weights is None else weights
         squares = np.stack([model.squares for model in self.models])
@@ -126,14 +126,14 @@ class Race:
         return np.asarray(left * (1.0 + self.rules.claim_cost * np.array([model.claims for model in self.models])))
 
     def winner(self, lead: float, weights: FloatArray | None = None) -> Model:
-        """Return the model with fewest effects among those that are not clearly worse than the best one.
+        """Return the model with the fewest effects among those that are not clearly worse than the best one.
 
-        An effect is thus named only if every model without it is clearly worse, whatever its base form.
+        An effect is therefore named only if every model without it, with any base form, is clearly worse.
 
         Parameters
         ----------
         lead
-            Share by which a model must cost more than the best one to be clearly worse.
+            A model is clearly worse if its cost exceeds the least one by this share.
         weights
             See :meth:`costs`.
         """
@@ -149,7 +149,7 @@ class Race:
         return self.models[min(near, key=order)]
 
     def tied_forms(self, winner: Model, lead: float) -> tuple[str, ...]:
-        """Return the other base forms that are not clearly worse with the same effects, the best first."""
+        """Return other base forms that are not clearly worse with the same effects, the best first."""
         costs = self.costs()
         own = costs[self.models.index(winner)]
         found: dict[str, float] = {}
@@ -159,7 +159,7 @@ class Race:
         return tuple(sorted(found, key=lambda name: found[name]))
 
     def extended(self, winner: Model) -> Model:
-        """Return the cheapest model of the winner's form that holds its effects and further ones; else the winner."""
+        """Return the cheapest model with the form and effects of the winner and further effects; else the winner."""
         costs = self.costs()
         count = len(winner.effects)
         able = [
@@ -170,14 +170,14 @@ class Race:
         return self.models[min(able, key=lambda place: float(costs[place]))]
 
     def alone_on_all_tests(self, problem: Problem, names: Collection[str], *, jobs: int = 1) -> dict[str, Fit]:
-        """Return base forms without effects that were searched, fitted to all tests of a problem, on some threads."""
+        """Return base forms without effects, of those that were searched, fitted to all tests of a problem."""
         drafted = {model.form: model.fit for model in self.models if model.effects == self.own and model.form in names}
         whole = partial(on_all_tests, problem=problem, coupled=self.coupled, iterations=LISTED_STEPS)
         with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
             return dict(zip(drafted, pool.map(whole, drafted.values()), strict=True))
 
     def support(self, effect: str, lead: float, *, draws: int, rng: np.random.Generator) -> float:
-        """Return the share of resamples in which the winner has an effect; tests are drawn with replacement."""
+        """Return the share of bootstrap samples of the tests in which the winner has an effect."""
         tests = len(self.counts)
         present = np.flatnonzero(self.counts)
         held = 0
@@ -198,20 +198,20 @@ def race(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Race:
-    """Search effects under the best base forms, and try what was found under other forms.
+    """Search effects under the best base forms, and try the effects that were found under other forms.
 
     Parameters
     ----------
     base
         Fit of the declared form to all training tests.
     singles
-        Every base form of the library, the declared one too, fitted without effects to the draft of `base`.
+        Fits of every base form of the library, including the declared one, without effects to the draft of `base`.
     search
-        Searches effects from a fit without them.
+        Function that searches effects from a fit without effects.
     noise
         Mean squared weighted residual that noise leaves.
     further
-        Fits further models from the best one; None for none.
+        Function that fits further models from the best one; None: no further models.
     rules
         Decision thresholds; their defaults if None.
     jobs
@@ -224,7 +224,7 @@ def race(
     singles = {name: _held(item) if name in coupled else item for name, item in singles.items()}
     fits = list(singles.values())
     if min(item.chi_square for item in fits) <= rules.sufficient**2 * noise:
-        # a base form alone leaves no more than noise, so no effect is needed
+        # the error of a base form without effects is that of noise, so no effect is needed
         return _compared(fits, base, {}, noise, coupled, rules, jobs)
     ordered = sorted(singles, key=lambda name: _draft_cost(singles[name], noise, rules))
     names = list(dict.fromkeys((base.problem.base.name, *ordered[:LEADERS])))
@@ -266,7 +266,7 @@ def race(
 
 
 def _held(found: Fit) -> Fit:
-    """Return a coupled form with the laws that its steps read held: the search for effects is three times faster."""
+    """Return a coupled form whose laws are kept fixed in its steps, which makes the search three times faster."""
     base = found.problem.base
     held = replace(base, form=replace(base.form, coupled=False))
     return fit(replace(found.problem, base=held, reference=found.laws), found.theta, iterations=0)
@@ -288,14 +288,14 @@ def _compared(
         models = tuple(Model(item, value) for item, value in zip(fits, squares, strict=True))
     used = problem.root_weight > 0.0
     counts = np.bincount(problem.recordings.test[used], minlength=problem.recordings.tests).astype(np.float64)
-    # noise is no larger than what the best model leaves: what differs between repeats may be an effect that it lacks
+    # noise cannot exceed the residual of the best model: differences of repeats may be a missing effect
     noise = min(noise, min(float(np.sum(model.squares)) for model in models) / max(float(np.sum(counts)), 1.0))
     own = tuple(term.effect.name for term in problem.terms)
     return Race(models, problem.base.name, own, searches, counts, noise, coupled, rules)
 
 
 def alone(small: Fit, forms: Mapping[str, BaseForm], *, known: Known | None = None, jobs: int = 1) -> dict[str, Fit]:
-    """Return all base forms fitted to the tests of a draft, the form of the draft as it is.
+    """Return name -> fit of all base forms to the tests of a draft; the form of the draft is not fitted again.
 
     Parameters
     ----------
@@ -312,7 +312,7 @@ def alone(small: Fit, forms: Mapping[str, BaseForm], *, known: Known | None = No
     names = [name for name in forms if name != own]
 
     def fitted(name: str) -> Fit:
-        # effects scale with the laws of the form that they are added to, not with those of the declared form
+        # effects are proportional to the laws of the form that they are added to, not to those of the declared form
         return with_own_laws(fit_with_form(small, forms[name], starts=1, iterations=8, known=known))
 
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
@@ -330,10 +330,10 @@ def alone_of(found: Fit, options: TracingOptions, *, known: Known | None = None,
 
 
 def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, iterations: int = 8, jobs: int = 1) -> list[Fit]:
-    """Return base forms that were fitted alone, each with the effects of a fit, on the same tests.
+    """Return fits of other base forms with the effects of a fit, on the same tests.
 
-    The laws of the drive that the steps read are found again, because those of the base form alone contain the effect.
-    For the same reason a form also begins at its own starts: alone, its numbers imitate the effect that is missing.
+    The forms were fitted without effects before. The laws of the drive that their steps read are fitted again, because
+    without the effect they imitate it. For the same reason a fit also begins at the starts of the form.
     """
 
     def one(drafted: Fit) -> Fit:
@@ -350,16 +350,16 @@ def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, iterations: int = 8,
 
 
 def on_all_tests(drafted: Fit, problem: Problem, coupled: frozenset[str] = frozenset(), *, iterations: int = 10) -> Fit:
-    """Return a model of the race fitted to all training tests.
+    """Return a model of the race, fitted to all training tests.
 
     Parameters
     ----------
     drafted
         Fit on the draft.
     problem
-        Problem of the baseline: its recordings and weights are taken.
+        Problem of the baseline, which gives recordings and weights.
     coupled
-        See :class:`Race`: of these forms the laws that the steps read are fitted again.
+        See :class:`Race`; for these forms the laws that the steps read are fitted again.
     iterations
         Iterations of the search.
     """
@@ -382,7 +382,7 @@ def _draft_cost(found: Fit, noise: float, rules: RaceRules) -> float:
 
 
 def _squares(found: Fit, problem: Problem) -> FloatArray:
-    """Return the weighted squared error of a model on each test of a problem, its coefficients as they are."""
+    """Return the weighted squared error of a model on each test of a problem; its coefficients are not fitted again."""
     whole = found.problem.on_samples_of(problem)
     w = weighting(whole)
     error = problem.recordings.force - found.linear @ regressors(whole, found.theta)

@@ -1,8 +1,8 @@
-"""What improves a model after its effects are named: richer forms of the named effects, and further terms.
+"""Improvement of a model after its effects are named: richer forms of the named effects, and further terms.
 
-Flexible forms explain many things, so among the candidates they would make the names uncertain. Once an effect is
-named they do no such harm, and they lower the error where the plain forms do not fit. Further terms are effects whose
-cause is not proven. Both are kept only if tests that were left out are predicted better.
+Flexible forms can imitate many effects, so as candidates they would make the names uncertain. Once an effect is named,
+a richer form can lower the error where the simple forms do not fit. Further terms are effects whose cause is not
+proven. Both are kept only if they improve the prediction of tests left out.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from mrpipe.tracing.bench.select import Selection, draft
 from mrpipe.tracing.rules import RefinementRules
 
 NO_STRENGTH = 1e-3
-"""Numerical technique: share of its upper bound up to which a strength at its bound counts as zero."""
+"""Numerical technique: a strength below this share of its upper bound counts as zero."""
 
 CONFIRMED = 3
-"""Numerical technique: richer forms of an effect that left-out tests judge, until one of them is confirmed."""
+"""Numerical technique: largest number of richer forms of an effect that are judged on tests left out."""
 
 
 def with_richer_forms(
@@ -43,20 +43,20 @@ def with_richer_forms(
     jobs: int = 1,
     rules: RefinementRules | None = None,
 ) -> Selection:
-    """Return the selection with the forms of its named effects refined where tests left out are predicted better.
+    """Return the selection with richer forms of its named effects, if these predict tests left out better.
 
     Parameters
     ----------
-    declared
-        How many terms the campaign declares: they keep their forms.
-    folds, draws
-        Of the cross-validation and its bootstrap.
     selection
         Named effects with their fit.
+    declared
+        Number of terms that the campaign declares; they keep their forms.
+    folds, draws
+        Of the cross-validation and its bootstrap.
     rng
         Source of randomness.
     model_error
-        Whether residuals are weighed by an expected error of the model.
+        Whether residuals are weighted by an expected error of the model.
     jobs
         Threads; the result does not depend on their number.
     rules
@@ -67,7 +67,7 @@ def with_richer_forms(
     confirmed = partial(_confirmed, folds=folds, draws=draws, rng=rng, jobs=jobs, rules=rules)
     unseen: FloatArray | None = None
     for place in range(declared, min(declared + selection.proven, len(chosen.problem.terms))):
-        # where the model's error is the measure, it does not show whether something remains
+        # if weights follow from the error of the model, they do not show whether a structure remains
         if not model_error and chosen.chi_square < (1.0 + rules.worth_a_try) * selection.noise:
             break
         for richer in _richer(chosen, place, CONFIRMED, jobs):
@@ -137,14 +137,14 @@ def _confirmed(
     jobs: int,
     rules: RefinementRules,
 ) -> FloatArray | None:
-    """Return the residual of a trial on tests left out of its fit if it is clearly less than `unseen`; else None."""
+    """Return the residual of a trial on tests left out of its fit, if it is clearly less than `unseen`; else None."""
     residual = left_out_residual(trial, folds, jobs=jobs)
     gain = gain_of(unseen, residual, trial.problem, draws=draws, rng=rng)
     return residual if gain.significant and gain.share > rules.least_gain else None
 
 
 def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2, *, jobs: int = 1) -> Fit:
-    """Return the fit with the best forms of its terms at `places`, chosen on all tests one after another.
+    """Return the fit with the best forms of its terms at `places`, chosen one after another on all tests.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2, *, jobs:
     places
         Which of its terms may take another form.
     rounds
-        Numerical technique: how often all of them are visited, because a better form of one changes the others.
+        Numerical technique: number of passes over the terms, because a better form of one term changes the others.
     jobs
         Threads; the result does not depend on their number.
     """
@@ -167,17 +167,17 @@ def with_best_forms(found: Fit, places: Sequence[int], rounds: int = 2, *, jobs:
 
 
 def _richer(chosen: Fit, place: int, count: int, jobs: int = 1) -> Iterator[Fit]:
-    """Yield fits with other forms of one term, on all tests, in the order in which a share of the tests ranks them.
+    """Yield fits with other forms of one term on all tests, ranked on a share of the tests.
 
-    The forms of the search are tried as well as the richer ones: before the other terms and the laws were final,
-    another of them may have looked best. A form whose shape ends at a bound is not yielded.
+    Simple forms are tried as well as richer ones, because the other terms and the laws of the drive have changed since
+    the search. A form with a shape parameter at a bound is not yielded.
 
     Parameters
     ----------
     chosen, place
         The fit, and which of its terms takes other forms.
     count
-        How many of the forms are fitted to all tests.
+        Number of forms that are fitted to all tests.
     jobs
         Threads; the result does not depend on their number.
     """
@@ -205,22 +205,22 @@ def _richer(chosen: Fit, place: int, count: int, jobs: int = 1) -> Iterator[Fit]
 
 
 def _is_absent(item: Parameter, found: Fit, place: int) -> bool:
-    """Return whether a strength leaves its part of a profile out; a search within bounds ends just above zero."""
+    """Return whether a strength is zero within tolerance, because a search within bounds ends just above zero."""
     largest = item.bounds(found.problem.scales)[1]
     return item.role == "strength" and abs(found.term_values[place][item.name]) <= NO_STRENGTH * largest
 
 
 def _fits_in_chain(chosen: Fit, place: int, form: EffectForm) -> bool:
-    """Return whether the damper with another form of one term has no more steps than a chain may have."""
+    """Return whether the damper with another form of one term has at most the largest number of steps of a chain."""
     others = len(chosen.steps()) - len(chosen.problem.terms[place].form.steps(chosen.term_values[place]))
-    # one more step adds up the parts of the base form
+    # one further step sums the parts of the base form
     return others + len(form.steps(form.without_strength(chosen.problem.scales))) < CHAIN_LENGTH
 
 
 def _starts(form: EffectForm, known: Mapping[str, float], scales: EffectScales) -> Iterator[dict[str, float]]:
-    """Yield starts: what the plain form found where a parameter of the same name can take it, else those of the form.
+    """Yield starts: fitted values of the simple form for parameters of the same name, else the starts of the form.
 
-    A strength with distant starts takes these as well, because a plain form may have ended in another minimum.
+    For a strength with distant starts these are tried too, because the simple form may have ended in another minimum.
     """
 
     def choices(item: Parameter) -> tuple[float, ...]:

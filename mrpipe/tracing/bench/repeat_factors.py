@@ -1,9 +1,9 @@
-"""How differences of repeated motion are divided between the noise of the channels and what is not noise.
+"""Division of the differences of repeated motion into noise of the channels and other forces.
 
-White noise of a channel shows in every sample, so that the variances of the channels are the first guess of what
-repeats differ by. Few repeats cannot separate noise in the band of the motion, noise of the displacement and a
-disturbance that grows with the speed: a factor that differs from the first guess is taken only where the differences
-require it, by the Bayesian information criterion (Schwarz 1978, Ann. Statist. 6, 461-464).
+White noise of a channel is visible in every sample, so the variances of the channels are the first estimate of the
+variance of the differences. Few repeats cannot separate noise in the band of the motion, noise of the displacement and
+a disturbance that grows with the speed. A factor other than 1 on the first estimate is therefore used only if the
+differences require it, by the Bayesian information criterion (Schwarz 1978, Ann. Statist. 6, 461-464).
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import NoiseRules
 
 LEAST_EXPECTED = 0.05
-"""Numerical technique: least expected variance in the regression of the factors, as a share of the first guess."""
+"""Numerical technique: least expected variance in the regression of the factors, as a share of the first estimate."""
 
 WEIGHTED = 3
-"""Numerical technique: passes of the regression with weights from the pass before."""
+"""Numerical technique: number of passes of the regression, with weights from the pass before."""
 
 MOST_DEVIATIONS = 2.0
 """Numerical technique: deviations beyond this multiple of the expected one are limited to it."""
@@ -30,13 +30,13 @@ UNLIMITED = 0.9205
 """Numerical technique: mean square of a normal variable limited to +-2, by which limited squares are corrected."""
 
 NOISE_PASSES = 8
-"""Numerical technique: passes of the robust regression; each may raise a part fourfold."""
+"""Numerical technique: number of passes of the robust regression; each may raise a part by a factor of four."""
 
 MOST_LAGS = 50
 """Numerical technique: samples over which the correlation of neighbouring differences is summed."""
 
 FREE = ((False, False), (True, False), (False, True), (True, True))
-"""Numerical technique: which factors of force and motion noise are free in the models that are compared."""
+"""Numerical technique: for each model that is compared, whether the factors of force and motion noise are free."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Differences:
         Variances of the differences due to force noise, motion noise, and a force that grows with the speed, shape
         (n, 3), the pieces end to end.
     step_squared
-        Square of what rounding alone can change [N^2], shape (n,).
+        Square of the largest difference that rounding alone can cause, shape (n,) [N^2].
     """
 
     pieces: tuple[FloatArray, ...]
@@ -66,8 +66,8 @@ class Differences:
     def independent(self, expected: FloatArray) -> float:
         """Return the number of independent squared differences, for their expected values, shape (n,).
 
-        The squares of a normal process with correlation rho have correlation rho^2, which widens the variance of their
-        mean by 1 + 2 (sum of rho^2).
+        The squares of a normal process with correlation rho have the correlation rho^2, which increases the variance of
+        their mean by the factor 1 + 2 (sum of rho^2).
         """
         ends = np.cumsum([len(piece) for piece in self.pieces])
         lags = np.zeros(MOST_LAGS + 1)
@@ -77,20 +77,20 @@ class Differences:
                 lags[lag] += float(values[: len(values) - lag] @ values[lag:])
         count = int(ends[-1])
         correlation = lags[1:] / max(lags[0], 1e-300)
-        # what chance alone leaves, 1 / n, is subtracted
+        # the expected value by chance alone, 1 / n, is subtracted
         inflation = 1.0 + 2.0 * float(np.sum(np.maximum(correlation**2 - 1.0 / max(count, 1), 0.0)))
         return count / inflation
 
 
 def parts_of_differences(found: Differences, rules: NoiseRules) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the factors of force and motion noise, the differences without events, and the disturbance in them.
+    """Return the factors of force and motion noise, the differences without events, and their disturbance part.
 
     Parameters
     ----------
     found
         Differences of repeated motion.
     rules
-        From which share on events and a disturbance are separated from the noise.
+        Thresholds above which events and a disturbance are separated from the noise.
     """
     columns, target = found.columns, found.squares
     noise, nothing = columns[:, :2], np.zeros(len(target))
@@ -101,8 +101,8 @@ def parts_of_differences(found: Differences, rules: NoiseRules) -> tuple[FloatAr
     expected = columns * with_growing
     growing = target * expected[:, 2] / np.maximum(expected.sum(axis=1), 1e-300)
     large = float(np.sum(growing)) >= rules.disturbance * float(np.sum(target))
-    # where the noise that the channels show suffices, a disturbance must be required, too; where more is needed in any
-    # case, its dependence on the speed decides
+    # if the noise of the channels is sufficient, the criterion must require a disturbance; otherwise its dependence on
+    # the speed decides
     suffices = calm[0] <= 1.0
     growing_cost = _cost(target, _expected(columns, with_growing), columns.shape[1], count)
     if large and (growing_cost < cost or not suffices):
@@ -114,7 +114,7 @@ def parts_of_differences(found: Differences, rules: NoiseRules) -> tuple[FloatAr
 
 
 def _required_factors(noise: FloatArray, target: FloatArray, count: float) -> tuple[FloatArray, float]:
-    """Return the factors that differ from 1 only where the differences require it, and the criterion they reach."""
+    """Return the factors, different from 1 only if the differences require it, and the value of the criterion."""
     best = (np.ones(2), np.inf)
     for free in FREE:
         factors = _factors(noise, target, free)
@@ -124,10 +124,10 @@ def _required_factors(noise: FloatArray, target: FloatArray, count: float) -> tu
 
 
 def _factors(columns: FloatArray, target: FloatArray, free: Sequence[bool] = ()) -> FloatArray:
-    """Return the factors of the columns that explain squared differences; those that are not free are 1.
+    """Return the factors of the columns that explain the squared differences; factors that are not free are 1.
 
-    The scatter of squared differences is proportional to their mean, so they are weighted by their mean. The search
-    starts at what the channels show. All factors are free where `free` is left out.
+    The scatter of squared differences is proportional to their mean, so they are weighted by the inverse of their mean.
+    The search starts at the variances of the channels. Without `free` all factors are free.
     """
     searched = np.array(free) if free else np.ones(columns.shape[1], dtype=bool)
     factors = np.ones(columns.shape[1])
@@ -140,7 +140,7 @@ def _factors(columns: FloatArray, target: FloatArray, free: Sequence[bool] = ())
 
 
 def _expected(columns: FloatArray, factors: FloatArray) -> FloatArray:
-    """Return the expected squares, no less than a share of those by the channels alone."""
+    """Return the expected squares, at least a share of those of the channels alone."""
     together = columns[:, :2].sum(axis=1)
     # a channel without noise would have infinite weight
     least = np.maximum(LEAST_EXPECTED * together, max(1e-12 * float(np.max(together)), 1e-300))
@@ -164,15 +164,15 @@ def _cost(target: FloatArray, expected: FloatArray, fitted: int, count: float) -
 
 
 def _robust_factors(columns: FloatArray, target: FloatArray, step_squared: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the factors without single events, and the squared differences without them.
+    """Return the factors and the squared differences, both without single events.
 
-    Noise is spread over all samples. What exceeds its expected deviation several times in a few samples only is an
-    event that does not repeat, such as sticking, and not noise: it is limited to that multiple (proposal 2 of Huber
-    1964, Ann. Math. Statist. 35, 73-101). Rounding, too, makes few differences, of one step each. One step is not an
-    event.
+    Noise affects all samples. A difference that exceeds its expected deviation several times in only a few samples is
+    an event that does not repeat, such as sticking, and not noise. It is limited to a multiple of the expected
+    deviation (proposal 2 of Huber 1964, Ann. Math. Statist. 35, 73-101). Rounding also causes few differences, of one
+    step each; a difference of one step is not an event.
     """
     together = columns.sum(axis=1)
-    # half of all samples decide where the search starts, so that rare events cannot
+    # the search starts from the median, on which rare events have no influence
     middle = float(np.median(target / np.maximum(together, 1e-12 * float(np.max(together)))))
     start = max(middle / float(stats.chi2.median(1)), 1e-300)
     factors, limited, expected = np.full(2, start), target, start * together

@@ -1,4 +1,4 @@
-"""Whether a residual contains more than noise, and which states it depends on."""
+"""Tests whether a residual contains more than noise, and on which states it depends."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.rules import LocationRules
 
 BLOCK = 0.6
-"""Numerical technique: length, in periods of the motion, of the blocks whose means are taken as independent."""
+"""Numerical technique: length of the blocks whose sums are taken as independent, in periods of the motion."""
 
 BINS = 16
-"""Numerical technique: steps of the step function of a state."""
+"""Numerical technique: number of steps of the step function of a state."""
 
 LAGS_FIT = 4
-"""Numerical technique: autocorrelations are tested on records of at least this many times as many samples as lags."""
+"""Numerical technique: autocorrelations are tested on records with at least this number of samples per lag."""
 
 ELASTIC_SHARE = 0.1
-"""Numerical technique: yield displacement of a form that has no such parameter, as a share of the stroke."""
+"""Numerical technique: yield displacement that is assumed for a form without such a parameter, as share of the stroke.
+"""
 
 THIRD = 1.0 / 3.0
 """Numerical technique: a test is divided into three parts of equal length."""
@@ -38,7 +39,7 @@ class States:
 
 
 def states_of(found: Fit, recordings: Recordings) -> States:
-    """Return the states of the simulated damper: motion, drive, their past, memory."""
+    """Return the states of the simulated damper: motion, drive, their past, and memory variables."""
     wires = run_recordings(chain_of(found.problem, found.theta)[0], recordings)
     x, v, u = recordings.displacement, recordings.velocity, wires[CURRENT_AT]
     slip, since, past, drive_rate = memory_of(recordings)
@@ -109,14 +110,14 @@ def structure_p_value(residual: FloatArray, states: States) -> float:
 def correlation_p_value(residual: FloatArray, recordings: Recordings, lags: int = 20) -> float:
     """Return the probability that white noise has autocorrelations as large as this residual.
 
-    Portmanteau test of Ljung and Box (1978), each test on its own, corrected for the number of tests.
+    Portmanteau test of Ljung and Box (1978), for each test separately, corrected for the number of tests.
 
     Parameters
     ----------
     residual
         Shape (n,); samples that are not compared are left out.
     recordings
-        Tests that the residual belongs to.
+        Tests of the residual.
     lags
         Number of lags that are tested.
     """
@@ -137,9 +138,10 @@ def correlation_p_value(residual: FloatArray, recordings: Recordings, lags: int 
 
 
 def dependence(residual: FloatArray, states: States) -> list[tuple[str, float]]:
-    """Return (state, share of the residual's variance that it explains by itself), largest first.
+    """Return (state, share of the variance of the residual that this state alone explains), the largest first.
 
-    The share is that of a step function of the state, separately for both directions, judged on blocks left out.
+    The share is that of a step function of the state, separate for both directions of motion, judged on blocks left
+    out.
     """
     used = residual != 0.0
     r = residual[used]
@@ -165,7 +167,7 @@ def dependence(residual: FloatArray, states: States) -> list[tuple[str, float]]:
 def location(
     residual: FloatArray, found: Fit, recordings: Recordings, states: States, rules: LocationRules | None = None
 ) -> dict[str, dict[str, float]]:
-    """Return the shares of the residual's sum of squares by part of the cycle, drive, direction and time."""
+    """Return how the squared residual is divided over parts of the cycle, drive, direction and time, as shares."""
     rules = rules or LocationRules()
     squares = residual**2
     total = max(float(np.sum(squares)), 1e-300)

@@ -1,8 +1,8 @@
-"""Other base forms with the named effects, or with fewer of them, in their best forms.
+"""Comparison with other base forms that have the named effects, or fewer of them, in their best forms.
 
-The race compares base forms with effects in their plain forms. Where the true effect has a richer form, a wrong base
-form with one more effect can be ahead of the right base form. The best rivals are therefore compared again once it is
-known which effects are named, each with richer forms of the effects and adequate laws of the drive.
+The race compares base forms with effects in simple forms. If the true effect has a richer form, a wrong base form with
+one more effect can be better than the correct base form. The best rivals are therefore compared again once the named
+effects are known, each with richer forms of the effects and adequate laws of the drive.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ RIVALS = 3
 """Numerical technique: base forms, in addition to the chosen one, that are compared again."""
 
 HOPELESS = 5.0
-"""Numerical technique: richer forms are not tried where the plain ones leave this multiple of the chosen fit's
-chi-square."""
+"""Numerical technique: richer forms are not tried if the simple ones have this multiple of the chi-square of the chosen
+fit.
+"""
 
 ITERATIONS = 15
-"""Numerical technique: most steps of a fit with another base form ..."""
+"""Numerical technique: largest number of steps of a fit with another base form ..."""
 
 TOLERANCE = 1e-3
-"""Numerical technique: ... which ends where a step lowers the squares by less than this share."""
+"""Numerical technique: ... which ends when a step lowers the sum of squares by less than this share."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Orders:
     Attributes
     ----------
     yield_order, viscosity_order
-        Of the yield force and of the viscosity.
+        Degree for the yield force and for the viscosity.
     """
 
     yield_order: int
@@ -56,12 +57,12 @@ class Orders:
 
 @dataclass(frozen=True)
 class Unseen:
-    """How two fits are compared on tests that were left out of them.
+    """Comparison of two fits on tests left out of them.
 
     Attributes
     ----------
     folds, draws
-        Of the cross-validation and its bootstrap.
+        Number of folds of the cross-validation and of draws of its bootstrap.
     rng
         Source of randomness.
     """
@@ -71,7 +72,7 @@ class Unseen:
     rng: np.random.Generator
 
     def better(self, before: Fit, after: Fit, jobs: int) -> bool:
-        """Return whether the second fit predicts tests that were left out significantly better."""
+        """Return whether the fit `after` predicts tests left out significantly better than `before`."""
         first, second = (left_out_residual(item, self.folds, jobs=jobs) for item in (before, after))
         return gain_of(first, second, after.problem, draws=self.draws, rng=self.rng).significant
 
@@ -111,7 +112,7 @@ def with_best_base(
     unseen: Unseen,
     jobs: int = 1,
 ) -> Selection:
-    """Return the selection with the base form that fits best once the effects have their best forms.
+    """Return the selection with the base form that fits best, with the best forms of the effects.
 
     Parameters
     ----------
@@ -124,11 +125,12 @@ def with_best_base(
     race
         The models that competed; None where nothing is missing.
     worth_a_try
-        Excess of the chi-square over the noise, in units of the noise, from which other base forms are compared.
+        Other base forms are compared only if the excess of the chi-square over the noise, in units of the noise,
+        exceeds this.
     lead
-        Share by which the chi-square of the chosen base form must exceed that of another one.
+        Another base form is taken only if the chi-square of the chosen one exceeds its chi-square by this share.
     unseen
-        Comparison on tests that were left out, which the other base form must predict better, too.
+        Comparison on tests left out; the other base form must also predict these better.
     jobs
         Threads.
     """
@@ -140,7 +142,7 @@ def with_best_base(
     places = range(len(small.problem.terms))
     full = with_best_forms(orders.adequate(small), named, jobs=jobs)
     if full.chi_square < (1.0 + worth_a_try) * selection.noise:
-        # a richer form of the effect is all that is missing
+        # only a richer form of the effect is missing
         return selection
     found = best_rival(selection, small, [places], declared, orders, race, jobs)
     if found is None:
@@ -162,11 +164,11 @@ def with_base_of(rival: Model, small: Fit, places: Sequence[int], declared: int,
     Parameters
     ----------
     rival
-        Gives the base form and its start.
+        Model that gives the base form and its start.
     small
-        Gives the terms, their starts and the samples.
+        Fit that gives the terms, their starts and the samples.
     places
-        Which terms are kept.
+        Indices of the terms that are kept.
     declared
         How many terms the campaign declares: they keep their forms.
     orders
@@ -197,9 +199,9 @@ def best_rival(
     Parameters
     ----------
     selection, small
-        What was chosen, and its fit on the draft.
+        The selection, and the fit of its model on the draft.
     sets
-        Each holds the places of the terms that are kept.
+        Sets of indices of the terms that are kept.
     declared
         How many terms the campaign declares: they keep their forms.
     orders
@@ -224,7 +226,7 @@ def taken(selection: Selection, race: Race, rival: Model, found: Fit) -> Selecti
     Parameters
     ----------
     selection
-        What was chosen before.
+        The selection before.
     race
         The models that competed.
     rival

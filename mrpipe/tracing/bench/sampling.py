@@ -1,8 +1,8 @@
-"""At which rate models are fitted: the given rate, or a multiple of it where the chosen model then leaves clearly less.
+"""Rate at which models are fitted: the given rate, or a multiple of it if the error is then clearly smaller.
 
-Forces are picked from the records at a reduced rate, because most of them change slowly. A force that follows velocity,
-or the end of a free play, changes within a few milliseconds: between two samples of a reduced rate the model cannot
-follow it, and its numbers become biased. Only a model that holds the effect shows this.
+Forces are picked from the records at a reduced rate, because most of them change slowly. A force that depends on
+velocity, or the end of a free play, changes within a few milliseconds. The model cannot represent this change between
+two samples of a reduced rate, and its parameters become biased. Only a model with the effect shows this.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ def better_rate(
     highest_cutoff_hz: float = np.inf,
     gain: float,
 ) -> float:
-    """Return the rate at which a chosen model leaves clearly less than at half of it; the given rate if there is none.
+    """Return the rate [Hz] at which the error of a chosen model is clearly smaller than at half this rate.
+
+    It is the given rate if there is no such higher rate.
 
     Parameters
     ----------
@@ -41,16 +43,16 @@ def better_rate(
     tests
         Training tests.
     rate_hz
-        Rate at which it was chosen [Hz].
+        Rate at which the model was chosen [Hz].
     cutoff_hz, highest_cutoff_hz
-        Filter of the displacement with which it was chosen, see :func:`mrpipe.fitting.recordings.record_tests`.
+        Filter of the displacement with which the model was chosen, see :func:`mrpipe.fitting.recordings.record_tests`.
     gain
         Share by which the RMS of the residual must fall from one rate to the next.
     """
     recorded = max(test.sampling_rate_hz for test in tests)
 
     def again(start: Fit, rate: float) -> Fit:
-        # a limit that was chosen at a low rate can hide what a higher rate shows
+        # a limit that was chosen at a low rate can hide an effect that a higher rate shows
         fits = [at_rate(start, rate, limit) for limit in sorted({highest_cutoff_hz, np.inf})]
         return min(fits, key=lambda item: item.chi_square)
 

@@ -1,4 +1,4 @@
-"""Cheap screening: how much of the residual each effect could take, to first order, beyond a refit."""
+"""Fast screening: share of the residual that each effect could explain to first order, beyond a refit of the model."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from mrpipe.fitting.weighting import Weighting, centred, weighting
 
 @dataclass(frozen=True)
 class Screened:
-    """One form at one point of its grid.
+    """One form of an effect at one point of its grid of starts.
 
     Attributes
     ----------
-    gain
-        Share of the residual's sum of squares that it takes to first order.
-    values
-        Start values for a joint fit.
     term
         The effect in the form that was tried.
+    gain
+        Share of the sum of squares of the residual that the form explains to first order.
+    values
+        Start values for a joint fit.
     """
 
     term: Term
@@ -41,7 +41,7 @@ class Screened:
 
 @dataclass(frozen=True)
 class Tangent:
-    """What refitting the present model can absorb.
+    """Tangent space of the present model: changes of the force that a refit can produce.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class Tangent:
     basis
         Orthonormal basis of its weighted tangent, shape (t, m).
     weighting
-        The m samples compared.
+        The m samples that are compared.
     residual
-        Weighted residual without its part in the tangent, shape (m,).
+        Weighted residual without its part in the tangent space, shape (m,).
     force
         Force of the present model at all samples, without offsets, shape (n,) [N].
     """
@@ -65,7 +65,7 @@ class Tangent:
 
 
 def tangent_of(found: Fit) -> Tangent:
-    """Return the tangent of a fit at its optimum."""
+    """Return the tangent space of a fit at its optimum."""
     problem = found.problem
     w = weighting(problem)
     residual = found.residual[w.at]
@@ -82,7 +82,7 @@ def tangent_of(found: Fit) -> Tangent:
 
 
 def grid(term: Term, problem: Problem) -> Iterable[dict[str, float]]:
-    """Yield start values of a form: every combination of the starts of its shapes, strengths small."""
+    """Yield start values of a form: every combination of the starts of its shapes, with small strengths."""
     names = [item.name for item in term.form.searched]
     choices = [
         item.start_values(problem.scales)[: 1 if item.role == "strength" else None] for item in term.form.searched

@@ -1,4 +1,4 @@
-"""Which effects: screening, joint refits from several starts, forward selection, each kept only for a fair share."""
+"""Choice of the effects: screening, joint refits from several starts, and forward selection with a least share."""
 
 from __future__ import annotations
 
@@ -21,37 +21,37 @@ from mrpipe.tracing.bench.screen import Screened, screen
 from mrpipe.tracing.rules import SelectionRules
 
 DRAFT_SAMPLES = 8_000
-"""Numerical technique: samples, or slightly more, on which all forms are drafted ..."""
+"""Numerical technique: least number of samples of the draft, to which all forms are fitted ..."""
 
 MOST_PARTS = 4
-"""Numerical technique: ... but at least this part of the tests."""
+"""Numerical technique: ... but at least one in this number of tests."""
 
 BEGUN_STEPS = 3
-"""Numerical technique: iterations after which the most promising forms are chosen ..."""
+"""Numerical technique: number of iterations after which the best forms are chosen ..."""
 
 CONTINUED = 8
 """Numerical technique: ... and number of forms that are then fitted further."""
 
 DISTANT_STEPS = 6
-"""Numerical technique: iterations of a refit from a distant start of a strength, before which it cannot be judged."""
+"""Numerical technique: number of iterations of a refit from a distant start of a strength, before it is judged."""
 
 _Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A family in its best form, fitted jointly.
+    """An effect in its best form, fitted jointly with the model.
 
     Attributes
     ----------
-    fit
-        With the terms chosen before and this one, which is the last.
-    share
-        Share of the recoverable residual of the base that the whole set recovers.
-    forms
-        Share of each form that was tried.
     name
         Of the effect.
+    fit
+        Fit with the terms that were chosen before, and with this one as the last term.
+    share
+        Share of the recoverable residual of the base that all terms together recover.
+    forms
+        Form -> share, of all forms that were tried.
     """
 
     name: str
@@ -62,26 +62,26 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Selection:
-    """What forward selection found.
+    """Result of the forward selection.
 
     Attributes
     ----------
     base, noise
-        Fit of the base; chi-square of the noise.
+        Fit of the base model; chi-square of the noise.
     rounds
         Candidates of each round, best first.
     chosen
-        The fit kept (the base where none was).
+        The chosen fit; the base if no effect was taken.
     proven
-        How many of the rounds name a cause; terms of later rounds improve the model, their cause is not proven.
+        Number of rounds whose terms are named. Terms of later rounds improve the model, but their cause is not proven.
     ground
-        Fit without effects that the rounds build on: the base, or another base form that the tests need.
+        Fit without effects that the rounds start from: the base, or another base form that the tests require.
     tied_forms
         Other base forms that are not clearly worse with the same effects.
     extension
-        Fit with further terms, whose cause is not proven, until it is known whether left-out tests confirm them.
+        Fit with further terms, whose cause is not proven, before tests left out have confirmed them.
     named_fit
-        Fit with the named effects alone, where `chosen` holds further terms.
+        Fit with the named effects alone, if `chosen` has further terms.
     nothing_missing
         Excess of the chi-square over the noise, in units of the noise, below which nothing is missing.
     """
@@ -99,17 +99,17 @@ class Selection:
 
     @property
     def without_effects(self) -> Fit:
-        """Return the fit that the rounds build on."""
+        """Return the fit that the rounds start from."""
         return self.base if self.ground is None else self.ground
 
     @property
     def with_named_alone(self) -> Selection:
-        """Return the same without terms whose cause is not proven."""
+        """Return the selection without terms whose cause is not proven."""
         return self if self.named_fit is None else replace(self, chosen=self.named_fit, named_fit=None)
 
     @property
     def recoverable(self) -> float:
-        """Excess of the base's chi-square over the noise."""
+        """Excess of the chi-square of the base over that of the noise."""
         return max(self.base.chi_square - self.noise, 0.0)
 
     @property
@@ -118,7 +118,7 @@ class Selection:
         return self.recoverable > self.nothing_missing * self.noise
 
     def with_floor(self, floor: float) -> Selection:
-        """Return the same with another estimate of what cannot be recovered; shares follow."""
+        """Return the selection with another estimate of the chi-square that cannot be recovered; shares are updated."""
         rounds = tuple(
             tuple(replace(item, share=share_of(self.base, item.fit, floor)) for item in candidates)
             for candidates in self.rounds
@@ -131,7 +131,7 @@ class Selection:
 
 
 def share_of(base: Fit, found: Fit, noise: float) -> float:
-    """Return the share of the base's excess over noise that a fit recovers, at most 1."""
+    """Return the share of the excess of the base over noise that a fit recovers, at most 1."""
     excess = max(base.chi_square - noise, 1e-12)
     return float(min(1.0, (base.chi_square - found.chi_square) / excess))
 
@@ -185,10 +185,10 @@ def refit(before: Fit, screened: Screened, *, iterations: int = 7) -> Fit:
 
 
 def on_all(before: Fit, drafted: Fit, *, iterations: int) -> Fit:
-    """Fit the terms of a draft on all tests of `before`, from where the draft ended.
+    """Fit the terms of a draft on all tests of `before`, starting from the values of the draft.
 
-    What both share starts from the draft or from `before`, whichever is nearer: on a share of the tests it may have
-    gone where the others do not follow.
+    Parameters that both have start from the draft or from `before`, whichever gives the smaller error, because a fit to
+    a share of the tests may have ended far from the optimum of all tests.
     """
     problem = replace(before.problem, terms=(*before.problem.terms, drafted.problem.terms[-1]))
     both = [drafted.theta, np.concatenate([before.theta, drafted.theta[len(before.theta) :]])]
@@ -208,9 +208,9 @@ def candidates_after(
     jobs: int,
     progress: Progress = no_progress,
 ) -> list[Candidate]:
-    """Screen all terms after a fit and refit the families that promise most; best first.
+    """Screen all terms after a fit, and refit the best families; the best candidate is first.
 
-    Forms are tried on a share of the tests; those that may win are fitted on all of them.
+    Forms are tried on a share of the tests; the best ones are fitted to all tests.
     """
     rules = rules or SelectionRules()
     penalised = partial(_penalised, share=rules.per_parameter)
@@ -223,7 +223,7 @@ def candidates_after(
     chosen = list(families)[:refits]
     begun = partial(refit, small, iterations=BEGUN_STEPS)
     drafts = _each(begun, [item for name in chosen for item in families[name][:2]], jobs)
-    # the families in front get all their forms: a name is judged by the form that suits it best
+    # all forms of the best families are tried: an effect is judged by the form that suits it best
     front = sorted(chosen, key=lambda name: min(item.cost for item in drafts if _name(item) == name))[:3]
     drafts += _each(begun, [item for name in front for item in families[name][2:]], jobs)
     drafts.sort(key=penalised)
@@ -280,14 +280,14 @@ def _nothing_more(before: Fit, terms: Sequence[Term], least: float, jobs: int) -
 
 
 def admissible(found: Fit, main_part: float = SelectionRules().main_part) -> bool:
-    """Return whether the last term of a fit may be named: it does something and no strength sits at a bound."""
+    """Return whether the last term of a fit may be named: it has an effect, and no strength is at a bound."""
     term, values = found.problem.terms[-1], found.term_values[-1]
     for item in term.form.parameters:
         if item.role in ("strength", "amplitude") and len(term.form.amplitudes) <= 1 and item.name in found.at_bound:
             return False
     amplitudes = term.form.amplitudes
     if len(amplitudes) > 1 and amplitudes[0].lower == 0.0 and all(item.lower < 0.0 for item in amplitudes[1:]):
-        # without the part of definite sign only its corrections remain: a spring needs a stiffness
+        # without the part of definite sign only corrections remain: a spring needs a stiffness
         main, *corrections = (abs(values[p.name]) / found.problem.scales.of(p.scale) for p in amplitudes)
         if main <= main_part * max(corrections):
             return False
@@ -295,7 +295,7 @@ def admissible(found: Fit, main_part: float = SelectionRules().main_part) -> boo
 
 
 def stuck(found: Fit) -> set[str]:
-    """Return what sits at a bound; but one of several amplitudes of a form at zero is a part that is not there."""
+    """Return the parameters at a bound, except one of several amplitudes at zero, because that part is absent."""
     absent = {
         item.name
         for term, values in zip(found.problem.terms, found.term_values, strict=True)
@@ -316,10 +316,10 @@ def forward_selection(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Selection:
-    """Add effects one after another while each recovers a fair share.
+    """Add effects one after another, while each recovers a sufficient share.
 
-    A further term counts as a separate cause only where it recovers much of the rest and leads the other families.
-    Otherwise it may correct the form of the effect before it, and so may all terms that follow.
+    A further term counts as a separate cause only if it recovers a large share of the remaining residual and is clearly
+    better than the other families. Otherwise it, and every later term, may only correct the form of an earlier effect.
     """
     rules = rules or SelectionRules()
     rounds: list[tuple[Candidate, ...]] = []
@@ -354,7 +354,7 @@ def forward_selection(
         nearer = chosen if not rounds or again else _nearer(chosen, able[0].fit, rules.better_optimum)
         again = nearer is not chosen
         if again:
-            # the term had only shown the way to a better optimum of the others: look again from there
+            # the term had only led to a better optimum of the other terms: search again from there
             rounds[-1] = tuple(_with_fit(item, chosen, nearer, base, noise) for item in rounds[-1])
             chosen = nearer
             continue
@@ -369,7 +369,7 @@ def forward_selection(
 
 
 def _nearer(chosen: Fit, best: Fit, share: float) -> Fit:
-    """Return the fit without the last term of `best`, begun where that ended, if it is clearly better than before."""
+    """Return a fit without the last term of `best`, started from `best`, if it is clearly better than `chosen`."""
     trial = fit(chosen.problem, best.theta[: len(chosen.theta)], iterations=6)
     return trial if trial.chi_square < (1.0 - share) * chosen.chi_square else chosen
 

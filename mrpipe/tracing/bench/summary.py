@@ -1,4 +1,4 @@
-"""All that is printed of a tracing, as one dictionary for JSON."""
+"""The result of a tracing as one dictionary for JSON."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ UNATTRIBUTED: dict[str, Any] = {
     "tied_with": [],
     "physics": "A flexible model of what no named effect explains; it has no physical meaning.",
     "remedy": "Make the tests that `next_tests` lists.",
-    "corrected_in": "nowhere: it is a model of the record and cannot run in a loop",
+    "corrected_in": "nowhere: it is a model of the record and cannot run in a closed loop",
 }
 
 
 LISTED = 6
-"""Numerical technique: most states that are listed under `depends_on`."""
+"""Numerical technique: largest number of states that are listed under `depends_on`."""
 
 
 @dataclass(frozen=True)
 class Tracing:
-    """What was found; `summary` is what `close-loop --json` prints, the rest is for files and figures."""
+    """Result of a tracing; `summary` is printed by `close-loop --json`, the rest is for files and figures."""
 
     summary: dict[str, Any]
     selection: Selection
@@ -64,7 +64,7 @@ class Tracing:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors on the validation tests and what is printed of a tracing."""
+    """Errors on the validation tests, and the printed result of a tracing."""
 
     selection: Selection
     baseline: Baseline
@@ -85,10 +85,10 @@ class Summary:
         window: float,
         declared: list[str],
     ) -> Tracing:
-        """Return the tracing with all that is printed.
+        """Return the tracing with its printed result.
 
-        `further` are terms that improve the model, their cause not proven; `untested` the effects that no test shows,
-        and why.
+        `further` are terms that improve the model, but whose cause is not proven. `untested` are the effects that no
+        test can show, with the reason.
         """
         selection, training, found = self.selection, self.training, self.found
         states = states_of(selection.base, training)
@@ -132,7 +132,7 @@ class Summary:
         )  # fmt: skip
 
     def _verdict(self) -> dict[str, Any]:
-        """Return the keys of the verdict; what is wrong with single tests is said first."""
+        """Return the keys of the verdict; the sentence begins with faults of single tests."""
         found, first = self.judgement.verdict.as_json(), self.sorted_tests.sentence
         if first:
             found["verdict"] = f"{first}; {found['verdict']}"
@@ -176,7 +176,7 @@ class Summary:
         }
 
     def _unexplained(self, rules: TracingRules) -> dict[str, Any]:
-        """Return what remains in the training tests and in the validation tests, and what it varies with."""
+        """Return what remains unexplained in training and validation tests, and the states that it depends on."""
         selection, structured = self.selection, self.judgement.evidence.structured
         left = max(selection.chosen.chi_square - selection.noise, 0.0)
         excess = max(selection.base.chi_square - selection.noise, 1e-12)
@@ -198,7 +198,7 @@ class Summary:
         ).as_json()
 
     def _flexible(self) -> FloatArray:
-        """Return what a flexible model of the training tests' residual predicts on the validation tests [N]."""
+        """Return the prediction on the validation tests [N] of a flexible model of the training residual."""
         fitted = self.selection.chosen
         root = fitted.problem.root_weight
         residual = np.divide(fitted.residual, root, out=np.zeros_like(root), where=root > 0.0)
@@ -221,7 +221,7 @@ class Summary:
         errors = {name: score(judged, measured, predict(f, judged)).nrmse for name, f in fits.items()}
         if options.model not in errors:
             errors[options.model] = errors[next(iter(fits))]
-        # decided on the training tests, reported on the validation tests; a form must earn its parameters
+        # decided on the training tests with a penalty for parameters, and reported on the validation tests
         lead = 1.0 + options.rules.race.listed_lead
         best = min(fits, key=lambda name: fits[name].chi_square * (1.0 if name == base.problem.base.name else lead))
         ground = self.selection.ground
@@ -232,7 +232,7 @@ class Summary:
             best = taken
         declared = {"name": options.model, "declared": options.model}
         tied = list(self.selection.tied_forms)
-        # the stage knows the damper of identify-damper; a tracing of a structure has none
+        # the stage adds the comparison with the damper of identify-damper; a tracing of a structure has none
         return {**declared, "best": best, "taken": taken, "tied_with": tied, "nrmse": errors, "identified": None}
 
 

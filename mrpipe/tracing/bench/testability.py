@@ -28,7 +28,7 @@ def untestable(
 
 
 def missing(recordings: Recordings, rules: TestabilityRules | None = None) -> dict[Needs, str]:
-    """Return the needs of effects that the tests do not meet -> the reason, and what to record."""
+    """Return need of effects that the tests do not meet -> the reason, and which tests to record."""
     rules = rules or TestabilityRules()
     pieces = [
         slice(int(a), int(b)) for a, b in zip(recordings.starts[:-1], recordings.starts[1:], strict=True) if b > a
@@ -40,19 +40,19 @@ def missing(recordings: Recordings, rules: TestabilityRules | None = None) -> di
         ),
         "varying-speed": (
             _speed_varies(recordings, rules.speed_ratio),
-            "all tests move at one speed: record triangles at log-spaced speeds, or sines",
+            "all tests have one speed: record triangles at log-spaced speeds, or sines",
         ),
         "several-frequencies": (
             _several_frequencies(recordings, pieces, rules.frequency_ratio),
-            "all tests move at one frequency: record another",
+            "all tests have one frequency: record tests at another one",
         ),
         "several-positions": (
             _several_positions(recordings, pieces, rules.turning),
-            "all motions reverse at the same positions: record another amplitude or another middle",
+            "all motions reverse at the same positions: record another amplitude or another mean position",
         ),
         "long-tests": (
             _longest_cycles(recordings, pieces) >= rules.long_cycles,
-            f"no test has {rules.long_cycles:.0f} cycles of motion: record a long one",
+            f"no test has {rules.long_cycles:.0f} cycles of motion: record a long test",
         ),
     }
     return {need: reason for need, (fulfilled, reason) in met.items() if not fulfilled}

@@ -52,22 +52,23 @@ def trace_campaign(
     Parameters
     ----------
     tests
-        Prepared tests; roles `training` and `repeat` decide, `validation` only reports.
+        Prepared tests. The tests with the roles `training` and `repeat` decide; those with `validation` are used for
+        the reported errors.
     effects
         The library: name -> effect.
     declared
         Effects that the campaign declares: part of the baseline.
     options
-        How it is traced.
+        Options of the tracing.
     known
-        Base forms as `identify-damper` fitted them to the same tests: where the search of each begins. A form that is
-        not among them begins at its own starts.
+        Base forms as `identify-damper` fitted them to the same tests; the search of each starts from them. A form that
+        is not among them starts from the starts of the library.
     rng
         Source of randomness.
     jobs
         Processes; the result does not depend on their number.
     progress
-        Called with the share done and a text.
+        Called with the share of the work that is done (0 to 1) and a text.
     """
     rules = options.rules
     ordered = sort_tests(tests, rules.validation)
@@ -122,7 +123,7 @@ def trace_campaign(
     selection, assessed = with_likely_names(selection, case, gains, reason, rng)
     causes, further, found, judgement = assessed.causes, assessed.further, assessed.found, assessed.judgement
     if causes and judgement.evidence.after >= judgement.evidence.before:
-        # what does not lower the error on the validation tests is not named
+        # an effect that does not lower the error on the validation tests is not named
         selection = replace(selection, chosen=selection.without_effects, named_fit=None)
         causes, further, offsets = (), (), None
         reason = "the effects that the training tests require do not lower the error on the validation tests"
@@ -143,7 +144,7 @@ def _nothing_traced(
     options: TracingOptions,
     jobs: int,
 ) -> Tracing:
-    """Return the tracing of a base model on which no effect can be judged."""
+    """Return the tracing of a base model with which no effect can be judged."""
     selection = Selection(
         baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=options.rules.selection.nothing_missing
     )
@@ -163,7 +164,7 @@ def _needed(
     rng: np.random.Generator,
     jobs: int,
 ) -> Selection:
-    """Return the selection without superfluous effects, with the base form that fits best with the others."""
+    """Return the selection without superfluous effects, with the base form that fits best with the remaining ones."""
     rules = options.rules
     orders = Orders(options.yield_order, options.viscosity_order)
     by_force = choice.baseline.model_error
@@ -209,7 +210,7 @@ def _with_window(
     options: TracingOptions,
     jobs: int,
 ) -> tuple[float, Selection]:
-    """Look for a moving average that the records went through, where something is left to explain."""
+    """Search for a moving average by the recorder, if the model leaves more than noise."""
     left = selection.chosen.chi_square - noise
     if (
         not options.observation_filter
@@ -238,7 +239,7 @@ def _with_window(
     known = {term.effect.name for term in selection.chosen.problem.terms}
     others = {term.effect.name for term in again.chosen.problem.terms} - known
     if others or again.chosen.chi_square > filtered.chi_square:
-        # only the race compares an effect with all base forms, so the filter brings no new name
+        # only the race compares an effect with all base forms, so no effect is newly named after the filter
         again = replace(again, chosen=filtered, rounds=selection.rounds, proven=selection.proven)
     return share, again
 

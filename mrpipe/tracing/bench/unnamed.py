@@ -1,10 +1,10 @@
-"""A shape without a name that competes with the named effects: any linear force with memory of the motion.
+"""A rival without a name: any linear force with memory of the motion.
 
-The library holds named effects only. A force that none of them describes would get the name of the effect that
-resembles it most. Named effects therefore compete with the general linear viscoelastic force, whose strength grows with
+The library contains named effects only. A force that none of them describes would get the name of the most similar
+effect. Named effects therefore compete with the general linear viscoelastic force, whose strength is proportional to
 the drive: a sum of Maxwell elements (Prony series) with stiffnesses that are not negative, which can approximate every
-passive linear memory (Christensen, Theory of Viscoelasticity, 1982). The names are proven only if the named effects
-predict tests that were left out better than the memory does.
+passive linear memory (Christensen, Theory of Viscoelasticity, 1982). The names count as proven only if the named
+effects predict tests left out better than this force does.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ from mrpipe.tracing.bench.rivals import HOPELESS, ITERATIONS, Unseen
 from mrpipe.tracing.bench.select import Selection, draft
 
 RELAXATION_TIMES = tuple(float(item) for item in np.geomspace(0.02, 12.0, 5))
-"""Numerical technique: relaxation times of the elements, in units of stroke over speed. They are a factor of five apart
-and cover a hundredth of the shortest half period to several of the longest periods of usual bench tests."""
+"""Numerical technique: relaxation times of the elements, in units of stroke over speed. They differ by factors of five,
+and range from a hundredth of the shortest half period to several of the longest periods of usual bench tests.
+"""
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -42,12 +43,12 @@ def maxwell_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
 
 
 def linear_memory(scales: Scales) -> Effect:
-    """Return the linear memory as an effect that a fit can hold; it belongs to no library and is never named.
+    """Return the linear memory as an effect for a fit; it is not in the library and is never named.
 
     Parameters
     ----------
     scales
-        Of the campaign, for the relaxation times.
+        Scales of the campaign, which determine the relaxation times.
     """
     times = [item * scales.of("stroke/speed") for item in RELAXATION_TIMES]
     names = [f"stiffness_{place}" for place in range(len(times))]
@@ -81,7 +82,7 @@ def without_beaten_names(
 ) -> tuple[Selection, list[Gain | None], str]:
     """Return the selection, its gains, and why its effects are not named if the linear memory predicts as well.
 
-    Effects without a name become further terms, whose cause is not proven. The reason is empty if the names hold.
+    Effects that are not named become further terms, whose cause is not proven. The reason is empty if the names hold.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def without_beaten_names(
     gains
         Of the named effects on tests that were left out.
     declared
-        How many terms the campaign declares: they are part of every model.
+        Number of terms that the campaign declares; they are part of every model.
     unseen
         Comparison on tests that were left out.
     jobs
@@ -127,7 +128,7 @@ def with_linear_memory(found: Fit, declared: int, start: Fit | None = None) -> F
     declared
         How many terms are kept.
     start
-        A fit of the same model to a share of the tests; None to begin with the numbers of `found`.
+        A fit of the same model to a share of the tests; None: the search starts from `found`.
     """
     effect = linear_memory(found.problem.scales)
     problem = replace(found.problem, terms=(*found.problem.terms[:declared], Term(effect, effect.forms[0])))

@@ -77,12 +77,12 @@ def noise_variances(
 
     Parameters
     ----------
-    draws, seed
-        Number of noise records simulated, and the seed they are drawn from.
     found
         The fit.
     recordings
         Tests laid end to end.
+    draws, seed
+        Number of noise records simulated, and the seed they are drawn from.
     """
     rng = np.random.default_rng(seed)
     calm = predict(found, recordings)
@@ -232,12 +232,12 @@ def force_deviation(
 
     Parameters
     ----------
-    model_error_share
-        Expected model error, as a share of the force RMS.
     found
         Fit whose model is simulated.
     recordings
         Tests.
+    model_error_share
+        Expected model error, as a share of the force RMS.
     scale
         Factors on the force noise and on the motion noise.
     rules

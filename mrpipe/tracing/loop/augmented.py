@@ -59,12 +59,12 @@ def traced_damper(found: Fit, drive_unit: str = "A", *, effect_files: Mapping[st
 
     Parameters
     ----------
+    found
+        The fit.
     drive_unit
         `A` or `V`.
     effect_files
         Effect -> the user's own file that defines it.
-    found
-        The fit.
     """
     return damper_model(found, drive_unit, effects=True, assumed_eta=math.inf, effect_files=effect_files)
 
@@ -126,6 +126,8 @@ def force_in_use(
 
     Parameters
     ----------
+    chain
+        The damper.
     drive_limit
         Largest drive.
     stroke_m, speed_m_s
@@ -135,8 +137,6 @@ def force_in_use(
         taken.
     working_drive
         Earlier drive, for the table that comes from above.
-    chain
-        The damper.
     """
     speeds, drives = speed_m_s * np.array(SPEEDS), np.linspace(0.0, drive_limit, DRIVES)
     branches = np.empty((2, len(speeds), len(drives)))
@@ -259,12 +259,12 @@ def retrain_inverse(
         Damper with its effects.
     training, validation
         Prepared tests whose motions are used; of validation tests the motions only.
-    options
-        How it is trained; by default a few starts on a subsample, which takes seconds.
     drive_limit
         Largest drive [A or V].
     rng
         Source of randomness.
+    options
+        How it is trained; by default a few starts on a subsample, which takes seconds.
     jobs
         Processes; the result does not depend on their number.
     progress

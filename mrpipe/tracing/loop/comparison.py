@@ -259,11 +259,11 @@ def compare_laws(
 
     Parameters
     ----------
+    runs
+        Laws under their motion.
     ways
         `before`: controller as it ran, damper without the effect; `after`: the same with the effect; `recalibrated`:
         controller made for the damper with the effect. The last may be missing.
-    runs
-        Laws under their motion.
     bench
         Structure and sensors.
     jobs

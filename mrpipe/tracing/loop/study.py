@@ -60,10 +60,10 @@ class LoopStudy:
         Laws that are compared in addition to the recorded ones.
     band_rad_s
         Lowest and highest frequency over which the laws are ranked [rad/s].
-    rules
-        Decision thresholds.
     rng, seed, jobs, progress
         Randomness of a retrained inverse, seed of the sensor noise, processes, and progress.
+    rules
+        Decision thresholds.
     """
 
     rig: Rig

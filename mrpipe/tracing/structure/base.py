@@ -34,10 +34,6 @@ class FrameProblem:
 
     Attributes
     ----------
-    storey_stiffness
-        Of the shear frame fitted first, shape (n,) [N/m].
-    frequencies_hz
-        Its modes.
     training
         Spectra of the training records.
     validation
@@ -46,6 +42,10 @@ class FrameProblem:
         Floor masses, shape (n,).
     band
         Frequencies in use.
+    storey_stiffness
+        Of the shear frame fitted first, shape (n,) [N/m].
+    frequencies_hz
+        Its modes.
     rules
         Decision thresholds.
     """
@@ -126,12 +126,12 @@ def coupled_stiffness(
 
     Parameters
     ----------
+    spectra
+        Spectra of the records.
     sheared
         Of the shear frame, shape (n, n) [N/m].
     coupling
         Expected size of the couplings, as a share of the storey stiffness.
-    spectra
-        Spectra of the records.
     """
     n = len(sheared)
     found = sheared.copy()

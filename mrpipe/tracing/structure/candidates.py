@@ -179,12 +179,12 @@ def search(
 
     Parameters
     ----------
-    before
-        Projected columns of the effects chosen before, shape (k, n, 2 b).
     placed
         Form of an effect at its place.
     design
         The linear frame that the residual is judged against.
+    before
+        Projected columns of the effects chosen before, shape (k, n, 2 b).
     about
         Scales of the structure and decision thresholds.
     evaluations

@@ -71,12 +71,12 @@ class DelayFinding:
         Error on validation tests over the RMS of the signal, without and with the dead time beyond what is granted.
     interval_s
         Interval of the lag [s].
-    granted_error_s
-        Uncertainty of `granted_s` [s]: all of it where the campaign does not declare the controller, else 0.
     least_s
         Dead time beyond the granted lag that is reported [s].
     better
         Ratio of the errors below which the lag is reported.
+    granted_error_s
+        Uncertainty of `granted_s` [s]: all of it where the campaign does not declare the controller, else 0.
     """
 
     part: str
@@ -187,10 +187,10 @@ def law_lag(
 
     Parameters
     ----------
-    laws
-        Test -> law; those of vd, vdps and vdns are linear in velocity and displacement where they are not clipped.
     tests
         Closed-loop recordings.
+    laws
+        Test -> law; those of vd, vdps and vdns are linear in velocity and displacement where they are not clipped.
     rules
         Decision thresholds; their defaults if None.
     """

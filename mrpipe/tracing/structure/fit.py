@@ -57,16 +57,16 @@ class Design:
 
     Attributes
     ----------
-    residual
-        Weighted residual of each storey, shape (n, 2 b).
-    basis
-        Orthonormal basis of the weighted regressors of each storey, shape (2 b, p).
     base
         The linear frame.
     spectra
         Spectra of the records.
     width
         Number of equations b of one storey, real and imaginary parts apart.
+    residual
+        Weighted residual of each storey, shape (n, 2 b).
+    basis
+        Orthonormal basis of the weighted regressors of each storey, shape (2 b, p).
     solvers
         Pseudo-inverse of the regressors of each storey.
     free

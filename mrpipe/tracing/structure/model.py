@@ -21,11 +21,11 @@ class FrameModel:
 
     Attributes
     ----------
+    base
+        The linear frame.
     linear
         For each storey: displacements (or its drift), velocities of all floors, ground acceleration and its second
         derivative, loads.
-    base
-        The linear frame.
     chosen
         Effects with their parameters.
     amplitudes

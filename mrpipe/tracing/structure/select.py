@@ -50,16 +50,16 @@ class FrameSelection:
     ----------
     base
         The linear frame that the residual is judged against.
-    chi_squares
-        Chi-square of every linear frame.
-    groups
-        Groups of lines of the residual of the base that exceed the noise.
-    chosen
-        Effects in the order of choice, amplitudes one after another.
     design
         The linear model of all storeys.
+    groups
+        Groups of lines of the residual of the base that exceed the noise.
+    chi_squares
+        Chi-square of every linear frame.
     rounds
         Candidates of each round of the selection.
+    chosen
+        Effects in the order of choice, amplitudes one after another.
     amplitudes
         Amplitudes of the chosen effects, one after another.
     residual
@@ -202,16 +202,16 @@ def select(
 
     Parameters
     ----------
-    effects
-        The library.
-    declared
-        Effects that the campaign declares: fitted first, part of the baseline.
     problem
         Spectra of the records and the shear frame fitted to them.
+    effects
+        The library.
     rules
         Decision thresholds.
     most
         Largest number of effects.
+    declared
+        Effects that the campaign declares: fitted first, part of the baseline.
     rng
         Source of randomness.
     draws

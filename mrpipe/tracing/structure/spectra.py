@@ -96,6 +96,14 @@ class Spectra:
 
     Attributes
     ----------
+    record
+        The record.
+    motion
+        Its motion in the time domain.
+    frequencies_hz
+        Of the lines, shape (b,).
+    taper
+        Window in the time domain.
     target
         Shear force of each storey from inertia, shape (n, b) [N/sqrt(Hz)].
     regressors
@@ -105,14 +113,6 @@ class Spectra:
         Inverse of the standard deviation of a line's real or imaginary part, shape (n, b).
     variance
         Mean square of the noise of a line, shape (n, b).
-    record
-        The record.
-    motion
-        Its motion in the time domain.
-    frequencies_hz
-        Of the lines, shape (b,).
-    taper
-        Window in the time domain.
     """
 
     record: FrameRecord
@@ -352,16 +352,16 @@ def spectra_of(
 
     Parameters
     ----------
-    masses
-        Shape (n,) [kg].
-    stiffness
-        Shear of each storey per floor displacement, shape (n, n) [N/m]; used for the weights only.
     record
         The record.
+    masses
+        Shape (n,) [kg].
     band
         Frequencies in use.
     noise
         Of the sensors.
+    stiffness
+        Shear of each storey per floor displacement, shape (n, n) [N/m]; used for the weights only.
     motion
         Motion of the record in the time domain.
     rules

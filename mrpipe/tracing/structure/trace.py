@@ -72,16 +72,16 @@ def trace_frame(
 
     Parameters
     ----------
-    effects, declared
-        The library, and the effects of it that the campaign declares.
-    most
-        Most effects that are named together.
     data
         Records of the structure.
+    effects, declared
+        The library, and the effects of it that the campaign declares.
     rules
         Shares that prove a name.
     frame_rules
         Thresholds of the frame's residual; their defaults if None.
+    most
+        Most effects that are named together.
     draws
         Of the bootstrap.
     rng
