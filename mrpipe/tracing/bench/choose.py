@@ -286,7 +286,9 @@ def _with_noise_of(
     """
     scale = noise_scale(chosen, rules)
     noise = noise_level_of(chosen, scale)
-    if noise >= baseline.noise:
+    # the residual of a poor model hides hum, so that only hum makes the noise of the better model the larger one
+    newly_visible = scale.hum > 0.0 and baseline.scale.hum == 0.0
+    if noise >= baseline.noise and not newly_visible:
         scale, noise = baseline.scale, baseline.noise
     excess = chosen.chi_square / max(noise, 1e-300)
     if excess < 1.0:

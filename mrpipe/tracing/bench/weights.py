@@ -45,6 +45,8 @@ class NoiseScale:
         Root mean square, over all samples of these pairs, of the force of single events that do not repeat [N].
     disturbance
         The same of a force that does not repeat and that grows with the speed [N].
+    hum
+        Variance of the hum of the mains over that of the force channel's noise; 0 where none is visible.
     """
 
     force: float = 1.0
@@ -53,6 +55,7 @@ class NoiseScale:
     cycles: int = 0
     events: float = 0.0
     disturbance: float = 0.0
+    hum: float = 0.0
 
     @property
     def source(self) -> str:
@@ -130,10 +133,11 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     used = root > 0.0
     # the white noise of the channel and its hum are less than all noise
     hum = hum_variance(residual, recordings, rules) / max(float(np.mean(force[used])), 1e-300)
-    least = 1.0 + hum if hum <= rules.most_hum else 1.0
+    hum = hum if hum <= rules.most_hum else 0.0
+    least = 1.0 + hum
     if not rows or sum(map(len, differences)) < rules.least_samples:
         limit = _limit(residual[used], least * force[used] + motion[used])
-        return NoiseScale(limit * least, limit)
+        return NoiseScale(limit * least, limit, hum=hum)
     found_in = Differences(tuple(differences), np.concatenate(rows), np.concatenate(steps))
     columns, target = found_in.columns, found_in.squares
     factors, without, disturbed = parts_of_differences(found_in, rules)
@@ -155,7 +159,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     if least > 1.0:
         force_factor = max(force_factor, least)
     limit = _limit(residual[used], (force_factor * force + motion_factor * motion)[used])
-    return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events, disturbance)
+    return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events, disturbance, hum)
 
 
 def _relative_speed(recordings: Recordings) -> FloatArray:
