@@ -116,7 +116,7 @@ def form_checks(form: EffectForm) -> list[Check]:
     """Return every demand on one form of an effect of a damper, up to one without which the rest cannot be tried."""
     demands: list[tuple[str, Test, bool]] = [
         ("Units, scales, bounds and starts of the parameters are sound", _parameters, True),
-        ("Steps are compiled, keep to their memory and leave their parameters alone", _steps, True),
+        ("Steps are compiled, write only to their memory and do not change their parameters", _steps, True),
         ("The force is finite at the bounds of the parameters and at rest", _finite, True),
         ("The force depends on state, motion and drive alone (no hidden memory)", _memory, False),
         ("Some strength changes the force", _effective, False),

@@ -24,7 +24,7 @@ def check_file(path: Path) -> tuple[Effect | StructuralEffect, list[Check]]:
     """
     effect = effect_of_file(path, "")
     known = [*all_effects(), *all_structural_effects()]
-    own_name = Check("", "The name is none of an effect of the program", _taken(getattr(effect, "name", ""), known))
+    own_name = Check("", "The name is not that of an effect of the program", _taken(getattr(effect, "name", ""), known))
     if isinstance(effect, Effect):
         return effect, [own_name, *damper_checks.checks_of(effect, known)]
     if isinstance(effect, StructuralEffect):

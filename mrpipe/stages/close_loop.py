@@ -188,7 +188,7 @@ def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Ef
     tests = [*(item.model_dump(exclude_defaults=True) for item in listed), *new]
     settings: dict[str, Any] = {"laboratory": {"bench": {"tests": tests}}} if tests else {}
     if any("middle_m" in item for item in tests):
-        # the mean of a test about another middle is not an offset of its sensor
+        # the mean of a test about another mean position is not an offset of its sensor
         settings["prepare"] = {"offset": "campaign"}
     path = context.run_directory / NEXT_TESTS
     made = bool(extra.tests) and not new

@@ -1,1 +1,1 @@
-"""Tracing: find the residual between model and measurement, and the physical effect that explains it."""
+"""Tracing: from the residual between model and measurement to the physical effect that explains it."""

@@ -1,4 +1,4 @@
-"""Options of a tracing: the section `close_loop` of the settings, and the options of the domain's functions."""
+"""Options of a tracing: the section `close_loop` of the settings, and the options of the functions."""
 
 from __future__ import annotations
 
@@ -13,20 +13,25 @@ from mrpipe.options import Section
 from mrpipe.tracing.rules import TracingRules
 
 IDENTIFIED = "identified"
-"""In place of the name of the declared base form: the one that `identify-damper` chose."""
+"""Value of `model` that stands for the base form which `identify-damper` chose."""
 
 
 class NamingRules(Section):
-    """When an effect is named, and with what confidence. All numbers are dimensionless."""
+    """When an effect is named, and its confidence. All numbers are dimensionless."""
 
-    named_share: float = Field(0.9, gt=0.5, le=1.0, description="Share of the recoverable residual that proves a name.")
+    named_share: float = Field(
+        0.9,
+        gt=0.5,
+        le=1.0,
+        description="Share of the recoverable residual that an effect must explain to be named as proven.",
+    )
     least_share: float = Field(
         0.5, gt=0.0, lt=1.0, description="Share of the recoverable residual below which the cause is unknown."
     )
     lead: float = Field(
         0.3,
         ge=0.0,
-        description="Families that leave at most this share more than the best one leaves are tied with it.",
+        description="Families whose residual exceeds that of the best family by at most this share are tied with it.",
     )
     doubtful: float = Field(
         0.4,
@@ -38,25 +43,27 @@ class NamingRules(Section):
         0.99,
         gt=0.0,
         lt=1.0,
-        description="Largest evidence that counts, because a finite number of tests proves nothing.",
+        description="Upper limit of the evidence, because a finite number of tests does not prove an effect with "
+        "certainty.",
     )
     least_probability: float = Field(
         0.5,
         ge=0.0,
         lt=1.0,
-        description="An effect that is less likely there than this is not named; it stays in the model as a further "
-        "term, whose cause is not proven.",
+        description="An effect with a smaller probability is not named; it remains in the model as a further term, "
+        "whose cause is not proven.",
     )
     calibration: tuple[tuple[float, float], ...] = Field(
         ((0.0, 0.0), (0.5, 0.4), (0.75, 0.75), (0.95, 0.95), (1.0, 0.96)),
-        description="Evidence for an effect on the bench (share of resamples that need it, times shares recovered), "
-        "and the probability that an effect with this evidence is really there, where it is the only one named; linear "
-        "in between. The probabilities are those of the planted benchmark by the rule of succession, see "
-        "docs/tracing-benchmark.md.",
+        description="Pairs of evidence and probability for an effect that is named alone; linear in between. The "
+        "evidence is the share of bootstrap samples that need the effect, times the recovered shares. The probability "
+        "that an effect with this evidence is present follows from the planted benchmark by the rule of succession, "
+        "see docs/tracing-benchmark.md.",
     )
     calibration_of_several: tuple[tuple[float, float], ...] = Field(
         ((0.0, 0.0), (0.8, 0.17), (0.95, 0.75), (1.0, 0.75)),
-        description="The same for each of several named effects: one of them may correct the form of another.",
+        description="The same for each of several named effects, because one of them may only correct the form of "
+        "another.",
     )
     calibration_of_part: tuple[tuple[float, float], ...] = Field(
         ((0.0, 0.0), (0.5, 0.4), (0.75, 0.63), (1.0, 0.63)),
@@ -66,8 +73,8 @@ class NamingRules(Section):
     noise_share: float = Field(
         0.1,
         ge=0.0,
-        description="Differences below this share of the noise do not separate two families, because the noise itself "
-        "is not known better.",
+        description="Differences below this share of the noise do not separate two families, because the noise is not "
+        "known more accurately.",
     )
 
     @field_validator("calibration", "calibration_of_several", "calibration_of_part")
@@ -88,15 +95,15 @@ class TracingSettings(NamingRules):
     )
     model: str = Field(
         IDENTIFIED,
-        description="Declared base form. identified: the one that identify-damper chose. Else any of "
-        "mrpipe/dampers/forms; rate-dependent-yield stands for yielding-part, the form of this family that suits most "
-        "recordings. Other base forms are compared with it.",
+        description="Declared base form. identified: the form that identify-damper chose. Otherwise the name of a "
+        "form of mrpipe/dampers/forms; rate-dependent-yield stands for yielding-part, the form of this family that "
+        "suits most recordings. Other base forms are compared with the declared one.",
     )
     yield_order: int = Field(3, ge=0, le=3, description="Degree of the yield force in the drive.")
     viscosity_order: int = Field(1, ge=0, le=3, description="Degree of the viscosity in the drive.")
-    most_effects: int = Field(3, ge=0, le=3, description="Most effects that are named together.")
+    most_effects: int = Field(3, ge=0, le=3, description="Largest number of effects that are named together.")
     base_forms: tuple[str, ...] = Field(
-        (), description="Base forms that are tried in addition to the declared one; empty for all of the library."
+        (), description="Base forms that are tried in addition to the declared one; empty: all forms of the library."
     )
     fit_rate_hz: float = Field(
         250.0,
@@ -105,29 +112,40 @@ class TracingSettings(NamingRules):
         "as fast where the chosen model then leaves clearly less.",
     )
     displacement_cutoff_hz: float = Field(
-        0.0, ge=0.0, description="Zero-phase low-pass of the displacement [Hz]; 0 chooses it for each test."
+        0.0,
+        ge=0.0,
+        description="Cut-off frequency of the zero-phase low-pass of the displacement [Hz]; 0: chosen for each test.",
     )
-    refits: int = Field(8, ge=1, description="How many of the screened families are refitted jointly.")
-    folds: int = Field(3, ge=2, description="Folds of the cross-validation over whole training tests.")
-    bootstrap_draws: int = Field(400, ge=50, description="Draws of the block bootstrap.")
-    record_gain: bool = Field(False, description="Fit a gain for each record of the validation tests (weak sessions).")
+    refits: int = Field(8, ge=1, description="Number of the best families after screening that are refitted jointly.")
+    folds: int = Field(3, ge=2, description="Number of folds of the cross-validation over whole training tests.")
+    bootstrap_draws: int = Field(400, ge=50, description="Number of draws of the block bootstrap.")
+    record_gain: bool = Field(
+        False,
+        description="Whether a gain of each validation record is fitted, for sessions with another gain of the load "
+        "cell.",
+    )
     observation_filter: bool = Field(
-        True, description="Look for a moving average that the records went through, in shares of a period."
+        True,
+        description="Whether a moving average by the recorder is searched, with a length that is a share of the "
+        "period.",
     )
     model_error_share: float = Field(
         0.0,
         ge=0.0,
         lt=1.0,
-        description="Model error to weigh by, as a share of the force RMS, where it is known to outweigh the sensors' "
-        "noise, as on real dampers; 0: estimated by a first pass, which doubles the run time.",
+        description="Model error by which samples are weighted, as a share of the RMS force, if it is known to exceed "
+        "the noise of the sensors, as for real dampers. 0: it is estimated by a first pass, which doubles the run "
+        "time.",
     )
     rules: TracingRules = Field(TracingRules(), description="Thresholds of the decisions.")
-    unattributed: bool = Field(False, description="Add the flexible residual model as the effect `unattributed`.")
+    unattributed: bool = Field(
+        False, description="Whether a flexible residual model is added as the effect `unattributed`."
+    )
 
     @field_validator("model")
     @classmethod
     def _model_is_known(cls, value: str, info: ValidationInfo) -> str:
-        # a user's own file may define any name: it is looked at when the stage is checked
+        # a file of the user may define any name: it is read when the stage is checked
         if info.data.get("form_files"):
             return value
         known = (*form_names(), "rate-dependent-yield", IDENTIFIED)
@@ -151,11 +169,12 @@ def tracing_options(
     Parameters
     ----------
     settings
-        The section of the settings.
+        Section `close_loop` of the settings.
     drive_unit
         `A` or `V`; empty for A.
     form_files
-        The user's own base forms that the damper was identified with; they compete in the tracing too.
+        Files of the user that define base forms with which the damper was identified; these forms are tried in the
+        tracing too.
     identified
         Base form that `identify-damper` chose.
     """

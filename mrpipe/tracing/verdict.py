@@ -9,15 +9,15 @@ from typing import Any, Literal
 VerdictClass = Literal["noise", "explained", "partly explained", "unknown", "base form", "validation differs"]
 """Classes of verdicts on the validation tests.
 
-`noise`: nothing is missing. `explained`: the named effects leave no more than noise, or than an honest ceiling.
-`partly explained`: they lower the error, but less. `unknown`: something is missing and no effect explains it.
+`noise`: nothing is missing. `explained`: with the named effects the error is that of noise, or that of a flexible
+model. `partly explained`: they lower the error, but less. `unknown`: something is missing and no effect explains it.
 `base form`: another base form explains what is missing. `validation differs`: the validation tests differ from the
 training tests by something that a model of the damper cannot learn from the training tests.
 """
 
 
 IntervalKind = Literal["confidence", "range", "equivalent", "point"]
-"""What an interval means.
+"""Meaning of an interval.
 
 `confidence`: it contains the true value with the probability `level`. `range`: smallest and largest value over storeys
 or tests. `equivalent`: all values in it fit about as well. `point`: the uncertainty was not estimated.
@@ -31,9 +31,9 @@ class Interval:
     Attributes
     ----------
     low, high
-        Its ends, in the unit of the number.
+        Ends of the interval, in the unit of the number.
     kind
-        What it means.
+        Meaning of the interval.
     level
         Probability of a confidence interval; None for other kinds.
     """
@@ -61,7 +61,7 @@ class Estimate:
     Attributes
     ----------
     value, unit
-        Its value, and the unit of it.
+        Value of the parameter, and its unit.
     interval
         Its interval.
     by_storey
@@ -203,13 +203,13 @@ class Unexplained:
     structured
         Whether more than noise remains.
     share
-        Its share of the squared residual before.
+        Share of the squared residual before that remains.
     depends_on
         (state, share of the residual's variance that it explains), largest first.
     whiteness_p_value
-        Probability of its autocorrelation by chance; None if it was not tested.
+        Probability that its autocorrelation is due to chance; None if it was not tested.
     tests
-        Validation tests on which it remains, the worst first; None if they were not judged one by one.
+        Names of the validation tests on which it remains, the worst first; None if tests were not judged one by one.
     """
 
     structured: bool
@@ -219,7 +219,7 @@ class Unexplained:
     tests: tuple[str, ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as JSON."""
+        """Return the remainder as JSON."""
         found: dict[str, Any] = {"structured": self.structured, "share_of_residual": self.share}
         if self.whiteness_p_value is not None:
             found["whiteness_p_value"] = self.whiteness_p_value
@@ -239,9 +239,10 @@ class Difference:
     tests
         Names of the validation tests.
     value, unit
-        By how much: gain [1], lag [s], offset [N], share of the samples outside what training covers [1].
+        Size of the difference: gain [1], lag [s], offset [N], or share of the samples outside the range of the training
+        tests [1].
     sentence
-        The same in words.
+        The difference in words.
     """
 
     kind: str

@@ -139,7 +139,7 @@ def choose(bench: Bench, begun: Start) -> Chosen:
     if faster is not options:
         samples = round(MOST_SAMPLES * faster.fit_rate_hz / options.fit_rate_hz)
         again = _at(bench, faster, _better_filter(bench, found, faster), samples)
-        # a higher rate makes a model more accurate; it does not show that the number of effects is another one
+        # a higher rate makes a model more accurate; it does not show that an effect is missing or superfluous
         if again.names == found.names or (
             len(again.names) == len(found.names) and _leaves_less(again, found, options.rules.nuisances.rate_gain)
         ):

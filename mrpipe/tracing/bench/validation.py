@@ -1,4 +1,4 @@
-"""How validation tests differ from training tests: gain, lag, offset, range of motion and drive."""
+"""Differences between validation tests and training tests: gain, lag, offset, range of motion and drive."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Difference
 
 LAGS = 41
-"""Numerical technique: number of lags on the grid; the best is refined by a parabola."""
+"""Numerical technique: number of lags on the grid; the best lag is refined by a parabola."""
 
 RANGES = {"displacement": "amplitude", "velocity": "speed", "drive": "drive"}
-"""Channel -> kind of difference where a test leaves the range of the training tests."""
+"""Channel -> kind of difference if a test exceeds the range of the training tests."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How forces of one test relate: measured(t) = gain * simulated(t - lag) + offset.
+    """Relation of measured and simulated force on one test: measured(t) = gain * simulated(t - lag) + offset.
 
     Attributes
     ----------
@@ -34,12 +34,12 @@ class Agreement:
     rms_n
         RMS of the measured, offset-free force [N].
     error_n
-        RMS of measured less simulated force [N].
+        RMS of measured minus simulated force [N].
     rest_n, corrected_n
-        RMS error over the part of the record that the estimate has not seen [N]: as it is, and after gain, lag and
-        offset, estimated from the first part, are corrected.
+        RMS error over the rest of the record, which was not used for the estimate [N]: without correction, and after
+        correction of gain, lag and offset, which are estimated from the first part.
     gain, lag_s, offset_n
-        Estimates from the first part; SI.
+        Estimates from the first part of the record [1, s, N].
     """
 
     name: str
@@ -53,12 +53,12 @@ class Agreement:
 
     @property
     def error(self) -> float:
-        """Error over force, both RMS [1]."""
+        """RMS error over RMS force [1]."""
         return self.error_n / max(self.rms_n, 1e-12)
 
 
 def first_parts(recordings: Recordings, share: float) -> BoolArray:
-    """Return the samples in the first part of what is compared of each record, shape (n,)."""
+    """Return the samples in the first part of each record, among those that are compared, shape (n,) of bool."""
     found = np.zeros(len(recordings.force), dtype=np.bool_)
     for test in range(recordings.tests):
         own = np.flatnonzero(recordings.used & (recordings.test == test))
@@ -100,7 +100,7 @@ def agreements(
 def _relation(
     time: FloatArray, simulated: FloatArray, at: FloatArray, measured: FloatArray, longest_s: float
 ) -> tuple[float, float, float]:
-    """Return gain, lag [s] and offset [N] of least squared error; the lag is at most `longest_s` either way."""
+    """Return gain, lag [s] and offset [N] of least squared error; the lag is between -`longest_s` and `longest_s`."""
 
     def solved(lag: float) -> tuple[float, float, float]:
         shifted = np.interp(at - lag, time, simulated)
@@ -130,7 +130,7 @@ def _mean_period(recordings: Recordings, piece: slice) -> float:
 
 
 def training_agreements(found: Fit, folds: int, rules: ValidationRules, *, jobs: int = 1) -> tuple[Agreement, ...]:
-    """Return the agreement of every training test with a fit that has not seen it."""
+    """Return the agreement of every training test with a fit without this test."""
     recordings, root = found.problem.recordings, found.problem.root_weight
     left = left_out_residual(found, folds, jobs=jobs)
     error = np.divide(left, root, out=np.zeros_like(root), where=root > 0.0)
@@ -141,18 +141,19 @@ def training_agreements(found: Fit, folds: int, rules: ValidationRules, *, jobs:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What comparing validation with training tests has found.
+    """Result of the comparison of validation tests with training tests.
 
     Attributes
     ----------
     differences
         How validation tests differ.
     comparable
-        Samples that the training tests cover and that no difference of gain, lag or offset touches, shape (n,).
+        Samples within the range of the training tests, of tests without a difference of gain, lag or offset, shape
+        (n,).
     accounted
-        Share of the excess squared error that lies in tests with a difference.
+        Share of the squared error beyond noise that occurs in tests with a difference.
     corrected
-        NRMSE of all validation tests with gain, lag and offset of the odd ones corrected; None without any.
+        NRMSE of all validation tests after correction of gain, lag and offset of the odd ones; None if no test is odd.
     """
 
     differences: tuple[Difference, ...]
@@ -182,7 +183,7 @@ def compare(
     known
         The training tests.
     trained
-        Agreement of the training tests with fits that have not seen them.
+        Agreement of each training test with a fit without this test.
     faults
         Known faults of validation tests, by the name of the test.
     rules
@@ -237,7 +238,8 @@ def with_session(
 ) -> Comparison:
     """Return a comparison with the gain of a session, if that gain accounts for most of the error beyond noise.
 
-    Each record of a session with another gain can be within what single training tests scatter. Together they are not.
+    The gain of a single record may lie within the scatter of the training tests, while the common gain of several
+    records does not.
 
     Parameters
     ----------
@@ -248,7 +250,7 @@ def with_session(
     validation
         Validation tests.
     floor
-        NRMSE that noise leaves.
+        NRMSE that noise alone causes.
     rules
         Decision thresholds.
     """
@@ -297,7 +299,7 @@ def _ranges(
     expected: float,
     rules: ValidationRules,
 ) -> list[tuple[str, float]]:
-    """Return which ranges of the training tests an odd test leaves, if the error lies outside of them."""
+    """Return the ranges of the training tests that an odd test exceeds, if its error occurs outside of them."""
     beyond = own & ~inside
     if np.count_nonzero(beyond) < rules.outside * np.count_nonzero(own):
         return []
@@ -330,7 +332,7 @@ def _within(other: Recordings, known: Recordings, channel: str, rules: Validatio
 
 
 def _near_a_level(drive: FloatArray, known: Recordings, rules: ValidationRules) -> BoolArray:
-    """Return where a drive is near a level of the training tests; everywhere if their drive varies within a test."""
+    """Return the samples with a drive near a level of the training tests; all if their drive varies within a test."""
     pieces = [known.drive[a:b] for a, b in zip(known.starts[:-1], known.starts[1:], strict=True)]
     largest = max(float(np.max(np.abs(known.drive))), 1e-12)
     if any(float(np.ptp(piece)) > rules.level * largest for piece in pieces):

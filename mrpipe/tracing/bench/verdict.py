@@ -1,4 +1,4 @@
-"""From candidates to a verdict: what is named, with what confidence, what it is tied with, what stays unexplained."""
+"""From candidates to a verdict: named effects, their confidence, effects that are tied with them, and the rest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
 
 @dataclass(frozen=True)
 class Named:
-    """One effect of the verdict, with its definition."""
+    """One named effect of the verdict, with its definition."""
 
     effect: Effect
     form: str
@@ -31,7 +31,7 @@ class Named:
 
     @property
     def typed(self) -> NamedEffect:
-        """The effect as all tracings report it."""
+        """The effect in the form in which all tracings report it."""
         effect = self.effect
         return NamedEffect(
             effect.name,
@@ -57,8 +57,8 @@ def tied(
 ) -> tuple[str, ...]:
     """Return the families that these tests do not separate from the best one of a round.
 
-    A family is separated if it leaves clearly more than the best one does, and if the difference holds when the blocks
-    of the residual are drawn again, in pairs. See :class:`~mrpipe.tracing.options.NamingRules`.
+    A family is separated if its residual is clearly larger than that of the best one, and if the difference holds in a
+    paired bootstrap of the blocks of the residual. See :class:`~mrpipe.tracing.options.NamingRules`.
     """
     if not candidates:
         return ()
@@ -75,7 +75,7 @@ def tied(
 
 
 def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
-    """Return why nothing may be named, or nothing where something may."""
+    """Return why nothing may be named; an empty text if something may be named."""
     if not selection.structured:
         return "the residual is noise: nothing is missing"
     if selection.ground is not None and selection.chosen is selection.ground:
@@ -88,14 +88,14 @@ def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
 
 
 def confidence_of(share: float, support: float, gain: Gain | None, rules: NamingRules) -> float:
-    """Return the evidence for an effect, 0 to 1; :func:`calibrated` makes a probability of it.
+    """Return the evidence for an effect, 0 to 1; :func:`calibrated` converts it to a probability.
 
     Parameters
     ----------
     share
         Share of the recoverable residual that the chosen effects recover.
     support
-        Share of resamples of the training tests in which the effect is needed whatever the base form.
+        Share of bootstrap samples of the training tests in which the effect is needed with every base form.
     gain
         Gain on left-out tests; None if it was not computed.
     rules
@@ -107,14 +107,14 @@ def confidence_of(share: float, support: float, gain: Gain | None, rules: Naming
 
 
 def calibrated(evidence: float, rules: NamingRules, *, several: bool = False, partly: bool = False) -> float:
-    """Return the probability that an effect with this evidence is really there, by the planted benchmark.
+    """Return the probability that an effect with this evidence is present, calibrated on the planted benchmark.
 
     Parameters
     ----------
     evidence
         See :func:`confidence_of`.
     rules
-        They hold the probabilities.
+        Rules that contain the calibrated probabilities.
     several
         Whether the effect is named together with others.
     partly
@@ -128,7 +128,7 @@ def calibrated(evidence: float, rules: NamingRules, *, several: bool = False, pa
 def parameter_table(
     found: Fit, index: int, limits: Mapping[str, tuple[float, float]], drive_unit: str
 ) -> dict[str, Estimate]:
-    """Return value, unit and interval of every parameter of one effect."""
+    """Return parameter -> value, unit and interval, for all parameters of one effect."""
     term, values = found.problem.terms[index], found.term_values[index]
     result = {}
     for item in term.form.parameters:

@@ -1,4 +1,4 @@
-"""Weights of the samples, from the noise of the channels and from motion that is repeated."""
+"""Weights of the samples, from the noise of the channels and from differences of repeated motion."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from mrpipe.tracing.bench.repeat_factors import Differences, parts_of_difference
 from mrpipe.tracing.rules import NoiseRules
 
 MOST_SHIFT = 3.0
-"""Numerical technique: motions further apart than this number of samples are not aligned by a shift in time."""
+"""Numerical technique: largest shift, in samples, by which two motions are aligned in time."""
 
 SHORTEST_CYCLE = 8
-"""Numerical technique: cycles of fewer samples are not compared sample by sample."""
+"""Numerical technique: cycles with fewer samples are not compared sample by sample."""
 
 AVERAGED = 0.03
 """Numerical technique: time, in periods of the motion, over which the simulated variance of the noise is averaged."""
@@ -30,10 +30,10 @@ TOP = 0.9
 
 @dataclass(frozen=True)
 class NoiseScale:
-    """How much larger the variance of the noise is than the channels themselves show.
+    """Factors by which the variance of the noise exceeds that of the white noise of the channels.
 
     White noise of a channel is visible at its highest frequencies. Noise in the band of the motion, hum, and motion
-    that the machine does not repeat are not visible there. They show in repeated motion.
+    that the machine does not repeat are not visible there, but in differences of repeated motion.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class NoiseScale:
     events
         Root mean square, over all samples of these pairs, of the force of single events that do not repeat [N].
     disturbance
-        The same of a force that does not repeat and that grows with the speed [N].
+        Root mean square of a force that does not repeat and that grows with the speed [N].
     hum
         Variance of the hum of the mains over that of the force channel's noise; 0 where none is visible.
     """
@@ -59,14 +59,14 @@ class NoiseScale:
 
     @property
     def source(self) -> str:
-        """Return in words where the noise comes from."""
+        """Return in words what the noise was estimated from."""
         parts = [f"{self.repeats} repeated pairs of tests"] if self.repeats else []
         parts += [f"{self.cycles} repeated pairs of cycles"] if self.cycles else []
         return " and ".join(parts) or "sensor channels"
 
 
 AS_SHOWN = NoiseScale()
-"""Noise as the channels show it."""
+"""Noise as the channels show it: all factors are 1."""
 
 
 def noise_variances(
@@ -74,9 +74,10 @@ def noise_variances(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the variances of the force due to white noise of the force and the displacement channel [N^2], (n,) each.
 
-    That of the displacement is (F(x + noise) - F(x))^2 from simulations, averaged over a short time. At a reversal the
-    force rises by hundreds of newtons for each millimetre, so micrometres of displacement noise become newtons; where
-    the rod rests or creeps, noise reverses the hysteresis again and again, which a linearisation does not show.
+    The variance due to the displacement is (F(x + noise) - F(x))^2 from simulations, averaged over a short time. At a
+    reversal the force rises by hundreds of newtons per millimetre, so that micrometres of displacement noise cause
+    newtons of force. Where the rod rests or creeps, noise reverses the hysteresis repeatedly. A linearisation does not
+    show this.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def noise_variances(
     recordings
         Tests laid end to end.
     draws, seed
-        Number of noise records simulated, and the seed they are drawn from.
+        Number of simulated noise records, and the seed of their random numbers.
     """
     rng = np.random.default_rng(seed)
     calm = predict(found, recordings)
@@ -106,10 +107,11 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     """Return the noise in repeated tests and cycles, in units of the noise that the channels show.
 
     The error of a model is the same function of the motion in both repeats, so it cancels in the difference of their
-    residuals. Squared differences are regressed on the two variances, and on one that grows with the speed; no factor
-    is negative. The noise of a channel does not depend on the speed, so that the third part is not noise: it is a force
-    that motion and drive do not determine, such as a disturbance that is not in step with the motion, or a damper that
-    changes from cycle to cycle. Hum of the mains is estimated separately, because repeats can repeat it.
+    residuals. The squared differences are regressed on the two variances of the channels, and on one that grows with
+    the speed; no factor is negative. The noise of a channel does not depend on the speed. The third part is therefore
+    not noise, but a force that motion and drive do not determine, such as a disturbance that is not synchronous with
+    the motion, or a damper that changes from cycle to cycle. Hum of the mains is estimated separately, because it can
+    be equal in both repeats.
     """
     rules = rules or NoiseRules()
     problem = found.problem
@@ -131,7 +133,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
         steps.append(12.0 * recordings.force_rounding[recordings.test[a]] ** 2)
         differences.append(residual[a] - (1.0 - part) * residual[b] - part * residual[c])
     used = root > 0.0
-    # the white noise of the channel and its hum are less than all noise
+    # the sum of white noise and hum of the channel cannot exceed the total noise
     hum = hum_variance(residual, recordings, rules) / max(float(np.mean(force[used])), 1e-300)
     hum = hum if hum <= rules.most_hum else 0.0
     least = 1.0 + hum
@@ -141,17 +143,17 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     found_in = Differences(tuple(differences), np.concatenate(rows), np.concatenate(steps))
     columns, target = found_in.columns, found_in.squares
     factors, without, disturbed = parts_of_differences(found_in, rules)
-    # a difference holds the events of both repeats
+    # a difference contains the events of both repeats
     events, disturbance = (float(np.sqrt(0.5 * np.mean(part))) for part in (target - without, disturbed))
     target = without - disturbed
-    # no part exceeds the difference: the force overall, the motion where its own part is largest
+    # no part exceeds the difference: force noise in total, motion noise where its part is largest
     most = columns[:, 1] >= np.quantile(columns[:, 1], TOP)
     parts = ((target, columns[:, 0]), (target[most], columns[most, 1]))
     largest = [float(np.sum(all_)) / max(float(np.sum(part)), 1e-300) for all_, part in parts]
     force_factor, motion_factor = (
         max(min(float(factor), limit), rules.least_factor) for factor, limit in zip(factors, largest, strict=True)
     )
-    # repeated motion repeats rounding, and what the filter took away, so that their difference does not show it
+    # rounding errors, and errors of the filter, are equal in repeated motion, so that the difference does not show them
     lasting = recordings.noise_repeats[recordings.test] * motion
     motion_factor = max(motion_factor, float(np.sum(lasting[used])) / max(float(np.sum(motion[used])), 1e-300))
     rounding = recordings.force_rounding[recordings.test] ** 2
@@ -170,14 +172,15 @@ def _relative_speed(recordings: Recordings) -> FloatArray:
 
 
 def _limit(residual: FloatArray, variance: FloatArray) -> float:
-    """Return the factor, at most 1, on the variance of the noise: noise is no larger than what the model leaves."""
+    """Return the factor, at most 1, on the noise variance, because noise cannot exceed the residual of the model."""
     return min(1.0, float(np.sum(residual**2)) / max(float(np.sum(variance)), 1e-300))
 
 
 def _aligned(recordings: Recordings, first: IntArray, second: IntArray) -> tuple[IntArray, float]:
-    """Return the samples before the moments at which the second motion is where the first is, and the part beyond them.
+    """Return the indices, and the fraction of a sample beyond them, at which the second motion equals the first one.
 
-    A period is rarely a whole number of samples. A model's error that is steep in time would not cancel otherwise.
+    A period is rarely a whole number of samples. Without the fraction an error of the model that changes fast in time
+    would not cancel.
     """
     dt = recordings.dt[recordings.test[second[0]]]
     step = recordings.velocity[second] * dt
@@ -232,7 +235,7 @@ def force_deviation(
     scale: NoiseScale = AS_SHOWN,
     rules: NoiseRules | None = None,
 ) -> FloatArray:
-    """Return the standard deviation of noise and expected model error [N], shape (n,), whose inverse is the weight.
+    """Return the standard deviation of noise and expected model error [N], shape (n,); its inverse is the root weight.
 
     Parameters
     ----------
@@ -241,7 +244,7 @@ def force_deviation(
     recordings
         Tests.
     model_error_share
-        Expected model error, as a share of the force RMS.
+        Expected model error, as a share of the RMS force.
     scale
         Factors on the force noise and on the motion noise.
     rules

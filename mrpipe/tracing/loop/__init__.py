@@ -1,1 +1,1 @@
-"""The closed loop with the traced effect: corrected plant, recalibrated laws, error before and after."""
+"""The closed loop with the traced effect: corrected plant, recalibrated laws, errors before and after."""

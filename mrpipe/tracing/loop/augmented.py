@@ -1,4 +1,4 @@
-"""The damper with its effects as a plant: its force in use, its inverse, and its residual force."""
+"""The damper with its effects as a plant: its force under a controller, its inverse, and its residual force."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from mrpipe.networks.training import train
 from mrpipe.signals.prepared import PreparedTest
 
 SPEEDS = (0.025, 0.075, 0.2, 0.5, 1.0)
-"""Numerical technique: speeds at which the force in use is tabulated, in shares of the highest speed."""
+"""Numerical technique: speeds at which the force is tabulated, as shares of the highest speed."""
 
 DRIVES = 11
-"""Numerical technique: number of drives at which it is tabulated, from 0 to the limit."""
+"""Numerical technique: number of drives at which the force is tabulated, from 0 to the limit."""
 
 STEPS = (80.0, 40.0)
 """Numerical technique: least number of time steps in half a period of the motion and in half a cycle of a triangle."""
@@ -34,10 +34,10 @@ SETTLING_SHARE = 0.2
 """Numerical technique: share of a half period after a change of drive that is left out, so that its lag has decayed."""
 
 MIDDLE = 0.3
-"""Numerical technique: the force is averaged over this share of the stroke either side of its middle."""
+"""Numerical technique: the force is averaged over this share of the stroke on both sides of its middle."""
 
 MOST_MOTIONS = 40
-"""Numerical technique: most motions that are simulated for the inverse."""
+"""Numerical technique: largest number of motions that are simulated for the inverse."""
 
 CYCLES = 4
 """Numerical technique: steady cycles of each motion."""
@@ -46,7 +46,7 @@ RAMPS = (0.1, 0.8)
 """Numerical technique: shortest and longest ramp between two drives, in mean periods of the motion."""
 
 OFF = 0.33
-"""Numerical technique: share of the levels of the drive that are 0, as under a controller that switches."""
+"""Numerical technique: share of the levels of the drive that are 0, as under a switching controller."""
 
 
 def plant_chain(found: Fit) -> Chain:
@@ -64,7 +64,7 @@ def traced_damper(found: Fit, drive_unit: str = "A", *, effect_files: Mapping[st
     drive_unit
         `A` or `V`.
     effect_files
-        Effect -> the user's own file that defines it.
+        Name of an effect -> the user's file that defines it.
     """
     return damper_model(found, drive_unit, effects=True, assumed_eta=math.inf, effect_files=effect_files)
 
@@ -90,7 +90,7 @@ class ForceInUse:
         two histories of the drive, from 0 and from the working drive, so that a memory of the drive counts as in the
         loop.
     from_above_n
-        The same for the drive that comes from the working drive.
+        The same, for a drive that falls from the working drive.
     """
 
     speeds_m_s: FloatArray
@@ -122,7 +122,7 @@ class ForceInUse:
 def force_in_use(
     chain: Chain, drive_limit: float, *, stroke_m: float, speed_m_s: float, omega: float, working_drive: float
 ) -> ForceInUse:
-    """Tabulate the force of a chain at constant speeds and drives, as in a closed loop.
+    """Tabulate the force of a chain at constant speeds and drives, with histories of the drive as in a closed loop.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def force_in_use(
         Angular frequency of the motion to be damped [rad/s]; a drive is held for half a period before the force is
         taken.
     working_drive
-        Earlier drive, for the table that comes from above.
+        Earlier drive [A or V], for the table with a falling drive.
     """
     speeds, drives = speed_m_s * np.array(SPEEDS), np.linspace(0.0, drive_limit, DRIVES)
     branches = np.empty((2, len(speeds), len(drives)))
@@ -160,7 +160,7 @@ def _held(chain: Chain, speed: float, drive: float, before: float, stroke: float
     out = np.mod(turns, 2.0) < 1.0
     x, v = speed * half * (0.5 - ramp), np.where(out, speed, -speed)
     force = run_chain(chain, x, v, np.zeros_like(x), np.where(time < change, before, drive), dt)[:, FORCE]
-    # about the middle of the stroke springs cancel, and the lag of the drive has decayed
+    # springs cancel around the middle of the stroke, and the lag of the drive has decayed there
     part = (time > change + SETTLING_SHARE * whole) & (time < change + 2.0 * whole) & (np.abs(ramp - 0.5) < MIDDLE)
     moved = force * np.sign(v)
     return 0.5 * float(np.mean(moved[part & out]) + np.mean(moved[part & ~out]))
@@ -191,8 +191,8 @@ def simulated_history(
 ) -> History:
     """Return training data for an inverse network: the damper simulated over the motions of tests, twice.
 
-    Each motion is simulated with its own drive, and again with a drive that moves between 0 and its limit like that of
-    a controller, because campaigns have few such tests.
+    Each motion is simulated with its recorded drive, and again with a drive that varies between 0 and its limit like
+    that of a controller, because campaigns have few such tests.
     """
     made = []
     for test in spread(tests):
@@ -221,7 +221,8 @@ class Retrained:
     network
         The better of the old and the retrained network.
     before_nrmse, after_nrmse
-        Error of the drive over its RMS of the old and of the retrained network, on simulated validation motions.
+        RMS error of the drive over its RMS value, for the old and the retrained network, on simulated validation
+        motions.
     seconds
         Duration of the training.
     """
@@ -233,7 +234,7 @@ class Retrained:
 
     @property
     def replaced(self) -> bool:
-        """Whether the retrained network is the better."""
+        """Whether the retrained network is better than the old one."""
         return self.after_nrmse < self.before_nrmse
 
 
@@ -249,12 +250,12 @@ def retrain_inverse(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Retrained:
-    """Train an inverse network of the old layout on the damper with its effects, and compare both on other motions.
+    """Train an inverse network of the old architecture on the damper with its effects, and compare both networks.
 
     Parameters
     ----------
     old
-        The controller's inverse, trained on measured data.
+        Inverse network of the controller, trained on measured data.
     chain
         Damper with its effects.
     training, validation
@@ -264,7 +265,7 @@ def retrain_inverse(
     rng
         Source of randomness.
     options
-        How it is trained; by default a few starts on a subsample, which takes seconds.
+        Options of the training; the default is a few starts on a part of the samples, which takes seconds.
     jobs
         Processes; the result does not depend on their number.
     progress

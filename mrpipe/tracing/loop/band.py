@@ -1,7 +1,7 @@
-"""Ranking of the laws over a frequency band: the largest response of every loop, at its own resonance.
+"""Ranking of the laws over a frequency band, by the largest response of every closed loop.
 
-A comparison at one frequency favours the law that is detuned there. A locked damper, for example, moves the resonance
-away from the excitation and is by far the worst at the new one.
+A comparison at one frequency favours a law that moves the resonance away from this frequency. A locked damper, for
+example, has a small response at the old resonance and by far the largest one at the new resonance.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from mrpipe.tracing.loop.comparison import (
 from mrpipe.tracing.rules import LoopRules
 
 OPTIONS = CurveOptions(points=11, tolerance=1e-2, most_cycles=60, frequency_tolerance=5e-3, refined=("rms_x_top_m",))
-"""Numerical technique: response curves of the ranking, whose peaks are accurate to half of `rules.alike`."""
+"""Numerical technique: options of the response curves, whose peaks are accurate to half of `rules.alike`."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Band:
     band_rad_s
         Lowest and highest frequency [rad/s].
     amplitude_m_s2
-        Of the base acceleration [m/s^2].
+        Amplitude of the base acceleration [m/s^2].
     """
 
     band_rad_s: tuple[float, float]
@@ -51,12 +51,12 @@ class Band:
 
 
 def amplitude_of(run: LoopRun, steady: float = LoopRules().steady) -> float:
-    """Return the amplitude of harmonic motion with the RMS of the ground motion of a run [m/s^2].
+    """Return the amplitude [m/s^2] of a harmonic motion with the RMS acceleration of the ground motion of a run.
 
     Parameters
     ----------
     run
-        Gives the ground motion.
+        Run that gives the ground motion.
     steady
         See :class:`~mrpipe.tracing.rules.LoopRules`.
     """
@@ -73,7 +73,7 @@ def curves_of(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> dict[str, dict[str, ResponseCurve | None]]:
-    """Return law -> way -> response curve; None where the response grows without bound at some frequency.
+    """Return law -> way -> response curve; None if the response grows without bound at some frequency.
 
     Parameters
     ----------
@@ -86,10 +86,10 @@ def curves_of(
     jobs
         Threads; the result does not depend on their number.
     progress
-        Receives the share that is done.
+        Called with the share of the work that is done (0 to 1).
     """
     first = {law: next(run for run in runs if run.law == law) for law in ways}
-    # one that stands under two names is run once
+    # a way that has two names is run once
     tasks = [(law, way) for law, offered in ways.items() for way in {id(way): way for way in offered.values()}.values()]
     runner = Parallel(n_jobs=max(1, jobs), backend="threading", return_as="generator")
     found: dict[tuple[str, int], ResponseCurve | None] = {}
@@ -114,7 +114,7 @@ def _curve(run: LoopRun, way: Arrangement, bench: Bench, band: Band) -> Response
             rng=np.random.default_rng(bench.seed),
         )
         if np.max(np.abs(response.damper_displacement)) > bench.rules.diverged * bench.tested_stroke_m:
-            raise DivergedError(f"law {run.law}: the damper would move far beyond the stroke that it was tested at")
+            raise DivergedError(f"law {run.law}: the damper would move far beyond the tested stroke")
         return response
 
     curve = response_curve(loop, band.amplitude_m_s2, band.band_rad_s, OPTIONS)
@@ -122,12 +122,12 @@ def _curve(run: LoopRun, way: Arrangement, bench: Bench, band: Band) -> Response
 
 
 def best_way(curves: Mapping[str, ResponseCurve | None], alike: float = LoopRules().alike) -> str:
-    """Return the way with the smallest largest top displacement; an earlier one unless a later one is clearly better.
+    """Return the way with the smallest peak of the top displacement, unless an earlier one is almost as good.
 
     Parameters
     ----------
     curves
-        Way -> response curve, the least changed way first.
+        Way -> response curve, the way with the fewest changes first.
     alike
         Share by which a later way must be better.
     """
@@ -181,5 +181,5 @@ def _peaks(curve: ResponseCurve | None) -> dict[str, Any]:
 
 
 def _as_ranked(peaks: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the peak of the top displacement under the name by which laws are ranked."""
+    """Return the peak of the top displacement under the key by which laws are ranked."""
     return {"rms_x_top_m": peaks["peak_rms_x_top_m"]} if "peak_rms_x_top_m" in peaks else dict(peaks)

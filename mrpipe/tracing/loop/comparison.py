@@ -1,4 +1,4 @@
-"""The augmented damper in the closed loop: predicted against measured response, ranking of the laws."""
+"""The damper with its effects in the closed loop: predicted and measured response, and ranking of the laws."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from mrpipe.structures import Frame
 from mrpipe.tracing.rules import LoopRules
 
 ENERGY = (0.005, 0.05, 0.5, 0.98)
-"""Numerical technique: shares of the energy of the base motion at which a transient motion starts, growth is compared
-from, a steady motion has settled, and the motion ends."""
+"""Numerical technique: shares of the energy of the base motion at which a transient motion starts, from which its
+growth is compared, at which a steady motion has settled, and at which the motion ends.
+"""
 
 
 @dataclass(frozen=True)
@@ -34,20 +35,20 @@ class LoopRun:
     name, law
         Test and control law.
     gains
-        Gains that campaign.yaml states; empty if it states none.
+        Gains that campaign.yaml states; empty if there are none.
     time_s
         Shape (m,).
     ground_acceleration
         Shape (m,) [m/s^2].
     displacement
-        Of the floors that were measured, relative to the ground, lowest first, shape (m, p) [m]; empty where the run
-        was not recorded.
+        Displacement of the measured floors relative to the ground, lowest first, shape (m, p) [m]; empty if the run was
+        not recorded.
     absolute_acceleration
-        Of the floors that were measured, lowest first, shape (m, q) [m/s^2]; empty where not recorded.
+        Acceleration of the measured floors, lowest first, shape (m, q) [m/s^2]; empty if not recorded.
     damper_force
-        Shape (m,) [N]; empty where not recorded.
+        Shape (m,) [N]; empty if not recorded.
     displacement_of, acceleration_of
-        Degrees of freedom of the frame to which the columns belong, length p and q.
+        Degrees of freedom of the frame for the columns of displacement and acceleration, length p and q.
     """
 
     name: str
@@ -63,26 +64,26 @@ class LoopRun:
 
     @property
     def relative_acceleration(self) -> FloatArray:
-        """Accelerations of the floors relative to the ground, shape (m, q) [m/s^2]; empty where not recorded."""
+        """Accelerations of the floors relative to the ground, shape (m, q) [m/s^2]; empty if not recorded."""
         absolute = self.absolute_acceleration
         return absolute - self.ground_acceleration[:, None] if absolute.size else absolute
 
     @property
     def recorded(self) -> bool:
-        """Whether there is a response to compare with."""
+        """Whether a measured response exists."""
         return bool(self.displacement.size)
 
 
 @dataclass(frozen=True)
 class Arrangement:
-    """One way of running the loop: which damper, and what makes the controller of a run."""
+    """One way of running the loop: the damper, and the function that makes the controller of a run."""
 
     chain: Chain
     controller: Callable[[LoopRun], Controller]
 
 
 def measured_runs(campaign: Campaign, frame: Frame) -> list[LoopRun]:
-    """Return the closed-loop recordings of a frame campaign that name their law and record a floor of the frame."""
+    """Return the closed-loop recordings of a frame campaign that state their law and record a floor of the frame."""
     runs = []
     for item in campaign.recordings:
         law = str(item.details.get("law", ""))
@@ -126,7 +127,7 @@ def _floors(channels: Mapping[str, FloatArray], stem: str, frame: Frame) -> tupl
 
 
 def with_unrecorded(runs: Sequence[LoopRun], laws: Sequence[str]) -> list[LoopRun]:
-    """Return the recordings, and for every law that has none the base motions of the first law that has."""
+    """Return the recordings; a law without recordings gets the base motions of the first law with recordings."""
     there = {run.law for run in runs}
     first = [run for run in runs if run.law == runs[0].law]
     empty = np.zeros((0, 0))
@@ -150,14 +151,14 @@ def simulated_runs(excitation: Excitation, laws: Sequence[str], rate_hz: float =
 
 
 def judged_span(time: FloatArray, ground: FloatArray, steady: float = LoopRules().steady) -> tuple[float, float]:
-    """Return the start and end [s] of the span that is judged: the second half of a steady motion, else all of it.
+    """Return start and end [s] of the time that is judged: the second half of a steady motion, else the whole motion.
 
     Parameters
     ----------
     time, ground
         Time [s] and ground acceleration [m/s^2], shape (m,).
     steady
-        Largest departure of the energy from linear growth, as a share, of a steady motion.
+        Largest deviation of the energy from linear growth, as a share, with which a motion counts as steady.
     """
     energy = np.cumsum(ground**2)
     if energy[-1] <= 0.0:
@@ -180,7 +181,7 @@ class Bench:
     frame, position
         Structure and connectivity vector w, shape (n,).
     options
-        How the loop is run.
+        Options of the simulation of the loop.
     seed
         Seed of the sensors' noise, the same for every arrangement and law.
     tested_stroke_m
@@ -198,7 +199,7 @@ class Bench:
 
 
 def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
-    """Return the indices of a run simulated with its ground acceleration, and its error of the top floor.
+    """Return the indices of a simulated run with its recorded ground acceleration, and the error at the top floor.
 
     Raises
     ------
@@ -222,7 +223,7 @@ def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
     )
     beyond = float(np.max(np.abs(response.damper_displacement))) / bench.tested_stroke_m
     if beyond > bench.rules.diverged:
-        raise DivergedError(f"law {run.law}: the damper would move {beyond:.0f} times the stroke it was tested at")
+        raise DivergedError(f"law {run.law}: the damper would move {beyond:.0f} times the tested stroke")
     moved, felt = (list(of or bench.frame.moved_by_ground) for of in (run.displacement_of, run.acceleration_of))
     displacement, acceleration = response.displacement[:, moved], response.acceleration[:, felt]
     found = run_indices(response.time_s, span, displacement, acceleration, response.force)
@@ -237,7 +238,7 @@ def predicted(run: LoopRun, way: Arrangement, bench: Bench) -> dict[str, float]:
 def run_indices(
     time: FloatArray, span: tuple[float, float], displacement: FloatArray, acceleration: FloatArray, force: FloatArray
 ) -> dict[str, float]:
-    """Return RMS of first and last column and of the damper force over the span that is judged, SI."""
+    """Return the RMS of first and last column and of the damper force over the time that is judged, in SI."""
     steady = (time >= span[0]) & (time <= span[1])
     found = {}
     for label, values in (("x", displacement), ("a", acceleration)):
@@ -303,7 +304,7 @@ def _row(run: LoopRun, ways: Mapping[str, Arrangement], bench: Bench) -> dict[st
         )
     done: dict[int, dict[str, Any]] = {}
     for when, way in ways.items():
-        # a way that stands under two names is run once
+        # a way that has two names is run once
         if id(way) not in done:
             try:
                 done[id(way)] = predicted(run, way, bench)
@@ -316,7 +317,7 @@ def _row(run: LoopRun, ways: Mapping[str, Arrangement], bench: Bench) -> dict[st
 def law_rows(
     rows: Sequence[Mapping[str, Any]], columns: Sequence[str], tested: float = LoopRules().tested
 ) -> list[dict[str, Any]]:
-    """Return one row per law: the mean of each index over its runs, by column.
+    """Return one row per law: the mean of each index over the runs of the law, for each column.
 
     Parameters
     ----------
@@ -325,7 +326,7 @@ def law_rows(
     columns
         Keys of the rows that hold indices.
     tested
-        Damper motion over the tested stroke above which a prediction is an extrapolation.
+        Ratio of damper motion to tested stroke above which a prediction is an extrapolation.
     """
     found = []
     for law in dict.fromkeys(row["law"] for row in rows):
@@ -359,7 +360,7 @@ def ranking(rows: Sequence[Mapping[str, Any]], when: str) -> list[str]:
 def reversed_pairs(
     rows: Sequence[Mapping[str, Any]], first: str, second: str, alike: float = LoopRules().alike
 ) -> list[list[str]]:
-    """Return the pairs of laws whose order differs between two columns, the law that is better by `second` first.
+    """Return the pairs of laws whose order differs between two columns; the law that `second` ranks higher is first.
 
     Parameters
     ----------

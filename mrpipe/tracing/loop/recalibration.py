@@ -1,4 +1,4 @@
-"""Gains and switch of a controller for a damper that gives other forces than the model it was calibrated with."""
+"""Gains and switch force of a controller, for a damper whose forces differ from those of the calibration model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mrpipe.tracing.rules import LoopRules
 
 
 def realised_force(law: Law, gains: Gains, damper: ForceInUse, amplitude_m: float) -> Callable[..., FloatArray]:
-    """Return the force of a damper under a law, over displacement and velocity; it is at least the residual force."""
+    """Return the force [N] of a damper under a law as a function of x [m] and v [m/s]; at least the residual force."""
     demand = law.harmonic_force
     if demand is None:
         raise ValueError(f"law {law.name} has no force in harmonic motion")
@@ -44,7 +44,7 @@ def gain_factor(
     amplitude_m: float,
     most: float = LoopRules().most_gain,
 ) -> float:
-    """Return the factor on the tuned gain with which the new damper has the equivalent damping of the old one.
+    """Return the factor on the tuned gain with which the new damper has the same equivalent damping as the old one.
 
     The best equivalent damping depends on the frame only (4.13), (4.25). A calibrated law stays calibrated if its gain
     compensates the changed force of the damper. The equivalent stiffness is not changed.
@@ -58,7 +58,8 @@ def gain_factor(
     omega, amplitude_m
         Angular frequency [rad/s] and amplitude [m] of the motion at the damper.
     most
-        Largest factor either way; the gain is kept where no factor within it restores the equivalent damping.
+        Largest factor, and inverse of the smallest one; the gain is kept if no factor in this range restores the
+        equivalent damping.
     """
     wanted = equivalent_loss(law, gains, before, omega, amplitude_m)
 
@@ -72,5 +73,5 @@ def gain_factor(
 
 
 def switch_threshold(old_n: float, before: ForceInUse, after: ForceInUse, speed_m_s: float) -> float:
-    """Return the desired force [N] below which the drive is 0: it keeps its ratio to the residual force."""
+    """Return the desired force [N] below which the drive is 0; its ratio to the residual force is kept."""
     return old_n * after.residual_n(speed_m_s) / max(before.residual_n(speed_m_s), 1e-12)

@@ -1,4 +1,4 @@
-"""The closed loop under every law: as it ran, on the damper with its effects, and with a renewed controller."""
+"""The closed loop under every law: with the damper before, with its effects, and with a renewed controller."""
 
 from __future__ import annotations
 
@@ -81,14 +81,14 @@ class LoopStudy:
 
 
 NOTHING = "nothing"
-"""What a law renews that does better with the controller as it was."""
+"""Renewed parts of a law that is better with the unchanged controller: none."""
 
 PARTS = (("inverse",), ("inverse", "switch"), ("inverse", "switch", "gain"))
-"""Parts of the controller that are renewed together, the least change first."""
+"""Sets of parts of the controller that are renewed together, the smallest change first."""
 
 
 def closed_loop(study: LoopStudy) -> dict[str, Any]:
-    """Return every law as measured, before and after the effects, and with a controller renewed for them."""
+    """Return for every law the response as measured, without and with the effects, and with a renewed controller."""
     rig, traced = study.rig, study.traced
     position = rig.controllers.calibrated.position
     stroke = traced.selection.base.problem.scales.stroke
@@ -108,7 +108,7 @@ def closed_loop(study: LoopStudy) -> dict[str, Any]:
         offered = {
             ", ".join(parts): Arrangement(chosen, partial(_renewed_controller, rig, renewed, parts)) for parts in PARTS
         }
-    # a law that commands the drive itself uses neither inverse nor switch
+    # a law that commands the drive directly uses neither inverse nor switch
     ways_of = {law: ways | (offered if law_named(law).output == "force" else {}) for law in laws}
     curves = curves_of(
         runs, ways_of, bench, band, study.jobs, lambda done, text="": study.progress(0.5 + 0.4 * done, text)
@@ -125,7 +125,7 @@ def closed_loop(study: LoopStudy) -> dict[str, Any]:
 
 
 def _best_parts(curves: Mapping[str, ResponseCurve | None], offered: Sequence[str], alike: float) -> str:
-    """Return the renewed parts with which a law does best over the band."""
+    """Return the renewed parts with which the largest response of a law over the band is smallest."""
     found = {parts: curves[parts] for parts in offered if parts in curves}
     return best_way({NOTHING: curves["after"], **found}, alike)
 
@@ -136,11 +136,11 @@ def laws_to_compare(asked: Sequence[str], stages: Sequence[str], available: Sequ
     Parameters
     ----------
     asked
-        Setting `close_loop.laws`; empty: the laws that the run simulates, or all where it simulates none.
+        Setting `close_loop.laws`; empty: the laws that the run simulates, or all laws if it simulates none.
     stages
         Stages of the run.
     available
-        Laws for which everything is there that they need.
+        Laws whose requirements are met.
     """
     simulated = [stage.removeprefix("simulate-") for stage in stages if stage.startswith("simulate-")]
     wanted = asked or simulated or available
@@ -148,7 +148,7 @@ def laws_to_compare(asked: Sequence[str], stages: Sequence[str], available: Sequ
 
 
 def _runs(study: LoopStudy) -> tuple[list[LoopRun], str]:
-    """Return the recordings and the other laws under their motion; without recordings the excitation of `simulate`."""
+    """Return the runs of all laws: under the recorded motions, or without any under the excitation of `simulate`."""
     laws, recorded = study.laws, study.recorded
     if recorded:
         runs = with_unrecorded(list(recorded), laws)
@@ -161,7 +161,7 @@ def _runs(study: LoopStudy) -> tuple[list[LoopRun], str]:
 
 
 def _plant_words(traced: Tracing) -> dict[str, Any]:
-    """Return which effects are in the plant and which are not, and why."""
+    """Return in words which effects are in the plant, and why others are not."""
     terms = traced.selection.chosen.problem.terms
     left_out = {term.effect.name: "a fault of sensors: corrected in prepare" for term in terms if term.effect.sensor}
     for item in traced.summary["effects"]:
@@ -237,7 +237,7 @@ def _renewed(study: LoopStudy) -> Renewed:
 
 
 def _working_drive(rig: Rig, force_n: float, limit: float, speed_m_s: float) -> float:
-    """Return the drive at which the damper without effects has the peak force of viscous damping at a speed."""
+    """Return the drive [A or V] at which the damper without effects gives the peak force of viscous damping."""
     drive = np.linspace(0.0, limit, 101)
     forces = np.asarray(rig.damper.quasi_static_force(speed_m_s, drive))
     return float(drive[min(int(np.searchsorted(np.maximum.accumulate(forces), force_n)), 100)])

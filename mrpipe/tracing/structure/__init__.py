@@ -1,1 +1,1 @@
-"""Tracing on the structure: residual of the linear frame against measured vibration."""
+"""Tracing on the structure: residual between measured vibration and a linear frame."""

@@ -1,4 +1,4 @@
-"""Band, weights and spectra of a structure's records, and the linear frames that are compared with them."""
+"""Band, weights and spectra of the records of a structure, and the linear frames that are compared with them."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from mrpipe.tracing.structure.records import FrameRecord
 from mrpipe.tracing.structure.spectra import Band, Spectra, motion_of, noise_of, spectra_of, storey_sums
 
 OF_RATE = 0.4
-"""Numerical technique: highest frequency in use, as a share of the sampling rate; above it anti-alias filters act."""
+"""Numerical technique: highest frequency in use, as a share of the sampling rate, because of anti-alias filters."""
 
 POWER_SHARE = 0.002
-"""Numerical technique: share of the power outside either edge of the band that the first fit starts from."""
+"""Numerical technique: share of the power beyond each edge of the band of the first fit."""
 
 ABOVE_NOISE = 3.0
-"""Numerical technique: the first band counts only power that exceeds the sensors' flat noise by this factor."""
+"""Numerical technique: power counts in the first band only if it exceeds the flat noise of the sensors by this factor.
+"""
 
 START_MARGINS = (0.5, 1.3, 4.0)
 """Numerical technique: factors on the lowest and the highest frequency with power, and least ratio of the two. The band
@@ -39,13 +40,13 @@ class FrameProblem:
     validation
         Spectra of the validation records.
     masses_kg
-        Floor masses, shape (n,).
+        Floor masses, shape (n,) [kg].
     band
         Frequencies in use.
     storey_stiffness
-        Of the shear frame fitted first, shape (n,) [N/m].
+        Storey stiffness of the shear frame that is fitted first, shape (n,) [N/m].
     frequencies_hz
-        Its modes.
+        Natural frequencies of this shear frame, shape (n,) [Hz].
     rules
         Decision thresholds.
     """
@@ -70,7 +71,7 @@ def frame_problem(
     Parameters
     ----------
     training, validation
-        Records that hold the motion of every floor.
+        Records that contain the motion of every floor.
     masses
         Floor masses, shape (n,) [kg].
     rules
@@ -81,7 +82,7 @@ def frame_problem(
     band = _band_of_power(training)
     storey = np.full(n, float(np.mean(masses)) * (2.0 * np.pi * np.sqrt(band.low_hz * band.high_hz)) ** 2)
     frequencies = np.zeros(n)
-    # band and weights need few records: the shortest forced ones
+    # few records are sufficient for band and weights: the shortest forced ones
     few = _few(training)
     for _ in range(3):
         spectra = _spectra(few, masses, band, _matrix(storey), rules)
@@ -118,18 +119,18 @@ def _matrix(storey: FloatArray) -> FloatArray:
 def coupled_stiffness(
     spectra: Sequence[Spectra], sheared: FloatArray, coupling: float = FrameRules().coupling
 ) -> FloatArray:
-    """Return the shear of each storey per floor displacement of any linear frame, shape (n, n) [N/m].
+    """Return the shear of each storey per floor displacement of a general linear frame, shape (n, n) [N/m].
 
-    At low frequencies the displacement of a floor without a laser is far noisier than that of a floor with one. If it
-    enters the equation of a storey, even weakly, its noise dominates there. Couplings that the records hardly determine
-    are therefore held near those of a shear frame.
+    At low frequencies the displacement of a floor without a laser has far more noise than that of a floor with one.
+    Even with a small coefficient in the equation of a storey, this noise dominates there. Couplings that the records
+    hardly determine are therefore kept near those of a shear frame.
 
     Parameters
     ----------
     spectra
         Spectra of the records.
     sheared
-        Of the shear frame, shape (n, n) [N/m].
+        Shear of each storey per floor displacement of the shear frame, shape (n, n) [N/m].
     coupling
         Expected size of the couplings, as a share of the storey stiffness.
     """
@@ -152,7 +153,7 @@ def coupled_stiffness(
 
 
 def _band_of_power(records: Sequence[FrameRecord]) -> Band:
-    """Return the band that holds the power of the floors' motion."""
+    """Return the band that contains the power of the motion of the floors."""
     lowest, highest = [], []
     for item in records:
         frequencies, density = signal.welch(
@@ -187,5 +188,5 @@ def shear_stiffness_of(design: Design, masses: FloatArray) -> tuple[FloatArray, 
 
 
 def ladder(spectra: Sequence[Spectra]) -> dict[Base, Design]:
-    """Return the linear models from simple to free."""
+    """Return the linear frames that are compared, from the simplest to the most general one."""
     return {"shear-frame": design_of("shear-frame", spectra), "linear-frame": design_of("linear-frame", spectra)}

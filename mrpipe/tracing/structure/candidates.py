@@ -1,4 +1,4 @@
-"""Effects of a structure fitted to the residual of a linear frame: histories, columns, search of shapes and places."""
+"""Fit of effects to the residual of a linear frame: histories, columns, search of shape parameters and places."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def unit_forces(
 
 @dataclass(frozen=True)
 class Placed:
-    """A form at a place: `floor` from 1 for a floor effect, 0 for all storeys at once."""
+    """A form of an effect at a place: `floor` from 1 for an effect on a floor, 0 for all storeys together."""
 
     effect: StructuralEffect
     form: StructuralForm
@@ -61,7 +61,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A placed form with its searched numbers; amplitudes follow from the design."""
+    """A placed form with its searched parameters; its amplitudes are solved for by the design."""
 
     placed: Placed
     numbers: FloatArray
@@ -75,12 +75,12 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a search needs in addition to the records.
+    """Data that a search needs in addition to the records.
 
     Attributes
     ----------
     storey_stiffness
-        Stiffness of the storeys, shape (n,) [N/m]; the rotation of a base is distributed by it.
+        Stiffness of the storeys, shape (n,) [N/m]; the rotation of a base is distributed over the storeys by it.
     rules
         Decision thresholds.
     """
@@ -100,7 +100,7 @@ class Histories:
     which
         History of each amplitude, shape (k,).
     on_storey
-        What one unit of an amplitude adds to the shear force of each storey, shape (k, n).
+        Contribution of one unit of an amplitude to the shear force of each storey, shape (k, n).
     """
 
     force: FloatArray
@@ -108,19 +108,19 @@ class Histories:
     on_storey: FloatArray
 
     def shear(self, amplitudes: FloatArray) -> FloatArray:
-        """Return what the effect adds to the shear force that inertia shows, shape (m, n) [N]."""
+        """Return the contribution of the effect to the shear force of the storeys, shape (m, n) [N]."""
         return np.asarray(self.force[:, self.which] @ (amplitudes[:, None] * self.on_storey))
 
 
 def histories_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Histories:
-    """Return the unit forces of an effect along a record: amplitude after amplitude, each storey after the other."""
+    """Return the unit forces of an effect along a record, ordered by amplitude and then by storey."""
     effect, form = fitted.placed.effect, fitted.placed.form
     motion, dt, n = spectra.motion, spectra.record.dt, spectra.record.floors
     kinds = len(form.amplitudes)
     if effect.acts_on == "floor":
         place = fitted.placed.floor - 1
         position, rate = motion.state_displacement[:, place], motion.state_velocity[:, place]
-        # a force on a floor is carried by all storeys below it
+        # all storeys below a floor carry a force on it
         below = np.where(np.arange(n) <= place, -1.0, 0.0)
         return Histories(
             unit_forces(form, position, rate, dt, fitted.numbers), np.arange(kinds), np.tile(below, (kinds, 1))
@@ -138,7 +138,7 @@ def histories_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Histo
 
 
 def columns_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Columns:
-    """Return the lines of the unit forces of an effect in a record."""
+    """Return the spectral lines of the unit forces of an effect in a record."""
     found = histories_of(fitted, spectra, about)
     lines = spectra.lines_of(found.force)
     return Columns(found.on_storey[:, :, None] * lines[found.which][:, None, :])
@@ -146,14 +146,14 @@ def columns_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Columns
 
 @dataclass(frozen=True)
 class Outcome:
-    """A candidate after its search."""
+    """Result of the search of a candidate."""
 
     fitted: Fitted
     solved: Solved
 
 
 def scales_of(spectra: Sequence[Spectra], place: Placed) -> EffectScales:
-    """Return what bounds and starts are multiples of, at a place."""
+    """Return the scales at a place; bounds and starts are multiples of them."""
     drifts, rates, forces, length = [], [], [], 0.0
     for item in spectra:
         x, v = item.motion.drift, item.motion.drift_rate
@@ -175,7 +175,7 @@ def search(
     evaluations: int = 30,
     screen_only: bool = False,
 ) -> Outcome:
-    """Search the shape of a form: every combination of starts, then downhill from the best.
+    """Search the shape parameters of a form: every combination of starts, then a local search from the best one.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
 """Motion of floors without a sensor, from the sensors of the other floors and the identified frame.
 
-The tracing needs the motion of every floor. Once mass, damping and stiffness are identified, the equations of motion of
-all floors are more than the unknown motions, so that these follow by least squares at each frequency. The equations of
-the floors without a sensor alone would give them too (dynamic condensation; Guyan, AIAA Journal 3, 380, 1965, is its
-limit at frequency zero), but amplify the noise of the neighbours where such a floor resonates between them.
-Damping and stiffness get one factor in each test, with which the equations hold best: a structure that loosens between
-tests must not be completed with its mean stiffness.
+The tracing needs the motion of every floor. Once mass, damping and stiffness are identified, there are more equations
+of motion than unknown motions, so that these follow by least squares at each frequency. The equations of the floors
+without a sensor alone would also determine them (dynamic condensation; its limit at frequency zero is that of Guyan,
+AIAA Journal 3, 380, 1965). They would however amplify the noise of the neighbouring floors at frequencies at which such
+a floor resonates between them. Damping and stiffness have one common factor for each test, the one with the smallest
+error of the equations, because a structure that loosens between tests must not be completed with its mean stiffness.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _ACCELERATION, _DISPLACEMENT = "floor_acceleration_", "floor_displacement_"
 SOFTEST, STIFFEST = 0.6, 1.5
 """Numerical technique: limits of the factor of a test."""
 LOWEST, HIGHEST = 0.3, 1.2
-"""Numerical technique: band in which the factor is sought, in multiples of the first and the last frequency."""
+"""Numerical technique: band in which the factor is fitted, in multiples of the first and the last frequency."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class _Spectra:
 
 
 def completed(campaign: Campaign, progress: Progress = no_progress) -> tuple[Campaign, list[str]]:
-    """Return a campaign with the acceleration of every floor, and what was done, one line each.
+    """Return a campaign with the acceleration of every floor, and messages on the changes, one line each.
 
     Forced tests are completed. Free decays are not, because their motion before the release is not recorded, and
     tests with a damper are not.
@@ -51,9 +51,10 @@ def completed(campaign: Campaign, progress: Progress = no_progress) -> tuple[Cam
     Parameters
     ----------
     campaign
-        Of a shear frame that moves in one direction; unchanged where it has all sensors or no masses.
+        Campaign of a shear frame that moves in one direction; returned unchanged if all floors have a sensor or masses
+        are not given.
     progress
-        Of the identification of the frame.
+        Progress callback for the identification of the frame.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def completed(campaign: Campaign, progress: Progress = no_progress) -> tuple[Cam
     except UserError:
         if all(lacking.values()):
             raise
-        # the tests with all floors are enough; the others are left out
+        # tests that record all floors are sufficient; the others are left out
         return campaign, []
     tests, changes = [], []
     for item in campaign.recordings:
@@ -99,7 +100,7 @@ def _identified(campaign: Campaign, missing: Sequence[int], progress: Progress) 
     from mrpipe.modal.options import IdentificationOptions
     from mrpipe.modal.records import frame_tests
 
-    # one direction of a structure: its channels have no suffix, so that places and inertias of a plate mean nothing
+    # one direction of a structure: its channels have no suffix, so that positions and inertias of plates do not apply
     declared = dict(campaign.declared)
     if "frame" in declared:
         plate = ("sensor_positions_m", "floor_inertias_kg_m2")
@@ -115,7 +116,7 @@ def _identified(campaign: Campaign, missing: Sequence[int], progress: Progress) 
 
 
 def _completed_test(test: Recording, frame: Frame, places: Sequence[int]) -> tuple[Recording, float]:
-    """Return a test with the absolute acceleration of all floors, and the factor on damping and stiffness."""
+    """Return a test with the absolute acceleration of all floors, and its factor on damping and stiffness."""
     hidden = np.array(places) - 1
     seen = np.setdiff1d(np.arange(frame.floors), hidden)
     size = test.time_s.size
@@ -126,7 +127,7 @@ def _completed_test(test: Recording, frame: Frame, places: Sequence[int]) -> tup
     channels = dict(test.channels)
     for place, history in zip(places, motion.T, strict=True):
         channels[f"{_ACCELERATION}{place}"] = history + ground
-    # what happened before and after the record is not known, so that its ends are left out
+    # the motion before and after the record is not known, so that its ends are left out
     slowest_hz = float(natural_modes(frame).angular_frequencies[0]) / (2.0 * np.pi)
     end = round(test.sampling_rate_hz / slowest_hz)
     segments = tuple((max(a, end), min(b, size - end)) for a, b in test.segments or ((0, size),))
@@ -142,7 +143,7 @@ def _centred(test: Recording, name: str) -> FloatArray:
 
 def _spectra(test: Recording, frame: Frame, seen: NDArray[np.intp]) -> _Spectra:
     size, dt = test.time_s.size, 1.0 / test.sampling_rate_hz
-    length = 2 * size  # with zeros, so that the end does not act on the begin
+    length = 2 * size  # zeros are appended, so that the end of the record does not act on its beginning
     ground = _centred(test, _GROUND)
     columns = []
     for index in seen:
@@ -171,7 +172,7 @@ def _stiffness(frame: Frame, omega: FloatArray, factor: float) -> NDArray[np.com
 
 
 def _load(frame: Frame, spectra: _Spectra) -> NDArray[np.complex128]:
-    """Return the load times minus the squared frequency, shape (f, n): of the ground and of the forces."""
+    """Return the load of ground motion and forces, times minus the squared frequency, shape (f, n)."""
     inertia = frame.mass @ frame.ground_influence
     return np.asarray(spectra.omega[:, None] ** 2 * (spectra.ground[:, None] * inertia - spectra.forces))
 
@@ -188,7 +189,7 @@ def _hidden_motion(
 
 
 def _factor(frame: Frame, spectra: _Spectra, seen: NDArray[np.intp], hidden: NDArray[np.intp]) -> float:
-    """Return the factor on damping and stiffness with the least squared force that the equations lack."""
+    """Return the factor on damping and stiffness with the smallest squared error of the equations of motion."""
     omega = natural_modes(frame).angular_frequencies
     used = (spectra.omega > LOWEST * omega[0]) & (spectra.omega < HIGHEST * omega[-1])
     band = _Spectra(spectra.omega[used], spectra.floors[used], spectra.ground[used], spectra.forces[used])

@@ -1,7 +1,8 @@
-"""The damper in a structure: closed-loop tests traced like those of a bench, and the compliance of a flexible brace.
+"""The damper in a structure: tracing of closed-loop tests like bench tests, and compliance of a flexible brace.
 
-A brace stretches with the force, so the damper's rod moves less than the floor: rod = floor - compliance x force. The
-stretch follows from the measured force, which is low-pass filtered because its noise would otherwise be differentiated.
+A brace stretches with the force, so that the rod of the damper moves less than the floor: rod = floor - compliance x
+force. The elongation is computed from the measured force, after a low-pass, because its noise would otherwise be
+differentiated.
 """
 
 from __future__ import annotations
@@ -27,23 +28,24 @@ from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import BraceRules
 
 STRETCH_HARMONICS = 30.0
-"""Numerical technique: cutoff of the force before it is turned into a stretch, in multiples of the mean frequency of
-the motion. The force of a damper that switches between levels has harmonics far above the motion."""
+"""Numerical technique: cut-off of the force before the elongation is computed, in multiples of the mean frequency of
+the motion. The force of a damper that switches between levels has harmonics far above the motion.
+"""
 
 OF_RATE = 0.3
-"""Numerical technique: highest cutoff, as a share of the sampling rate."""
+"""Numerical technique: highest cut-off frequency, as a share of the sampling rate."""
 
 SEARCHED_CYCLES = 9.0
-"""Numerical technique: cycles of motion of each test by which the compliance is searched; more cost time only."""
+"""Numerical technique: cycles of motion of each test with which the compliance is searched; more only cost time."""
 
 JUDGED_CYCLES = 32.0
-"""Numerical technique: cycles of motion of each validation test by which the errors are computed."""
+"""Numerical technique: cycles of motion of each validation test with which the errors are computed."""
 
 PIECES = 12
 """Numerical technique: least number of pieces into which closed-loop tests are cut."""
 
 SHARES = (0.01, 0.03, 0.08, 0.2, 0.4)
-"""Numerical technique: compliances that are tried first, in strokes over the RMS force."""
+"""Numerical technique: compliances that are tried first, in multiples of stroke over RMS force."""
 
 WORSE = 1.5
 """Numerical technique: the search stops at a compliance whose mean squared error is this multiple of the least one."""
@@ -85,10 +87,10 @@ class BraceFinding:
 
 
 def prepared_loops(campaign: Campaign, rules: BraceRules | None = None) -> list[PreparedTest]:
-    """Return closed-loop tests, given as a bench campaign, prepared as those of a bench are.
+    """Return closed-loop tests, given as a bench campaign, after the same preparation as bench tests.
 
-    Skip tests whose RMS rod motion is below `rules.least_motion` times its noise, because they carry no information on
-    the damper; keep them if no training test or no validation test would remain.
+    Tests whose RMS rod motion is below `rules.least_motion` times its noise are skipped, because they carry no
+    information on the damper. They are kept if no training test or no validation test would remain.
     """
     least = (rules or BraceRules()).least_motion
     noises = {
@@ -118,10 +120,10 @@ def trace_damper(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Tracing:
-    """Trace the damper's residual on prepared closed-loop tests, as on a bench.
+    """Trace the residual of the damper on prepared closed-loop tests, as on a bench.
 
-    A closed loop has few long tests, a bench many short ones. The long tests are cut into pieces, so that forms can be
-    tried on some of the pieces and the tracing takes no longer than on a bench.
+    Closed-loop campaigns have few long tests, bench campaigns many short ones. The long tests are cut into pieces, so
+    that forms can be tried on some of the pieces, and the tracing takes no longer than on a bench.
     """
     training = enough_tests([item for item in tests if item.role != "validation"], PIECES)
     judged = [item for item in tests if item.role == "validation"]
@@ -134,14 +136,14 @@ def find_brace(
     declared: Sequence[Effect],
     rules: BraceRules | None = None,
 ) -> BraceFinding:
-    """Search the compliance of a brace: the base model is fitted anew for each compliance.
+    """Search the compliance of a brace; the base model is fitted again for each compliance.
 
     Parameters
     ----------
     tests
         Prepared closed-loop tests.
     options
-        How the base model is fitted.
+        Options of the fit of the base model.
     declared
         Effects of the damper that the campaign declares.
     rules
@@ -168,7 +170,7 @@ def find_brace(
         baseline = fit_baseline(recordings, base, declared)
         noise.append(baseline.noise)
         tried[share] = baseline.fit
-        # in newtons, because the weights depend on the compliance
+        # errors in newtons are compared, because the weights depend on the compliance
         return _mean_square(baseline.fit)
 
     noise: list[float] = []

@@ -1,9 +1,10 @@
-"""Whether the controller is late: drive against desired force, and desired force against its law.
+"""Dead time of the controller: of the drive relative to the desired force, and of the desired force relative to its
+law.
 
-A controller samples, filters and holds its command, which makes a lag that is granted to it. The drive is compared with
-a table over desired force and velocity at an earlier time, which is learnt on training tests. The desired force is
-compared with its own law: it is proportional to velocity and displacement where it is not clipped. The shift of the
-clock with the least error is the lag.
+A controller samples, filters and holds its command. The resulting lag is expected and called the granted lag. The drive
+is compared with a table over desired force and velocity at an earlier time, which is fitted to training tests. The
+desired force is compared with its law: it is proportional to velocity and displacement where it is not clipped. The lag
+is the time shift with the smallest error.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ COARSE = 4
 """Numerical technique: the search starts with every fourth step."""
 
 FITTED = 4
-"""Numerical technique: shifts that a parabola is fitted to, at least."""
+"""Numerical technique: least number of shifts to which a parabola is fitted."""
 
 BINS = (16, 10)
-"""Numerical technique: bins of the table over desired force and velocity."""
+"""Numerical technique: number of bins of the table in desired force and in velocity."""
 
 
 @dataclass(frozen=True)
 class LoopSignals:
-    """A closed-loop test on its own clock; SI, shape (m,) each.
+    """A closed-loop test on its recorded clock; SI, shape (m,) each.
 
     `displacement` and `velocity` are those of the damper, relative to the ground. `gains` are those of the law on
     velocity [N s/m] and displacement [N/m]; None if the campaign does not state them. `controller_rate_hz` and
@@ -72,7 +73,7 @@ class DelayFinding:
     interval_s
         Interval of the lag [s].
     least_s
-        Dead time beyond the granted lag that is reported [s].
+        Least dead time beyond the granted lag that is reported [s].
     better
         Ratio of the errors below which the lag is reported.
     granted_error_s
@@ -102,7 +103,7 @@ class DelayFinding:
 
     @property
     def late(self) -> bool:
-        """Whether the controller is later than it is granted."""
+        """Whether the lag of the controller clearly exceeds the granted lag."""
         return self.interval_s[0] > self.granted_s + self.least_s and self.after < self.better * self.before
 
 
@@ -111,7 +112,7 @@ def _shifted(values: FloatArray, shift_s: float, rate_hz: float) -> FloatArray:
 
 
 def drive_lag(tests: Sequence[LoopSignals], rules: DelayRules | None = None) -> DelayFinding | None:
-    """Return by how much the drive lags desired force and motion; None if no test varies its drive."""
+    """Return the lag of the drive behind desired force and motion; None if the drive does not vary in any test."""
     rules = rules or DelayRules()
     varied = [
         item
@@ -143,7 +144,7 @@ def _period(tests: Sequence[LoopSignals]) -> float:
 
 
 def _filter_lag(tests: Sequence[LoopSignals], period: float, rules: DelayRules) -> float:
-    """Return the lag [s] of the filter on the command: as declared, else the granted share of a period."""
+    """Return the lag [s] of the filter of the command: as declared, else the granted share of a period."""
     cutoffs = [item.command_filter_hz for item in tests if item.command_filter_hz > 0.0]
     # delay of a second-order Butterworth filter at low frequency
     return float(np.sqrt(2.0) / (2.0 * np.pi * min(cutoffs))) if cutoffs else rules.filter_periods * period
@@ -156,7 +157,7 @@ class _Table:
         pairs = np.concatenate([_sizes(item, shift) for item in tests])
         drive = np.concatenate([item.drive for item in tests])
         acting = pairs[:, 0] > least * float(pairs[:, 0].max())
-        # desired forces near zero, where the drive is off, have their own bin
+        # desired forces near zero, where the drive is off, have a separate bin
         self.edges = [
             np.unique(np.quantile(pairs[acting, k], np.linspace(0.0, 1.0, bins)[: -1 if k == 0 else None]))
             for k, bins in enumerate(BINS)
@@ -183,7 +184,7 @@ def _sizes(item: LoopSignals, shift: float) -> FloatArray:
 def law_lag(
     tests: Sequence[LoopSignals], laws: Mapping[str, str], rules: DelayRules | None = None
 ) -> DelayFinding | None:
-    """Return by how much the desired force lags the motion; None if no test follows a linear law.
+    """Return the lag of the desired force behind the motion; None if no test has a linear law.
 
     Parameters
     ----------
@@ -206,7 +207,7 @@ def law_lag(
             acting = np.abs(item.desired) > rules.acting * np.max(np.abs(item.desired))
             rows = np.column_stack([_shifted(v, shift, item.rate_hz) for v in (item.velocity, item.displacement)])
             if item.gains is not None:
-                # in harmonic motion free gains would take a delay for stiffness
+                # in harmonic motion a delay is equivalent to a stiffness, so the gains must not be fitted
                 rows = (rows @ np.array(item.gains))[:, None]
             numbers = np.linalg.lstsq(rows[acting], item.desired[acting], rcond=None)[0]
             found.append(_relative(rows[acting] @ numbers, item.desired[acting]))
@@ -218,7 +219,7 @@ def law_lag(
 
 
 def _held(tests: Sequence[LoopSignals], period: float, rules: DelayRules) -> float:
-    """Return the lag of sampling and holding [s]: half a sample of the controller, else the granted share."""
+    """Return the lag of sampling and holding [s]: half a sampling interval if declared, else the granted share."""
     rates = [item.controller_rate_hz for item in tests if item.controller_rate_hz > 0.0]
     return 0.5 / min(rates) if rates else rules.filter_periods * period
 
@@ -228,9 +229,9 @@ def _relative(predicted: FloatArray, measured: FloatArray) -> float:
 
 
 def _vertex(shifts: FloatArray, errors: FloatArray, step: float) -> float:
-    """Return the shift of least error between the steps, from a parabola through the squared errors around the least.
+    """Return the shift of least error, from a parabola through the squared errors around the smallest one.
 
-    The squared error of a shifted signal is a parabola near its minimum, so the lag is known better than one step.
+    The squared error of a shifted signal is a parabola near its minimum, so the lag is more accurate than one step.
     """
     place = int(np.argmin(errors))
     near = np.abs(shifts - shifts[place]) < (COARSE - 0.5) * step
@@ -252,7 +253,7 @@ def _least(
     *,
     declared: bool,
 ) -> DelayFinding:
-    """Return the shift of least error: every fourth step first, then every step about the best of these."""
+    """Return the shift of least error: first over every fourth step, then over every step around the best one."""
     step = STEP_PERIODS * period
     coarse = COARSE * step * np.arange(int(rules.longest_periods / (COARSE * STEP_PERIODS)) + 1)
     table = {float(shift): errors(float(shift)) for shift in coarse}

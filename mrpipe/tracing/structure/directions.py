@@ -17,7 +17,7 @@ _GROUND, _FORCE = "ground_acceleration", "input_force"
 
 
 def directions_of(campaign: Campaign) -> list[str]:
-    """Return the axes in which sensors measure, such as x and y; empty where the campaign has one direction."""
+    """Return the axes in which sensors measure, such as x and y; empty if the campaign has one direction."""
     suffixes = {
         found[2] for item in campaign.recordings for name in item.channels if (found := _SENSOR.match(name)) is not None
     }
@@ -25,16 +25,16 @@ def directions_of(campaign: Campaign) -> list[str]:
 
 
 def in_direction(campaign: Campaign, axis: str) -> Campaign | None:
-    """Return what a campaign holds of one axis, as a campaign of a structure with one direction.
+    """Return the part of a campaign along one axis, as a campaign of a structure with one direction.
 
-    Several sensors on a floor give the translation of its centre of mass: floors move as rigid plates, and
-    `frame.sensor_positions_m` says where the sensors are. Without positions their mean is taken. Tests without a
-    measured excitation along the axis are left out, unless they are free decays. Dampers are left out.
+    Several sensors on a floor give the translation of its centre of mass, because floors move as rigid plates, and
+    `frame.sensor_positions_m` gives the positions of the sensors. Without positions the mean of the sensors is taken.
+    Tests without a measured excitation along the axis are left out, unless they are free decays. Dampers are left out.
 
     Parameters
     ----------
     campaign
-        With channels such as `floor_acceleration_3_x`.
+        Campaign with channels such as `floor_acceleration_3_x`.
     axis
         First letter of the suffixes.
 

@@ -1,7 +1,7 @@
-"""Whether the stiffness of a structure changes between tests: softening, loosening, wear.
+"""Changes of the stiffness of a structure between tests: softening, loosening, wear.
 
-The linear frame is fitted to all training tests together. What it leaves in a single test in phase with its restoring
-forces is a change of stiffness of that test. A structure that softens with amplitude shows smaller stiffness in larger
+The linear frame is fitted to all training tests together. The residual of a single test in phase with the restoring
+forces is a change of stiffness in that test. A structure that softens with amplitude shows smaller stiffness in larger
 tests; a structure that loosens shows smaller stiffness in later tests. Both are fitted to the changes, and the order of
 the tests counts only where it predicts tests that were left out much better than the amplitude does.
 """
@@ -37,9 +37,9 @@ class TestStiffness:
     change
         Relative change of the stiffness [1]; the change of the frequencies is half of it.
     error
-        Its standard error [1].
+        Standard error of the change [1].
     drift_m
-        RMS drift of the storey that moves most [m].
+        RMS drift of the storey with the largest drift [m].
     """
 
     test: str
@@ -50,12 +50,12 @@ class TestStiffness:
 
 @dataclass(frozen=True)
 class StiffnessBetweenTests:
-    """Changes of all tests in their order, and what explains them.
+    """Changes of stiffness of all tests, and the kind of change that explains them.
 
     Attributes
     ----------
     tests
-        In the order of the campaign.
+        Tests in the order of the campaign.
     kind
         `constant`, `amplitude`, `drift` (steady change over the order of the tests) or `step`.
     change
@@ -87,7 +87,7 @@ class StiffnessBetweenTests:
         }
 
     def sentence(self) -> str:
-        """Return what changes by how much; empty where the stiffness does not drift."""
+        """Return a sentence with the size of the change; empty if the stiffness does not drift."""
         if not self.drifts:
             return ""
         first, last = self.tests[0].test, self.tests[-1].test
@@ -95,7 +95,7 @@ class StiffnessBetweenTests:
         return f"the stiffness {how} by {100 * self.change:+.1f} % (frequencies {50 * self.change:+.1f} %)"
 
     def finding(self) -> str:
-        """Return one line for the user with a remedy; empty where the stiffness does not drift."""
+        """Return one line with a remedy for the user; empty if the stiffness does not drift."""
         said = self.sentence()
         advice = "joints loosen or parts wear; check the bolts, and use tests of one state only"
         return f"{said}: {advice}" if said else ""
@@ -142,7 +142,7 @@ def _explained(tests: Sequence[TestStiffness], rules: FrameRules) -> tuple[Kind,
     if count < LEAST_TESTS:
         return "constant", 0.0, ""
     values = np.array([item.change for item in tests])
-    # clocks and gains differ between tests by the floor of the model, whatever the noise
+    # clocks and gains differ between tests by at least the floor of the model, whatever the noise
     weights = 1.0 / np.hypot([item.error for item in tests], rules.model_floor)
     order = np.linspace(-0.5, 0.5, count)
     sizes = np.log(np.maximum([item.drift_m for item in tests], 1e-300))
@@ -154,7 +154,7 @@ def _explained(tests: Sequence[TestStiffness], rules: FrameRules) -> tuple[Kind,
     steady = [*plain[kind], order]
     stepped = [*plain[kind], _best_step(plain[kind], values, weights)]
     errors = {"drift": _left_out(steady, values, weights), "step": _left_out(stepped, values, weights)}
-    # the place of the step was chosen with all tests, so that a step must be much better than a steady drift
+    # the position of the step was chosen with all tests, so a step must be much better than a steady drift
     best: Kind = "step" if errors["step"] < rules.better_drift * errors["drift"] else "drift"
     columns = stepped if best == "step" else steady
     change, error = _last_coefficient(columns, values, weights)
@@ -165,7 +165,7 @@ def _explained(tests: Sequence[TestStiffness], rules: FrameRules) -> tuple[Kind,
 
 
 def _best_step(base: Sequence[FloatArray], values: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the step over the order of the tests that fits best: 0 before it and 1 after it."""
+    """Return the best step over the order of the tests, as regressor: 0 before the step and 1 after it."""
     count = values.size
     steps = [(np.arange(count) >= place).astype(np.float64) for place in range(1, count)]
     costs = []
@@ -177,7 +177,7 @@ def _best_step(base: Sequence[FloatArray], values: FloatArray, weights: FloatArr
 
 
 def _left_out(columns: Sequence[FloatArray], values: FloatArray, weights: FloatArray) -> float:
-    """Return the squared error of each test for a fit to the others, summed, in units of its weight."""
+    """Return the weighted sum of squared errors of each test by a fit to the other tests."""
     matrix, total = np.column_stack(columns), 0.0
     for index in range(values.size):
         kept = weights.copy()

@@ -1,4 +1,4 @@
-"""Linear frame and effects fitted to the storeys' equations of motion; amplitudes are solved for, shapes searched."""
+"""Fit of linear frame and effects to the equations of motion of the storeys; amplitudes are solved for."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TINY = 1e-9
 
 @dataclass(frozen=True)
 class Columns:
-    """Unit forces of an effect in one record: (row, amplitude) -> lines; amplitudes may act on several storeys.
+    """Spectral lines of the unit forces of an effect in one record; an amplitude may act on several storeys.
 
     Attributes
     ----------
@@ -47,13 +47,13 @@ def base_rows(base: Base, spectra: Spectra, storey: int) -> ComplexArray:
 
 
 def stacked(values: ComplexArray) -> FloatArray:
-    """Return real and imaginary parts one after another, shape (..., 2 b)."""
+    """Return real and imaginary parts, concatenated, shape (..., 2 b)."""
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
 @dataclass(frozen=True)
 class Design:
-    """The linear model of all storeys over some records, ready to project effects on what it cannot absorb.
+    """The linear model of all storeys over some records, with the projection of effects onto its residual space.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Design:
     solvers
         Pseudo-inverse of the regressors of each storey.
     free
-        Number of fitted numbers.
+        Number of fitted coefficients.
     """
 
     base: Base
@@ -83,7 +83,7 @@ class Design:
 
     @property
     def size(self) -> int:
-        """Number of equations less free numbers."""
+        """Number of equations minus number of fitted coefficients."""
         return max(1, self.residual.size - self.free)
 
     @property
@@ -92,7 +92,7 @@ class Design:
         return float(np.sum(self.residual**2)) / self.size
 
     def project(self, columns: Sequence[Columns]) -> FloatArray:
-        """Return the weighted columns less what the linear model absorbs, shape (k, n, 2 b)."""
+        """Return the weighted columns minus their projection onto the linear model, shape (k, n, 2 b)."""
         weighted = weighted_columns(self.spectra, columns)
         for storey, basis in enumerate(self.basis):
             acting = np.flatnonzero(np.any(weighted[:, storey], axis=1))
@@ -102,7 +102,7 @@ class Design:
 
 
 def weighted_columns(spectra: Sequence[Spectra], columns: Sequence[Columns]) -> FloatArray:
-    """Return columns times weights, real and imaginary lines of all records one after another, shape (k, n, 2 b)."""
+    """Return columns times weights, with real and imaginary lines of all records concatenated, shape (k, n, 2 b)."""
     parts = [c.lines * s.weight[None] for s, c in zip(spectra, columns, strict=True)]
     return np.concatenate([stacked(part) for part in parts], axis=-1)
 
@@ -140,7 +140,7 @@ def design_of(base: Base, spectra: Sequence[Spectra]) -> Design:
 
 @dataclass(frozen=True)
 class Solved:
-    """Amplitudes of columns on a design.
+    """Solution for the amplitudes of columns on a design.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class Solved:
 
 
 def solve(design: Design, projected: FloatArray) -> Solved:
-    """Return the amplitudes, none negative, that leave least; columns of shape (k, n, 2 b)."""
+    """Return the non-negative amplitudes with the smallest residual; columns have shape (k, n, 2 b)."""
     flat = projected.reshape(len(projected), -1)
     target = design.residual.reshape(-1)
     scale = np.linalg.norm(flat, axis=1)

@@ -1,4 +1,4 @@
-"""Where a residual exceeds the noise: groups of neighbouring lines, and the share of them that a fit explains."""
+"""Groups of neighbouring spectral lines in which a residual exceeds the noise, and the share that a fit explains."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.fit import Design, stacked
 
 LINES_OF_A_GROUP = 24
-"""Numerical technique: lines of a group; fewer are noisier, more blur the resonances."""
+"""Numerical technique: number of lines of a group; fewer have more scatter, more blur the resonances."""
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,11 @@ class Groups:
     Attributes
     ----------
     index
-        Group of each weighted residual, shape (n, 2 b).
+        Index of the group of each weighted residual, shape (n, 2 b).
     count
-        Lines of each group (real and imaginary), shape (g,).
+        Number of lines of each group (real and imaginary), shape (g,).
     scale
-        Mean square of the noise of each storey's residual, shape (n,); 1 if the sensors' noise is as estimated.
+        Mean square of the noise in the residual of each storey, shape (n,); 1 if the sensor noise is as estimated.
     storey
         Storey of each group, shape (g,).
     flagged
@@ -54,7 +54,7 @@ class Groups:
         return np.asarray(sums / self.count / self.scale[self.storey])
 
     def excess(self, residual: FloatArray) -> float:
-        """Return the excess of the flagged groups over the noise: sum of squares over the noise's mean square."""
+        """Return the excess of the flagged groups over the noise: sum of squares over the mean square of the noise."""
         if not self.flagged.any():
             return 0.0
         over = (self.mean_square(residual) - 1.0) * self.count

@@ -1,4 +1,4 @@
-"""Closed-loop tests of a structure as tests of its damper: motion at the damper, drive, force, on one clock."""
+"""Closed-loop tests of a structure as tests of its damper: motion at the damper, drive and force on one clock."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from mrpipe.tracing.structure.records import part_of
 from mrpipe.tracing.structure.spectra import noise_density
 
 CROSSOVERS = (0.4, 12.0)
-"""Numerical technique: bounds of the frequency at which the accelerometers take over from the laser, in multiples of
-the mean frequency of the motion."""
+"""Numerical technique: bounds of the frequency above which the accelerometers replace the laser, in multiples of the
+mean frequency of the motion.
+"""
 
 LOWEST = 0.2
 """Numerical technique: without a laser the motion is taken from accelerometers above this multiple of its mean
 frequency; below it integrated noise dominates."""
 
 SMOOTHED = 50.0
-"""Numerical technique: cutoff of the motion whose velocity is taken, in multiples of its mean frequency."""
+"""Numerical technique: cut-off of the motion before differentiation, in multiples of its mean frequency."""
 
 OF_RATE = 0.3
-"""Numerical technique: highest cutoff, as a share of the sampling rate."""
+"""Numerical technique: highest cut-off frequency, as a share of the sampling rate."""
 
 NOISE_ABOVE_SHARE = 0.25
 """Numerical technique: the noise of a channel is measured above this share of the sampling rate."""
@@ -97,7 +98,7 @@ def _densities(recording: Recording) -> tuple[float, float]:
 
 
 def damper_motion(recording: Recording, part: slice) -> FloatArray | None:
-    """Return the displacement at the damper [m], shape (m,): its own sensor, else floor 1's laser and accelerometer."""
+    """Return the displacement at the damper [m], shape (m,): of its sensor, else of laser and accelerometer."""
     channels = recording.channels
     if "damper_displacement" in channels:
         return np.asarray(channels["damper_displacement"][part])
@@ -121,7 +122,7 @@ def damper_motion(recording: Recording, part: slice) -> FloatArray | None:
 
 
 def bench_of(loops: Sequence[Recording], directory: Path, name: str, drive_unit: str) -> Campaign | None:
-    """Return the closed-loop tests as a campaign of a damper bench; None if no test holds motion, drive and force."""
+    """Return the closed-loop tests as a campaign of a damper bench; None if no test has motion, drive and force."""
     found = []
     for item in loops:
         part = part_of(item)
@@ -156,7 +157,7 @@ def bench_of(loops: Sequence[Recording], directory: Path, name: str, drive_unit:
 
 
 def loop_signals(loops: Sequence[Recording]) -> list[LoopSignals]:
-    """Return the tests that hold desired force, drive and the damper's motion."""
+    """Return the tests that have desired force, drive and motion of the damper."""
     found = []
     for item in loops:
         part = part_of(item)

@@ -1,4 +1,4 @@
-"""A fitted frame with its effects: what it predicts of any record, in lines and in time."""
+"""A fitted frame with its effects, and its prediction of a record in spectral lines and in time."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from mrpipe.tracing.structure.spectra import Spectra
 
 @dataclass(frozen=True)
 class FrameModel:
-    """Linear numbers of every storey, effects and their amplitudes.
+    """Linear coefficients of every storey, and effects with their amplitudes.
 
     Attributes
     ----------
     base
         The linear frame.
     linear
-        For each storey: displacements (or its drift), velocities of all floors, ground acceleration and its second
-        derivative, loads.
+        Coefficients for each storey: of the displacements (or its drift), velocities of all floors, ground acceleration
+        and its second derivative, and loads.
     chosen
         Effects with their parameters.
     amplitudes
-        Of the effects, one after another.
+        Amplitudes of the effects, concatenated.
     about
         Scales of the structure.
     """
@@ -45,11 +45,11 @@ class FrameModel:
         return joined([columns_of(item, record, self.about) for item in self.chosen]) if self.chosen else None
 
     def predict(self, record: Spectra) -> ComplexArray:
-        """Return the lines of each storey's shear force, shape (n, b)."""
+        """Return the spectral lines of the shear force of each storey, shape (n, b) [N/sqrt(Hz)]."""
         return predicted(self.base, record, self.linear, self.columns(record), self.amplitudes)
 
     def effect_shear(self, record: Spectra) -> FloatArray:
-        """Return what all effects add to each storey's shear force in time, shape (m, n) [N]."""
+        """Return the contribution of all effects to the shear force of each storey in time, shape (m, n) [N]."""
         total = np.zeros_like(record.motion.acceleration)
         first = 0
         for item in self.chosen:
@@ -66,7 +66,7 @@ def joined(parts: Sequence[Columns]) -> Columns:
 
 
 def model_of(design: Design, chosen: Sequence[Fitted], about: Surroundings) -> FrameModel:
-    """Solve amplitudes and linear numbers on the records of a design; the shapes of the effects are kept."""
+    """Solve for amplitudes and linear coefficients on the records of a design; shape parameters are kept."""
     columns, amplitudes = None, np.zeros(0)
     if chosen:
         columns = [joined([columns_of(item, record, about) for item in chosen]) for record in design.spectra]

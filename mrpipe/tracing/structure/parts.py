@@ -1,4 +1,4 @@
-"""The verdicts on the parts of a rig: frame, controller command and damper, each with its part of the JSON."""
+"""The verdicts on the parts of a rig (frame, controller command, damper), each with its part of the JSON."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Part:
 
     @property
     def unexplained(self) -> bool:
-        """Whether something is missing that has no name."""
+        """Whether something is missing and no effect is named for it."""
         return bool(self.summary["unexplained"]["structured"])
 
 
@@ -148,8 +148,8 @@ def damper_part(
     if brace is not None and not measured and brace.name not in campaign.declared_effects:
         found = find_brace(tests, options, declared, rules.brace)
     if found is not None and found.strong(rules.brace):
-        # with a rigid brace the residual is far above the noise: weigh rival effects, one at a time, by what the
-        # flexible brace leaves
+        # with a rigid brace the residual is far above the noise: judge rival effects, one at a time, relative to the
+        # residual with the flexible brace
         share = max(options.model_error_share, found.nrmse_after)
         options = options.changed(model_error_share=share, most_effects=1)
     summary = dict(trace_damper(tests, effects, declared, options, rng=rng, jobs=jobs, progress=progress).summary)
@@ -163,7 +163,7 @@ def damper_part(
 
 
 def _nothing_that_matters(summary: dict[str, Any]) -> None:
-    """Change a verdict to: nothing is missing, because the error exceeds that of noise by too little to matter."""
+    """Change a verdict to 'nothing is missing', if the error exceeds the noise by too little to matter."""
     if summary["residual"]["structured"]:
         sentence = "the residual exceeds the noise by too little to matter: nothing is missing"
         summary |= Verdict("noise", sentence).sentence_as_json()
@@ -178,7 +178,7 @@ def _with_brace(
     options: TracingOptions,
     brace_rules: BraceRules,
 ) -> None:
-    """Add the brace to the candidates, and name it if it explains more than any effect within the damper."""
+    """Add the brace to the candidates, and name it if it explains more than any effect of the damper."""
     rules = options
     share = float(np.clip(found.share, 0.0, 1.0)) if found.compliance_m_n > 0.0 else 0.0
     entry = Candidate(effect.name, "spring", found.nrmse_after, found.rigid / found.chi_square, share).as_json()
@@ -215,7 +215,7 @@ def _score(nrmse: float) -> dict[str, float]:
 
 
 def merged(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return one verdict: that of the part that names an effect, with the effects of all parts and a list of parts."""
+    """Return one verdict: that of the first part that names an effect, with the effects of all parts."""
     order = sorted(parts, key=lambda part: (not part.named, not part.unexplained))
     first = order[0]
     summary = dict(first.summary)

@@ -1,4 +1,4 @@
-"""Recordings of a structure for the tracing: all floors' motion on one clock, from accelerometers alone."""
+"""Recordings of a structure for the tracing: motion of all floors on one clock, from accelerometers alone."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ class FrameRecord:
     measured_displacement
         Floor (from 1) -> displacement relative to the ground, shape (m,) [m].
     loads
-        Floor (from 1) -> known force on it, shape (m,) [N]: a shaker's, or the damper's with its sign turned.
+        Floor (from 1) -> known force on it, shape (m,) [N]: that of a shaker, or minus that of the damper.
     damper
-        `force`, `drive`, `desired`, `displacement` of a closed-loop test as far as recorded, shape (m,).
+        `force`, `drive`, `desired`, `displacement` of a closed-loop test, those that were recorded, shape (m,).
     from_displacement
-        Floors whose acceleration was differentiated.
+        Floors whose acceleration was computed from the displacement.
     details
-        What campaign.yaml says of the test.
+        Entries of the test in campaign.yaml.
     computed
         Floors (from 1) without a sensor, whose acceleration was computed.
     """
@@ -76,7 +76,7 @@ class FrameRecord:
 
     @property
     def known_loads(self) -> dict[int, FloatArray]:
-        """Return floor (from 1) -> force on it that was measured, the damper's included, shape (m,) [N]."""
+        """Return floor (from 1) -> measured force on it, including that of the damper, shape (m,) [N]."""
         return {**self.loads, **({1: self.damper["force"]} if "force" in self.damper else {})}
 
     @property
@@ -87,7 +87,7 @@ class FrameRecord:
 
 @dataclass(frozen=True)
 class FrameData:
-    """The tests whose floors are all recorded, and those of the closed loop, which may lack some.
+    """The tests that record all floors, and the closed-loop tests, which may lack some.
 
     `source` is campaign.yaml, for messages.
     """
@@ -104,7 +104,7 @@ class FrameData:
 
 
 COMPUTED = "computed_floors"
-"""Key of a test's details: floors (from 1) whose motion was computed from that of the others."""
+"""Key of the details of a test: floors (from 1) whose motion was computed from that of the others."""
 _FLOORS = ("floor_acceleration_", "floor_displacement_")
 
 
@@ -148,7 +148,7 @@ def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
         )
     if whole and masses.size != floors:
         raise UserError(
-            source, "frame.floor_masses_kg", f"has {masses.size} entries, the channels are of {floors} floors",
+            source, "frame.floor_masses_kg", f"has {masses.size} entries, but the channels are for {floors} floors",
             "give the mass of every floor in kg",
         )  # fmt: skip
     unknown = np.flatnonzero(~np.isfinite(masses))
@@ -169,7 +169,7 @@ def _floors_of(recording: Recording) -> list[int]:
 
 
 def without_sensor(recording: Recording, floors: int) -> list[int]:
-    """Return the floors (from 1) of which a recording holds neither acceleration nor displacement."""
+    """Return the floors (from 1) for which a recording has neither acceleration nor displacement."""
     recorded = _floors_of(recording)
     return [floor for floor in range(1, floors + 1) if floor not in recorded]
 

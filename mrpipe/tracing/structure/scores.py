@@ -1,4 +1,4 @@
-"""Errors on validation records, the share of them that is recoverable, and the states that a residual depends on."""
+"""Errors on validation records, their recoverable share, and the states that a residual depends on."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from mrpipe.tracing.structure.model import FrameModel, in_time
 from mrpipe.tracing.structure.spectra import Spectra
 
 LAGS = (0.03, 0.1, 0.3, 0.8)
-"""Numerical technique: lags of the states that the flexible model sees, in periods of the lowest mode."""
+"""Numerical technique: lags of the states that the flexible model reads, in periods of the lowest mode."""
 
 MOST_ROWS = 8000
-"""Numerical technique: samples that the flexible model is trained on."""
+"""Numerical technique: largest number of samples that the flexible model is trained on."""
 
 BINS = 16
-"""Numerical technique: steps of the step function of a state."""
+"""Numerical technique: number of steps of the step function of a state."""
 
 
 @dataclass(frozen=True)
 class FrameScore:
-    """Errors of the storeys' shear force, pooled over storeys and records, lines weighted by the sensors' noise."""
+    """Errors of the storey shear forces, pooled over storeys and records; lines are weighted by the sensor noise."""
 
     nrmse: float
     fit_percent: float
@@ -33,7 +33,7 @@ class FrameScore:
 
 
 def frame_score(model: FrameModel, records: Sequence[Spectra]) -> FrameScore:
-    """Return RMS of error over RMS of the storeys' shear force on records."""
+    """Return the RMS error over the RMS of the storey shear forces, on some records."""
     errors, wholes, own = 0.0, 0.0, {}
     for record in records:
         error = float(np.sum(np.abs((record.target - model.predict(record)) * record.weight) ** 2))
@@ -45,14 +45,14 @@ def frame_score(model: FrameModel, records: Sequence[Spectra]) -> FrameScore:
 
 
 def noise_floor(records: Sequence[Spectra], scale: FloatArray) -> float:
-    """Return the NRMSE that the sensors' noise alone makes; `scale` is the noise's mean square a storey."""
+    """Return the NRMSE that sensor noise alone causes; `scale` is the mean square of the noise of each storey."""
     errors = sum(2.0 * float(np.sum(scale)) * item.frequencies_hz.size for item in records)
     wholes = sum(float(np.sum(np.abs(item.target * item.weight) ** 2)) for item in records)
     return float(np.sqrt(errors / max(wholes, 1e-300)))
 
 
 def residual_in_time(model: FrameModel, record: Spectra) -> FloatArray:
-    """Return the residual of each storey's shear force in the band, shape (m, n) [N]."""
+    """Return the residual of the shear force of each storey in the band, shape (m, n) [N]."""
     return in_time(record.target - model.predict(record), record)
 
 
@@ -92,18 +92,18 @@ def flexible_score(
     storeys: Sequence[int],
     period_s: float,
 ) -> float:
-    """Return the NRMSE on validation records of the model with boosted trees on the residual of some storeys.
+    """Return the NRMSE on validation records of the model plus boosted trees for the residual of some storeys.
 
     Parameters
     ----------
     model
         The frame with its effects.
     training, validation
-        Records that the trees learn from, and records that are judged.
+        Records that the trees are trained on, and records that are judged.
     storeys
         Storeys, from 0, whose residual the trees predict.
     period_s
-        Period of the lowest mode; the trees see earlier states by shares of it.
+        Period of the lowest mode [s]; the lags of the states are shares of it.
     """
     extra = [np.zeros_like(item.motion.acceleration) for item in validation]
     for storey in storeys:
@@ -124,7 +124,7 @@ def flexible_score(
                 force[:, storey] = trees.predict(_features(item, storey, period_s))
     errors = wholes = 0.0
     for item, force in zip(validation, extra, strict=True):
-        # the trees learn a tapered, band-limited residual: compare their sum on the same lines
+        # the trees are trained on a tapered, band-limited residual: compare the sum on the same lines
         left = item.target - model.predict(item) - item.lines_of(force)
         errors += float(np.sum(np.abs(left * item.weight) ** 2))
         wholes += float(np.sum(np.abs(item.target * item.weight) ** 2))

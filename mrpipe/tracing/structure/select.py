@@ -1,4 +1,4 @@
-"""The choice of the linear frame and of the effects, by forward selection and cross-validation."""
+"""Choice of the linear frame and of the effects, by forward selection and cross-validation."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_FORMS = (5, 2)
 
 @dataclass(frozen=True)
 class FrameCandidate:
-    """A family in its best form on top of those chosen before."""
+    """An effect in its best form, in addition to those chosen before."""
 
     outcome: Outcome
     share: float
@@ -44,7 +44,7 @@ class FrameCandidate:
 
 @dataclass(frozen=True)
 class FrameSelection:
-    """What was found on the training records.
+    """Result of the selection on the training records.
 
     Attributes
     ----------
@@ -61,13 +61,13 @@ class FrameSelection:
     chosen
         Effects in the order of choice, amplitudes one after another.
     amplitudes
-        Amplitudes of the chosen effects, one after another.
+        Amplitudes of the chosen effects, concatenated.
     residual
         Weighted residual with the chosen effects.
     gains
         Cross-validated gain of each chosen effect.
     declared
-        Number of them that the campaign declares.
+        Number of the chosen effects that the campaign declares.
     storey_stiffness
         Stiffness of the storeys of the shear frame, shape (n,) [N/m].
     rules
@@ -89,7 +89,7 @@ class FrameSelection:
 
     @property
     def about(self) -> Surroundings:
-        """What a search needs in addition to the records."""
+        """Data that a search needs in addition to the records."""
         return Surroundings(self.storey_stiffness, self.rules)
 
     @property
@@ -103,7 +103,7 @@ class FrameSelection:
 
 
 def placed_forms(effects: Sequence[StructuralEffect], floors: int) -> list[Placed]:
-    """Return every form at every place it may have, of effects that act on the structure itself."""
+    """Return every form at every possible place, for effects that act on the structure."""
     found = []
     for effect in effects:
         if effect.acts_on == "floor":
@@ -151,7 +151,7 @@ def _round(
 
 
 def admissible(item: Outcome) -> bool:
-    """Return whether the amplitudes of the form searched last lie within their bounds, where these are shares."""
+    """Return whether the amplitudes of the last form lie within their bounds, for bounds that are shares."""
     form = item.fitted.placed.form
     own = item.solved.amplitudes[-len(form.amplitudes) :]
     shares = [parameter.scale == "one" for parameter in form.amplitudes]
@@ -274,15 +274,15 @@ def _rocking(
     rules: NamingRules,
     jobs: int,
 ) -> FrameSelection | None:
-    """Return the shear frame on a rocking base if it explains the residual of a shear frame as well as a linear frame.
+    """Return the shear frame on a rocking base, if it is as good as a general linear frame; else None.
 
-    A rocking base without inertia is a linear frame whose stiffness is not tri-diagonal. It can therefore be seen only
-    against the shear frame, and only if a general linear frame needs no other kind of coupling.
+    A rocking base without inertia is a linear frame whose stiffness is not tri-diagonal. It can therefore be detected
+    only by comparison with a shear frame, and only if no other coupling is needed.
     """
     base_forms = [item for item in forms if item.effect.acts_on == "base"]
     if not base_forms:
         return None
-    # share that a general linear frame, which has many more parameters, explains of the same groups
+    # share of the same groups that a general linear frame explains, which has many more parameters
     reachable = simple.share(free.design.residual)
     # a rocking base is visible at one of the start values already; otherwise skip the search
     screened = [search(item, simple.design, None, about, screen_only=True) for item in base_forms]
@@ -298,7 +298,7 @@ def _rocking(
         about = Surroundings(own, simple.rules)
         found = _round(simple, base_forms, about, jobs) or found
     proven = found[0].share >= max(rules.named_share, reachable - simple.rules.rocking_lead)
-    # a base whose edge lifts is not linear: with few parameters it may explain more than any linear frame
+    # a base with an edge that lifts is nonlinear: with few parameters it may explain more than any linear frame
     ahead = found[0].share >= max(simple.rules.rocking_share, reachable + simple.rules.rocking_lead)
     if not proven and not ahead:
         return None
@@ -354,7 +354,7 @@ def _gains(
 def left_out_errors(
     design: Design, chosen: Sequence[Fitted], records: Sequence[Spectra], about: Surroundings
 ) -> list[FloatArray]:
-    """Return weighted squares of the error of each group of lines of records that a design has not seen."""
+    """Return the weighted squared error of each group of lines, for records that were not used for the design."""
     model = model_of(design, chosen, about)
     errors = []
     for record in records:

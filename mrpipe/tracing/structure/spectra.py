@@ -1,9 +1,10 @@
-"""The equation of motion of each storey as weighted spectra: shear force from inertia against motion.
+"""The equation of motion of each storey as weighted spectra: shear force from inertia, and motion.
 
 If the acceleration of every floor is measured, the shear force of storey s is known: the sum of mass times absolute
 acceleration of the floors above it. Displacement and velocity come from the same accelerometers, integrated in the
-frequency domain, so the equation holds sample by sample. It is multiplied by a taper and transformed. Each line of the
-spectrum is weighted by the noise that the accelerometers cause in it; at low frequencies integrated noise dominates.
+frequency domain, so the equation holds sample by sample. It is multiplied by a taper and Fourier-transformed. Each line
+of the spectrum is weighted by the noise that the accelerometers cause in it; at low frequencies integrated noise
+dominates.
 """
 
 from __future__ import annotations
@@ -26,8 +27,9 @@ NOISE_BLOCKS = 14
 """Numerical technique: least number of blocks over which the spectrum of a sensor's noise is averaged."""
 
 NOISE_PARTS, LEAST_PART, FEWEST_PARTS = 8, 250, 3
-"""Numerical technique: parts of a record whose noise is estimated separately, least number of samples of a part, and
-least number of parts."""
+"""Numerical technique: number of parts of a record whose noise is estimated separately, least number of samples of a
+part, and least number of parts.
+"""
 
 STRONG_LINES = 0.1
 """Numerical technique: gains are compared on lines whose power exceeds this share of the strongest one."""
@@ -36,8 +38,9 @@ ABOVE_EDGE = 1.5
 """Numerical technique: gains are compared above this multiple of the lower edge of the band."""
 
 QUIET_SECOND = 0.01
-"""Numerical technique: a record starts or ends at rest if its quietest second has less than this share of its mean
-power; the mean of a laser is then taken there."""
+"""Numerical technique: a record contains a time at rest if its quietest second has less than this share of its mean
+power; the mean of a laser signal is then taken there.
+"""
 
 ABOVE_BAND, HIGHEST_START, HIGHEST = 1.25, 0.3, 0.45
 """Numerical technique: noise is measured above this multiple of the band's upper edge, which starts at the second share
@@ -59,11 +62,11 @@ class Noise:
     Attributes
     ----------
     acceleration
-        Of ground and floors, shape (1 + n,) [(m/s2)^2/Hz].
+        Power density of ground and floor accelerometers, shape (1 + n,) [(m/s2)^2/Hz].
     displacement
-        Floor -> of its laser [m2/Hz].
+        Floor -> power density of its laser [m2/Hz].
     loads
-        Floor -> of the load cell there [N2/Hz].
+        Floor -> power density of the load cell there [N2/Hz].
     """
 
     acceleration: FloatArray
@@ -92,7 +95,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Spectra:
-    """A record's lines in the band.
+    """Spectral lines of a record in the band.
 
     Attributes
     ----------
@@ -159,7 +162,7 @@ def taper_of(samples: int, dt: float, low_hz: float) -> FloatArray:
 
 
 def motion_of(record: FrameRecord, band: Band, noise: Noise, rules: FrameRules | None = None) -> Motion:
-    """Return the motion of a record: integrated accelerations, mixed with lasers by the noise of both.
+    """Return the motion of a record: integrated accelerations and laser signals, weighted by the noise of both.
 
     The signals of the equation of motion are high-pass filtered below the band.
 
@@ -224,7 +227,7 @@ def _gain_of(
     """Return the factor that brings a laser to the gain of the accelerometer; 1 if they do not measure the same."""
     inside = (frequencies > ABOVE_EDGE * band.low_hz) & (frequencies < band.high_hz)
     power = np.where(inside, np.abs(laser) ** 2, 0.0)
-    # use the strongest lines only, because noise of either sensor would bias the gain
+    # use only the strongest lines, because noise of either sensor would bias the gain
     strong = power > STRONG_LINES * float(power.max())
     gain = float(np.sum((np.conj(laser[strong]) * integrated[strong]).real)) / max(float(power[strong].sum()), 1e-300)
     known = 1.0 / rules.gain_range < gain < rules.gain_range
@@ -232,9 +235,10 @@ def _gain_of(
 
 
 def _over_floors(n: int, floors: Sequence[int]) -> FloatArray:
-    """Return the matrix that extends the slow motion of lasers to all floors, shape (lasers, n).
+    """Return the matrix that extends the slow motion of floors with lasers to all floors, shape (lasers, n).
 
-    The slow motion has about the shape of the first mode of a uniform frame; its factor is interpolated between lasers.
+    The slow motion has approximately the shape of the first mode of a uniform frame; its factor is interpolated between
+    the lasers.
     """
     shape = np.sin(np.pi * np.arange(1, n + 1) / (2 * n + 1))
     own = shape[np.array(floors) - 1]
@@ -273,8 +277,8 @@ def _at_rest(record: FrameRecord) -> slice:
 def noise_density(values: FloatArray, rate_hz: float, above_hz: float, quietest: float | None = None) -> float:
     """Return the power density of the noise on a channel, measured above the band [unit^2/Hz].
 
-    Slip and impact reach far above the band, but not while a frame rests or moves little. The noise is therefore taken
-    from the quieter parts of a record.
+    Slip and impact cause vibration far above the band, but not while a frame rests or moves little. The noise is
+    therefore estimated in the quieter parts of a record.
 
     Parameters
     ----------
@@ -313,9 +317,9 @@ def _density_above(values: FloatArray, rate_hz: float, above_hz: float) -> float
 
 
 def _of_all(densities: FloatArray, computed: Sequence[int]) -> FloatArray:
-    """Return densities, (floors + 1,), where floors that were computed are as noisy as the noisiest sensor of a floor.
+    """Return densities, (floors + 1,); computed floors get the largest density of all floor sensors.
 
-    Above the band their computed motion falls to nothing, but in the band it carries the noise of their neighbours.
+    Above the band their computed motion vanishes, but in the band it contains the noise of their neighbours.
     """
     sensors = [floor for floor in range(1, densities.size) if floor not in computed]
     densities = densities.copy()

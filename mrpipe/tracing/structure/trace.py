@@ -31,10 +31,10 @@ QUANTITY = (
 )
 
 BY_STOREY = 3
-"""Numerical technique: with fewer storeys their largest amplitude is reported, else the median of those that act."""
+"""Numerical technique: with fewer storeys their largest amplitude is reported, else the median of acting storeys."""
 
 LISTED = 6
-"""Numerical technique: most states that are listed under `depends_on`."""
+"""Numerical technique: largest number of states that are listed under `depends_on`."""
 
 NO_GAIN = 1e-12
 """Numerical technique: a smaller squared error counts as zero in a ratio."""
@@ -68,22 +68,22 @@ def trace_frame(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> FrameTracing:
-    """Trace the residual of a linear frame on the records that hold every floor.
+    """Trace the residual of a linear frame on the records of all floors.
 
     Parameters
     ----------
     data
         Records of the structure.
     effects, declared
-        The library, and the effects of it that the campaign declares.
+        The library, and those of its effects that the campaign declares.
     rules
-        Shares that prove a name.
+        Rules for naming an effect.
     frame_rules
-        Thresholds of the frame's residual; their defaults if None.
+        Thresholds for the residual of the frame; their defaults if None.
     most
-        Most effects that are named together.
+        Largest number of effects that are named together.
     draws
-        Of the bootstrap.
+        Number of draws of the bootstrap.
     rng
         Source of randomness.
     jobs
@@ -289,7 +289,7 @@ def place_in_words(item: Fitted, amplitudes: FloatArray, acting: float) -> str:
     amplitudes
         Its amplitudes, storey after storey.
     acting
-        Least share of the largest amplitude.
+        Share of the largest amplitude from which on a storey is named.
     """
     if item.placed.floor:
         return f"floor {item.placed.floor}"
@@ -364,12 +364,12 @@ def _verdict(
     reason: str,
     between: StiffnessBetweenTests,
 ) -> Verdict:
-    # the residual of tests of several states is their difference, which no effect explains
+    # the residual of tests in several states of the structure is their difference, which no effect explains
     drift = f"; {between.sentence()}" if between.drifts else ""
     if reason:
         return Verdict("unknown" if selection.structured else "noise", f"{reason}{drift}")
     names = " and ".join(f"{item.name} ({item.place})" for item in named)
     if share >= rules.named_share:
         return Verdict("explained", f"{names}: explains what is missing{drift}", share)
-    form = "explains part of what is missing, its form is not proven"
+    form = "explains part of what is missing; its form is not proven"
     return Verdict("partly explained", f"{names}: {form}{drift}", share)

@@ -24,7 +24,7 @@ from mrpipe.tracing.structure.trace import FrameTracing, trace_frame
 
 @dataclass(frozen=True)
 class History:
-    """An array for the artifact."""
+    """An array of the artifact, with its unit and axes."""
 
     values: FloatArray
     unit: str
@@ -35,7 +35,7 @@ UNCOUPLED = (
     "each direction is traced by itself: forces that couple the directions, such as torsion, are not modelled; they "
     "count as unexplained, and an effect may imitate them"
 )
-"""What the result says about structures whose sensors measure in directions."""
+"""Note in the result on structures whose sensors measure in several directions."""
 
 UNLIKELY_ERROR = 0.1
 """A larger error of a linear frame that no effect explains is often a mistake in the description of the channels."""
@@ -52,9 +52,9 @@ class StructureTracing:
     histories
         Name in the artifact -> array.
     maps
-        (storey, drift [m], rate [m/s], residual shear force [N]) of the training records, before any effect.
+        Training records before any effect: (storey, drift [m], drift rate [m/s], residual shear force [N]).
     shown
-        (test, storey, time [s], measured, before, after) of validation records: residual shear forces [N].
+        Validation records: (test, storey, time [s], measured, before, after), with residual shear forces [N].
     findings
         Messages for the user, one line each.
     """
@@ -85,7 +85,7 @@ def trace_structure(
     effects, damper_effects
         The libraries of effects of a structure and of a damper.
     options
-        How it is traced.
+        Options of the tracing.
     rng
         Source of randomness.
     jobs
@@ -124,8 +124,8 @@ def trace_structure(
     parts += [item for item in found if item is not None]
     if not parts:
         raise UserError(
-            campaign.directory / "campaign.yaml", "tests", "no test can be judged: floors or drive are missing",
-            "record every floor's acceleration, or damper_force, drive and floor 1",
+            campaign.directory / "campaign.yaml", "tests", "no test can be judged, because floors or drive are missing",
+            "record the acceleration of every floor; or damper_force, drive and the motion of floor 1",
         )  # fmt: skip
     summary = {"campaign": campaign.name, **merged(parts), "declared_effects": list(names)}
     if directions := [axis for axis in frames if axis]:
@@ -184,7 +184,7 @@ def _by_direction(
 
 
 def _completed(campaigns: Sequence[Campaign], progress: Progress) -> tuple[list[Campaign], list[str]]:
-    """Return the campaigns with the motion of floors without a sensor, and what was computed."""
+    """Return the campaigns with the computed motion of floors without a sensor, and messages on it."""
     found = [completed(item, progress) for item in campaigns]
     return [item for item, _ in found], [line for _, lines in found for line in lines]
 
