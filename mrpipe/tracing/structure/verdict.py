@@ -38,7 +38,7 @@ UNCOUPLED = (
 """Note in the result on structures whose sensors measure in several directions."""
 
 UNLIKELY_ERROR = 0.1
-"""A larger error of a linear frame that no effect explains is often a mistake in the description of the channels."""
+"""Numerical technique: above this error without an effect, a hint at the description of the channels is given."""
 
 
 @dataclass(frozen=True)
