@@ -205,8 +205,7 @@ def simulate(
         typer.Option(
             metavar="DAMPER",
             help="Damper in the structure: identified, traced (by close-loop), a parameter set of configs/dampers, or "
-            "a "
-            "file. With traced, the controller remains the one for the identified damper.",
+            "a file. With traced, the controller remains the one for the identified damper.",
         ),
     ] = None,
     gains: Annotated[
@@ -251,8 +250,7 @@ def design(
         typer.Option(
             metavar="DAMPER",
             help="Damper in the structure: identified, traced (by close-loop), a parameter set of configs/dampers, or "
-            "a "
-            "file. With traced, the result also says how much worse the design without the tracing is.",
+            "a file. With traced, the result also says how much worse the design without the tracing is.",
         ),
     ] = None,
 ) -> None:

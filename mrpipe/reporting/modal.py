@@ -15,7 +15,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.modal.decays.decay import DecayResult
 from mrpipe.modal.spectra import FrequencyResponses
 from mrpipe.modal.verification import FrequencyVerification, TimeVerification
-from mrpipe.reporting.places import ROTATION, by_direction
+from mrpipe.reporting.places import ROTATION, by_direction, floor_names
 from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
 from mrpipe.structures import Frame
@@ -116,7 +116,7 @@ def mode_shapes(
         Of the degrees of freedom; empty: floors in one direction.
     """
     rows, modes = shapes.shape
-    names = list(names) or [f"floor {row + 1}" for row in range(rows)]
+    names = list(names) or floor_names(rows)
     directions = by_direction(names)
     if directions is None and heights_m is not None:
         directions = {"": {row + 1: row for row in range(rows)}}

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 _FLOOR = re.compile(r"^floor (\d+)(?: (\S+))?$")
 _MODE = re.compile(r"^mode \d+$")
 ROTATION = "rotation"
+
+
+def names_of(summary: Mapping[str, Any]) -> list[str]:
+    """Return the names of the degrees of freedom of an identified or given structure; without names, its floors."""
+    return list(summary.get("degrees_of_freedom") or floor_names(len(summary["mode_shapes"])))
+
+
+def floor_names(count: int) -> list[str]:
+    """Return the names of the floors of a frame in one direction."""
+    return [f"floor {floor}" for floor in range(1, count + 1)]
 
 
 def by_direction(names: Sequence[str]) -> dict[str, dict[int, int]] | None:

@@ -87,10 +87,21 @@ def columns_of(file: DataFile) -> list[Column]:
     return [item for item in found if item.values.size == longest]
 
 
-def unreadable_channels(file: DataFile) -> dict[str, str]:
-    """Return why a column is not used, for each one whose header names a channel and whose samples cannot be read."""
+def unreadable_channels(file: DataFile, columns: Sequence[Column]) -> dict[str, str]:
+    """Return why a column is not used, for each one whose header names a channel and whose samples cannot be read.
+
+    Parameters
+    ----------
+    file
+        Data file.
+    columns
+        Its columns that were read.
+    """
     lines = {}
+    read = {item.name for item in columns}
     for name in file.names[:MOST_COLUMNS] if file.table else ():
+        if name in read:
+            continue
         header = read_header(name)
         if not (header.quantity or header.unit_quantity):
             continue

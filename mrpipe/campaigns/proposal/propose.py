@@ -200,7 +200,7 @@ def _not_used(files: list[_File]) -> list[str]:
     """Return a line for each column that names a channel and cannot be read; files with the same column share it."""
     found: dict[str, list[str]] = {}
     for item in files:
-        for column, why in unreadable_channels(item.file).items():
+        for column, why in unreadable_channels(item.file, item.columns).items():
             found.setdefault(column, []).append(f"{item.path.name}: {why}")
     return [
         f"column {column} is not used: {lines[0]}" + (f" (and in {len(lines) - 1} other files)" if lines[1:] else "")

@@ -47,7 +47,7 @@ _START = re.compile(
     r"(?:\s+([A-Z]{3})\b)?",
     re.IGNORECASE,
 )
-EPOCH = datetime(1900, 1, 1)
+_EPOCH = datetime(1900, 1, 1)
 """Starts of records are counted from here."""
 _YEAR_DIGITS = 3
 """A first number of the date with as many digits is the year."""
@@ -96,6 +96,11 @@ def is_vertical(name: ChannelName, header: str) -> bool:
     return bool(_VERTICAL.search(words)) or azimuth
 
 
+def since_epoch_s(moment: datetime) -> float:
+    """Return the time [s] from the fixed day on from which starts of records are counted."""
+    return (moment - _EPOCH).total_seconds()
+
+
 def start_s(header: str) -> float | None:
     """Return the start of the record [s] from a fixed day on, None where the header states none."""
     said = _START.search(header)
@@ -110,7 +115,7 @@ def start_s(header: str) -> float | None:
         moment = datetime(year, month, day, hour, minute)
     except ValueError:
         return None
-    return None if behind_h is None else (moment - EPOCH).total_seconds() + 3600.0 * behind_h + float(said[6])
+    return None if behind_h is None else since_epoch_s(moment) + 3600.0 * behind_h + float(said[6])
 
 
 def interval_s(path: Path, said: str, header: str, count: int) -> float:

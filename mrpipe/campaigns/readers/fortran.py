@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from pathlib import Path
+
+from mrpipe.errors import UserError
 
 _D_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
 _LONG_EXPONENT = re.compile(r"(?<=\d|\.)(?=[-+]\d{3}(?![\d.]))")
@@ -32,6 +35,32 @@ def row_of_numbers(line: str, width: int | None = None) -> list[float] | None:
     if width is not None:
         return _floats(text[start : start + width] for start in range(0, len(text), width))
     return _floats(_BEFORE_A_SIGN.sub(" ", _LONG_EXPONENT.sub("E", text)).split())
+
+
+def required_row(
+    path: Path, number: int, line: str, width: int | None = None, *, remedy: str = "download the record again"
+) -> list[float]:
+    """Return the numbers of a line as :func:`row_of_numbers` does.
+
+    Parameters
+    ----------
+    path, number
+        The file, and the number of the line from 1, for the message.
+    line, width
+        See :func:`row_of_numbers`.
+    remedy
+        What the message advises.
+
+    Raises
+    ------
+    UserError
+        If the line is not a row of numbers.
+    """
+    row = row_of_numbers(line, width)
+    if row is None:
+        problem = f"is not a row of numbers ({line.strip()[:30]!r})"
+        raise UserError(path, f"line {number}", problem, remedy)
+    return row
 
 
 def _floats(pieces: Iterable[str]) -> list[float] | None:

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mrpipe.campaigns.readers.channel_header import EPOCH
-from mrpipe.campaigns.readers.fortran import row_of_numbers
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.readers.channel_header import since_epoch_s
+from mrpipe.campaigns.readers.fortran import required_row
 from mrpipe.campaigns.readers.motion import StrongMotion
 from mrpipe.errors import UserError
 
@@ -71,24 +72,20 @@ def geonet_channels(path: Path, text: str) -> Iterator[StrongMotion]:
         begin = place + sum(math.ceil(count / _PER_LINE) for count in counts)
 
 
-def _block(path: Path, lines: list[str], first: int, count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def _block(path: Path, lines: list[str], first: int, count: int) -> FloatArray:
     values: list[float] = []
     for index in range(first, min(first + math.ceil(count / _PER_LINE), len(lines))):
-        row = row_of_numbers(lines[index], _WIDTH)
-        if row is None:
-            problem = f"is not a row of numbers ({lines[index].strip()[:30]!r})"
-            raise UserError(path, f"line {index + 1}", problem, "download the record again")
-        values += row
+        values += required_row(path, index + 1, lines[index], _WIDTH)
     if len(values) != count or not np.all(np.isfinite(values)):
         problem = f"and the rows after it hold {len(values)} numbers, {count} are promised"
         raise UserError(path, f"line {first + 1}", problem, "download the record again")
     return np.asarray(values, dtype=np.float64)
 
 
-def _start_s(integers: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float | None:
+def _start_s(integers: FloatArray) -> float | None:
     year, month, day, hour, minute = (int(integers[place]) for place in (_YEAR, _MONTH, _DAY, _HOUR, _MINUTE))
     try:
         moment = datetime(year, month, day, hour, minute)
     except ValueError:
         return None
-    return (moment - EPOCH).total_seconds() + 1e-3 * float(integers[_MILLISECONDS])
+    return since_epoch_s(moment) + 1e-3 * float(integers[_MILLISECONDS])

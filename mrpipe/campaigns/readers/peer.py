@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.campaigns.readers.fortran import row_of_numbers
+from mrpipe.campaigns.readers.fortran import required_row, row_of_numbers
 from mrpipe.errors import UserError
 
 ENDINGS = (".at2",)
@@ -74,10 +74,7 @@ def peer_record(path: Path, text: str) -> PeerRecord:
     samples: list[float] = []
     longest = 0
     for number, line in enumerate(lines[first:], start=first + 1):
-        row = row_of_numbers(line)
-        if row is None:
-            problem = f"is not a row of numbers ({line.strip()[:30]!r})"
-            raise UserError(path, f"line {number}", problem, "leave text to the header lines, or download it again")
+        row = required_row(path, number, line, remedy="leave text to the header lines, or download it again")
         samples.extend(row)
         longest = max(longest, len(row))
     # some programs fill the last row with zeros

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mrpipe.campaigns.readers.channel_header import EPOCH
-from mrpipe.campaigns.readers.fortran import row_of_numbers
+from mrpipe.artifacts import FloatArray
+from mrpipe.campaigns.readers.channel_header import since_epoch_s
+from mrpipe.campaigns.readers.fortran import required_row, row_of_numbers
 from mrpipe.campaigns.readers.motion import StrongMotion
 from mrpipe.errors import UserError
 
@@ -81,18 +82,12 @@ def _header(path: Path, lines: list[str], first: int, rows: int, width: int, cou
     return found
 
 
-def _samples(
-    path: Path, lines: list[str], first: int, count: int, width: int
-) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def _samples(path: Path, lines: list[str], first: int, count: int, width: int) -> FloatArray:
     values: list[float] = []
     for number, line in enumerate(lines, start=first + 1):
         if len(values) >= count or not line.strip():
             break
-        row = row_of_numbers(line, width)
-        if row is None:
-            problem = f"is not a row of numbers ({line.strip()[:30]!r})"
-            raise UserError(path, f"line {number}", problem, "download the record again")
-        values += row
+        values += required_row(path, number, line, width)
     if len(values) != count or not np.all(np.isfinite(values)):
         problem = f"promises {count} finite samples, {int(np.sum(np.isfinite(values)))} follow"
         raise UserError(path, "integer header 17", problem, "download the record again")
@@ -118,4 +113,4 @@ def _start_s(integers: list[int]) -> float | None:
         return None
     year, day, hour, minute, second, millisecond = parts
     moment = datetime(year, 1, 1) + timedelta(days=day - 1, hours=hour, minutes=minute, seconds=second)
-    return (moment - EPOCH).total_seconds() + 1e-3 * millisecond
+    return since_epoch_s(moment) + 1e-3 * millisecond

@@ -15,7 +15,7 @@ from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
-from mrpipe.reporting.places import is_chain
+from mrpipe.reporting.places import is_chain, names_of
 from mrpipe.reporting.words import listed, number, percent, quantity
 from mrpipe.reporting.writer import Section
 
@@ -216,7 +216,7 @@ def structure(facts: RunFacts) -> Section:
     else:
         section.table("modes", modes[["mode", "frequency [Hz]", "damping ratio [%]"]], "Modes of the given structure.")
     shapes = np.asarray(summary["mode_shapes"], dtype=np.float64)
-    names = summary.get("degrees_of_freedom") or [f"floor {row + 1}" for row in range(len(shapes))]
+    names = names_of(summary)
     frequencies = summary["frequencies_hz"]
     if is_chain(names):
         drawn = figures.shapes_on_frame(shapes, frequencies, summary["damping_ratios"])

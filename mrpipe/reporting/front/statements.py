@@ -13,7 +13,7 @@ from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front import several_dampers
 from mrpipe.reporting.headlines import weak_network
-from mrpipe.reporting.places import size_in_words
+from mrpipe.reporting.places import names_of, size_in_words
 from mrpipe.reporting.words import duration, listed, number, percent, plain, quantity, with_interval
 
 NARROW = 0.001
@@ -79,8 +79,7 @@ def measured(facts: RunFacts) -> str:
     frame = facts.summary("identify-frame")
     if "frequencies_hz" in frame:
         source = f"campaign {frame['campaign']}" if frame.get("campaign") else "given in the configuration"
-        names = frame.get("degrees_of_freedom") or [f"floor {k + 1}" for k in range(len(frame["mode_shapes"]))]
-        parts.append(f"Structure: {size_in_words(names)}, {source}.")
+        parts.append(f"Structure: {size_in_words(names_of(frame))}, {source}.")
     loop = facts.summary("close-loop").get("closed_loop") or {}
     recorded = sum(bool(item.get("recorded")) for item in loop.get("tests", []))
     if recorded:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -40,17 +41,27 @@ class Gain:
         return self.interval[0] > 0.0
 
 
-def folds_of(recordings: Recordings, folds: int) -> list[list[int]]:
+def folds_of(recordings: Recordings, folds: int, among: Sequence[int] | None = None) -> list[list[int]]:
     """Return the tests of each fold: every k-th test in the order of drive level, then stroke.
 
     A campaign usually steps through its drive levels. Folds in the order of the campaign could leave out all tests of
     one level, and the other levels do not determine the force at this level.
+
+    Parameters
+    ----------
+    recordings
+        Tests laid end to end.
+    folds
+        Number of folds.
+    among
+        Indices of the tests that are divided; None: all.
     """
-    keys = [
-        (round(float(np.mean(np.abs(recordings.drive[part]))), 2), float(np.ptp(recordings.displacement[part])))
-        for part in (recordings.test == index for index in range(recordings.tests))
-    ]
-    order = sorted(range(recordings.tests), key=lambda index: keys[index])
+
+    def level_and_stroke(index: int) -> tuple[float, float]:
+        part = recordings.test == index
+        return round(float(np.mean(np.abs(recordings.drive[part]))), 2), float(np.ptp(recordings.displacement[part]))
+
+    order = sorted(range(recordings.tests) if among is None else among, key=level_and_stroke)
     return [sorted(order[k::folds]) for k in range(folds)]
 
 

@@ -149,9 +149,8 @@ def draft_tests(recordings: Recordings) -> list[int]:
     """
     parts = max(1, min(-(-len(recordings.force) // DRAFT_SAMPLES), MOST_PARTS, recordings.tests // 4))
     varying = tests_of_varying_drive(recordings)
-    groups = [np.flatnonzero(item) for item in (varying, ~varying) if np.any(item)]
-    drawn = [group[folds_of(recordings.subset(list(group)), parts)[0]] for group in groups]
-    return sorted(int(index) for index in np.concatenate(drawn))
+    groups = (np.flatnonzero(kind).tolist() for kind in (varying, ~varying))
+    return sorted(index for group in groups for index in folds_of(recordings, parts, group)[0])
 
 
 def draft(found: Fit) -> Fit:

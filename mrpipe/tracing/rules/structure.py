@@ -125,6 +125,12 @@ class FrameRules(Section):
         description="After screening, only effects that recover this share of what the best one recovers are searched "
         "in full.",
     )
+    unlikely_error: float = Field(
+        0.1,
+        gt=0.0,
+        description="If no effect explains a larger error of a linear frame, a finding points to the description of "
+        "the channels, because a wrong sign, unit or floor is then likely.",
+    )
     per_parameter: float = Field(
         0.003,
         ge=0.0,

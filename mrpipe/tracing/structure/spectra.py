@@ -2,9 +2,8 @@
 
 If the acceleration of every floor is measured, the shear force of storey s is known: the sum of mass times absolute
 acceleration of the floors above it. Displacement and velocity come from the same accelerometers, integrated in the
-frequency domain, so the equation holds sample by sample. It is multiplied by a taper and Fourier-transformed. Each line
-of the spectrum is weighted by the noise that the accelerometers cause in it; at low frequencies integrated noise
-dominates.
+frequency domain, so the equation holds sample by sample. It is tapered and Fourier-transformed. Each line of the
+spectrum is weighted by the noise that the accelerometers cause in it; at low frequencies integrated noise dominates.
 """
 
 from __future__ import annotations
@@ -28,8 +27,7 @@ NOISE_BLOCKS = 14
 
 NOISE_PARTS, LEAST_PART, FEWEST_PARTS = 8, 250, 3
 """Numerical technique: number of parts of a record whose noise is estimated separately, least number of samples of a
-part, and least number of parts.
-"""
+part, and least number of parts."""
 
 STRONG_LINES = 0.1
 """Numerical technique: gains are compared on lines whose power exceeds this share of the strongest one."""
@@ -39,8 +37,7 @@ ABOVE_EDGE = 1.5
 
 QUIET_SECOND = 0.01
 """Numerical technique: a record contains a time at rest if its quietest second has less than this share of its mean
-power; the mean of a laser signal is then taken there.
-"""
+power; the mean of a laser signal is then taken there."""
 
 ABOVE_BAND, HIGHEST_START, HIGHEST = 1.25, 0.3, 0.45
 """Numerical technique: noise is measured above this multiple of the band's upper edge, which starts at the second share
@@ -99,10 +96,8 @@ class Spectra:
 
     Attributes
     ----------
-    record
-        The record.
-    motion
-        Its motion in the time domain.
+    record, motion
+        The record, and its motion in the time domain.
     frequencies_hz
         Of the lines, shape (b,).
     taper

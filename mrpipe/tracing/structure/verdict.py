@@ -14,6 +14,7 @@ from mrpipe.effects.contract import Effect
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.completion import completed
 from mrpipe.tracing.structure.directions import directions_of, in_direction
 from mrpipe.tracing.structure.parts import Part, command_part, damper_part, merged
@@ -36,9 +37,6 @@ UNCOUPLED = (
     "count as unexplained, and an effect may imitate them"
 )
 """Note in the result on structures whose sensors measure in several directions."""
-
-UNLIKELY_ERROR = 0.1
-"""Numerical technique: above this error without an effect, a hint at the description of the channels is given."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def trace_structure(
         )  # fmt: skip
         frames[axis] = frame
         parts.append(Part(f"frame {axis}".strip(), frame.summary))
-        findings += [f"direction {axis}: {line}" if axis else line for line in _lines(frame)]
+        findings += [f"direction {axis}: {line}" if axis else line for line in _lines(frame, rules.frame)]
         if axis and parts[-1].unexplained:
             findings.append(f"direction {axis} has an unexplained part, which coupling with other directions may cause")
     data = next(iter(by_direction.values()))
@@ -144,11 +142,11 @@ def trace_structure(
     return StructureTracing(summary, histories, _maps(drawn), _shown(drawn), findings)
 
 
-def _lines(frame: FrameTracing) -> list[str]:
+def _lines(frame: FrameTracing, rules: FrameRules) -> list[str]:
     lines = [frame.between.finding()] if frame.between.drifts else []
     summary = frame.summary
     error = float(summary["before"]["nrmse"])
-    if not summary["effects"] and summary["unexplained"]["structured"] and error > UNLIKELY_ERROR:
+    if not summary["effects"] and summary["unexplained"]["structured"] and error > rules.unlikely_error:
         lines.append(
             f"a linear frame misses {100.0 * error:.0f} % of the storey forces, and no effect explains it. So large an "
             "error often comes from the sign, the unit or the floor of a channel: see what mrpipe identify-frame finds"
