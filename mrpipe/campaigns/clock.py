@@ -1,4 +1,4 @@
-"""The clock of a test: where it comes from, and whether it can be trusted."""
+"""The clock of a test: its source, and checks of its samples."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ RATE_TOLERANCE = 0.01
 """Largest relative difference between a stated rate and the clock."""
 
 JITTER_TOLERANCE = 0.02
-"""Largest rms deviation of an interval from the median, over the median, that goes unmentioned."""
+"""Largest rms deviation of an interval from the median, over the median, without a finding."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Time of each sample, shape (n,), the nominal rate, and what was noticed."""
+    """Time of each sample [s], shape (n,), nominal rate [Hz], and findings."""
 
     time_s: FloatArray
     sampling_rate_hz: float
@@ -58,7 +58,10 @@ def build_clock(
         return Clock(np.arange(samples) / rate, rate)
     if time.size != samples:
         raise UserError(
-            file.path, where, f"time has {time.size} samples, the channels {samples}", "pick columns of one length"
+            file.path,
+            where,
+            f"time has {time.size} samples, the channels {samples}",
+            "choose columns of the same length",
         )
     _require_increasing(file, time, where)
     rate = _measured_rate(file, time)
@@ -80,7 +83,7 @@ def _require_increasing(file: DataFile, time: FloatArray, where: str) -> None:
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
         raise UserError(
-            file.path, f"{where}, row {row + int(bad[0])}", f"time is {time[bad[0]]}", "every sample needs its time"
+            file.path, f"{where}, row {row + int(bad[0])}", f"time is {time[bad[0]]}", "every sample needs a time"
         )
     steps = np.diff(time)
     wrong = np.flatnonzero(~(steps > 0.0))
