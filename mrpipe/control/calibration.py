@@ -92,7 +92,7 @@ _SETTINGS = CalibrationSettings()
 
 @dataclass(frozen=True)
 class CalibrationOptions:
-    """What the laws are calibrated for.
+    """Options of the calibration of the laws.
 
     Attributes
     ----------

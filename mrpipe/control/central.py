@@ -23,7 +23,7 @@ the ground hardly excites."""
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the observer reads in addition to the ground acceleration.
+    """Sensors that the observer reads in addition to the ground acceleration.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ def central_regulator(
 
 @njit(LAW_SIGNATURE, cache=True)
 def requested_force(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:  # noqa: ARG001
-    """Return the force that the central regulator asked this damper for."""
+    """Return the force [N] that the central regulator requests from this damper."""
     return state[S_REQUEST]
 
 

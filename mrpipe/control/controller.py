@@ -1,6 +1,6 @@
 """A controller as plain arrays: built here, run by :func:`mrpipe.control.kernel.controller_step`.
 
-What the closed loop, the virtual laboratory, the tracing of effects and the C export all use::
+The controller that closed loop, virtual laboratory, tracing of effects and C export share::
 
     controller = build_controller("fdns", Gains(alpha_n_m=3000.0), ControllerOptions(rate_hz=200.0), inverse=network)
     state = controller.new_state()
@@ -48,7 +48,7 @@ _SETTINGS = ControllerSettings()
 
 @dataclass(frozen=True)
 class ControllerOptions:
-    """How the controller runs.
+    """Options of the controller.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class ControllerOptions:
     displacement_noise_m, acceleration_noise_m_s2
         RMS noise that the Kalman filter assumes.
     bias_drift_m_s2
-        Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.
+        Drift of the bias of the accelerometer per second that the filter follows [m/s^2]; 0: no bias state.
     inverse_request
         What the past values of an inverse network are: `steady`, the present ones, that is the drive that would hold
         this force at this speed; or `history`, the forces desired before. A network has learned from measured forces,
@@ -76,7 +76,8 @@ class ControllerOptions:
         Speed over which the friction of fdns changes its sign, tanh(v/v0); 0: the jump of (4.18), which makes the loop
         chatter on the noise of the velocity.
     extremum_step_m, extremum_share
-        How far the displacement must come back from an extremum to make it count: metres, or share of the amplitude.
+        Distance by which the displacement must return from an extremum before it counts: in metres, or as share of the
+        amplitude.
     extremum_memory_s
         After this time without a new extremum the pending one counts; three quarters of a period suits.
 
@@ -86,7 +87,7 @@ class ControllerOptions:
     saturation_force_n
         Largest force of the damper; None: not known.
     fault_hold_s
-        How long a refused reading is replaced by the last good one before the drive goes to `safe_drive`.
+        Time [s] for which a refused reading is replaced by the last good one before the drive is set to `safe_drive`.
     safe_drive
         Drive while the readings cannot be used.
     """

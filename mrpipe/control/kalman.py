@@ -31,7 +31,7 @@ def kalman_gains(
     dt
         Interval [s].
     bias_drift_m_s2
-        How far the accelerometer's bias wanders in a second; 0 leaves the bias out.
+        Drift of the bias of the accelerometer per second [m/s^2]; 0: no bias state.
     """
     size = 3 if bias_drift_m_s2 > 0.0 else 2
     A = np.eye(size)

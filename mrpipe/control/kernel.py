@@ -127,7 +127,7 @@ LAW_FUNCTION = types.FunctionType(LAW_SIGNATURE)
 def _guard(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> int:
     """Take over the plausible readings; return 0 if all are, 1 while others are held, 2 if the drive must be safe.
 
-    A reading is refused if it is not finite or larger than its limit. After the safe drive the controller starts anew,
+    A reading is refused if it is not finite or larger than its limit. After the safe drive the controller is reset,
     because its memory ends before the gap.
     """
     at, limits, refused = layout[STATE_GOOD], layout[AT_LIMITS], False

@@ -1,4 +1,4 @@
-"""What a control law is: one entry with its gains, calibration, checks, compiled force and C code."""
+"""Definition of a control law: one entry with its gains, calibration, checks, compiled force and C code."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mrpipe.structures import Frame
 
 Need = Literal["network", "observer", "floor-accelerations", "damper-force", "drive-limit"]
-"""What a law may need in addition to the motion of the damper.
+"""Needs that a law may have in addition to the motion of the damper.
 
 `network`: the trained reference network. `observer`: a state observer, which reads all accelerometers.
 `floor-accelerations`: the accelerometers of ground and floors. `damper-force`: a load cell at the damper.
@@ -48,7 +48,7 @@ class GainRange:
 
 @dataclass(frozen=True)
 class Plant:
-    """What a law is calibrated for.
+    """Plant for which a law is calibrated.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class Law:
     gains
         Its free gains.
     needs
-        What it needs in addition to the motion of the damper.
+        Needs of the law in addition to the motion of the damper.
     candidates
         From a plant to gains by source: `closed-form`, `exact` and more.
     assess

@@ -163,7 +163,7 @@ def optimal_viscosity(modes: LimitingModes, stiffness: float = 0.0) -> float:
 
 
 def optimal_viscosity_thesis(modes: LimitingModes, stiffness: float = 0.0) -> float:
-    """Return c [N s/m] of (4.13) and (4.16), in which omega_inf + omega_0 stands for 2 omega_0."""
+    """Return c [N s/m] of (4.13) and (4.16), with omega_inf + omega_0 instead of 2 omega_0."""
     return 2.0 * (modes.omega_inf - modes.omega_0) / modes.u_0**2 + stiffness / modes.omega_0
 
 

@@ -176,7 +176,7 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
     if own_route or not _is_tunable(found) or options.source != "exact":
         return found
 
-    # the law's own calibration knows neither a brace nor the gains that the user gives
+    # the calibration of a single law does not account for a brace or for gains that the user gives
     def ratio(factors: FloatArray) -> float:
         device = found.device(law.scaled(gains, float(factors[0])))
         return float(damping_together(plant.bare, [device] if device else [], [damper.mode]).damping_ratios[0])

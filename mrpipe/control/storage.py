@@ -137,7 +137,7 @@ class Calibrated:
     path
         Of the file, for messages.
     designed
-        Law -> gains of the stage `design`, which are used in place of the calibrated ones; empty: none.
+        Law -> gains of the stage `design`, which replace the calibrated ones; empty: none.
     """
 
     position: FloatArray

@@ -1,4 +1,4 @@
-"""What an exported model does not contain, one sentence each: for the warnings, the README and the JSON file."""
+"""Effects that an exported model does not contain, one sentence each, for warnings, README and JSON file."""
 
 from __future__ import annotations
 

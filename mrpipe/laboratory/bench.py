@@ -203,7 +203,7 @@ def _at_first(tests: Sequence[BenchTest], motions: Sequence[FineMotion]) -> list
 
 
 class _Shares:
-    """What each effect is of the force, summed up test by test."""
+    """Share of each effect in the force, summed over the tests."""
 
     def __init__(self, damper: TrueDamper) -> None:
         effects = damper.effects
@@ -240,7 +240,7 @@ def calibrated(damper: TrueDamper, motions: Sequence[FineMotion]) -> TrueDamper:
         for _ in range(3 if long else 1):
             damper = calibrate_strength(damper, index, some, share=asked)
             if long:
-                # some tests stand for all: ask of them what gives the share on all
+                # a part of the tests is simulated, with a target that gives the share over all tests
                 asked *= wanted / effect_share(damper, index, motions)
                 if abs(asked / wanted - 1.0) < 0.01:
                     break

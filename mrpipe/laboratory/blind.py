@@ -68,7 +68,7 @@ def record_blind(
     share
         RMS of each effect over RMS of the force; a pair is a range.
     count
-        How many; 0 records a clean rig.
+        Number of effects; 0: a rig without effects.
     plan, tests
         Which tests: a plan's name, or a list in its place.
     rig

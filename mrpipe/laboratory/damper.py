@@ -164,7 +164,7 @@ def calibrate_strength(
     Parameters
     ----------
     damper
-        With the effect in place; its `strength_share` is what is wanted.
+        Damper with the effect, whose `strength_share` is the target.
     index
         Which effect.
     motions
@@ -196,7 +196,7 @@ def calibrate_strength(
         raise UserError(
             f"effect {effect.name} ({effect.form.form})",
             "strength_share",
-            f"{wanted:g} is out of reach on these tests",
+            f"{wanted:g} cannot be reached on these tests",
             "choose a smaller share, or tests that excite the effect",
         )
     return damper.with_effects([*others[:index], effect.with_strength(strength), *others[index + 1 :]])
@@ -205,7 +205,7 @@ def calibrate_strength(
 def solve_strength(
     share_at: Callable[[float], float], wanted: float, guess: float, strongest: float, tolerance: float
 ) -> float | None:
-    """Return the strength by bracketing and regula falsi on logarithms; None where it is out of reach."""
+    """Return the strength by bracketing and regula falsi on logarithms; None if it cannot be reached."""
     low, high = 0.0, 0.0
     low_share, high_share = 0.0, 0.0
     strength = min(guess, strongest) or 1e-6

@@ -1,4 +1,4 @@
-"""What can be planted in the virtual damper: names as in docs/effects.md, their forms, parameters and ranges."""
+"""Effects that can be planted in the virtual damper: names as in docs/effects.md, forms, parameters and ranges."""
 
 from __future__ import annotations
 

@@ -162,7 +162,7 @@ def run_structure(
     law, numbers, layout, memory_of_controller
         Of :class:`~mrpipe.control.controller.Controller`.
     sensor_noise
-        What the controller's sensors add, shape (ticks, 4 + floors), in the order of its measurements.
+        Noise of the sensors of the controller, shape (ticks, 4 + floors), in the order of its measurements.
 
     Returns
     -------

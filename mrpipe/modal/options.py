@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class IdentificationOptions(BaseModel):
-    """How the frame is identified from its forced, ambient and decay tests."""
+    """Options of the identification of a frame from its forced, ambient and decay tests."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

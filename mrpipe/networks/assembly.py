@@ -14,7 +14,7 @@ from mrpipe.networks.network import CHANNEL_UNITS, FeatureSpec
 from mrpipe.signals.prepared import PreparedTest
 
 CHANNELS = ("displacement", "velocity", "acceleration", "drive", "force")
-"""What a history holds of each test."""
+"""Channels of each test in a history."""
 
 _ATTRIBUTES = ("displacement_m", "velocity_m_s", "acceleration_m_s2", "drive", "force_n")
 
@@ -112,7 +112,7 @@ class Samples:
 
 
 def decimation_factor(native_rate_hz: float, wanted_rate_hz: float) -> int:
-    """Return the whole factor that comes nearest to the wanted rate; 1 where the record is slower than that."""
+    """Return the integer factor with the rate nearest to the requested one; 1 if the record is slower."""
     return max(1, round(native_rate_hz / wanted_rate_hz))
 
 
@@ -132,7 +132,7 @@ def without_aliases(signal: FloatArray, factor: int) -> FloatArray:
 
 
 def cut(test: PreparedTest, cycles: int) -> tuple[int, int]:
-    """Return the half-open range of samples that goes into the history.
+    """Return the half-open range of samples that is used for the history.
 
     The last `cycles` steady cycles, from one upward zero crossing of displacement to another; all there are where a
     test has fewer, and all of a test whose motion is not periodic.
@@ -144,7 +144,7 @@ def cut(test: PreparedTest, cycles: int) -> tuple[int, int]:
 
 
 def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float) -> History:
-    """Join the steady cycles of tests at zero crossings of displacement and bring them to the rate of the network.
+    """Join the steady cycles of tests at zero crossings of the displacement, at the rate of the network.
 
     Each test is low-passed as a whole before it is cut, so that no filter runs across a join. Displacement is
     continuous across joins. Other channels are not (the velocity at another frequency, the force at another current);
@@ -157,7 +157,7 @@ def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float)
     cycles
         Steady cycles of each periodic test.
     sampling_rate_hz
-        Rate wanted; the whole factor nearest to it is used, and the native rate where that is lower.
+        Requested rate [Hz]; the nearest rate with an integer factor is used, and the native rate if that is lower.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float)
     """
     rates = {test.sampling_rate_hz for test in tests}
     if len(rates) > 1:
-        raise ValueError(f"tests at {sorted(rates)} Hz cannot be joined; prepare brings them to one rate")
+        raise ValueError(f"tests at {sorted(rates)} Hz cannot be joined; prepare them at one rate")
     native = next(iter(rates)) if rates else sampling_rate_hz
     factor = decimation_factor(native, sampling_rate_hz)
     parts: dict[str, list[FloatArray]] = {name: [np.zeros(0)] for name in CHANNELS}

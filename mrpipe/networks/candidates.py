@@ -1,4 +1,4 @@
-"""What an architecture sweep tries: input states x past values x layers x neurons (thesis Figure 2.13)."""
+"""Architectures of a sweep: input states x past values x layers x neurons (Figure 2.13 of the thesis)."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Grid:
     Attributes
     ----------
     states, past_values, layers, neurons
-        What is tried on each axis; all hidden layers of a network have the same number of neurons.
+        Values that are tried on each axis; all hidden layers of a network have the same number of neurons.
     biases
         Both are tried where it holds both.
     centre
@@ -125,7 +125,7 @@ class Grid:
 
     @property
     def most_crossings(self) -> int:
-        """How many crossings there can be."""
+        """Largest possible number of crossings."""
         at = self.centre
         shapes = [(neurons,) * layers for layers, neurons in product(self.layers, self.neurons)]
         axes = (

@@ -61,7 +61,7 @@ def error_figures(measured: FloatArray, estimated: FloatArray) -> ErrorFigures:
 
 
 def travel_since_reversal(displacement: FloatArray, velocity: FloatArray, starts: IntArray) -> FloatArray:
-    """Return the distance [m] moved since the velocity last changed sign, shape (n,), starting anew at each test.
+    """Return the distance [m] moved since the velocity last changed sign, shape (n,), starting at 0 in each test.
 
     The first travel of a test is unknown and taken as long (infinite).
     """
@@ -152,7 +152,7 @@ def linear_baseline(training: Samples, judged: Samples) -> FloatArray:
 
 
 def free_run(network: Network, history: History) -> FloatArray:
-    """Return the estimate where the network's own past outputs stand for the measured ones, shape (n,).
+    """Return the estimate in a free run, with past outputs of the network instead of measured ones, shape (n,).
 
     All tests step side by side. The first `past_values` samples of each test are the measured ones.
     """

@@ -62,7 +62,7 @@ def choose(outcomes: Sequence[Outcome]) -> Outcome:
 
 @dataclass(frozen=True)
 class Finding:
-    """One statement of the thesis and what the sweep says of it.
+    """One statement of the thesis, and the result of the sweep for it.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ Method = Literal["least-squares", "minpack", "mu-identity", "mu-diagonal"]
 
 @dataclass(frozen=True)
 class FitResult:
-    """What a training run gave.
+    """Result of a training run.
 
     Attributes
     ----------

@@ -32,14 +32,14 @@ CHANNEL_UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"
 
 @dataclass(frozen=True)
 class FeatureSpec:
-    """What the features of a network are.
+    """Definition of the features of a network.
 
     Attributes
     ----------
     channels
         Input channels in order, such as ("velocity", "drive") of (2.8) or ("velocity", "force") of (2.9).
     past_values
-        How many past values of each channel, in addition to the present one.
+        Number of past values of each channel, in addition to the present one.
     absolute
         Absolute values of all channels are taken, as in (2.9).
     sampling_rate_hz
@@ -183,7 +183,8 @@ class Network:
         features
             Feature rows as for :meth:`predict`.
         margin
-            How far beyond counts as within, as a share of the range (noise at the edge is not an extrapolation).
+            Share of the range beyond its ends that still counts as within, because noise at the ends is not an
+            extrapolation.
         """
         if not len(self.feature_minimum) or not len(features):
             return 0.0

@@ -1,4 +1,4 @@
-"""What a training stage trains: features and options from the settings, the training set and the sweep."""
+"""Plan of a training stage: features and options from the settings, the training set and the sweep."""
 
 from __future__ import annotations
 

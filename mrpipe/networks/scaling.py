@@ -109,7 +109,7 @@ def channel_blocks(spec: FeatureSpec) -> list[slice]:
 
 
 def scale_safe(scale: FloatArray) -> FloatArray:
-    """Return the scale with ones in place of zeros (a channel that never moves)."""
+    """Return the scale with zeros replaced by ones (constant channels)."""
     return np.where(scale > 0.0, scale, 1.0)
 
 

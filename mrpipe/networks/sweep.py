@@ -175,7 +175,7 @@ def _mean(errors: FloatArray) -> float:
 
 
 def readable(seconds: float) -> str:
-    """Return a time as people say it: 45 s, 12 min, 3.2 h."""
+    """Return a duration in a readable unit, such as 45 s, 12 min or 3.2 h."""
     if seconds < 120.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"

@@ -164,7 +164,7 @@ def emulate_viscous(
 
 @dataclass(frozen=True)
 class TrackingJudgement:
-    """How well an inverse network serves a controller.
+    """Force tracking of a controller with an inverse network.
 
     Attributes
     ----------

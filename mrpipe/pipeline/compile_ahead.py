@@ -78,7 +78,7 @@ def _started(modules: Sequence[str]) -> subprocess.Popen[bytes] | None:
 
 
 def _mark(modules: Sequence[str]) -> Path | None:
-    """Return the file that says that these modules are in the cache; None without a cache.
+    """Return the file that marks these modules as compiled in the cache; None without a cache.
 
     numba keeps the code of every copy of the sources separately, so the file is named by the place of this copy too.
     """

@@ -27,7 +27,7 @@ _NOT_CONTENT = {
 
 
 def digest_of_artifact(path: Path) -> str:
-    """Return the SHA-256 of what an HDF5 artifact says: names, units, dims, shapes, types and values, not its date.
+    """Return the SHA-256 of the content of an HDF5 artifact: names, units, dims, shapes, types, values; not its date.
 
     An artifact that is built again with the same numbers has the same digest, so nothing after it becomes stale.
 

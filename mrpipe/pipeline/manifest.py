@@ -1,4 +1,4 @@
-"""What is remembered of a stage that ran, and the comparison with what would run now."""
+"""Record of a stage that ran, and its comparison with the present inputs, settings and code."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class StageKey:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a finished stage left: its key, outputs, summary and warnings.
+    """Record of a finished stage: key, outputs, summary and warnings.
 
     Attributes
     ----------

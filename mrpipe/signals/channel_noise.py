@@ -68,7 +68,7 @@ def displacement_cutoff(displacement: FloatArray, rate_hz: float, motion_hz: flo
     found = cutoff_by_criterion(displacement, rate_hz, velocity_share=0.9995, margin=CUTOFF_MARGIN)
     # remaining noise is differentiated twice if an effect needs the acceleration
     found = min(found, CUTOFF_MARGIN * signal_end(displacement, rate_hz))
-    # a channel without motion has no frequency, and nothing in it is worth a filter
+    # a channel without motion has no frequency and needs no filter
     least = DISPLACEMENT_HARMONICS * motion_hz or 0.25 * rate_hz
     return float(min(max(found, least), 0.25 * rate_hz, 250.0))
 

@@ -24,7 +24,7 @@ def usable_cutoff(cutoff_hz: float, sampling_rate_hz: float) -> float | None:
 
 
 def samples_needed(cutoff_hz: float, sampling_rate_hz: float) -> int:
-    """Return the fewest samples on which a low-pass with this cut-off says anything: three of its periods."""
+    """Return the least number of samples for a low-pass with this cut-off: three of its periods."""
     return math.ceil(3.0 * sampling_rate_hz / cutoff_hz) + 1
 
 

@@ -161,7 +161,7 @@ def _on_working_rate(recording: Recording, begin: int, end: int, name: str, rate
 
 
 def _require_rate(options: PreparationOptions) -> None:
-    """Refuse a requested rate that cannot represent the velocity's band (a campaign that is slow by itself may be)."""
+    """Refuse a requested rate that is too low for the band of the velocity; a recorded rate may be too low."""
     asked, cutoff = options.working_rate_hz, options.velocity_cutoff_hz
     if 0.0 < asked < 2.5 * cutoff:
         problem = f"is {asked:g}, too slow for a velocity cut-off of {cutoff:g} Hz"
@@ -366,6 +366,6 @@ def _differentiate(values: FloatArray, dt: float, options: PreparationOptions, m
     velocity = backward_difference(values, dt)
     if options.phase == "causal":
         return velocity
-    # (2.5) stands for the middle between two samples: bring it back on the clock of the other channels
+    # (2.5) is the velocity at the middle between two samples: interpolate it to the clock of the other channels
     velocity[0] = velocity[1]
     return np.concatenate((0.5 * (velocity[:-1] + velocity[1:]), velocity[-1:]))

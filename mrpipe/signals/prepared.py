@@ -34,7 +34,7 @@ class PreparedTest:
     force_n
         Filtered, without offset, shape (n,).
     force_raw_n, displacement_raw_m
-        Offset-free but unfiltered, for estimators that bring their own noise model.
+        Offset-free but unfiltered, for estimators with a separate noise model.
     cycles
         Start indices of the steady cycles at upward zero crossings of displacement, with the end of the last one;
         empty where the motion is not periodic.
@@ -45,7 +45,7 @@ class PreparedTest:
     drive_is_set_point
         The drive is a set point and no record.
     displacement_offset_m, force_offset_n
-        What was taken out of the channels as static offset (add it to have the records as measured).
+        Static offsets that were removed from the channels; their sum with the channels is the measured record.
     displacement_noise_m, displacement_noise_band_hz
         Standard deviation and band of the displacement's noise where it was put together from several sensors, so that
         the channel itself does not show; 0 if it does. Not written to the artifact.

@@ -124,7 +124,7 @@ class SensorFaultSettings(Section):
         "like late samples.",
     )
     sensor: Literal["displacement", "accelerometers", "velocity", "force", "all"] = Field(
-        "all", description="Which sensor."
+        "all", description="Sensor with the fault."
     )
     share: float = Field(0.01, ge=0.0, le=1.0, description="Share of the samples at which a fault begins.")
     samples: int = Field(1, ge=1, description="Duration of a fault in samples of the controller.")
@@ -190,8 +190,8 @@ class ResonanceSettings(Section):
 
     band_rad_s: tuple[float, float] | None = Field(
         None,
-        description="Lowest and highest frequency; null: from 0.75 times the free frequency of the calibrated mode to "
-        "1.2 times its frequency with a locked damper.",
+        description="Lowest and highest frequency; null: from 0.75 times the natural frequency of the calibrated mode "
+        "without damper force to 1.2 times that with a locked damper.",
     )
     points: int = Field(19, ge=5, description="Number of frequencies of the grid; resonances are refined in addition.")
     amplitude_factors: tuple[float, ...] = Field(

@@ -31,7 +31,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     began = time.perf_counter()
     settings, simulate = context.settings.design, context.settings.simulate
     rig = read_rig(simulate, context.artifact)
-    # what would be designed without the tracing, to say what the tracing is worth
+    # the design without the tracing, to show the benefit of the tracing
     identified = (
         read_rig(simulate.changed(damper="identified"), context.artifact) if simulate.damper == "traced" else None
     )

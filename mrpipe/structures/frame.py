@@ -27,7 +27,7 @@ class Frame:
     degrees_of_freedom
         Names of the degrees of freedom, length n; empty: `floor 1` and so on.
     modal_coordinates
-        How many of the last coordinates are amplitudes of modes, as after a Craig-Bampton reduction.
+        Number of last coordinates that are amplitudes of modes, as after a Craig-Bampton reduction.
     influence_y
         The same for ground motion in the second direction; None: the structure has one direction.
     """

@@ -63,9 +63,9 @@ class GroundMotion:
     unit
         Unit in the file.
     unit_from
-        How the unit was found: `given`, `header` or `peak`.
+        Source of the unit: `given`, `header` or `peak`.
     notes
-        What was assumed, for tables.
+        Assumptions, for tables.
     """
 
     name: str
@@ -155,7 +155,8 @@ def read_motion(
     Raises
     ------
     UserError
-        If the file is missing, empty, holds NaN, breaks its promises (NPTS, DT), mixes units or does not say enough.
+        If the file is missing or empty, contains NaN, contradicts its header (NPTS, DT), mixes units, or does not
+        determine the unit.
     """
     path = Path(path)
     if not path.is_file():
@@ -333,7 +334,9 @@ def _unit(path: Path, raw: _Raw, given: str | None) -> tuple[str, str]:
         to_si(np.zeros(1), text, where=f"{path}: header", quantity="acceleration")
     said = {name for pattern, name in _UNITS if pattern.search(raw.header)} | further
     if len(said) > 1:
-        raise UserError(path, "header", f"names the units {', '.join(sorted(said))}", f"bring all to one; {_ADVICE}")
+        raise UserError(
+            path, "header", f"names the units {', '.join(sorted(said))}", f"convert all to the same unit; {_ADVICE}"
+        )
     if said:
         return said.pop(), "header"
     peak = float(np.abs(raw.values).max())

@@ -171,7 +171,7 @@ def balanced_structure(
 
 
 def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
-    """Reduce a structure as the settings say; without a reduction its coordinates and its response stay the same.
+    """Reduce a structure with the settings; without a reduction coordinates and response are unchanged.
 
     Raises
     ------

@@ -51,7 +51,7 @@ def linear_response(
     shaker_floor
         0 for the ground.
     force_position
-        Shape (n,): what a unit force gives to each degree of freedom, in place of `shaker_floor`.
+        Shape (n,): share of a unit force on each degree of freedom, instead of `shaker_floor`.
     initial_state
         [x, v] at the first sample, shape (2n,); at rest if left out.
     """

@@ -1,4 +1,4 @@
-"""What the laws of friction with negative stiffness share: f = sign(v) alpha X - alpha x (4.18), (4.20)."""
+"""Functions that the laws of friction with negative stiffness share: f = sign(v) alpha X - alpha x (4.18), (4.20)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the laws with a state observer share: z+ = F z + g f + H y, u = -k z."""
+"""Functions that the laws with a state observer share: z+ = F z + g f + H y, u = -k z."""
 
 from __future__ import annotations
 

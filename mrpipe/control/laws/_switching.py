@@ -1,4 +1,4 @@
-"""What the laws share that switch the largest drive on and off by the measured damper force.
+"""Functions that the laws share which switch the largest drive on and off by the measured damper force.
 
 Signs: the damper force f is positive where it resists, so the force on the structure along w is -f. Jansen and Dyke
 (2000) write the same laws for the force on the structure.
