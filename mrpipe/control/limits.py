@@ -60,11 +60,6 @@ class LimitingModes:
         """(omega_inf - omega_0)/(omega_inf + omega_0) of P2 (7) [1]."""
         return (self.omega_inf - self.omega_0) / (self.omega_inf + self.omega_0)
 
-    @property
-    def share_thesis(self) -> float:
-        """(omega_inf - omega_0)/omega_0 of (4.10) [1]."""
-        return (self.omega_inf - self.omega_0) / self.omega_0
-
 
 STILL = 1e-9
 """Stroke of a mode over that of the mode with the largest one, below which only rounding moves the damper."""
@@ -151,14 +146,8 @@ def damping_estimate(modes: LimitingModes, stiffness: float, loss: float) -> flo
     return modes.share_p2 * 2.0 * imaginary / ((1.0 + real) ** 2 + imaginary**2)
 
 
-def damping_estimate_thesis(modes: LimitingModes, stiffness: float, loss: float) -> float:
-    """Return zeta of (4.10) for a device with Re H = `stiffness`, Im H = `loss` [N/m]."""
-    real, imaginary = modes.nu * stiffness, modes.nu * loss
-    return modes.share_thesis * imaginary / ((1.0 + real) ** 2 + imaginary**2)
-
-
 def optimal_viscosity(modes: LimitingModes, stiffness: float = 0.0) -> float:
-    """Return c [N s/m] of P2 (13), the missing 1/omega_0 put in (errata row 12)."""
+    """Return c [N s/m] of P2 (13), with the factor 1/omega_0 that is missing in print (errata row 12)."""
     return 1.0 / (modes.nu * modes.omega_0) + stiffness / modes.omega_0
 
 
