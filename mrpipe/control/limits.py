@@ -13,12 +13,12 @@ from mrpipe.errors import UserError
 from mrpipe.structures import Frame
 
 FRICTION_RATIO = 4.0 / math.pi
-"""Equivalent viscous over stiffness part of (4.24)."""
+"""Ratio of the viscous part to the stiffness part of the equivalent (4.24)."""
 
 
 @dataclass(frozen=True)
 class LimitingModes:
-    """Free and locked mode of the target, and the reduced model that follows from them.
+    """Free and locked mode of the target mode, and the reduced model that follows from them.
 
     Attributes
     ----------
@@ -27,11 +27,11 @@ class LimitingModes:
     omega_0, omega_inf
         Angular frequency with the damper free (4.4) and locked [rad/s].
     shape_0, shape_inf
-        Shapes of unit modal mass (4.5), shape (n,) [1/sqrt(kg)]; the locked one has no damper motion.
+        Mode shapes of unit modal mass (4.5), shape (n,) [1/sqrt(kg)]; the damper does not move in the locked shape.
     u_0
         Amplitude of the free mode at the damper [1/sqrt(kg)].
     kappa
-        Coupling of the two, shape_inf' M shape_0 [1]; the closed forms take it for 1.
+        Coupling of the two shapes, shape_inf' M shape_0 [1]; the closed forms assume 1.
     top
         Index of the top, the last degree of freedom that moves with the ground.
     """
@@ -62,7 +62,7 @@ class LimitingModes:
 
 
 STILL = 1e-9
-"""Stroke of a mode over that of the mode with the largest one, below which only rounding moves the damper."""
+"""Ratio of the stroke of a mode to the largest stroke of all modes, below which the stroke is only a rounding error."""
 
 
 def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> LimitingModes:
@@ -79,12 +79,12 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     position
         Connectivity vector w, shape (n,).
     mode
-        Target, from 1.
+        Number of the target mode, from 1.
 
     Raises
     ------
     UserError
-        If the mass is singular or indefinite, the mode has no locked partner, or the damper sits in a node of the mode.
+        If the mass is singular or indefinite, the mode has no locked partner, or the damper is at a node of the mode.
     """
     n = frame.floors
     w = np.asarray(position, dtype=np.float64)
@@ -127,13 +127,15 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
 
 
 def moving_modes(position: FloatArray, shapes: FloatArray) -> list[int]:
-    """Return the numbers (from 1) of the modes that move a damper; `shapes` are normalised to the mass."""
+    """Return the numbers (from 1) of the modes that move a damper; `shapes` have unit modal mass."""
     stroke = np.abs(position @ shapes)
     return [int(place) + 1 for place in np.flatnonzero(stroke > STILL * float(np.max(stroke)))]
 
 
 def static_stiffness(frame: Frame, position: FloatArray) -> float:
-    """Return 1/(w' K^-1 w) [N/m]: a device stiffness below minus this makes the structure fold (errata row 8)."""
+    """Return 1/(w' K^-1 w) [N/m]: the structure is statically unstable with a device stiffness below minus this value
+    (errata row 8).
+    """
     return float(1.0 / (position @ np.linalg.solve(frame.stiffness, position)))
 
 
@@ -167,10 +169,11 @@ def inherent_damping(frame: Frame, modes: LimitingModes) -> float:
 
 
 def placement_warning(frame: Frame, modes: LimitingModes) -> str:
-    """Return what the user should know where the damper hardly acts on the target mode; empty where it does.
+    """Return a warning if the damper hardly acts on the target mode; empty if it acts on it.
 
-    A damper without stiffness adds at most the damping ratio of P2 (14). Where this is less than the mode has already,
-    no gain of such a law can double the damping of the mode. Negative stiffness raises the bound by P2 (14).
+    A damper without stiffness adds at most the damping ratio of P2 (14). If this is less than the inherent damping
+    ratio of the mode, no gain of such a law can double the damping of the mode. Negative stiffness raises the bound by
+    P2 (14).
     """
     most, present = attainable_damping(modes), inherent_damping(frame, modes)
     if most >= present:
