@@ -185,9 +185,7 @@ class ControllerFactory:
         )
 
     def _largest_force(self, limit: float) -> float | None:
-        """Return the force of the damper at the drive limit and the expected amplitude [N]; None if it is infinite or
-        zero.
-        """
+        """Return the force [N] at the drive limit and the expected amplitude; None if it is infinite or zero."""
         speed = self.calibrated.amplitude_m * self.calibrated.omega_0
         force = float(self.damper.quasi_static_force(speed, limit))
         return force if math.isfinite(force) and force > 0.0 else None

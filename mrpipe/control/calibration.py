@@ -267,9 +267,7 @@ def validity_warnings(
 
 
 def needed_force(law: Law, gains: Gains, amplitude_m: float, omega: float) -> float:
-    """Return the largest force [N] that a law demands in harmonic motion; 0 for a law whose harmonic force is not
-    defined.
-    """
+    """Return the largest force [N] of a law in harmonic motion; 0 if the law defines no harmonic force."""
     if law.harmonic_force is None:
         return 0.0
     phase = np.linspace(0.0, 2.0 * np.pi, 1441)

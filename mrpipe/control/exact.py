@@ -137,9 +137,7 @@ def best_gain(damping_ratio: Callable[[float], float], largest: float) -> Optimu
 
 
 def damping_map(frame: Frame, position: FloatArray, modes: LimitingModes, c: FloatArray, k: FloatArray) -> FloatArray:
-    """Return exact damping ratios, shape (len(k), len(c)), of f = c v + k x; NaN where the structure is statically
-    unstable.
-    """
+    """Return exact damping ratios, shape (len(k), len(c)), of f = c v + k x; NaN if statically unstable."""
     result = np.full((len(k), len(c)), np.nan)
     for row, stiffness in enumerate(k):
         for column, viscosity in enumerate(c):

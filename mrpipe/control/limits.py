@@ -133,9 +133,7 @@ def moving_modes(position: FloatArray, shapes: FloatArray) -> list[int]:
 
 
 def static_stiffness(frame: Frame, position: FloatArray) -> float:
-    """Return 1/(w' K^-1 w) [N/m]: the structure is statically unstable with a device stiffness below minus this value
-    (errata row 8).
-    """
+    """Return 1/(w' K^-1 w) [N/m]: a device stiffness below minus this value is unstable (errata row 8)."""
     return float(1.0 / (position @ np.linalg.solve(frame.stiffness, position)))
 
 

@@ -1,6 +1,4 @@
-"""Neural model reference control: a network that gives the force of fdns from twelve values of the motion (thesis
-4.3.4, P3).
-"""
+"""Neural model reference control: a network that gives the force of fdns from past motion (thesis 4.3.4, P3)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Calibration of several dampers: each alone by the calibration of its law, then all together by exact complex
-eigenvalues.
-"""
+"""Calibration of several dampers: each alone, then all together by exact complex eigenvalues."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from mrpipe.options import Section
 State = Literal["displacement", "velocity", "acceleration"]
 
 THESIS_HIDDEN = (6, 6)
-"""Neurons of the hidden layers of the thesis' networks, about which the sweep's star is laid."""
+"""Neurons of the hidden layers of the networks of the thesis, which are the reference of the sweep."""
 
 _TRAINLM = StoppingRules()
 

@@ -59,9 +59,7 @@ def linear_candidates(plant: Plant, k: float) -> Mapping[str, Gains]:
 
 
 def linear_assessment(plant: Plant, gains: Gains) -> Assessment:
-    """Return the damping of f = c v + k x by closed form, by complex eigenvalue, and by the equivalent of the clipped
-    law.
-    """
+    """Return the damping of f = c v + k x by closed form, complex eigenvalue, and equivalent of the clipped law."""
     modes, c, k = plant.modes, gains.c_n_s_m, gains.k_n_m
     without, with_frame = (exact.exact_damping(item, plant.position, modes, c, k) for item in (plant.bare, plant.frame))
     clipped = float("nan")

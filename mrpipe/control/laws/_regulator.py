@@ -84,9 +84,7 @@ C_BODY = "    return observe(state, measured, state[S_FORCE]);\n"
 
 
 def regulator_assessment(plant: Plant, gain: FloatArray) -> Assessment:
-    """Follow the pole of the target mode while the regulator u = -k z without clipping increases from zero; k has shape
-    (2n,).
-    """
+    """Follow the pole of the target mode while the unclipped u = -k z, shape (2n,), increases from zero."""
     answers = []
     for item in (plant.bare, plant.frame):
         space = state_space(item, plant.position)

@@ -32,9 +32,7 @@ STEEPEST = 64.0
 
 @njit(float64(float64, float64, float64, float64), cache=True)
 def bounded_energy(slope: float, amplitude: float, lowest: float, highest: float) -> float:
-    """Return the integral of slope u, limited to the range between two forces, over u from 0 to twice the amplitude
-    [J].
-    """
+    """Return the integral of slope u, limited to between two forces, for u from 0 to twice the amplitude [J]."""
     way = 2.0 * amplitude
     first = min(lowest / slope, way)
     last = min(highest / slope, way)
