@@ -1,4 +1,4 @@
-"""Options of the virtual rigs: bench, shaking table, closed loop. They hold nothing of the rigs' hidden effects."""
+"""Options of the virtual rigs: bench, shaking table, closed loop. They do not contain the hidden effects."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Servo(Section):
 
 
 class BenchRig(Section):
-    """The testing machine around the damper, and its recorder."""
+    """Testing machine and recorder of the damper tests."""
 
     sampling_rate_hz: float = Field(1000.0, ge=100.0, description="Rate of the recorder [Hz].")
     fine_steps: int = Field(4, ge=1, le=32, description="Number of integration steps per sample of the true damper.")
@@ -51,7 +51,7 @@ class BenchRig(Section):
 
 
 class FrameRig(Section):
-    """The shaking table, its sensors and the tests of the frame."""
+    """Shaking table, its sensors and the tests of the frame."""
 
     sampling_rate_hz: float = Field(200.0, ge=50.0, description="Rate of the recorder [Hz].")
     fine_steps: int = Field(5, ge=1, le=64, description="Number of integration steps per sample of the true frame.")
@@ -87,7 +87,7 @@ class FrameRig(Section):
 
 
 class LoopRig(Section):
-    """The shaking table, its sensors and the base motion of the closed-loop tests."""
+    """Shaking table, its sensors and the base motion of the closed-loop tests."""
 
     frequency_rad_s: float = Field(8.0, gt=0.0, description="Frequency of the base [rad/s].")
     base_amplitude_m_s2: float = Field(
@@ -119,7 +119,7 @@ class LoopRig(Section):
 
 
 class CustomTest(Section):
-    """One test of a custom plan."""
+    """Test of a custom plan."""
 
     name: str = Field(description="Name of the test.")
     role: Literal["training", "validation", "repeat"] = Field("training", description="Role of the test.")

@@ -1,4 +1,4 @@
-"""The tests of a bench campaign."""
+"""Test plans of a bench campaign."""
 
 from __future__ import annotations
 
