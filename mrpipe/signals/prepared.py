@@ -1,4 +1,4 @@
-"""A prepared test: filtered, offset-free, differentiated, ready for every estimator of the bench."""
+"""Prepared test: filtered, without offsets, differentiated, as input of every estimator of the bench."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mrpipe.signals.channel_noise import displacement_cutoff, motion_frequency, 
 
 @dataclass(frozen=True)
 class PreparedTest:
-    """One test after `prepare`; all channels on one clock, SI, shape (n,).
+    """Test after `prepare`; all channels have the same times, SI, shape (n,).
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class PreparedTest:
     excitation
         `periodic` or `random`.
     drive_is_set_point
-        The drive is a set point and no record.
+        Whether the drive is a set point instead of a recorded channel.
     displacement_offset_m, force_offset_n
         Static offsets that were removed from the channels; their sum with the channels is the measured record.
     displacement_noise_m, displacement_noise_band_hz
@@ -89,7 +89,7 @@ class PreparedTest:
         """Sampling interval [s]."""
         return 1.0 / self.sampling_rate_hz
 
-    # spectra of whole records: an estimator that compares filters or rates reads them again and again
+    # spectra of whole records are cached, because an estimator that compares filters or rates reads them repeatedly
 
     @cached_property
     def force_noise_n(self) -> float:
@@ -168,7 +168,7 @@ def write_prepared(artifact: ArtifactWriter, tests: list[PreparedTest]) -> None:
 
 
 def read_prepared(artifact: Artifact) -> list[PreparedTest]:
-    """Read what :func:`write_prepared` wrote, in the order of writing."""
+    """Read the tests that :func:`write_prepared` wrote, in the order of writing."""
     tests = []
     for name in artifact.members("tests"):
         group = f"tests/{name}"
