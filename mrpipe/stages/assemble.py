@@ -1,4 +1,4 @@
-"""`assemble`: prepared tests to the training set."""
+"""`assemble`: builds the training set from prepared tests."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from mrpipe.pipeline.loop_inputs import LOOP_INPUTS
 from mrpipe.pipeline.stage import Stage, StageContext
 
 KEPT = "design-kept"
-"""Folder with the results of the laws that are done, until the design is complete."""
+"""Folder with the results of completed laws, until the design is complete."""
 
 if TYPE_CHECKING:
     from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty

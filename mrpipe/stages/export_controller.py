@@ -16,7 +16,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 FOLDER = "controller"
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
-"""Dampers of this run by name, and the stage whose artifact holds each."""
+"""Dampers of this run by name, and the stage whose artifact contains each."""
 
 
 FILES = ("controller.json", "controller.c", "controller.h", "self_test.c", "vectors.csv", "README.md")
