@@ -30,7 +30,7 @@ def effects_left_out(summary: Mapping[str, Any], where: str, remedy: str) -> lis
     where
         `structure` or `plant`: where the effects are corrected.
     remedy
-        What the user can do.
+        Sentence on what the user can do.
     """
     names = [
         f"{item['name']} ({item['place']})" if item.get("place") else str(item["name"])

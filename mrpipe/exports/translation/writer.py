@@ -16,7 +16,7 @@ class Writer(ABC):
     Parameters
     ----------
     routine
-        What is translated.
+        Function that is translated.
     """
 
     def __init__(self, routine: Routine) -> None:
