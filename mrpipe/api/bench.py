@@ -49,7 +49,7 @@ class PreparedTests(Sequence[PreparedTest]):
     campaign
         Campaign that they come from.
     findings
-        What the preparation noticed.
+        Findings of the preparation.
     """
 
     tests: tuple[PreparedTest, ...]

@@ -157,7 +157,7 @@ def simulate(
     floor
         Floor that the damper acts on, from 1.
     options
-        How the loop is run.
+        Options of the simulation of the loop.
     controller
         Settings of the section `simulate.controller`; the inverse is the damper model itself.
 

@@ -25,7 +25,7 @@ def config_directory() -> Path:
 def public_data_directory() -> Path | None:
     """Return the folder of the public measurements: $MRPIPE_DATA, else ../shared/data next to the project.
 
-    Returns None where neither exists; the caller says so.
+    Returns None if neither exists; the caller reports this.
     """
     named = os.environ.get("MRPIPE_DATA")
     if named:

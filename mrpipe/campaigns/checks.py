@@ -1,4 +1,4 @@
-"""What can be wrong with measured samples, and what is worth telling."""
+"""Checks of measured samples: errors that refuse a campaign, and findings for the user."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.errors import UserError
 
 LARGEST_SAMPLE = 1e30
-"""Larger numbers [SI] are not measurements of any quantity."""
+"""Largest plausible sample [SI]; larger numbers are not measurements of any quantity."""
 
 
 def require_finite(file: DataFile, values: FloatArray, first: int, channel: str, where: str) -> None:
@@ -23,7 +23,7 @@ def require_finite(file: DataFile, values: FloatArray, first: int, channel: str,
     Raises
     ------
     UserError
-        Naming the first bad row.
+        If a sample is bad; the message names the first bad row.
     """
     bad = np.flatnonzero(~(np.abs(values) < LARGEST_SAMPLE))
     if bad.size:
@@ -33,7 +33,7 @@ def require_finite(file: DataFile, values: FloatArray, first: int, channel: str,
             raise UserError(
                 file.path,
                 f"{where}, {channel}, row {row}",
-                "is missing in the last row, as where a recording was cut off",
+                "is missing in the last row, as if the recording was interrupted",
                 "delete this row, or end the test before it with segments_s",
             )
         if bad.size == values.size and np.isnan(values).all():
@@ -46,16 +46,16 @@ def require_finite(file: DataFile, values: FloatArray, first: int, channel: str,
             file.path,
             f"{where}, {channel}, row {row}",
             f"is {kind}, {bad.size} such samples in all",
-            "cut them off with segments_s, or correct the file",
+            "leave them out with segments_s, or correct the file",
         )
 
 
 def clipped_share(values: FloatArray) -> float:
-    """Return the share of samples that sit at an extreme as a clipped channel's do, 0 where none is clipped.
+    """Return the share of samples at an extreme of a clipped channel; 0 if the channel is not clipped.
 
-    A peak that is only coarsely resolved dwells at its top level for at most a few times as long as at the level
-    below it, and a rig at rest creeps into its rest; a clipped channel has flat tops that it enters at speed, with
-    hardly a sample just below.
+    A peak with coarse resolution stays at its top level for at most a few times as long as at the level below it, and a
+    rig approaches its rest slowly. A clipped channel has flat tops that it reaches at speed, with hardly a sample just
+    below.
     """
     share = 0.0
     span = float(np.ptp(values))
@@ -80,7 +80,7 @@ def clipped_share(values: FloatArray) -> float:
 
 
 def find_clipping(test: Recording) -> list[str]:
-    """Return a line for each measured channel that looks clipped; the drive may rest at its limit and is left out."""
+    """Return a line for each measured channel that looks clipped, except the drive, which may stay at its limit."""
     lines = []
     for channel in test.channels:
         if "drive" in channel or "desired" in channel:
@@ -96,9 +96,9 @@ def find_clipping(test: Recording) -> list[str]:
 
 
 def find_dropouts(test: Recording) -> list[str]:
-    """Return a line for each measured channel that stands still and then jumps, or falls to exactly 0 on its way.
+    """Return a line for each measured channel that repeats a value and then jumps, or falls to exactly 0 in motion.
 
-    A channel of coarse resolution stands still too, but its next step is no longer than the others.
+    A channel with coarse resolution repeats values too, but its next step is not larger than the others.
     """
     lines = []
     for channel in test.channels:
@@ -109,7 +109,7 @@ def find_dropouts(test: Recording) -> list[str]:
         still = _longest_freeze(values)
         if still is not None:
             begin, length = still
-            lines.append(f"{channel} stands still for {length} samples at {times[begin]:.4g} s and then jumps")
+            lines.append(f"{channel} repeats one value for {length} samples at {times[begin]:.4g} s and then jumps")
         lost = _falls_to_zero(values)
         if lost.size:
             lines.append(f"{channel} falls to exactly 0 in {lost.size} samples, the first at {times[lost[0]]:.4g} s")
@@ -117,7 +117,7 @@ def find_dropouts(test: Recording) -> list[str]:
 
 
 def _longest_freeze(values: FloatArray) -> tuple[int, int] | None:
-    """Return begin and length of the longest freeze that ends in a jump worth half of the motion missed."""
+    """Return start and length of the longest freeze that ends in a jump of at least half of the missed motion."""
     steps = np.abs(np.diff(values))
     speed = float(np.sqrt(np.mean(steps**2))) if steps.size else 0.0
     edges = np.diff(np.concatenate(([0], (steps == 0.0).astype(np.int8), [0])))
@@ -151,10 +151,10 @@ def _falls_to_zero(values: FloatArray) -> IntArray:
 
 
 def force_sign(recordings: Sequence[Recording]) -> float:
-    """Return the mean correlation of force with velocity over tests: +1 where force opposes motion as it should.
+    """Return the mean correlation of force with velocity over tests; it is positive with the correct sign of the force.
 
-    A damper dissipates, so the force that is positive with elongation does positive work on the rod's displacement;
-    a negative figure means that compression was taken as positive. 0 where nothing moves.
+    A damper dissipates energy, so a force that is positive in extension does positive work on the displacement of the
+    rod. A negative value means that compression was taken as positive. It is 0 if nothing moves.
     """
     figures = []
     for test in recordings:
@@ -176,7 +176,7 @@ def force_sign(recordings: Sequence[Recording]) -> float:
 
 
 def require_varying_drive(campaign: Campaign) -> None:
-    """Refuse a campaign whose drive never changes, from which no inverse model can be learned.
+    """Refuse a campaign with a constant drive, because it does not determine an inverse model.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def require_varying_drive(campaign: Campaign) -> None:
 
 
 def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
-    """Refuse drives (test -> samples) that are all one constant; see :func:`require_varying_drive`.
+    """Refuse drives (test -> samples) that are all the same constant; see :func:`require_varying_drive`.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
             source,
             "drive",
             f"never changes in the training tests ({levels.mean():.4g})",
-            "an inverse model needs training tests at two drives at least",
+            "an inverse model needs training tests at two or more drives",
         )
 
 
@@ -217,10 +217,10 @@ def require_roles(campaign: Campaign, source: str) -> None:
     Raises
     ------
     UserError
-        Naming the role that is missing.
+        If a role is missing; the message names it.
     """
     if campaign.rig != "damper-bench":
         return
     for role in ("training", "validation"):
         if not campaign.with_role(role):
-            raise UserError(source, "tests", f"no {role} test", f"give one test at least the role {role}")
+            raise UserError(source, "tests", f"no {role} test", f"give at least one test the role {role}")

@@ -1,4 +1,4 @@
-"""The clock of a test: where it comes from, and whether it can be trusted."""
+"""The clock of a test: its source, and checks of its samples."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ RATE_TOLERANCE = 0.01
 """Largest relative difference between a stated rate and the clock."""
 
 JITTER_TOLERANCE = 0.02
-"""Largest rms deviation of an interval from the median, over the median, that goes unmentioned."""
+"""Largest rms deviation of an interval from the median, over the median, without a finding."""
 
 MOST_REPEATED_TIMES = 0.05
-"""Share of samples with the time of the sample before, above which the clock was printed with too few digits."""
+"""Largest share of samples with the time of the sample before; above it the clock was printed with too few digits."""
 
 SHORTEST_GAP = 3
-"""So many lost samples break a record; fewer disturb it less than noise does."""
+"""Number of lost samples from which a record counts as interrupted; fewer disturb it less than noise does."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Time of each sample, shape (n,), the nominal rate, and what was noticed."""
+    """Time of each sample [s], shape (n,), nominal rate [Hz], and findings."""
 
     time_s: FloatArray
     sampling_rate_hz: float
@@ -66,7 +66,10 @@ def build_clock(
         return Clock(np.arange(samples) / rate, rate)
     if time.size != samples:
         raise UserError(
-            file.path, where, f"time has {time.size} samples, the channels {samples}", "pick columns of one length"
+            file.path,
+            where,
+            f"time has {time.size} samples, the channels {samples}",
+            "choose columns of the same length",
         )
     _require_increasing(file, time, where)
     rate = _measured_rate(file, time)

@@ -1,4 +1,4 @@
-"""A data file as named columns, and how a column is picked out of it."""
+"""A data file as named columns, and the selection of a column."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _plain(name: str) -> str:
 
 @dataclass(frozen=True)
 class DataFile:
-    """What a reader found in a file.
+    """Columns that a reader found in a file.
 
     Attributes
     ----------
@@ -36,11 +36,11 @@ class DataFile:
     fetch
         Name -> array of numbers (any shape); called only for columns that are used.
     table
-        Whether an integer picks a column by position.
+        Whether an integer selects a column by position.
     time_s, sampling_rate_hz
-        Clock that the file carries itself (data loggers, UFF), shape (n,); None where it has none.
+        Clock in the file (data loggers, UFF), shape (n,) [s] and rate [Hz]; None if it has none.
     parts
-        Half-open index ranges between the pauses of a logger; empty where there are none.
+        Half-open index ranges between the pauses of a logger; empty if there are none.
     first_row
         Line of the first sample in a text file, 0 where lines mean nothing.
     row_lines
@@ -48,7 +48,7 @@ class DataFile:
     aliases
         Other spellings of a name.
     headers
-        Header lines of a text file, a word for each column; empty for other formats.
+        Header lines of a text file, one word per column; empty for other formats.
     accelerations
         Columns that are known to be accelerations [m/s^2], as those of strong-motion records are: name -> whether
         horizontal.

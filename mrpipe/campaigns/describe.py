@@ -1,4 +1,4 @@
-"""What a campaign holds, as plain structure for `mrpipe show`."""
+"""Description of a campaign as plain data, for `mrpipe show`."""
 
 from __future__ import annotations
 

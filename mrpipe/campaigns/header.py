@@ -1,4 +1,4 @@
-"""What a campaign file says of its campaign, read without the data."""
+"""Head of a campaign file, read without the data."""
 
 from __future__ import annotations
 

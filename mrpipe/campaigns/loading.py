@@ -43,7 +43,7 @@ _ONLY_CLOSED_LOOP = (
 
 @dataclass
 class _Reader:
-    """What is needed while the tests of one campaign are read."""
+    """State while the tests of one campaign are read."""
 
     source: YamlSource
     entry: CampaignEntry
@@ -80,7 +80,7 @@ def load_campaign(path: Path) -> Campaign:
     reader = _Reader(source, entry, _folder(source, entry))
     shared = _channels(source, entry.channels, entry.rig, ("channels",))
     if not entry.tests:
-        raise source.error(("tests",), "is empty", "list one test at least")
+        raise source.error(("tests",), "is empty", "list at least one test")
     recordings = [_read_test(reader, shared, index) for index in range(len(entry.tests))]
     _require_unique_names(source, recordings)
     campaign = Campaign(
@@ -104,7 +104,7 @@ def load_campaign(path: Path) -> Campaign:
 
 
 def campaign_files(path: Path) -> tuple[Path, ...]:
-    """Return the files that a campaign is made of, campaign.yaml first, without reading the data.
+    """Return the files of a campaign, campaign.yaml first, without reading the data.
 
     Raises
     ------
@@ -231,7 +231,7 @@ def _read_test(reader: _Reader, shared: dict[str, ChannelEntry], index: int) -> 
         if channel.value is None and not (name in skipped and not _has(file, channel))
     }
     if not columns:
-        raise reader.source.error(place, "no channel is read from the file", "give one channel at least a column")
+        raise reader.source.error(place, "no channel is read from the file", "give at least one channel a column")
     samples = _one_length(file, columns, where)
     rate = entry.sampling_rate_hz or reader.entry.sampling_rate_hz
     clock = build_clock(file, columns.pop("time", None), rate, samples, where)
@@ -281,7 +281,7 @@ def _place_of(reader: _Reader, name: str, place: Place) -> Place:
 
 
 def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tuple[str, str | None]:
-    """Return the unit of a channel and its quantity; the drive settles the campaign's drive unit."""
+    """Return the unit of a channel and its quantity; the channel drive determines the drive unit of the campaign."""
     if channel.unit is None:
         usual = {"time": "s", "drive": "A"}.get(
             name, units.SI_UNITS.get(quantity_of(name, reader.entry.rig) or "", "N")
@@ -332,7 +332,7 @@ def _one_length(file: DataFile, columns: dict[str, FloatArray], where: str) -> i
     lengths = {name: values.size for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
         sizes = ", ".join(f"{name} {size}" for name, size in lengths.items())
-        raise UserError(file.path, where, f"channels differ in length ({sizes})", "pick columns of one length")
+        raise UserError(file.path, where, f"channels differ in length ({sizes})", "choose columns of the same length")
     return next(iter(lengths.values()))
 
 
@@ -340,12 +340,14 @@ def _require_unique_names(source: YamlSource, recordings: list[Recording]) -> No
     seen: set[str] = set()
     for index, test in enumerate(recordings):
         if test.name in seen:
-            raise source.error(("tests", index, "name"), f"{test.name!r} is used twice", "give each test its own name")
+            raise source.error(
+                ("tests", index, "name"), f"{test.name!r} is used twice", "give each test a different name"
+            )
         seen.add(test.name)
 
 
 def _require_floors(source: YamlSource, campaign: Campaign) -> None:
-    """Raise where the channels number floors without a sensor and the masses do not say how many floors there are."""
+    """Raise UserError if a floor has no sensor and the masses do not determine the number of floors."""
     if campaign.rig != "shear-frame":
         return
     masses = campaign.floor_masses_kg

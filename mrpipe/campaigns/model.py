@@ -32,7 +32,7 @@ class Recording:
     kind
         Frame tests: sweep, free-decay, closed-loop or random; empty on a bench.
     details
-        What else campaign.yaml says of the test (mode, law, gains, shaker floor, ...).
+        Other entries of the test in campaign.yaml (mode, law, gains, shaker floor, ...).
     """
 
     name: str
@@ -45,7 +45,7 @@ class Recording:
     details: Mapping[str, Any] = field(default_factory=dict)
 
     def used(self, channel: str) -> FloatArray:
-        """Return the samples of a channel that lie in segments, one after another."""
+        """Return the samples of a channel that lie in segments, concatenated."""
         return self._in_segments(self.channels[channel])
 
     def used_time(self) -> FloatArray:
@@ -67,7 +67,7 @@ class Campaign:
     name, rig
         As in campaign.yaml; rig is damper-bench or shear-frame.
     directory
-        Where campaign.yaml lies.
+        Folder of campaign.yaml.
     recordings
         The tests in order.
     drive_unit
@@ -79,9 +79,9 @@ class Campaign:
     floor_masses_kg
         Frame campaigns, floor 1 first; empty otherwise.
     declared
-        Everything else of campaign.yaml.
+        All other entries of campaign.yaml.
     findings
-        What the reader noticed and the user should know (clipping, sign of force, jitter), one line each.
+        Findings of the reader for the user (clipping, sign of force, jitter), one line each.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What a device in a benchmark structure does in one step: laws, inverses and the implicit Bingham force.
+"""One step of a device in a benchmark structure: laws, inverses and the implicit Bingham force.
 
 A force that is constant over a step does exactly the work f (x+ - x), so the energy balance closes to rounding for the
 device however it jumps. It is found from the velocity in the middle of the step (second order); where the rod turns
@@ -166,5 +166,5 @@ def desired_force(law: float, gains: FloatArray, displacement: float, velocity: 
 
 
 def no_network() -> tuple[FloatArray, ...]:
-    """Return the arrays of a network that is never asked."""
+    """Return placeholder arrays for a network that is not used."""
     return (np.zeros((1, 2)), np.zeros(1), np.zeros((1, 1)), np.zeros(1), np.zeros(1), np.ones(7))

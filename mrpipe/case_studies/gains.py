@@ -96,7 +96,7 @@ def exact_viscous(modal: ModalModel, stiffness: float, scale: float, modes: int 
     scale
         Order of magnitude of c [N s/m]; searched from a thousandth to a hundred times that.
     modes
-        How many of the lowest modes count.
+        Number of the lowest modes that count.
     """
     grid = scale * np.geomspace(1e-3, 1e2, 61)
     values = [lowest_damping(modal, float(c), stiffness, modes) for c in grid]

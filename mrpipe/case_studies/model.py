@@ -170,7 +170,7 @@ def modal_model(model: BenchmarkModel, modes: int | None = None) -> ModalModel:
     model
         The structure.
     modes
-        How many modes are kept, from the lowest; all if left out.
+        Number of modes that are kept, from the lowest; None: all.
     """
     squared, shapes = eigh(0.5 * (model.stiffness + model.stiffness.T), 0.5 * (model.mass + model.mass.T))
     count = len(squared) if modes is None else min(modes, len(squared))

@@ -12,18 +12,22 @@ class LqgWeights(Section):
 
     displacement: float = Field(100.0, ge=0.0, description="Weight of regulated displacements [1/m^2].")
     acceleration: float = Field(1.0, ge=0.0, description="Weight of regulated absolute accelerations [s^4/m^2].")
-    force_n: float = Field(1e6, gt=0.0, description="A force of this size weighs 1: R is the identity in it [N].")
-    interval_s: float = Field(0.001, gt=0.0, le=0.05, description="Sample of the controller [s].")
+    force_n: float = Field(
+        1e6, gt=0.0, description="Unit of force in the weight R, which is the identity matrix in this unit [N]."
+    )
+    interval_s: float = Field(0.001, gt=0.0, le=0.05, description="Sampling interval of the controller [s].")
 
 
 class WindClimate(Section):
     """The wind, and how the building takes it (Davenport's decay of the lateral turbulence)."""
 
     top_speed_m_s: float = Field(47.25, gt=0.0, description="Mean wind at the top [m/s].")
-    profile_exponent: float = Field(0.365, ge=0.0, le=1.0, description="Of the power law of the mean wind.")
+    profile_exponent: float = Field(0.365, ge=0.0, le=1.0, description="Exponent of the power law of the mean wind.")
     lift_coefficient: float = Field(0.27, ge=0.0, description="RMS lift coefficient of vortex shedding.")
     strouhal_number: float = Field(0.1, gt=0.0, description="Shedding frequency times width over wind speed.")
     bandwidth: float = Field(0.25, gt=0.0, description="Relative width of the shedding peak.")
     lateral_intensity: float = Field(0.1, ge=0.0, description="RMS lateral turbulence at the top over the mean wind.")
-    lateral_coefficient: float = Field(1.0, ge=0.0, description="Side force for a wind angle, dC_L/da + C_D.")
+    lateral_coefficient: float = Field(
+        1.0, ge=0.0, description="Side force coefficient per angle of the wind, dC_L/da + C_D."
+    )
     decay: float = Field(10.0, ge=0.0, description="Decay constant of lateral turbulence with height.")

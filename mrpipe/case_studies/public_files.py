@@ -11,7 +11,7 @@ from mrpipe.errors import UserError
 
 
 def named_file(option: str, value: str, public: Mapping[str, str]) -> Path:
-    """Return the file that a name of the public data or a path stands for; a file here goes before a public name.
+    """Return the file of a path or of a name in the public data; an existing path has priority.
 
     Parameters
     ----------

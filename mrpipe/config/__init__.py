@@ -1,1 +1,1 @@
-"""What the user can set."""
+"""Settings of the user: model of the configuration, its sections, and its loader."""

@@ -46,18 +46,21 @@ DEFAULT_STAGES = (
 
 
 class RunSettings(Section):
-    """What the program itself reads; the sections of the stages are added by name (:func:`config_model`)."""
+    """General settings of a run; the sections of the stages are added by name (:func:`config_model`)."""
 
-    name: str = Field("", description="Name of the run: its directory is runs/<name> unless --run says otherwise.")
-    description: str = Field("", description="What this configuration is for, in a sentence; shown in the report.")
-    seed: int = Field(2011, ge=0, description="Seed of all randomness; the same inputs and seed give the same numbers.")
-    stages: tuple[str, ...] = Field(
-        DEFAULT_STAGES, description="Stages of `mrpipe run`, by name; what they need is built too."
+    name: str = Field("", description="Name of the run; its directory is runs/<name> unless --run gives another one.")
+    description: str = Field("", description="Purpose of this configuration, a sentence for the report.")
+    seed: int = Field(
+        2011, ge=0, description="Seed of all random numbers; the same inputs and seed give the same results."
     )
-    campaigns: CampaignsSettings = Field(CampaignsSettings(), description="Where the measurements come from.")
+    stages: tuple[str, ...] = Field(
+        DEFAULT_STAGES, description="Stages of `mrpipe run`, by name; the stages that they need are built too."
+    )
+    campaigns: CampaignsSettings = Field(CampaignsSettings(), description="Sources of the measurements.")
     report: ReportSettings = Field(ReportSettings(), description="The report.")
     execution: ExecutionSettings = Field(
-        ExecutionSettings(), description="How the program runs; changes no result and makes no stage stale."
+        ExecutionSettings(),
+        description="Execution of the program; these settings change no result, and no stage becomes out of date.",
     )
 
 

@@ -1,6 +1,6 @@
-"""Controllers from settings, structure, damper and calibration: the one place where they are put together.
+"""Assembly of controllers from settings, structure, damper and calibration.
 
-Simulation, export, the virtual laboratory, the tracing and the design of laws use it::
+Simulation, export, the virtual laboratory, the tracing and the design of laws build their controllers here::
 
     factory = ControllerFactory(frame, damper, calibrated, ControllerSettings(inverse="model"))
     controller = factory.build("vdns", Gains(c_n_s_m=250.0, k_n_m=-4500.0))
@@ -32,17 +32,19 @@ from mrpipe.networks.network import Network, read_network
 from mrpipe.structures import Frame
 
 RATES_HZ = (200.0, 500.0)
-"""The two sampling rates that the thesis prints: with the damper, and for a perfect one."""
+"""Sampling rates of the thesis [Hz]: with the damper, and with a perfect damper."""
 
 PERFECT_ROUNDING = 1.5
-"""Rounding of friction for a perfect damper over that with a damper, because no yielding rounds its force."""
+"""Ratio of the rounding speed of friction with a perfect damper to that with a real damper. It is larger than 1,
+because no yielding rounds the force of a perfect damper.
+"""
 
 
 FORCE_MARGIN = 10.0
-"""Largest plausible reading of the damper force over the largest force of the model."""
+"""Ratio of the largest plausible reading of the damper force to the largest force of the model."""
 
 EXTREMUM_NOISE = 5.0
-"""Way back that makes an extremum count, over the noise of the displacement."""
+"""Ratio of the return distance that confirms an extremum to the noise of the displacement."""
 
 
 @dataclass(frozen=True)
@@ -52,20 +54,21 @@ class ControllerFactory:
     Attributes
     ----------
     frame, damper
-        What is controlled; the damper is the model that the controller knows.
+        Structure, and model of the damper that the controller uses.
     calibrated
         Position of the damper, gains and weights.
     settings
-        How the controllers run.
+        Settings of the controllers.
     inverse
-        Inverse network of the damper; None: a table of the model's post-yield force.
+        Inverse network of the damper; None: the inverse is a table of the post-yield force of the model.
     ideal_rounding_m_s
-        Speed over which friction changes its sign with a perfect damper; None: from the calibrated one.
+        Speed over which friction changes its sign with a perfect damper [m/s]; None: :data:`PERFECT_ROUNDING` times the
+        calibrated speed.
 
     Raises
     ------
     UserError
-        If the calibration is for another number of floors.
+        If the calibration was made for another number of floors.
     """
 
     frame: Frame
@@ -98,12 +101,13 @@ class ControllerFactory:
         law
             A law or its name.
         gains
-            In place of the calibrated gains.
+            Gains that replace the calibrated ones; None: the calibrated ones.
         perfect
-            For a perfect damper and perfect sensors: the controller reads the velocity, and runs at 500 Hz where the
-            rate is not given.
+            Whether the damper and the sensors are perfect. The controller then reads the velocity, and it runs at 500
+            Hz if the settings give no rate.
         inverse, residual_force_n
-            In place of the inverse, and of the force below which the drive is 0 [N].
+            Inverse, and force [N] below which the drive is 0, that replace those of the factory; None: those of the
+            factory.
 
         Raises
         ------
@@ -131,12 +135,12 @@ class ControllerFactory:
 
     @property
     def switch_force_n(self) -> float:
-        """Desired force below which the drive is 0 [N]."""
+        """Desired force below which the drive is zero [N]."""
         given = self.settings.residual_force_n
         return self.calibrated.residual_force_n if given is None else given
 
     def available(self) -> list[str]:
-        """Return the laws for which everything is there that they need."""
+        """Return the names of the laws whose gains and networks are all available."""
         known = self.calibrated
         return [
             name
@@ -181,7 +185,7 @@ class ControllerFactory:
         )
 
     def _largest_force(self, limit: float) -> float | None:
-        """Return the damper's force at the limit of the drive and the expected amplitude [N]; None where infinite."""
+        """Return the force [N] at the drive limit and the expected amplitude; None if it is infinite or zero."""
         speed = self.calibrated.amplitude_m * self.calibrated.omega_0
         force = float(self.damper.quasi_static_force(speed, limit))
         return force if math.isfinite(force) and force > 0.0 else None
@@ -207,7 +211,7 @@ def inverse_network(settings: ControllerSettings, trained: Callable[[], Artifact
     settings
         Of the controller.
     trained
-        Opens the artifact of `train-inverse`; not called where no network is needed.
+        Function that opens the artifact of `train-inverse`. It is called only if a network is needed.
     """
     return read_network(trained(), "network") if settings.inverse == "network" else None
 
@@ -215,15 +219,15 @@ def inverse_network(settings: ControllerSettings, trained: Callable[[], Artifact
 def expected_amplitude(damper: DamperModel, tested: Mapping[str, float], modes: LimitingModes) -> float:
     """Return the amplitude of the damper for which laws are calibrated [m].
 
-    Half the largest displacement of the bench tests, so that twice the amplitude is still known. Where the tests are
-    not known: the amplitude at which optimal viscous damping needs three times the residual force.
+    It is half the largest displacement of the bench tests, so that the model is still valid at twice the amplitude.
+    Without bench tests, it is the amplitude at which optimal viscous damping needs three times the residual force.
 
     Parameters
     ----------
     damper
         Model of the damper.
     tested
-        Largest |displacement| [m] of the bench tests, by `displacement`; empty where it is not known.
+        Largest |displacement| of the bench tests [m] under the key `displacement`; empty if it is not known.
     modes
         Of the target.
     """
@@ -246,18 +250,18 @@ def calibrated_from(
     friction_rounding_share: float = 1.0 / 6.0,
     reference: Network | None = None,
 ) -> Calibrated:
-    """Return a calibration in the form that the factory takes, without a file.
+    """Return a calibration in the form that :class:`ControllerFactory` reads, without a file.
 
     Parameters
     ----------
     calibration, weights, damper
-        What was calibrated.
+        Calibration of the laws, weights of the regulators, and model of the damper.
     amplitude_m
-        Expected amplitude of the damper.
+        Expected amplitude of the damper [m].
     friction_rounding_share
-        Speed over which friction changes its sign, over the peak speed at this amplitude.
+        Ratio of the speed over which friction changes its sign to the peak speed at this amplitude.
     reference
-        Network of laws that need one.
+        Network of the laws that need one.
     """
     return Calibrated(
         position=calibration.position,

@@ -1,4 +1,4 @@
-"""Gains of every law: by closed form, by the exact eigenvalue, or published ones."""
+"""Gains of every law: from closed forms, from exact eigenvalues, or from a publication."""
 
 from __future__ import annotations
 
@@ -21,31 +21,32 @@ from mrpipe.structures import Frame
 Source = Literal["exact", "closed-form", "published"]
 
 POSITIVE_SHARE, NEGATIVE_SHARE = 0.5, -0.8
-"""Stiffness of vdps and vdns over the static stiffness at the damper. At -1 the structure becomes unstable; the margin
-covers the error of an identified stiffness."""
+"""Ratio of the stiffness of vdps and of vdns to the static stiffness at the damper. At -1 the structure becomes
+unstable. The margin covers the error of an identified stiffness.
+"""
 
 
 @dataclass(frozen=True)
 class LawCalibration:
-    """One law.
+    """Calibration of one law.
 
     Attributes
     ----------
     law
         Name.
     gains
-        Those to run with.
+        Gains with which the law runs.
     candidates
         Source (`published`, `closed-form`, `closed-form-thesis`, `exact`) -> gains.
     damping_ratio_estimate, damping_ratio_exact
-        At `gains`: closed form P2 (7), and complex eigenvalue of the frame without its own damping; NaN where there is
-        none. Friction by its equivalent (4.24).
+        Damping ratio at `gains` by the closed form P2 (7), and by the complex eigenvalue of the frame without inherent
+        damping; NaN if the law has no such value. Friction is replaced by its equivalent (4.24).
     damping_ratio_with_frame
-        The exact one with the frame's own damping.
+        Exact damping ratio with the inherent damping of the frame.
     damping_ratio_clipped
-        Of the equivalent of the clipped law (laws with stiffness).
+        Damping ratio of the equivalent of the clipped law (laws with stiffness).
     unstable_pole_1_s
-        Largest real part of the unclipped loop's poles.
+        Largest real part of the poles of the loop without clipping [1/s].
     """
 
     law: str
@@ -60,14 +61,14 @@ class LawCalibration:
 
 @dataclass(frozen=True)
 class Calibration:
-    """All that calibrate finds.
+    """Result of :func:`calibrate`.
 
     Attributes
     ----------
     modes
         Limiting modes of the target.
     static_stiffness_n_m
-        At the damper: limit of negative stiffness.
+        Static stiffness of the structure at the damper [N/m], which is the limit of negative stiffness.
     laws
         Law -> its calibration.
     regulator_gain
@@ -87,27 +88,28 @@ class Calibration:
 
 
 _SETTINGS = CalibrationSettings()
-"""The defaults that the options share with the settings."""
+"""Source of the defaults, so that options and settings have the same ones."""
 
 
 @dataclass(frozen=True)
 class CalibrationOptions:
-    """What the laws are calibrated for.
+    """Options of the calibration of the laws.
 
     Attributes
     ----------
     mode
-        Target, from 1.
+        Number of the target mode, from 1.
     source
-        Which gains the laws run with.
+        Source of the gains with which the laws run.
     published
         Law -> published gains.
     positive_stiffness_n_m, negative_stiffness_n_m
-        k of vdps and vdns where c is calibrated for it; None: shares of the static stiffness at the damper.
+        k of vdps and of vdns, for which c is calibrated [N/m]; None: :data:`POSITIVE_SHARE` and :data:`NEGATIVE_SHARE`
+        of the static stiffness at the damper.
     overrides
-        Law -> gains given by the user, by name; the others are calibrated.
+        Law -> gains (name -> value) that the user gives; the other gains are calibrated.
     weights
-        Of laws that are designed by an optimum; None: from the frame.
+        Weights of the laws that are optimal regulators; None: :func:`balanced_weights` of the frame.
     """
 
     mode: int = _SETTINGS.target_mode
@@ -120,19 +122,20 @@ class CalibrationOptions:
 
 
 def balanced_weights(modes: limits.LimitingModes, residual_force_n: float = 0.0, **given: float) -> Weights:
-    """Return weights of energy and force that damp the target mode as viscous damping can at best.
+    """Return weights of energy and force that damp the target mode as much as optimal viscous damping.
 
-    For an oscillator of unit mass and the cost of its energy plus R u^2, where u acts through u_0, the regulator gives
-    the damping ratio u_0/(2 omega sqrt(2 R)) if it is small. R follows from the attainable damping ratio, P2 (14).
+    Consider an oscillator of unit mass on which the force u acts through u_0. For the cost of its energy plus R u^2,
+    the regulator gives the damping ratio u_0/(2 omega sqrt(2 R)) if this ratio is small. R follows from the attainable
+    damping ratio, P2 (14).
 
     Parameters
     ----------
     modes
         Limiting modes of the target.
     residual_force_n
-        Of the damper: the noise of its force.
+        Residual force of the damper [N], taken as the noise of its force.
     given
-        Weights that are known.
+        Weights that are given, by name; they replace the computed ones.
     """
     ratio = limits.attainable_damping(modes)
     force = given.get("energy", 1.0) * modes.u_0**2 / (8.0 * modes.omega_0**2 * ratio**2)
@@ -147,9 +150,9 @@ def calibrate(
     Parameters
     ----------
     frame, position, options
-        What is calibrated.
+        Structure, connectivity vector of the damper, and options of the calibration.
     laws
-        All laws if left out.
+        Laws to calibrate; None: all laws.
 
     Raises
     ------
@@ -177,7 +180,7 @@ def calibrate(
 
 
 def plant_of(frame: Frame, position: FloatArray, options: CalibrationOptions) -> Plant:
-    """Return what the laws are calibrated for.
+    """Return the structure, the modes and the weights for which the laws are calibrated.
 
     Raises
     ------
@@ -201,7 +204,7 @@ def plant_of(frame: Frame, position: FloatArray, options: CalibrationOptions) ->
 
 
 def calibrate_law(plant: Plant, law: Law, options: CalibrationOptions) -> LawCalibration:
-    """Return the gains of a law from every source, those to run with, and the damping that they give.
+    """Return the gains of a law from every source, the gains with which it runs, and the damping that these give.
 
     Raises
     ------
@@ -224,16 +227,16 @@ def validity_warnings(
     residual_force_n: float,
     largest_force_n: float,
 ) -> list[str]:
-    """Return what the user should know before running the laws, a sentence each.
+    """Return warnings about the calibrated laws, one sentence each.
 
     Parameters
     ----------
     calibration
         Of all laws.
     amplitude_m
-        Damper amplitude at which forces are judged.
+        Amplitude of the damper at which the forces are compared [m].
     residual_force_n, largest_force_n
-        Of the damper at that speed, at no drive and at its limit.
+        Force of the damper at the peak speed of this amplitude [N], without drive and at the drive limit.
     """
     said = []
     limit = calibration.static_stiffness_n_m
@@ -264,7 +267,7 @@ def validity_warnings(
 
 
 def needed_force(law: Law, gains: Gains, amplitude_m: float, omega: float) -> float:
-    """Return the largest force [N] that a law demands in harmonic motion of the damper; 0 for laws without such."""
+    """Return the largest force [N] of a law in harmonic motion; 0 if the law defines no harmonic force."""
     if law.harmonic_force is None:
         return 0.0
     phase = np.linspace(0.0, 2.0 * np.pi, 1441)

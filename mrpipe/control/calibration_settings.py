@@ -14,15 +14,20 @@ class NeuralReferenceSettings(Section):
 
     hidden: tuple[int, ...] = Field((6, 6), min_length=1, description="Neurons of the hidden layers.")
     past_values: int = Field(5, ge=0, le=20, description="Past values of displacement and velocity.")
-    rate_hz: float = Field(200.0, gt=0.0, description="Rate at which the past values lie.")
+    rate_hz: float = Field(200.0, gt=0.0, description="Sampling rate of the past values.")
     amplitudes: int = Field(
-        7, ge=2, description="Loops of how many amplitudes, from a fifth to twice the expected one."
+        7, ge=2, description="Number of amplitudes of the training loops, from a fifth of to twice the expected one."
     )
-    frequencies: int = Field(7, ge=2, description="Of how many frequencies, 0.625 to 1.6 times the free frequency.")
-    starts: int = Field(4, ge=1, description="Random starts of the training.")
-    iterations: int = Field(150, ge=1, description="Most Levenberg-Marquardt iterations of a start.")
+    frequencies: int = Field(
+        7,
+        ge=2,
+        description="Number of frequencies of the training loops, 0.625 to 1.6 times the natural frequency without "
+        "damper force.",
+    )
+    starts: int = Field(4, ge=1, description="Number of random starts of the training.")
+    iterations: int = Field(150, ge=1, description="Largest number of Levenberg-Marquardt iterations of a start.")
     disturbance_share: float = Field(
-        0.2, ge=0.0, description="Speed of the frame's other modes, put on the loops, over that of the loop."
+        0.2, ge=0.0, description="Speed of superimposed higher modes of the frame, relative to that of the loop."
     )
 
 
@@ -34,14 +39,17 @@ class RegulatorSettings(Section):
     force_weight: float | None = Field(
         None,
         gt=0.0,
-        description="Weight of the damper force squared [1/N2]; null: such that the regulator damps the target mode as "
-        "viscous damping can at best.",
+        description="Weight of the damper force squared [1/N2]; null: such that the regulator gives the target mode "
+        "the largest damping that viscous damping can give.",
     )
-    ground_noise_m_s2: float = Field(0.1, gt=0.0, description="Noise of the ground's accelerometer, with model error.")
+    ground_noise_m_s2: float = Field(
+        0.1, gt=0.0, description="Noise of the accelerometer of the ground, including model error."
+    )
     force_noise_n: float | None = Field(
         None,
         ge=0.0,
-        description="Difference of the damper's force from the desired one, as a noise; null: its residual force.",
+        description="Difference between damper force and desired force, taken as noise; null: residual force of the "
+        "damper.",
     )
 
     def known(self) -> dict[str, float]:
@@ -57,12 +65,12 @@ class RegulatorSettings(Section):
 
 
 class CalibrationSettings(Section):
-    """What the laws are calibrated for, and the gains they run with."""
+    """Operating conditions for which the laws are calibrated, and the gains that are used."""
 
     target_mode: int = Field(1, ge=1, description="Mode to be damped.")
     gains: Literal["exact", "closed-form", "published"] = Field(
         "exact",
-        description="Gains the laws run with: the exact optimum, the closed forms of P2, or those of `published`; laws "
+        description="Gains that are used: the exact optimum, the closed forms of P2, or those of `published`; laws "
         "without published gains take the exact optimum.",
     )
     published: dict[str, dict[str, float]] = Field({}, description="Gains of a publication: law -> gain -> value.")

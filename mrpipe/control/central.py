@@ -1,4 +1,4 @@
-"""One regulator and one observer for several dampers, with the sensors that are there (LQG, thesis appendix E)."""
+"""One regulator and one observer for several dampers, with any set of sensors (LQG, thesis appendix E)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from mrpipe.errors import UserError
 from mrpipe.structures import Frame, discretise_zero_order, state_space
 
 MODEL_NOISE_SHARE = 0.05
-"""Noise on the velocity of every degree of freedom over that of the ground. It keeps the observer awake in modes that
-the ground hardly excites."""
+"""Ratio of the noise on the velocity of every degree of freedom to that of the ground. It keeps the gain of the
+observer above zero in modes that the ground hardly excites.
+"""
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the observer reads in addition to the ground acceleration.
+    """Sensors that the observer reads in addition to the ground acceleration.
 
     Attributes
     ----------
@@ -39,16 +40,20 @@ class Sensors:
 
 @dataclass(frozen=True)
 class CentralRegulator:
-    """z+ = F z + G f + H y and desired forces -K z, with y = [ground, damper displacements, accelerations].
+    """Regulator z+ = F z + G f + H y with the desired forces -K z.
+
+    The measurements are y = [ground acceleration, displacements of the dampers, floor accelerations].
 
     Attributes
     ----------
     transition, force_input, innovation, gain
-        F (2n, 2n), G (2n, k), H (2n, 1 + p), K (k, 2n); k dampers, p further sensors.
+        F (2n, 2n), G (2n, k), H (2n, 1 + p), K (k, 2n) for n degrees of freedom, k dampers, and p sensors in addition
+        to the ground acceleration.
     sensors
-        Order of the readings after the ground acceleration: displacements of the dampers, then accelerometers.
+        Sensors. The order of their readings after the ground acceleration is: displacements of the dampers, then
+        accelerometers.
     sample_time_s
-        Interval that it was made for [s].
+        Sampling interval for which the regulator was computed [s].
     """
 
     transition: FloatArray
@@ -70,13 +75,13 @@ def central_regulator(
     Parameters
     ----------
     frame
-        The structure, with the linear equivalents of other dampers.
+        Structure, including the linear equivalents of the other dampers.
     positions
-        W, shape (n, k).
+        Connectivity matrix W of the dampers, shape (n, k).
     weights
-        Of each damper.
+        Weights of each damper.
     sensors
-        What is measured.
+        Sensors that the observer reads.
     dt
         Sampling interval [s].
 
@@ -128,7 +133,7 @@ def central_regulator(
 
 @njit(LAW_SIGNATURE, cache=True)
 def requested_force(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:  # noqa: ARG001
-    """Return the force that the central regulator asked this damper for."""
+    """Return the force [N] that the central regulator requests from this damper."""
     return state[S_REQUEST]
 
 

@@ -1,6 +1,6 @@
-"""A controller as plain arrays: built here, run by :func:`mrpipe.control.kernel.controller_step`.
+"""Construction of a controller as plain arrays, which :func:`mrpipe.control.kernel.controller_step` runs.
 
-What the closed loop, the virtual laboratory, the tracing of effects and the C export all use::
+The closed loop, the virtual laboratory, the tracing of effects and the C export use the same arrays::
 
     controller = build_controller("fdns", Gains(alpha_n_m=3000.0), ControllerOptions(rate_hz=200.0), inverse=network)
     state = controller.new_state()
@@ -43,52 +43,55 @@ _LARGEST_FORCE_N = 1e9
 
 
 _SETTINGS = ControllerSettings()
-"""The defaults that the options share with the settings."""
+"""Source of the defaults, so that options and settings have the same ones."""
 
 
 @dataclass(frozen=True)
 class ControllerOptions:
-    """How the controller runs.
+    """Options of the controller.
 
     Attributes
     ----------
     rate_hz
-        Its sampling rate (the thesis prints 200 and 500 Hz).
+        Sampling rate [Hz] (200 and 500 in the thesis).
     velocity
         `kalman` (5.1 to 5.3), `measured` (a perfect velocity sensor) or `difference` (backward difference).
     displacement_noise_m, acceleration_noise_m_s2
         RMS noise that the Kalman filter assumes.
     bias_drift_m_s2
-        Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.
+        Drift of the bias of the accelerometer per second that the filter follows [m/s^2]; 0: no bias state.
     inverse_request
-        What the past values of an inverse network are: `steady`, the present ones, that is the drive that would hold
-        this force at this speed; or `history`, the forces desired before. A network has learned from measured forces,
-        which build up over the yield displacement after a reversal. A desired force jumps there.
+        Past values of an inverse network. `steady`: the present values, so that the network gives the drive that would
+        hold this force at this speed. `history`: the forces that were desired before. A network was trained on measured
+        forces, which build up over the yield displacement after a reversal, whereas a desired force jumps at a
+        reversal.
     residual_force_n
-        Switch P2 (24): below it the drive is 0; 0 leaves the switch out.
+        Switch P2 (24): below this desired force [N] the drive is 0; 0: no switch.
     low_pass_hz
-        Second-order Butterworth low-pass on the drive; None leaves it out.
+        Cut-off of the second-order Butterworth low-pass on the drive [Hz]; None: no low-pass.
     drive_limit
-        Largest drive; that of the inverse or the damper where None.
+        Largest drive [A or V]; None: that of the inverse or of the damper.
     dead_band_m_s
-        Speed below which the direction of motion is taken to be unchanged.
+        Speed below which the direction of motion is kept [m/s].
     friction_rounding_m_s
-        Speed over which the friction of fdns changes its sign, tanh(v/v0); 0: the jump of (4.18), which makes the loop
-        chatter on the noise of the velocity.
+        Speed v0 over which the friction of fdns changes its sign, tanh(v/v0) [m/s]; 0: the jump of (4.18), with which
+        the noise of the velocity makes the force chatter.
     extremum_step_m, extremum_share
-        How far the displacement must come back from an extremum to make it count: metres, or share of the amplitude.
+        Distance by which the displacement must return from an extremum before it counts: in metres, or as share of the
+        amplitude.
     extremum_memory_s
-        After this time without a new extremum the pending one counts; three quarters of a period suits.
+        Time after which a pending extremum is confirmed even if the displacement does not return [s]; three quarters of
+        a period is suitable.
 
     largest_displacement_m, largest_velocity_m_s, largest_acceleration_m_s2, largest_force_n
         Largest plausible readings; larger ones and those that are not finite are refused. None: what a sensor of
         :data:`DYNAMIC_RANGE` can read.
     saturation_force_n
-        Largest force of the damper; None: not known.
+        Largest force of the damper [N]; None: not known.
     fault_hold_s
-        How long a refused reading is replaced by the last good one before the drive goes to `safe_drive`.
+        Time [s] for which a refused reading is replaced by the last good one before the drive is set to `safe_drive`.
     safe_drive
-        Drive while the readings cannot be used.
+        Drive while the readings cannot be used [A or V].
     """
 
     rate_hz: float = 200.0
@@ -116,7 +119,7 @@ class ControllerOptions:
 
 @dataclass(frozen=True)
 class Controller:
-    """A controller ready to run.
+    """Controller as a compiled force and plain arrays.
 
     Attributes
     ----------
@@ -127,13 +130,13 @@ class Controller:
     numbers, layout
         Arrays for :func:`~mrpipe.control.kernel.controller_step`.
     gains, options
-        What it was built from.
+        Gains and options from which it was built.
     floors
-        Floors whose accelerometers it reads, else 0.
+        Number of floors whose accelerometers it reads; 0: it reads none.
     networks
-        `inverse` and `law`, where there are such, in the form in which they are evaluated.
+        Networks `inverse` and `law`, if present, in the form in which they are evaluated.
     details
-        More about how it was built, for tables and JSON.
+        Further facts about the controller, for tables and JSON.
     """
 
     law: str
@@ -153,21 +156,21 @@ class Controller:
 
     @property
     def sample_time_s(self) -> float:
-        """Interval between calls."""
+        """Interval between calls [s]."""
         return 1.0 / self.options.rate_hz
 
     @property
     def state_size(self) -> int:
-        """Length of its memory."""
+        """Length of its state array."""
         return int(self.layout[kernel.STATE_SIZE])
 
     @property
     def measured_size(self) -> int:
-        """Length that the array of measurements must have at least."""
+        """Smallest length of the array of measurements."""
         return kernel.MEASURED_FLOORS + self.floors
 
     def new_state(self) -> FloatArray:
-        """Return a fresh memory."""
+        """Return a state array of zeros for the first call."""
         return np.zeros(self.state_size)
 
 
@@ -181,7 +184,7 @@ def build_controller(
     observer: Observer | None = None,
     position: FloatArray | None = None,
 ) -> Controller:
-    """Pack a controller.
+    """Return the controller of a law, packed into arrays.
 
     Parameters
     ----------
@@ -190,20 +193,22 @@ def build_controller(
     gains
         Of the law.
     options
-        How it runs.
+        Options of the controller.
     inverse
-        From desired force to drive: a network as P2 (23) or a table; None for a damper that tracks perfectly.
+        Inverse from desired force to drive: a network as P2 (23), or a table; None: a damper that tracks the desired
+        force perfectly.
     reference
-        For a law that needs a network: from displacement and velocity to force (4.3.4).
+        Network from displacement and velocity to force (4.3.4), for a law that needs one.
     observer
-        For a law that needs an observer.
+        Observer, for a law that needs one.
     position
         Connectivity vector w of the damper, shape (n,), for a law that reads the accelerometers of the floors.
 
     Raises
     ------
     UserError
-        If the law is unknown or lacks its gains, network or observer, or the low-pass lies above half the rate.
+        If the law is unknown, if its gains, network or observer are missing, or if the cut-off of the low-pass is above
+        half the sampling rate.
     """
     entry = law_named(law) if isinstance(law, str) else law
     _check_parts(entry, gains, reference, observer, position)
@@ -255,7 +260,7 @@ def _check_parts(
 
 
 class _Pack:
-    """Lays the parts of a controller end to end."""
+    """Appends the parts of a controller to its arrays."""
 
     def __init__(self, options: ControllerOptions) -> None:
         self.options = options
@@ -283,7 +288,7 @@ class _Pack:
 
     @property
     def at(self) -> int:
-        """Where the next block of numbers begins."""
+        """Index at which the next block of numbers begins."""
         return sum(len(block) for block in self.numbers)
 
     def table(self, table: InverseTable) -> None:
@@ -296,7 +301,7 @@ class _Pack:
         self.numbers.append(np.ravel(table.forces))
 
     def network(self, network: Network, slot: int, spacing_slot: int) -> int:
-        """Add a network; return how long the histories must be."""
+        """Add a network and return the length of the histories that it needs."""
         spec = network.features
         unknown = [name for name in spec.channels if name not in _CHANNELS]
         if unknown or spec.past_target or len(spec.channels) > 4:
@@ -326,7 +331,7 @@ class _Pack:
         return int(np.ceil(spec.past_values * spacing)) + 2
 
     def observer(self, observer: Observer) -> int:
-        """Add an observer; return the number of floors it reads."""
+        """Add an observer and return the number of floors that it reads."""
         if abs(observer.sample_time_s * self.options.rate_hz - 1.0) > 1e-9:
             raise UserError("control law", "observer", "was made for another rate", "calibrate at this rate")
         self.layout[kernel.AT_OBSERVER] = self.at
@@ -381,7 +386,7 @@ def _largest_readings(options: ControllerOptions, law: Law, floors: int) -> Floa
 
 
 def _low_pass(options: ControllerOptions) -> FloatArray:
-    """Return b0, b1, b2, a1, a2 of the Butterworth low-pass at the controller's rate."""
+    """Return the coefficients b0, b1, b2, a1, a2 of the Butterworth low-pass at the rate of the controller."""
     if options.low_pass_hz is None:
         return np.array([1.0, 0.0, 0.0, 0.0, 0.0])
     if options.low_pass_hz >= 0.5 * options.rate_hz:

@@ -1,4 +1,4 @@
-"""The exact complex eigenvalue of frame and linear device: damping, its optimum, maps over the gains."""
+"""Exact complex eigenvalue of a frame with a linear device: damping, optimal gain, maps over the gains."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from mrpipe.control.limits import FRICTION_RATIO, LimitingModes
 from mrpipe.structures import Frame, state_space
 
 CONTINUATION_STEPS = 24
-"""Steps in which the device is faded in to follow the target's eigenvalue."""
+"""Number of steps in which the device is increased from zero, in order to follow the eigenvalue of the target mode."""
 
 
 @dataclass(frozen=True)
 class ExactDamping:
-    """The target mode of frame and device.
+    """Target mode of a frame with a device.
 
     Attributes
     ----------
     pole
-        s [rad/s].
+        Pole s of the target mode [rad/s].
     unstable_pole
-        Largest real part of all poles [rad/s].
+        Largest real part of all poles [1/s].
     """
 
     pole: complex
@@ -34,12 +34,12 @@ class ExactDamping:
 
     @property
     def stable(self) -> bool:
-        """No pole grows."""
+        """Whether no pole has a positive real part."""
         return self.unstable_pole < 1e-9
 
     @property
     def damping_ratio(self) -> float:
-        """-Re s/|s| of the target; of the worst pole (negative) where the structure is statically unstable."""
+        """-Re s/|s| of the target mode [1]; -1 if a pole grows and the pole of the target mode is real."""
         if not self.stable and abs(self.pole.imag) < 1e-9:
             return -1.0
         return float(-self.pole.real / max(abs(self.pole), 1e-300))
@@ -52,7 +52,7 @@ def _poles(frame: Frame, position: FloatArray, c: float, k: float) -> NDArray[np
 
 
 def exact_damping(frame: Frame, position: FloatArray, modes: LimitingModes, c: float, k: float) -> ExactDamping:
-    """Follow the target's eigenvalue while the linear device f = c v + k x is faded in.
+    """Follow the eigenvalue of the target mode while the linear device f = c v + k x increases from zero.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def exact_damping(frame: Frame, position: FloatArray, modes: LimitingModes, c: f
     modes
         The target.
     c, k
-        Of the device [N s/m], [N/m].
+        Viscosity [N s/m] and stiffness [N/m] of the device.
     """
     pole = complex(0.0, modes.omega_0)
     poles = np.zeros(0, dtype=np.complex128)
@@ -76,7 +76,7 @@ def exact_damping(frame: Frame, position: FloatArray, modes: LimitingModes, c: f
 
 
 def exact_equivalent(frame: Frame, position: FloatArray, modes: LimitingModes, H: complex) -> ExactDamping:
-    """Follow the target's eigenvalue with a device of constant complex stiffness f = H x.
+    """Follow the eigenvalue of the target mode with a device of constant complex stiffness f = H x.
 
     This is the equivalent of a law whose loop does not depend on frequency, such as FDNS (4.24); the eigenvalues are
     those of (K + H w w' + i omega C - omega^2 M) u = 0 with Re omega > 0, so that s = i omega.
@@ -104,30 +104,30 @@ def exact_equivalent(frame: Frame, position: FloatArray, modes: LimitingModes, H
 
 
 def exact_friction(frame: Frame, position: FloatArray, modes: LimitingModes, alpha: float) -> ExactDamping:
-    """Return the target's eigenvalue with the equivalent of FDNS, H = alpha (i 4/pi - 1) (4.24)."""
+    """Return the eigenvalue of the target mode with the equivalent of fdns, H = alpha (i 4/pi - 1) (4.24)."""
     return exact_equivalent(frame, position, modes, alpha * complex(-1.0, FRICTION_RATIO))
 
 
 def stable_ratio(answer: ExactDamping) -> float:
-    """Return the damping ratio; -1 where a pole grows, so that a search for the best gain avoids it."""
+    """Return the damping ratio; -1 if a pole grows, so that a search for the best gain avoids this gain."""
     return answer.damping_ratio if answer.stable else -1.0
 
 
 def undamped(frame: Frame) -> Frame:
-    """Return the frame without its own damping: what the closed forms and the printed figures are about."""
+    """Return the frame without inherent damping, because the closed forms and the figures of the thesis assume none."""
     return replace(frame, damping=np.zeros_like(frame.damping))
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """Gain of largest exact damping and that damping ratio."""
+    """Gain with the largest exact damping ratio, and this damping ratio."""
 
     gain: float
     damping_ratio: float
 
 
 def best_gain(damping_ratio: Callable[[float], float], largest: float) -> Optimum:
-    """Return the gain within (0, largest) of largest damping ratio: a scan, then Brent's method around its best."""
+    """Return the gain between 0 and `largest` with the largest damping ratio, by a scan and then Brent's method."""
     scan = np.linspace(largest / 40.0, largest, 40)
     values = [damping_ratio(float(gain)) for gain in scan]
     best = int(np.argmax(values))

@@ -1,4 +1,4 @@
-"""The numbers by which a control law can be tuned."""
+"""Gains of a control law."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ NAMES = ("c_n_s_m", "k_n_m", "alpha_n_m")
 """Gains with a fixed place in the compiled controller: viscosity, stiffness, friction with negative stiffness."""
 
 GainsSource = Literal["calibrated", "design"]
-"""Where the gains of the laws come from: the stage `calibrate`, or the search of the stage `design`."""
+"""Source of the gains of the laws: the stage `calibrate`, or the search of the stage `design`."""
 
 
 class Gains(Mapping[str, float]):
-    """Gains of a law by name; a name ends in its unit. A gain that was not given is 0.
+    """Gains of a law by name. A name ends in its unit. A gain that is not given is 0.
 
-    The three common ones are attributes: f = c v + k x (4.14), and f = sign(v) alpha X - alpha x (4.18) with (4.20). A
-    law may declare further ones, such as a weight.
+    The three common gains are attributes: f = c v + k x (4.14), and f = sign(v) alpha X - alpha x (4.18) with (4.20). A
+    law may declare further gains, such as a weight.
     """
 
     __slots__ = ("_values",)
@@ -56,5 +56,5 @@ class Gains(Mapping[str, float]):
         return self._values["alpha_n_m"]
 
     def changed(self, **values: float) -> Gains:
-        """Return the gains with some of them replaced."""
+        """Return the gains with the given ones replaced."""
         return Gains(**{**self._values, **values})

@@ -1,4 +1,4 @@
-"""The inverse of a parametric damper as a table: the drive at which the post-yield force has a given size."""
+"""Inverse of a parametric damper as a table: the drive at which the post-yield force has a given magnitude."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from mrpipe.errors import UserError
 
 @dataclass(frozen=True)
 class InverseTable:
-    """Post-yield force over speed and drive, both from zero in equal steps.
+    """Post-yield force on a grid of speed and drive, both in equal steps from zero.
 
     Attributes
     ----------
     forces
-        Shape (speeds, drives) [N], rising along the drive.
+        Forces, shape (speeds, drives) [N]; they increase with the drive.
     largest_speed_m_s, largest_drive
-        Of the last row and column (m/s; A or V).
+        Speed of the last row [m/s] and drive of the last column [A or V].
     """
 
     forces: FloatArray
@@ -43,9 +43,9 @@ def inverse_table(
     damper
         The model to be inverted.
     largest_speed_m_s, speeds, drives
-        Range in speed and number of points; faster motion is treated as that speed.
+        Largest speed [m/s] and numbers of points in speed and drive. The table treats a faster motion as this speed.
     drive_limit
-        Largest drive; that of the damper if left out.
+        Largest drive [A or V]; None: that of the damper.
 
     Raises
     ------
@@ -54,14 +54,14 @@ def inverse_table(
     """
     limit = damper.drive_limit if drive_limit is None else min(drive_limit, damper.drive_limit)
     if not np.isfinite(limit) or limit <= 0.0:
-        raise UserError("damper", "drive_limit", f"is {limit:g}", "give the largest drive the damper takes")
+        raise UserError("damper", "drive_limit", f"is {limit:g}", "give the largest drive of the damper")
     speed = np.linspace(0.0, largest_speed_m_s, speeds)
-    # the hysteresis carries its yield force at rest too: the sign of a tiny speed is enough
+    # the hysteretic element has its yield force at rest as well, so that the sign of a tiny speed is sufficient
     speed[0] = 1e-9
     drive = np.linspace(0.0, limit, drives)
     forces = np.asarray(damper.quasi_static_force(speed[:, None], drive[None, :]))
     moving = forces[1:]
     if not np.all(moving[:, -1] > moving[:, 0]):
         raise UserError("damper", "force", "does not rise with the drive", "a constant damper has no inverse")
-    # a fitted cubic may sag near an end; the inverse takes the smallest drive that gives the force
+    # a fitted cubic may decrease near an end; the inverse is the smallest drive that gives the force
     return InverseTable(np.maximum.accumulate(forces, axis=1), largest_speed_m_s, float(limit))

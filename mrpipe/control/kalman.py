@@ -1,4 +1,4 @@
-"""Gains of the kinematic Kalman filter: velocity from displacement and acceleration (thesis 5.2)."""
+"""Gains of the kinematic Kalman filter, which estimates velocity from displacement and acceleration (thesis 5.2)."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ def kalman_gains(
 ) -> FloatArray:
     """Return the steady gains on displacement [1], velocity [1/s] and acceleration bias [1/s^2], shape (3,).
 
-    The filter runs on samples: x- = x + dt v + dt2/2 (a - b), v- = v + dt (a - b), where a is the mean of the
-    acceleration over the interval. For short intervals gains/dt tend to those of :func:`continuous_kalman_gains`.
+    The filter is discrete: x- = x + dt v + dt2/2 (a - b), v- = v + dt (a - b), where a is the mean of the acceleration
+    over the interval. For short intervals gains/dt tend to those of :func:`continuous_kalman_gains`.
 
     Parameters
     ----------
     displacement_noise_m, acceleration_noise_m_s2
-        RMS noise of a sample of each sensor.
+        RMS noise of a sample of each sensor [m], [m/s^2].
     dt
         Interval [s].
     bias_drift_m_s2
-        How far the accelerometer's bias wanders in a second; 0 leaves the bias out.
+        Drift of the bias of the accelerometer per second [m/s^2]; 0: no bias state.
     """
     size = 3 if bias_drift_m_s2 > 0.0 else 2
     A = np.eye(size)

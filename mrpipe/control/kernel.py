@@ -17,7 +17,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 
 # --- measured: the readings of the sensors at this instant ---
 MEASURED_DISPLACEMENT = 0  # of the damper [m]
-MEASURED_ACCELERATION = 1  # of the damper: floor less ground, both as accelerometers give them [m/s^2]
+MEASURED_ACCELERATION = 1  # of the damper: floor minus ground, both as absolute accelerations [m/s^2]
 MEASURED_VELOCITY = 2  # m/s; read only where the controller was built with velocity="measured"
 MEASURED_GROUND = 3  # ground acceleration [m/s^2]; read only by laws that need the accelerometers
 MEASURED_FORCE = 4  # damper force, positive where it resists [N]; read only by laws that need it
@@ -37,7 +37,7 @@ COMMAND_FAULT = 9  # 0; 1 while a refused reading is replaced by the last good o
 COMMAND_SIZE = 12
 
 # --- layout ---
-OUTPUT = 0  # whether the law gives a force, or the drive itself
+OUTPUT = 0  # whether the output of the law is a force or the drive
 INVERSE = 1
 VELOCITY_SOURCE = 2
 FLOORS = 3
@@ -56,7 +56,7 @@ STATE_LAW = 15  # where in `state` the memory of the law is
 AT_LIMITS = 16  # where in `numbers` the largest plausible readings are; 0: not read
 STATE_GOOD = 17  # where in `state` the last good readings are
 CHANNELS = 18  # number of measurements
-HOLD = 19  # samples for which a refused reading is replaced by the last good one
+HOLD = 19  # number of samples for which the last good reading replaces a refused one
 LAYOUT_SIZE = 24
 # a network in `layout`: layers, then neurons of each (input included), channels, past values, absolute, channel codes
 NET_AT = 0  # where in `numbers`
@@ -78,22 +78,23 @@ GAIN_C = 1
 GAIN_K = 2
 GAIN_ALPHA = 3
 RESIDUAL_FORCE = 4
-DRIVE_LIMIT = 5  # largest drive; 1e300 where there is none
+DRIVE_LIMIT = 5  # largest drive; 1e300 if there is no limit
 KALMAN = 7  # three gains: displacement, velocity, bias
 DEAD_BAND = 10
 EXTREMUM_STEP = 11
 EXTREMUM_SHARE = 12
 LOW_PASS = 13  # b0, b1, b2, a1, a2
 INVERSE_SPACING = 18  # samples between past values of the inverse network
-LAW_SPACING = 19  # the same for the network of the law
+LAW_SPACING = 19  # samples between past values of the network of the law
 TABLE_SPEED = 20  # largest speed of the inverse table [m/s]
 TABLE_DRIVE = 21  # largest drive of the inverse table
 ROUNDING = 22  # speed over which the friction of fdns changes its sign [m/s]; 0: a jump
-MEMORY = 23  # how long an extremum counts [s]
+MEMORY = 23  # time for which an extremum is valid [s]
 SAFE_DRIVE = 24  # drive while the readings cannot be used
-LARGEST_FORCE = 25  # of the damper [N]; 1e300 where it is not known
+LARGEST_FORCE = 25  # largest force of the damper [N]; 1e300 if it is not known
 HEAD = 32
-# a network in `numbers`: input scale, input shift, output scale, output shift, then weights by row and biases a layer
+# a network in `numbers`: input scale, input shift, output scale, output shift, then for each layer the weights by row
+# and the biases
 
 # --- state ---
 S_STARTED = 0
@@ -109,26 +110,26 @@ S_FILTER = 9  # two
 S_FORCE = 11  # last desired force
 S_DISPLACEMENT = 12  # last measured displacement
 S_AGE = 13  # time since the last extremum
-S_REQUEST = 14  # drive that a law commands itself
+S_REQUEST = 14  # drive that a law commands directly
 S_FAULTS = 15  # samples in a row with a refused reading
 S_READY = 16  # 1 after the first sample whose readings were all good
 S_HEAD = 24
 
-WIDEST = 256  # neurons of a layer, several networks side by side included
+WIDEST = 256  # largest number of neurons of a layer, summed over networks that are evaluated together
 
 LAW_SIGNATURE = float64(float64[::1], int64[::1], float64[::1], float64[::1])
-"""Of the compiled force of a law: numbers, layout, state, measured -> desired force before clipping [N]."""
+"""Signature of the compiled force of a law: numbers, layout, state, measured -> desired force before clipping [N]."""
 
 LAW_FUNCTION = types.FunctionType(LAW_SIGNATURE)
-"""The compiled type of such a function, for the signatures of kernels that call it."""
+"""Compiled type of such a function, for the signatures of kernels that call it."""
 
 
 @njit(int64(float64[::1], int64[::1], float64[::1], float64[::1]), cache=True)
 def _guard(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> int:
-    """Take over the plausible readings; return 0 if all are, 1 while others are held, 2 if the drive must be safe.
+    """Store the plausible readings; return 0 if all are plausible, 1 while some are held, 2 for the safe drive.
 
-    A reading is refused if it is not finite or larger than its limit. After the safe drive the controller starts anew,
-    because its memory ends before the gap.
+    A reading is refused if it is not finite or larger than its limit. After the safe drive the controller is reset,
+    because its state dates from before the gap.
     """
     at, limits, refused = layout[STATE_GOOD], layout[AT_LIMITS], False
     for channel in range(layout[CHANNELS]):
@@ -154,7 +155,7 @@ def _guard(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: F
 
 @njit(void(float64[::1], float64[::1], float64[::1], int64), cache=True)
 def _estimate(numbers: FloatArray, state: FloatArray, measured: FloatArray, source: int) -> None:
-    """Kinematic Kalman filter (5.1) to (5.3) with acceleration input and bias, or what stands for it."""
+    """Estimate the velocity: kinematic Kalman filter (5.1) to (5.3) with bias, backward difference, or sensor."""
     x, a, dt = measured[MEASURED_DISPLACEMENT], measured[MEASURED_ACCELERATION], numbers[SAMPLE_TIME]
     if state[S_STARTED] < 0.5:
         state[S_X], state[S_V], state[S_BIAS], state[S_ACCELERATION] = x, 0.0, 0.0, a
@@ -179,7 +180,7 @@ def _estimate(numbers: FloatArray, state: FloatArray, measured: FloatArray, sour
 
 @njit(void(float64[::1], float64[::1]), cache=True)
 def _follow_motion(numbers: FloatArray, state: FloatArray) -> None:
-    """Direction of motion with a dead band, and the most recent extremum of displacement, robust to noise.
+    """Update the direction of motion, with a dead band, and the most recent extremum of displacement.
 
     An extremum counts once the displacement has come back from it by a step well above the noise.
     """
@@ -202,7 +203,7 @@ def _follow_motion(numbers: FloatArray, state: FloatArray) -> None:
         state[S_EXTREME] = x
         state[S_AGE] = 0.0
     elif state[S_AGE] > numbers[MEMORY]:
-        # a damper that sticks shows no extremum: without this the last one would keep it locked
+        # a damper that sticks has no extremum: without this rule the last extremum would keep the damper locked
         state[S_AMPLITUDE] = abs(state[S_EXTREME])
         state[S_SEEKING] = 1.0 if v >= 0.0 else -1.0
         state[S_EXTREME] = x
@@ -211,7 +212,7 @@ def _follow_motion(numbers: FloatArray, state: FloatArray) -> None:
 
 @njit(void(int64[::1], float64[::1], float64, float64, float64, float64), cache=True)
 def _remember(layout: IntArray, state: FloatArray, x: float, v: float, a: float, force: float) -> None:
-    """Push the present values onto the histories (newest first); the first call fills them."""
+    """Prepend the present values to the histories (newest first); the first call fills the histories."""
     length = layout[HISTORY]
     for channel in range(4):
         at = layout[STATE_HISTORY] + channel * length
@@ -320,7 +321,7 @@ def controller_step(
         Its memory: zeros before the first call (:meth:`Controller.new_state`).
     measured
         Shape (5 + floors,), filled by the caller; indices MEASURED_...: damper displacement [m], damper acceleration
-        (absolute floor acceleration less ground acceleration) [m/s^2], damper velocity [m/s] (only for
+        (absolute floor acceleration minus ground acceleration) [m/s^2], damper velocity [m/s] (only for
         velocity="measured"), and for laws that need them: ground acceleration [m/s^2], damper force [N], absolute
         accelerations of the floors [m/s^2].
     command
@@ -362,7 +363,7 @@ def controller_step(
     if switched:
         drive = 0.0
     if state[S_STARTED] < 0.5 and direct:
-        # a passive damper was at its drive before the start: the low-pass starts in equilibrium
+        # a passive damper has its drive before the start, so that the low-pass starts in equilibrium
         state[S_FILTER] = drive * (1.0 - numbers[LOW_PASS])
         state[S_FILTER + 1] = drive * (numbers[LOW_PASS + 2] - numbers[LOW_PASS + 4])
     filtered = numbers[LOW_PASS] * drive + state[S_FILTER]

@@ -1,4 +1,4 @@
-"""What a control law is: one entry with its gains, calibration, checks, compiled force and C code."""
+"""Definition of a control law: one entry with its gains, calibration, checks, compiled force and C code."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mrpipe.structures import Frame
 
 Need = Literal["network", "observer", "floor-accelerations", "damper-force", "drive-limit"]
-"""What a law may need in addition to the motion of the damper.
+"""Needs that a law may have in addition to the motion of the damper.
 
 `network`: the trained reference network. `observer`: a state observer, which reads all accelerometers.
 `floor-accelerations`: the accelerometers of ground and floors. `damper-force`: a load cell at the damper.
@@ -26,18 +26,18 @@ Need = Literal["network", "observer", "floor-accelerations", "damper-force", "dr
 
 @dataclass(frozen=True)
 class GainRange:
-    """One free gain of a law.
+    """Free gain of a law.
 
     Attributes
     ----------
     name
-        With its unit, such as `c_n_s_m`.
+        Name with its unit, such as `c_n_s_m`.
     meaning
-        In a few words.
+        Meaning in a few words.
     bounds
-        From a plant to the smallest and largest value that a search for the best gain should try.
+        Function from a plant to the smallest and the largest value in a search for the best gain.
     optional
-        The gain may be 0.
+        Whether the gain may be 0.
     """
 
     name: str
@@ -48,22 +48,22 @@ class GainRange:
 
 @dataclass(frozen=True)
 class Plant:
-    """What a law is calibrated for.
+    """Plant for which a law is calibrated.
 
     Attributes
     ----------
     frame, bare
-        The structure, with and without its own damping.
+        Structure with and without its inherent damping.
     position
         Connectivity vector w of the damper, shape (n,).
     modes
         Limiting modes of the target.
     static_stiffness_n_m
-        Of the structure at the damper: the limit of negative stiffness.
+        Static stiffness of the structure at the damper [N/m], which is the limit of negative stiffness.
     stiffness_n_m
-        Stiffness k at which laws with stiffness are calibrated, by law.
+        Law -> stiffness k for which a law with stiffness is calibrated [N/m].
     weights
-        Of laws that are designed by an optimum.
+        Weights of the laws that are optimal regulators.
     """
 
     frame: Frame
@@ -82,13 +82,14 @@ class Assessment:
     Attributes
     ----------
     damping_ratio_estimate
-        Closed form P2 (7).
+        Damping ratio by the closed form P2 (7).
     damping_ratio_exact, damping_ratio_with_frame
-        Complex eigenvalue of the frame without and with its own damping. Friction by its equivalent (4.24).
+        Damping ratio by the complex eigenvalue of the frame without and with inherent damping. Friction is replaced by
+        its equivalent (4.24).
     damping_ratio_clipped
-        Of the equivalent of the clipped law.
+        Damping ratio of the equivalent of the clipped law.
     unstable_pole_1_s
-        Largest real part of the poles of the unclipped loop.
+        Largest real part of the poles of the loop without clipping [1/s].
     """
 
     damping_ratio_estimate: float = float("nan")
@@ -99,21 +100,21 @@ class Assessment:
 
 
 HarmonicForce = Callable[[Gains, FloatArray, FloatArray, float], FloatArray]
-"""From gains, displacement (n,) [m], velocity (n,) [m/s] and amplitude [m] to the desired force (n,) [N]."""
+"""Function from gains, displacement (n,) [m], velocity (n,) [m/s] and amplitude [m] to the desired force (n,) [N]."""
 
 
 def no_candidates(_: Plant) -> Mapping[str, Gains]:
-    """Return no calibrated gains: for laws without gains."""
+    """Return no candidates, for laws without gains."""
     return {}
 
 
 def no_assessment(_: Plant, __: Gains) -> Assessment:
-    """Return no damping: for laws that have no linear equivalent."""
+    """Return no damping ratios, for laws that have no linear equivalent."""
     return Assessment()
 
 
 def no_numbers(_: Gains, __: FloatArray | None, ___: float) -> FloatArray:
-    """Return no further numbers for the compiled law."""
+    """Return an empty array, for compiled laws without further numbers."""
     import numpy as np
 
     return np.zeros(0)
@@ -121,48 +122,50 @@ def no_numbers(_: Gains, __: FloatArray | None, ___: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Law:
-    """One control law.
+    """Control law.
 
     Attributes
     ----------
     name
-        As on the command line; the file's name with hyphens.
+        Name on the command line: the name of the file with hyphens.
     summary
-        One line.
+        Description in one line.
     source
         Equation of the thesis or paper.
     force
         Compiled with :data:`~mrpipe.control.kernel.LAW_SIGNATURE`: numbers, layout, state and measurements to the
         desired force [N] before clipping. A law that commands the drive writes it into `state[S_REQUEST]`.
     c_body
-        The same as the body of the C function `double law(double *state, const double *measured)`.
+        The same force as the body of the C function `double law(double *state, const double *measured)`.
     c_helpers
         C functions that `c_body` calls.
     output
         `force`: the inverse of the damper turns the force into a drive. `drive`: the law commands the drive, and the
         force that it returns is only reported.
     gains
-        Its free gains.
+        Free gains of the law.
     needs
-        What it needs in addition to the motion of the damper.
+        Needs of the law in addition to the motion of the damper.
     candidates
-        From a plant to gains by source: `closed-form`, `exact` and more.
+        Function from a plant to gains by source: `closed-form`, `exact` and others.
     assess
-        From a plant and gains to the damping that they give.
+        Function from a plant and gains to the damping.
     signs
-        Gain -> +1 or -1: the sign that it must have where it is not 0.
+        Gain -> +1 or -1, the sign that the gain must have if it is not 0.
     harmonic_force
         Desired force in harmonic motion; None where the law depends on more than the motion of the damper.
     linear
-        f = c v + k x, clipped: the law has no memory and may act in continuous time.
+        Whether the law is f = c v + k x, clipped. Such a law has no state, and it can act in continuous time.
     tuned_gain
-        The gain that is scaled to make up for a damper that gives other forces than its model; empty: none.
+        Gain that is scaled to compensate the difference between the damper and its model; empty: none.
     observer
-        From frame, position, weights and sample time to the observer of the law.
+        Function from frame, position, weights and sample time to the observer of the law; None: the law has no
+        observer.
     numbers
-        From gains, position and sample time to further numbers, found at `numbers[layout[AT_LAW]]`.
+        Function from gains, position and sample time to further numbers, which the law reads from
+        `numbers[layout[AT_LAW]]` on.
     memory
-        Places in the state from `state[layout[STATE_LAW]]` on.
+        Number of places of the law in the state, from `state[layout[STATE_LAW]]` on.
     """
 
     name: str
@@ -186,21 +189,21 @@ class Law:
 
     @property
     def gain_names(self) -> tuple[str, ...]:
-        """Names of its free gains."""
+        """Names of the free gains."""
         return tuple(gain.name for gain in self.gains)
 
     @property
     def calibrated(self) -> bool:
-        """Whether there is something to calibrate: gains, a network or an observer."""
+        """Whether the law has gains, a network or an observer to calibrate."""
         return bool(self.gains) or bool({"network", "observer"} & self.needs)
 
     def check(self, gains: Gains) -> None:
-        """Refuse gains that the law does not have, or of the wrong sign.
+        """Check that the law has these gains and that their signs are right.
 
         Raises
         ------
         UserError
-            Naming the gain.
+            If the law does not have a gain, or a gain has the wrong sign.
         """
         where = f"calibrate.{self.name}"
         known = self.gain_names
@@ -216,13 +219,13 @@ class Law:
                 raise UserError(where, name, f"is {value:g}", f"law {self.name} needs a {_SIGNS[sign]} {name}")
 
     def scaled(self, gains: Gains, factor: float) -> Gains:
-        """Return gains with the tuned one times a factor; unchanged where the law has none."""
+        """Return the gains with the tuned gain multiplied by a factor; unchanged if the law has no tuned gain."""
         if not self.tuned_gain:
             return gains
         return gains.changed(**{self.tuned_gain: factor * gains[self.tuned_gain]})
 
     def gains_as_json(self, gains: Gains) -> dict[str, float]:
-        """Return the gains that the law has, keys with units."""
+        """Return name -> value of the gains that the law has; the names end in units."""
         return {name: gains.get(name, 0.0) for name in self.gain_names}
 
 

@@ -13,12 +13,12 @@ from mrpipe.errors import UserError
 from mrpipe.structures import Frame
 
 FRICTION_RATIO = 4.0 / math.pi
-"""Equivalent viscous over stiffness part of (4.24)."""
+"""Ratio of the viscous part to the stiffness part of the equivalent (4.24)."""
 
 
 @dataclass(frozen=True)
 class LimitingModes:
-    """Free and locked mode of the target, and the reduced model that follows from them.
+    """Free and locked mode of the target mode, and the reduced model that follows from them.
 
     Attributes
     ----------
@@ -27,11 +27,11 @@ class LimitingModes:
     omega_0, omega_inf
         Angular frequency with the damper free (4.4) and locked [rad/s].
     shape_0, shape_inf
-        Shapes of unit modal mass (4.5), shape (n,) [1/sqrt(kg)]; the locked one has no damper motion.
+        Mode shapes of unit modal mass (4.5), shape (n,) [1/sqrt(kg)]; the damper does not move in the locked shape.
     u_0
         Amplitude of the free mode at the damper [1/sqrt(kg)].
     kappa
-        Coupling of the two, shape_inf' M shape_0 [1]; the closed forms take it for 1.
+        Coupling of the two shapes, shape_inf' M shape_0 [1]; the closed forms assume 1.
     top
         Index of the top, the last degree of freedom that moves with the ground.
     """
@@ -60,14 +60,9 @@ class LimitingModes:
         """(omega_inf - omega_0)/(omega_inf + omega_0) of P2 (7) [1]."""
         return (self.omega_inf - self.omega_0) / (self.omega_inf + self.omega_0)
 
-    @property
-    def share_thesis(self) -> float:
-        """(omega_inf - omega_0)/omega_0 of (4.10) [1]."""
-        return (self.omega_inf - self.omega_0) / self.omega_0
-
 
 STILL = 1e-9
-"""Stroke of a mode over that of the mode with the largest one, below which only rounding moves the damper."""
+"""Ratio of the stroke of a mode to the largest stroke of all modes, below which the stroke is only a rounding error."""
 
 
 def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> LimitingModes:
@@ -84,12 +79,12 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
     position
         Connectivity vector w, shape (n,).
     mode
-        Target, from 1.
+        Number of the target mode, from 1.
 
     Raises
     ------
     UserError
-        If the mass is singular or indefinite, the mode has no locked partner, or the damper sits in a node of the mode.
+        If the mass is singular or indefinite, the mode has no locked partner, or the damper is at a node of the mode.
     """
     n = frame.floors
     w = np.asarray(position, dtype=np.float64)
@@ -138,13 +133,13 @@ def limiting_modes(frame: Frame, position: FloatArray, mode: int = 1) -> Limitin
 
 
 def moving_modes(position: FloatArray, shapes: FloatArray) -> list[int]:
-    """Return the numbers (from 1) of the modes that move a damper; `shapes` are normalised to the mass."""
+    """Return the numbers (from 1) of the modes that move a damper; `shapes` have unit modal mass."""
     stroke = np.abs(position @ shapes)
     return [int(place) + 1 for place in np.flatnonzero(stroke > STILL * float(np.max(stroke)))]
 
 
 def static_stiffness(frame: Frame, position: FloatArray) -> float:
-    """Return 1/(w' K^-1 w) [N/m]: a device stiffness below minus this makes the structure fold (errata row 8)."""
+    """Return 1/(w' K^-1 w) [N/m]: a device stiffness below minus this value is unstable (errata row 8)."""
     return float(1.0 / (position @ np.linalg.solve(frame.stiffness, position)))
 
 
@@ -157,19 +152,13 @@ def damping_estimate(modes: LimitingModes, stiffness: float, loss: float) -> flo
     return modes.share_p2 * 2.0 * imaginary / ((1.0 + real) ** 2 + imaginary**2)
 
 
-def damping_estimate_thesis(modes: LimitingModes, stiffness: float, loss: float) -> float:
-    """Return zeta of (4.10) for a device with Re H = `stiffness`, Im H = `loss` [N/m]."""
-    real, imaginary = modes.nu * stiffness, modes.nu * loss
-    return modes.share_thesis * imaginary / ((1.0 + real) ** 2 + imaginary**2)
-
-
 def optimal_viscosity(modes: LimitingModes, stiffness: float = 0.0) -> float:
-    """Return c [N s/m] of P2 (13), the missing 1/omega_0 put in (errata row 12)."""
+    """Return c [N s/m] of P2 (13), with the factor 1/omega_0 that is missing in print (errata row 12)."""
     return 1.0 / (modes.nu * modes.omega_0) + stiffness / modes.omega_0
 
 
 def optimal_viscosity_thesis(modes: LimitingModes, stiffness: float = 0.0) -> float:
-    """Return c [N s/m] of (4.13) and (4.16), in which omega_inf + omega_0 stands for 2 omega_0."""
+    """Return c [N s/m] of (4.13) and (4.16), with omega_inf + omega_0 instead of 2 omega_0."""
     return 2.0 * (modes.omega_inf - modes.omega_0) / modes.u_0**2 + stiffness / modes.omega_0
 
 
@@ -184,10 +173,11 @@ def inherent_damping(frame: Frame, modes: LimitingModes) -> float:
 
 
 def placement_warning(frame: Frame, modes: LimitingModes) -> str:
-    """Return what the user should know where the damper hardly acts on the target mode; empty where it does.
+    """Return a warning if the damper hardly acts on the target mode; empty if it acts on it.
 
-    A damper without stiffness adds at most the damping ratio of P2 (14). Where this is less than the mode has already,
-    no gain of such a law can double the damping of the mode. Negative stiffness raises the bound by P2 (14).
+    A damper without stiffness adds at most the damping ratio of P2 (14). If this is less than the inherent damping
+    ratio of the mode, no gain of such a law can double the damping of the mode. Negative stiffness raises the bound by
+    P2 (14).
     """
     most, present = attainable_damping(modes), inherent_damping(frame, modes)
     if most >= present:

@@ -1,4 +1,4 @@
-"""Equivalent linearisation of a law in harmonic motion (4.21) to (4.29): same energy, same mean inclination."""
+"""Equivalent linearisation of a law in harmonic motion (4.21) to (4.29): equal dissipated energy, equal mean slope."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.control.limits import FRICTION_RATIO
 
 SAMPLES = 4096
-"""Samples of a cycle."""
+"""Number of samples of a cycle."""
 
 
 def equivalent_stiffness(
     force: Callable[[FloatArray, FloatArray], FloatArray], amplitude_m: float, omega: float
 ) -> complex:
-    """Return H [N/m]: fundamental of the force over that of the displacement.
+    """Return H [N/m], the ratio of the fundamental of the force to that of the displacement.
 
     Parameters
     ----------
     force
-        From displacement (n,) [m] and velocity (n,) [m/s] of one cycle to the force (n,) [N].
+        Function from displacement (n,) [m] and velocity (n,) [m/s] of one cycle to the force (n,) [N].
     amplitude_m, omega
-        Of the motion [m], [rad/s].
+        Amplitude [m] and angular frequency [rad/s] of the motion.
     """
     phase = 2.0 * np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES
     x = amplitude_m * np.sin(phase)
@@ -34,7 +34,7 @@ def equivalent_stiffness(
 
 
 def clipped_linear_stiffness(c: float, k: float, omega: float) -> complex:
-    """Return H [N/m] of f = c v + k x clipped where it would put energy in (P2 (22)), exactly.
+    """Return the exact H [N/m] of f = c v + k x, clipped where it would add energy to the structure (P2 (22)).
 
     Over a half cycle the force acts over pi less the angle arctan(|k|/(c omega)).
     """
@@ -50,11 +50,11 @@ def clipped_linear_stiffness(c: float, k: float, omega: float) -> complex:
 
 
 def friction_stiffness(alpha: float) -> complex:
-    """Return H [N/m] of FDNS with k = -alpha (4.24); of the neural loop with f_m = 2 alpha X too (4.29)."""
+    """Return H [N/m] of fdns with k = -alpha (4.24), and of the neural loop with f_m = 2 alpha X (4.29)."""
     return alpha * complex(-1.0, FRICTION_RATIO)
 
 
 def clipped_force(c: float, k: float, x: FloatArray, v: FloatArray) -> FloatArray:
-    """Return f = c v + k x, zero where it would put energy in (P2 (22)); shape of `x`."""
+    """Return f = c v + k x, or zero where it would add energy to the structure (P2 (22)); same shape as `x`."""
     force = c * v + k * x
     return np.where(force * v >= 0.0, force, 0.0)

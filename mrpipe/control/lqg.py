@@ -16,14 +16,16 @@ from mrpipe.structures import Frame, discretise_zero_order, state_space
 
 @dataclass(frozen=True)
 class Observer:
-    """z+ = F z + g f + H y, f_desired = -k z, with y = [damper displacement, ground and floor accelerations].
+    """Observer z+ = F z + g f + H y with the desired force -k z.
+
+    The measurements are y = [damper displacement, ground acceleration, floor accelerations].
 
     Attributes
     ----------
     transition, force_input, innovation, gain
-        F (2n, 2n), g (2n,), H (2n, n + 2), k (2n,).
+        F (2n, 2n), g (2n,), H (2n, n + 2), k (2n,) for n floors.
     sample_time_s
-        Interval that it was made for.
+        Sampling interval for which the observer was computed [s].
     floors
         Number of floors n.
     """
@@ -37,7 +39,7 @@ class Observer:
 
 
 _REGULATOR, _CONTROLLER = RegulatorSettings(), ControllerSettings()
-"""The defaults that the weights share with the settings."""
+"""Sources of the defaults, so that weights and settings have the same ones."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +55,11 @@ class Weights:
     force
         Weight of the damper force squared [1/N^2].
     ground_noise_m_s2
-        Noise of the measured ground acceleration, with model error, that drives the state.
+        Noise of the measured ground acceleration, including model error, which excites the state [m/s^2].
     force_noise_n
-        By how much the damper's force differs from the desired one (its residual force at least), as a noise.
+        Difference between damper force and desired force, taken as noise [N]; at least the residual force.
     displacement_noise_m, acceleration_noise_m_s2
-        Noise of the sensors.
+        RMS noise of the sensors [m], [m/s^2].
     """
 
     energy: float = _REGULATOR.energy_weight
@@ -70,7 +72,7 @@ class Weights:
 
 
 def state_weight(frame: Frame, weights: Weights) -> FloatArray:
-    """Return Q (2n, 2n) of z = [x, v]: energy and the top displacement."""
+    """Return the weight Q, shape (2n, 2n), of the state z = [x, v], from energy and top displacement."""
     n = frame.floors
     Q = np.zeros((2 * n, 2 * n))
     Q[:n, :n] = 0.5 * weights.energy * (frame.stiffness + frame.stiffness.T)
@@ -82,7 +84,7 @@ def state_weight(frame: Frame, weights: Weights) -> FloatArray:
 def regulator_gain(frame: Frame, position: FloatArray, weights: Weights) -> FloatArray:
     """Return k, shape (2n,), of the continuous regulator u = -k z with u the force on the structure along `position`.
 
-    u = -R^-1 B' P z with one minus sign (errata row 18).
+    u = -R^-1 B' P z, with one minus sign (errata row 18).
 
     Raises
     ------
@@ -103,16 +105,17 @@ def regulator_gain(frame: Frame, position: FloatArray, weights: Weights) -> Floa
 def observer_gain(frame: Frame, position: FloatArray, weights: Weights, dt: float) -> FloatArray:
     """Return the steady gain L (2n, n + 1) of the discrete Kalman predictor on [damper displacement, accelerations].
 
-    The noise of the ground's accelerometer drives the state and the floors' accelerometers have their own.
+    The noise of the accelerometer of the ground excites the state. The accelerometers of the floors have independent
+    noise.
     """
     Ad, Bd, C, D = _sampled(frame, position, dt)
     W = weights.ground_noise_m_s2**2 * np.outer(Bd[:, 0], Bd[:, 0])
     W += weights.force_noise_n**2 * np.outer(Bd[:, 1], Bd[:, 1])
-    # a little noise on every velocity keeps the observer awake in modes that the ground hardly drives
+    # a small noise on every velocity keeps the gain of the observer above zero in modes that the ground hardly excites
     n = frame.floors
     W[n:, n:] += (0.05 * weights.ground_noise_m_s2 * dt) ** 2 * np.eye(n)
     V = np.diag([weights.displacement_noise_m**2] + [weights.acceleration_noise_m_s2**2] * n)
-    # an accelerometer on the damper's floor feels the force at once
+    # an accelerometer on the floor of the damper measures the force without delay
     V += weights.force_noise_n**2 * np.diag(D[:, 1] ** 2)
     P = solve_discrete_are(Ad.T, C.T, W, V)
     return np.asarray(Ad @ P @ C.T @ np.linalg.inv(C @ P @ C.T + V))

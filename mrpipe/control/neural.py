@@ -1,4 +1,4 @@
-"""Neural model reference control: a network that gives the force of FDNS from twelve motions (thesis 4.3.4, P3)."""
+"""Neural model reference control: a network that gives the force of fdns from past motion (thesis 4.3.4, P3)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
 
 _SETTINGS = NeuralReferenceSettings()
-"""The defaults that the options share with the settings."""
+"""Source of the defaults, so that options and settings have the same ones."""
 
 
 @dataclass(frozen=True)
@@ -26,26 +26,29 @@ class ReferenceOptions:
     alpha_n_m
         Gain of FDNS.
     amplitudes_m
-        Of the loops; every second one in between is kept for verification.
+        Amplitudes of the loops [m]; loops with amplitudes between them are used for verification.
     frequencies_hz
         Of the loops.
     rate_hz, past_values
-        Of the network: displacement and velocity now and `past_values` before.
+        Sampling rate of the network [Hz], and number of past values of displacement and velocity in addition to the
+        present ones.
     hidden
         Neurons of the hidden layers.
     starts, iterations
-        Of the training.
+        Number of random starts, and largest number of iterations of a start.
     rows
-        Rows of the training set.
+        Number of rows of the training set.
     rounding_m_s
-        Speed over which the friction of the law changes its sign; 0: the jump of (4.18).
+        Speed over which the friction of the law changes its sign [m/s]; 0: the jump of (4.18).
     disturbances_rad_s, disturbance_share
-        Frequencies of other modes that ride on the loops, and their speed over that of the loop (deviation of a normal
-        distribution). Floor 1 does not move harmonically in the closed loop: a network that has seen harmonic motion
-        only answers to the rest of it at random, and the loop hunts.
+        Angular frequencies of the higher modes that are superimposed on the loops, and standard deviation of their
+        speed relative to that of the loop (normal distribution). They are necessary because floor 1 does not move
+        harmonically in the closed loop. A network that was trained on harmonic motion only gives an arbitrary output
+        for the other components, and the closed loop oscillates.
     displacement_noise_m, velocity_noise_m_s
-        Noise on the inputs in training. Lagged samples of a smooth motion are nearly collinear, and a network trained
-        without noise lives on their tiny differences: the noise of an estimator would then drown the force.
+        RMS noise on the inputs in the training [m], [m/s]. Successive samples of a smooth motion are nearly collinear.
+        A network trained without noise depends on their small differences, so that the noise of an estimator would
+        dominate its force.
     """
 
     alpha_n_m: float
@@ -66,7 +69,7 @@ class ReferenceOptions:
 
 @dataclass(frozen=True)
 class ReferenceNetwork:
-    """The trained network and how well it does on loops of amplitudes and frequencies it has not seen."""
+    """Trained network and its errors on loops with amplitudes and frequencies that are not in the training set."""
 
     network: Network
     training_nrmse: float
@@ -75,7 +78,7 @@ class ReferenceNetwork:
 
 
 CYCLES = 4
-"""Cycles of a loop."""
+"""Number of cycles of a loop."""
 
 
 def loop(
@@ -83,7 +86,8 @@ def loop(
 ) -> tuple[FloatArray, ...]:
     """Return displacement, velocity and force of some cycles of FDNS in harmonic motion, each of shape (n,).
 
-    With a generator other modes ride on the motion, at random strength and phase; X of the law stays that of the loop.
+    With a generator, other modes with random amplitude and phase are superimposed on the motion; X of the law remains
+    that of the loop.
     """
     omega = 2.0 * np.pi * frequency_hz
     t = np.arange(int(CYCLES * options.rate_hz / frequency_hz)) / options.rate_hz
@@ -104,8 +108,8 @@ def train_reference(
 ) -> ReferenceNetwork:
     """Train the network of 4.3.4 on harmonic loops of FDNS.
 
-    The law is of first degree in amplitude and its loop does not depend on frequency; a network is neither by itself,
-    hence the many amplitudes and frequencies.
+    The force of the law is proportional to the amplitude, and its loop does not depend on frequency. A network does not
+    have these properties by construction; therefore the training set has many amplitudes and frequencies.
     """
     spec = FeatureSpec(("displacement", "velocity"), options.past_values, False, options.rate_hz, "force")
     history = _with_noise(_history(options, options.amplitudes_m, options.frequencies_hz, rng), options, rng)

@@ -1,4 +1,4 @@
-"""Calibration of several dampers: each alone by its law's own route, then all together by exact complex eigenvalues."""
+"""Calibration of several dampers: each alone, then all together by exact complex eigenvalues."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from mrpipe.errors import UserError
 from mrpipe.structures import Frame
 
 LARGEST_FACTOR = 8.0
-"""Largest factor on a gain, and the inverse of the smallest, in the search for the gains of all dampers together."""
+"""Largest factor on a gain, and inverse of the smallest factor, in the search for the gains of all dampers together."""
 
 CENTRAL_LAW = "lqg"
-"""Law whose dampers share one regulator; it has no gains to calibrate here."""
+"""Law whose dampers share one regulator, so that no gains are calibrated here."""
 
 
 @dataclass(frozen=True)
 class PlacedDamper:
-    """A damper in a structure, with the law that drives it.
+    """A damper in a structure, with its control law.
 
     Attributes
     ----------
     name
-        For tables.
+        Name of the damper in tables.
     position
         Connectivity vector w, shape (n,).
     law
@@ -50,7 +50,7 @@ class PlacedDamper:
     mode
         Target mode, from 1.
     gains
-        Gains that the user gives; the others are calibrated.
+        Gains that the user gives; the other gains are calibrated.
     brace_n_m
         Stiffness of the brace in series with it [N/m]; infinite: rigid.
     """
@@ -65,22 +65,22 @@ class PlacedDamper:
 
 @dataclass(frozen=True)
 class PlacedCalibration:
-    """Gains of one damper.
+    """Calibrated gains of one damper.
 
     Attributes
     ----------
     damper
         What was calibrated.
     modes
-        Limiting modes of its target, all other dampers off, with a rigid brace.
+        Limiting modes of its target mode with a rigid brace, without the other dampers.
     static_stiffness_n_m
-        Of the structure at the damper.
+        Static stiffness of the structure at the damper [N/m].
     alone, together
-        Gains for the largest damping of the target mode with this damper alone, and with all dampers.
+        Gains with the largest damping of the target mode: with this damper alone, and with all dampers.
     law
-        The law's own calibration without a brace; None for a law without gains.
+        Calibration of the law without a brace; None for a law without gains.
     weights
-        Of laws that are designed by an optimum.
+        Weights of the laws that are optimal regulators.
     """
 
     damper: PlacedDamper
@@ -92,7 +92,7 @@ class PlacedCalibration:
     weights: Weights
 
     def device(self, gains: Gains) -> LinearDevice | None:
-        """Return the linear equivalent at these gains; None where the law has none."""
+        """Return the linear equivalent at these gains; None if the law has none."""
         damper = self.damper
         return linear_device(law_named(damper.law), gains, damper.position, self.modes.omega_0, 1.0, damper.brace_n_m)
 
@@ -102,9 +102,10 @@ def calibrate_placed(
 ) -> list[PlacedCalibration]:
     """Calibrate every damper alone, and then all of them together.
 
-    Together, the gains are multiplied by factors that give the largest damping ratio of the target modes; where there
-    are several target modes, the one that gained least over the gains of single dampers counts. The equivalents of
-    nonlinear laws are used, and the structure's own damping is left out, as in the calibration of one damper.
+    For all dampers together, the gains are multiplied by factors that maximise the damping ratio of the target mode.
+    With several target modes, the factors maximise the smallest improvement over the gains of the single dampers.
+    Nonlinear laws are replaced by their equivalents, and the inherent damping of the structure is neglected, as in the
+    calibration of one damper.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ def calibrate_placed(
     options
         Source of the gains and further options; the target mode is that of each damper.
     together
-        Whether gains are searched for all dampers together.
+        Whether the gains are searched for all dampers together.
 
     Raises
     ------
@@ -154,7 +155,7 @@ def calibrate_placed(
 def modes_together(
     frame: Frame, calibrated: Sequence[PlacedCalibration], modes: Sequence[int], *, alone: bool = False
 ) -> TogetherDamping:
-    """Return the target modes with all dampers that have a linear equivalent, at their gains together (or alone)."""
+    """Return the target modes with all dampers that have a linear equivalent, at their gains `together` or `alone`."""
     found = [item.device(item.alone if alone else item.together) for item in calibrated]
     return damping_together(frame, [item for item in found if item is not None], modes)
 
@@ -183,7 +184,7 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
     if own_route or not _is_tunable(found) or options.source != "exact":
         return found
 
-    # the law's own calibration knows neither a brace nor the gains that the user gives
+    # the calibration of a single law does not account for a brace or for gains that the user gives
     def ratio(factors: FloatArray) -> float:
         device = found.device(law.scaled(gains, float(factors[0])))
         return float(damping_together(plant.bare, [device] if device else [], [damper.mode]).damping_ratios[0])
@@ -193,7 +194,7 @@ def _alone(frame: Frame, damper: PlacedDamper, options: CalibrationOptions) -> P
 
 
 def _is_tunable(item: PlacedCalibration) -> bool:
-    """Return whether the law has a gain to search and an equivalent, and the user has not given this gain."""
+    """Return whether the law has an equivalent and a tuned gain that the user has not given."""
     law: Law = law_named(item.damper.law)
     given = item.damper.gains or {}
     return bool(law.tuned_gain) and law.tuned_gain not in given and item.device(item.alone) is not None
@@ -216,7 +217,7 @@ def _largest(value: Callable[[FloatArray], float], count: int) -> FloatArray:
 def placed_warnings(
     item: PlacedCalibration, *, amplitude_m: float, residual_force_n: float, largest_force_n: float
 ) -> list[str]:
-    """Return what the user should know about one damper, a sentence each; arguments as in `validity_warnings`."""
+    """Return warnings about one damper, one sentence each; arguments as in `validity_warnings`."""
     if item.law is None:
         return []
     calibration = Calibration(

@@ -1,4 +1,4 @@
-"""Several dampers: from the settings to what is calibrated, and the calibration in control.h5 and as JSON."""
+"""Several dampers: from the settings to the dampers to calibrate, and the calibration in control.h5 and as JSON."""
 
 from __future__ import annotations
 
@@ -41,12 +41,13 @@ def placed_dampers(frame: Frame, entries: Sequence[DamperSettings], target_mode:
     entries
         Section `structure.dampers`.
     target_mode
-        Of dampers that name none; the first mode after it where it does not move the damper.
+        Target mode of a damper without one in the settings. If it does not move the damper, the next mode that does is
+        used.
 
     Raises
     ------
     UserError
-        If a law, a degree of freedom or a sensor is not known, or two dampers have the same name.
+        If a law, a degree of freedom or a sensor is unknown, or two dampers have the same name.
     """
     result: list[PlacedDamper] = []
     for place, entry in enumerate(entries):
@@ -73,13 +74,13 @@ def placed_dampers(frame: Frame, entries: Sequence[DamperSettings], target_mode:
 
 
 def _first_moving(frame: Frame, position: FloatArray, target_mode: int) -> int:
-    """Return the target mode, or the first one after it that moves the damper (one in the other direction)."""
+    """Return the target mode or, if this mode is in the other direction, the next mode that moves the damper."""
     moving = moving_modes(position, natural_modes(frame).mode_shapes)
     return next((mode for mode in moving if mode >= target_mode), target_mode)
 
 
 def accelerometers_of(frame: Frame, names: Sequence[str | int]) -> tuple[int, ...]:
-    """Return the indices (from 0) of the degrees of freedom with an accelerometer; all where none is named."""
+    """Return the indices (from 0) of the degrees of freedom with an accelerometer; all of them if `names` is empty."""
     if not names:
         return tuple(range(frame.floors))
     where = "structure.accelerometers"
@@ -92,7 +93,7 @@ def accelerometers_of(frame: Frame, names: Sequence[str | int]) -> tuple[int, ..
 
 @dataclass(frozen=True)
 class KnownDamper:
-    """One damper in control.h5.
+    """Calibration of one damper in control.h5.
 
     Attributes
     ----------
@@ -103,7 +104,7 @@ class KnownDamper:
     omega_inf
         Frequency of its target mode with this damper locked and the others off [rad/s].
     calibrated
-        In the form that builds its controller.
+        Calibration in the form from which its controller is built.
     """
 
     name: str
@@ -123,7 +124,8 @@ def damper_as_json(
     item
         What was calibrated.
     amplitude_m, residual_force_n, rounding_m_s
-        Expected amplitude, force without drive at that amplitude, and speed over which friction changes its sign.
+        Expected amplitude [m], force without drive at this amplitude [N], and speed over which friction changes its
+        sign [m/s].
     """
     law = law_named(item.damper.law)
     return {
@@ -161,7 +163,7 @@ def write_placed(
     weights: Sequence[Weights],
     summary: Mapping[str, Any],
 ) -> None:
-    """Write everything that building the controllers needs; `summary` is that of the stage."""
+    """Write all data from which the controllers are built; `summary` is that of the stage."""
     rows = [
         {
             **row,
@@ -177,7 +179,7 @@ def write_placed(
 
 
 def read_placed(artifact: Artifact) -> list[KnownDamper]:
-    """Read what :func:`write_placed` wrote."""
+    """Read the data of :func:`write_placed`."""
     return [
         KnownDamper(
             name=row["name"],

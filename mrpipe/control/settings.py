@@ -16,9 +16,9 @@ class ControllerSettings(Section):
     rate_hz: float | None = Field(
         None,
         gt=0.0,
-        description="Sampling rate; null: as printed, 200 Hz, and 500 Hz for a perfect damper.",
+        description="Sampling rate; null: the values of the thesis, 200 Hz, and 500 Hz for a perfect damper.",
     )
-    delay_s: float = Field(0.0, ge=0.0, description="From sampling to output.")
+    delay_s: float = Field(0.0, ge=0.0, description="Delay from sampling to output.")
     velocity: Literal["kalman", "difference", "measured"] = Field(
         "kalman", description="Kinematic Kalman filter, backward difference, or a perfect velocity sensor."
     )
@@ -26,31 +26,35 @@ class ControllerSettings(Section):
         20e-6, gt=0.0, description="Displacement noise that the filter assumes [m]."
     )
     kalman_acceleration_noise_m_s2: float = Field(
-        0.1, gt=0.0, description="Acceleration noise that it assumes [m/s^2]."
+        0.1, gt=0.0, description="Acceleration noise that the filter assumes [m/s^2]."
     )
     kalman_bias_drift_m_s2: float = Field(
         0.0,
         ge=0.0,
-        description="Drift of the accelerometer's bias in a second that the filter follows; 0: no bias state.",
+        description="Drift of the bias of the accelerometer per second that the filter follows; 0: no bias state.",
     )
     inverse: Literal["network", "model"] = Field(
-        "network", description="Inverse of the damper: the trained network, or the identified model's post-yield force."
+        "network",
+        description="Inverse of the damper: the trained network, or the inverse of the post-yield force of the "
+        "identified model.",
     )
     inverse_request: Literal["steady", "history"] = Field(
         "steady",
-        description="Past values for an inverse network: `steady`, the present ones; `history`, as (2.9) has it, what "
-        "was desired before: at a reversal a history that no measured force has, and the network answers with spikes.",
+        description="Past values for an inverse network. `steady`: the present values. `history`: the past desired "
+        "forces, as in (2.9); at a reversal no measured force has such a history, so that the network answers with "
+        "spikes.",
     )
     residual_force_n: float | None = Field(
         None,
         ge=0.0,
-        description="Switch: below this desired force the drive is 0 (P2 24); null: the damper's residual force.",
+        description="Switch force: below this desired force the drive is 0, P2 (24); null: residual force of the "
+        "damper.",
     )
     low_pass_hz: float | None = Field(60.0, gt=0.0, description="Butterworth low-pass on the drive; null: none.")
     low_pass_delay_s: float | None = Field(
         None,
         gt=0.0,
-        description="Delay of the low-pass at low frequencies, which sets its cut-off in place of `low_pass_hz`; "
+        description="Delay of the low-pass at low frequencies, which determines its cut-off instead of `low_pass_hz`; "
         "paper P5 filters the current with 0.05 s.",
     )
     drive_limit: float | None = Field(None, gt=0.0, description="Largest drive; null: that of the damper.")
@@ -61,12 +65,16 @@ class ControllerSettings(Section):
         description="Speed over which friction of fdns changes its sign; 0: the jump of (4.18); null: as calibrated.",
     )
     extremum_memory_periods: float = Field(
-        0.75, gt=0.0, description="Free periods after which a pending extremum counts though nothing came back from it."
+        0.75,
+        gt=0.0,
+        description="Time, in natural periods without damper force, after which an extremum counts although the "
+        "displacement has not returned from it.",
     )
     extremum_step_m: float | None = Field(
         None,
         gt=0.0,
-        description="Way back that makes an extremum count (X of fdns); null: five times the displacement's noise.",
+        description="Distance by which the displacement must return before an extremum counts (X of fdns); null: five "
+        "times the noise of the displacement.",
     )
     extremum_share: float = Field(0.1, ge=0.0, lt=1.0, description="The same as a share of the last amplitude.")
     largest_displacement_m: float | None = Field(
@@ -88,7 +96,7 @@ class ControllerSettings(Section):
         ge=0.0,
         description="Time for which the last good reading replaces a refused one; then the drive is `safe_drive`.",
     )
-    safe_drive: float = Field(0.0, ge=0.0, description="Drive while readings are refused.")
+    safe_drive: float = Field(0.0, ge=0.0, description="Drive after that time, while readings are refused.")
 
     @property
     def cutoff_hz(self) -> float | None:

@@ -24,7 +24,7 @@ def finite(value: float) -> float | None:
 
 
 def calibration_to_json(calibration: Calibration) -> dict[str, Any]:
-    """Return what `--json` prints: limiting frequencies and every law."""
+    """Return the calibration as `--json` prints it: limiting frequencies and every law."""
     modes = calibration.modes
     laws: dict[str, Any] = {}
     for name, item in calibration.laws.items():
@@ -112,7 +112,7 @@ def read_gains(artifact: Artifact, law: str) -> Gains:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """What control.h5 holds for those who build controllers.
+    """Contents of control.h5 from which controllers are built.
 
     Attributes
     ----------
@@ -123,21 +123,21 @@ class Calibrated:
     top_0
         Amplitude of the target mode at the top floor [1/sqrt(kg)].
     amplitude_m, residual_force_n
-        Expected amplitude of the damper, and its force without drive at that amplitude.
+        Expected amplitude of the damper [m], and its force without drive at this amplitude [N].
     friction_rounding_m_s
-        Speed over which friction changes its sign.
+        Speed over which friction changes its sign [m/s].
     weights
-        Of laws that are designed by an optimum.
+        Weights of the laws that are optimal regulators.
     gains
         Law -> its calibrated gains.
     reference
-        Network of laws that need one; None where it was not trained.
+        Network of the laws that need one; None if it was not trained.
     skipped
         Law that could not be calibrated -> reason.
     path
-        Of the file, for messages.
+        Path of the file, for messages.
     designed
-        Law -> gains of the stage `design`, which are used in place of the calibrated ones; empty: none.
+        Law -> gains of the stage `design`, which replace the calibrated ones; empty: none.
     """
 
     position: FloatArray
@@ -155,12 +155,12 @@ class Calibrated:
     designed: Mapping[str, Gains] = field(default_factory=dict)
 
     def gains_of(self, law: str) -> Gains:
-        """Return the gains of a law; none for a law that has nothing to calibrate.
+        """Return the gains of a law; empty for a law without calibration.
 
         Raises
         ------
         UserError
-            If the law needs a calibration and has none.
+            If the law needs a calibration that does not exist.
         """
         if law in self.designed:
             return self.designed[law]
@@ -177,12 +177,12 @@ class Calibrated:
 
 
 def read_calibrated(artifact: Artifact) -> Calibrated:
-    """Read what is needed to build controllers.
+    """Read the data from which controllers are built.
 
     Raises
     ------
     UserError
-        If the calibration is that of several dampers.
+        If the file holds the calibration of several dampers.
     """
     if "dampers" in artifact.members():
         remedy = "use mrpipe simulate without --law, or mrpipe design; or leave structure.dampers out"
@@ -205,14 +205,15 @@ def read_calibrated(artifact: Artifact) -> Calibrated:
 
 
 def read_calibrated_with(artifact: Callable[[str], Artifact], source: GainsSource) -> Calibrated:
-    """Return what is needed to build controllers, with the gains of a source.
+    """Return the data from which controllers are built, with the gains of a source.
 
     Parameters
     ----------
     artifact
-        Opens the artifact of a stage by its name; `design` only where its gains are used.
+        Function that opens the artifact of a stage by its name. It opens `design` only if the gains of the design are
+        used.
     source
-        Of the gains.
+        Source of the gains.
     """
     found = read_calibrated(artifact("calibrate"))
     if source == "calibrated":

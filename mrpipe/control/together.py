@@ -1,4 +1,4 @@
-"""Exact complex eigenvalues of a structure with several linear devices, each perhaps behind a brace."""
+"""Exact complex eigenvalues of a structure with several linear devices, each with or without a brace in series."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from mrpipe.structures import Frame, natural_modes
 ComplexArray = NDArray[np.complex128]
 
 CONTINUATION_STEPS = 24
-"""Steps in which all devices are faded in together to follow the eigenvalues of the target modes."""
+"""Number of steps in which all devices are increased from zero, in order to follow the eigenvalues of the target modes.
+"""
 
 
 @dataclass(frozen=True)
 class LinearDevice:
-    """A device f = c v + (k + H) x, where x is its own displacement without that of its brace.
+    """Device f = c v + (k + H) x, where x is the displacement of the device without that of its brace.
 
     Attributes
     ----------
@@ -45,11 +46,11 @@ class LinearDevice:
 
     @property
     def has_state(self) -> bool:
-        """Whether its displacement is a state of the loop, because brace and viscosity are in series."""
+        """Whether the displacement of the device is a state, because brace and viscosity are in series."""
         return self.viscosity > 0.0 and not math.isinf(self.brace_n_m)
 
     def scaled(self, share: float) -> LinearDevice:
-        """Return the device with this share of its force and the same brace."""
+        """Return the device with its force multiplied by `share` and the same brace."""
         return replace(
             self,
             viscosity=share * self.viscosity,
@@ -58,7 +59,7 @@ class LinearDevice:
         )
 
     def dynamic_stiffness(self, s: complex) -> complex:
-        """Return the complex stiffness of device and brace at the Laplace variable s [rad/s]; [N/m]."""
+        """Return the complex stiffness [N/m] of device and brace at the Laplace variable s [rad/s]."""
         own = self.stiffness + self.equivalent + s * self.viscosity
         return own if math.isinf(self.brace_n_m) else own * self.brace_n_m / (own + self.brace_n_m)
 
@@ -66,19 +67,19 @@ class LinearDevice:
 def linear_device(
     law: Law, gains: Gains, position: FloatArray, omega: float, amplitude_m: float, brace_n_m: float = math.inf
 ) -> LinearDevice | None:
-    """Return the linear equivalent of a device under a law; None where the law has none.
+    """Return the linear equivalent of a device under a law; None if the law has none.
 
-    A linear law without negative stiffness is its own equivalent. A clipped law is described by its first harmonic at
-    `omega`, and so is every other law with a known force in harmonic motion of amplitude `amplitude_m`.
+    A linear law without negative stiffness is equal to its equivalent. A clipped law, and every other law with a known
+    force in harmonic motion, is replaced by its first harmonic at `omega` and `amplitude_m`.
 
     Parameters
     ----------
     law, gains
-        Of the device.
+        Control law of the device and its gains.
     position
         Connectivity vector, shape (n,).
     omega, amplitude_m
-        Of the harmonic motion [rad/s], [m].
+        Angular frequency [rad/s] and amplitude [m] of the harmonic motion.
     brace_n_m
         Stiffness of the brace [N/m].
     """
@@ -95,7 +96,7 @@ def linear_device(
 
 
 def loop_matrix(frame: Frame, devices: Sequence[LinearDevice]) -> ComplexArray:
-    """Return A of z' = A z, z = [x, v] and the displacement of each device that has viscosity behind a brace.
+    """Return A of z' = A z; z is [x, v] and the displacement of each device with viscosity in series with a brace.
 
     With a brace of stiffness k_b the force is k_b (w'x - x_d) = c x_d' + (k + H) x_d. A device without viscosity is in
     series with its brace, so that its stiffness is (k + H) k_b/(k + H + k_b).
@@ -131,7 +132,7 @@ class TogetherDamping:
     Attributes
     ----------
     poles
-        s of each target mode, shape (m,) [rad/s].
+        Eigenvalue s of each target mode, shape (m,) [rad/s].
     growth_1_s
         Largest real part of all eigenvalues [1/s].
     """
@@ -146,27 +147,27 @@ class TogetherDamping:
 
     @property
     def damping_ratios(self) -> FloatArray:
-        """-Re s/|s| of each target mode, shape (m,); -1 for all where a mode grows."""
+        """Damping ratio -Re s/|s| of each target mode, shape (m,); -1 for all if a mode grows."""
         ratios = np.asarray(-self.poles.real / np.maximum(np.abs(self.poles), 1e-300))
         return ratios if self.stable else np.full(ratios.shape, -1.0)
 
 
 def damping_together(frame: Frame, devices: Sequence[LinearDevice], modes: Sequence[int]) -> TogetherDamping:
-    """Follow the eigenvalues of the target modes while all devices are faded in together.
+    """Follow the eigenvalues of the target modes while all devices increase from zero together.
 
     Parameters
     ----------
     frame
         The structure.
     devices
-        With positions of shape (n,).
+        Linear devices, with connectivity vectors of shape (n,).
     modes
         Numbers of the target modes, from 1.
     """
     omega = natural_modes(frame).angular_frequencies
     poles = 1j * omega[np.asarray(modes, dtype=np.int64) - 1]
     eigenvalues = poles
-    # the equivalents hold for positive frequencies, so that only eigenvalues of the upper half plane count
+    # the equivalents are valid at positive frequencies, so that only eigenvalues in the upper half plane are used
     for share in np.linspace(0.0, 1.0, CONTINUATION_STEPS + 1)[1:]:
         eigenvalues = np.linalg.eigvals(loop_matrix(frame, [item.scaled(float(share)) for item in devices]))
         upper = eigenvalues[eigenvalues.imag >= -1e-9 * np.abs(eigenvalues)]
@@ -176,12 +177,12 @@ def damping_together(frame: Frame, devices: Sequence[LinearDevice], modes: Seque
 
 
 def ground_response(frame: Frame, devices: Sequence[LinearDevice], omega: float) -> tuple[ComplexArray, ComplexArray]:
-    """Return displacements of the floors (n,) and of the devices (k,) for a ground acceleration of 1 m/s^2; [m].
+    """Return the displacements [m] of floors (n,) and devices (k,) for a ground acceleration of 1 m/s^2.
 
     Parameters
     ----------
     frame, devices
-        The structure with its devices.
+        Structure and its devices.
     omega
         Frequency of the harmonic ground motion [rad/s].
     """

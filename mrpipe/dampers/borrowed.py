@@ -1,7 +1,7 @@
-"""Arrays that compiled code may read and write without counting references to them.
+"""Arrays that compiled code reads and writes without reference counting.
 
-numba counts the references to every slice that a kernel hands to a step. Each count is an atomic operation, and four of
-them per step take longer than most steps.
+numba counts the references to every slice that a kernel passes to a step. Each count is an atomic operation, and four
+of them per step take longer than most steps.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from numba.extending import intrinsic
 
 @intrinsic
 def borrowed(typing_context: Any, array: Any) -> Any:
-    """Return, inside compiled code, the same array without its reference count: slices of it are not counted either.
+    """Return, inside compiled code, the same array without reference count; its slices are not counted either.
 
-    The caller must keep the array itself alive for as long as the borrowed one is in use.
+    The caller must keep a reference to the array itself while the returned one is in use.
     """
     del typing_context
     if not isinstance(array, types.Array):

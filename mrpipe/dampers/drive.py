@@ -1,4 +1,4 @@
-"""From the command to the coefficients: the driver's lag (2.4) and the polynomials (2.3)."""
+"""From the command to the coefficients: the lag of the drive (2.4) and the laws of the drive (2.3)."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mrpipe.dampers.plant import (
 )
 
 POLYNOMIAL_SIZE = 4
-"""Coefficients of each polynomial in the effective drive: up to the cube of (2.3)."""
+"""Number of coefficients of each polynomial in the effective drive; (2.3) is a cubic polynomial."""
 
 COEFFICIENT_STEPS = ("polynomial-coefficients", "drive-laws")
 """Names of the steps that set yield force and viscosity from the effective drive."""
@@ -33,10 +33,10 @@ COEFFICIENT_STEPS = ("polynomial-coefficients", "drive-laws")
 
 @njit(float64(float64, float64, float64, float64), cache=True)
 def advance_lag(lagged: float, previous: float, present: float, rate_dt: float) -> float:
-    """Return the exact answer of u' = -eta (u - I) to a command that is linear from `previous` to `present`.
+    """Return the exact response of u' = -eta (u - I) to a command that is linear from `previous` to `present`.
 
-    `rate_dt` is eta times the interval. A straight command between samples keeps the lag right to second order where
-    the command was recorded; a held one would come out half a sample late.
+    `rate_dt` is eta times the interval. For recorded commands linear interpolation between samples is accurate to
+    second order; a held command would be half a sample late.
     """
     if rate_dt < 1e-8:
         return lagged
@@ -104,15 +104,15 @@ def laws_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
 
 
 def driver_lag(eta: float) -> Step:
-    """Return the driver's lag (2.4), eta in 1/s."""
+    """Return the lag of the drive (2.4), with eta in 1/s."""
     return Step("driver-lag", Phase.CURRENT, lag_step, np.array([float(eta)]), state_size=2)
 
 
 def command_place(chain: Chain) -> int:
-    """Return where the state of a chain keeps the command of the step before; -1 where it has no lag (2.4).
+    """Return the index in the state of a chain of the last command; -1 if the chain has no lag (2.4).
 
-    Write the present command there where it jumps at the beginning of a step and is held over it, as that of a sampled
-    controller; the lag takes it as straight between the ends of a step otherwise.
+    The lag interpolates the command linearly between the ends of a step. If the command jumps at the beginning of a
+    step and is held over it, like that of a sampled controller, write the present command to this place.
     """
     for function, at in zip(chain.functions, chain.state_offsets, strict=False):
         if function is lag_step or function is lag_apart_step:
@@ -121,7 +121,7 @@ def command_place(chain: Chain) -> int:
 
 
 def driver_lag_apart(rise: float, fall: float) -> Step:
-    """Return the driver's lag with separate rates [1/s] for rising and falling effective drive."""
+    """Return the lag of the drive with separate rates [1/s] for rising and falling effective drive."""
     return Step("driver-lag", Phase.CURRENT, lag_apart_step, np.array([float(rise), float(fall)]), state_size=2)
 
 
@@ -153,7 +153,7 @@ def _series(drive: FloatArray, starts: IntArray, dt: FloatArray, eta: float, res
 
 
 def lag_series(drive: FloatArray, starts: IntArray, dt: FloatArray, eta: float) -> FloatArray:
-    """Return the effective drive, shape (n,), over recordings laid end to end.
+    """Return the effective drive [A or V], shape (n,), over concatenated recordings.
 
     Parameters
     ----------

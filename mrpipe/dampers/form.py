@@ -1,13 +1,13 @@
-"""What a base form is: the one narrow contract that every file of `dampers/forms` (and a user's own file) keeps.
+"""Definition of a base form: the contract that every file of `dampers/forms` (and of a user) fulfils.
 
-A file defines `FORM = BaseForm(...)` and nothing else knows of it. The force of a base form is
+A file defines `FORM = BaseForm(...)`; no other module has to be changed. The force of a base form is
 
     f = F_y(u) z + c0(u) w' + F_p(u) p + known + amplitudes,
 
-where the steps of the form give the normalised hysteretic force z (and, where the form has a second yielding part, its
-normalised force p). F_y, c0 and F_p are laws of the effective drive u (:mod:`mrpipe.dampers.laws`). They are linear in
+where the steps of the form give the normalised hysteretic force z and, if the form has a second yielding part, its
+normalised force p. F_y, c0 and F_p are laws of the effective drive u (:mod:`mrpipe.dampers.laws`). They are linear in
 their coefficients, so that a fit solves for them exactly and searches only the parameters listed here. w' is the
-velocity of the rod, or that of an inner element which the steps put in its place.
+velocity of the rod, or that of an inner element, if the steps set one.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from mrpipe.dampers.plant import Step
 
 @dataclass(frozen=True)
 class Strength:
-    """What the post-yield force of a form follows from; arrays of one shape.
+    """Quantities that determine the post-yield force of a form; arrays of the same shape.
 
     Attributes
     ----------
     speed
-        Of the rod [m/s], not negative.
+        Speed of the rod [m/s], not negative.
     drive
         Effective drive [A or V].
     yield_force, viscosity, part_force
@@ -44,7 +44,7 @@ class Strength:
 
 
 def fully_yielded(values: Values, at: Strength) -> FloatArray:
-    """Return F_y + c0 v: the hysteresis carries its whole yield force at any speed."""
+    """Return F_y + c0 v [N]: the hysteresis has reached its yield force at any speed."""
     del values
     return at.yield_force + at.viscosity * at.speed
 
@@ -56,36 +56,37 @@ class BaseForm:
     Attributes
     ----------
     name, summary
-        Key, and the law in a line.
+        Key, and the law in one line.
     source
         Publication that describes it.
     parameters
-        Its numbers, without the laws of the drive and the lag of the driver, which all forms share.
+        Parameters of the form, without the laws and the lag of the drive, which all forms share.
     steps
         (values) -> steps of the chain that set z, p and other forces of the form. Every amplitude has its own step.
     amplitude_steps
-        Amplitude -> index in what `steps` returns.
+        Amplitude -> index of its step in the list that `steps` returns.
     post_yield
-        (values, strength) -> size of the force at constant speed and drive [N]: what inverses work with.
+        (values, strength) -> magnitude of the force at constant speed and drive [N], which inverses use.
     part
-        Name of the second yielding part's law (`""`: there is none).
+        Name of the law of the second yielding part; empty if there is none.
     coupled
-        The steps read yield force or viscosity, so z depends on the laws of the drive.
+        Whether the steps read yield force or viscosity, so that z depends on the laws of the drive.
     known
-        A step adds a force to `EXTRA_FORCE` that no linear coefficient scales, such as that of an inner spring.
+        Whether a step adds a force to `EXTRA_FORCE` that no linear coefficient scales, such as that of an inner spring.
     family
-        Physical family where several forms are variants of one, else the form's own name.
+        Physical family of forms that are variants of each other; else the name of the form.
     begins_with
-        Form whose fitted laws a coupled form reads first; empty for a simple hysteresis.
+        Form whose fitted laws a coupled form reads at first; empty: those of a simple hysteresis.
     hysteresis
         (values) -> yield displacement [m], gamma/(gamma + beta), exponent of Bouc-Wen's equation (2.2); None for forms
         that do not hold it.
     dissipative
-        Over a closed cycle the form never feeds energy, whatever its parameters within their bounds.
+        Whether the form never feeds energy into a closed cycle, for all parameters within their bounds.
     springs
-        Names of the parameters that are springs across the damper. They are what the effect `accumulator` stands for.
+        Names of the parameters that are springs across the damper; the effect `accumulator` represents the same
+        physics.
     file
-        The user's own file that defines the form, if any; set when the file is loaded.
+        File of the user that defines the form, if any; it is set when the file is loaded.
     """
 
     name: str
@@ -133,10 +134,10 @@ class BaseForm:
         return {item.name: item.start_values(scales)[0] for item in self.parameters if item.role == "constant"}
 
     def unit(self, name: str) -> str | None:
-        """Return the unit of a parameter of this form; None where it has none of this name."""
+        """Return the unit of a parameter of this form; None if it has no parameter of this name."""
         return next((item.unit for item in self.parameters if item.name == name), None)
 
 
 def rounded_sum(share: FloatArray, at: Strength) -> FloatArray:
-    """Return F_y times a share of it, and c0 v: the post-yield force of forms without an inner element."""
+    """Return F_y times a share, plus c0 v [N]: the post-yield force of forms without an inner element."""
     return np.asarray(at.yield_force * share + at.viscosity * at.speed, dtype=np.float64)

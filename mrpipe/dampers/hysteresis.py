@@ -1,4 +1,4 @@
-"""Bouc-Wen hysteresis in displacement increments: closed between samples for n = 1 and n = 2.
+"""Bouc-Wen hysteresis in displacement increments, with closed-form updates for n = 1 and n = 2.
 
 (2.2) divided by the velocity is an equation in displacement alone. With zeta = z/z_max, where z_max =
 (A/(gamma + beta))^(1/n), the yield displacement x_y = z_max/A, the share of gamma g = gamma/(gamma + beta) and
@@ -8,8 +8,8 @@ y = sign(dx) zeta,
                     1 - (1 - 2 g) |y|^n         for y < 0  (unloading).
 
 Both branches integrate to hyperbolic, circular or exponential functions for n = 2 and n = 1, so an update is exact for
-any length of step in which the motion does not turn. Other exponents are integrated by sub-stepped Runge-Kutta.
-The Dahl model is n = 1, g = 1.
+a step of any length without a reversal. Other exponents are integrated by sub-stepped Runge-Kutta. The Dahl model is n
+= 1, g = 1.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ LONGEST_PART_S = 1e-3
 """Longest part of an interval [s] over which the yield force of a form with a spring in series is taken as constant."""
 
 MOST_PARTS = 4
-"""An interval is divided into at most so many parts: records thinned for a ranking of forms need no more."""
+"""Largest number of parts of an interval, which is sufficient for decimated records in a ranking of forms."""
 
 
-# numbers that several base forms share
+# parameters that several base forms share
 YIELD_DISPLACEMENT = shape(
     "yield_displacement", "m", "yield force over initial stiffness", "stroke", 1e-3, 2.0, (0.05, 0.15, 0.015)
 )
@@ -43,7 +43,7 @@ EXPONENT = shape("exponent", "1", "n of (2.2)", "one", 1.0, 8.0, (1.9, 1.1))
 
 
 def bouc_wen_numbers(values: Values) -> tuple[float, float, float]:
-    """Return yield displacement [m], share of gamma and exponent; gamma = beta and n = 2 where they are left out."""
+    """Return yield displacement [m], share of gamma and exponent; gamma = beta and n = 2 are the defaults."""
     return values["yield_displacement"], values.get("gamma_share", 0.5), values.get("exponent", 2.0)
 
 
@@ -112,12 +112,12 @@ def _advance_linear(y: float, path: float, unloading: float) -> float:
 def advance_hysteresis(
     zeta: float, increment: float, yield_displacement: float, gamma_share: float, exponent: float
 ) -> float:
-    """Return the normalised hysteretic variable after the rod moved by `increment` [m] without turning.
+    """Return the normalised hysteretic variable after a motion of the rod by `increment` [m] without reversal.
 
     Parameters
     ----------
     zeta
-        Before the increment, -1..1.
+        Normalised hysteretic variable before the increment, -1..1.
     increment
         Displacement of the step [m].
     yield_displacement
@@ -156,11 +156,11 @@ def _linear_part(mean: float, speed_before: float, speed_after: float) -> float:
 
 @njit(float64(float64, float64, float64, float64, float64), cache=True)
 def turning_share(before: float, speed_before: float, after: float, speed_after: float, dt: float) -> float:
-    """Return when the motion turns between two samples, as a share of the interval; 1 where it does not turn.
+    """Return the instant of the reversal between two samples, as a share of the interval; 1 if there is none.
 
-    The cubic through both displacements and velocities (Hermite) describes the motion between the samples. Without
-    the turning point, a stiff hysteresis sampled at 250 Hz misses a part of the path that is several per cent of its
-    yield displacement at every reversal.
+    The cubic through both displacements and velocities (Hermite) describes the motion between the samples. Without the
+    turning point, several per cent of the yield displacement would be missing from the path of a stiff hysteresis at
+    every reversal, at a sampling rate of 250 Hz.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def turning_share(before: float, speed_before: float, after: float, speed_after:
     square = _square_part(mean, speed_before, speed_after)
     linear = _linear_part(mean, speed_before, speed_after)
     root = math.sqrt(max(linear * linear - 4.0 * square * speed_before, 0.0))
-    # the form of the roots without cancellation (Press et al. 2007, Numerical Recipes, section 5.6)
+    # formula of the roots without cancellation (Press et al. 2007, Numerical Recipes, section 5.6)
     half = -0.5 * (linear + math.copysign(root, linear))
     share = speed_before / half
     if share < 0.0 or share > 1.0 + 1e-9:
@@ -219,8 +219,8 @@ def follow_hysteresis(
 ) -> float:
     """Return the normalised hysteretic variable at a sample, from that at the sample before it.
 
-    The arguments are those of :func:`advance_hysteresis` and of :func:`turning_share`: the path leads over the point at
-    which the motion turns.
+    The arguments are those of :func:`advance_hysteresis` and of :func:`turning_share`. The path includes the turning
+    point of the motion.
     """
     share = turning_share(before, speed_before, after, speed_after, dt)
     turn = displacement_between(share, before, speed_before, after, speed_after, dt)
@@ -260,7 +260,7 @@ def growing_hysteresis_step(wire: FloatArray, state: FloatArray, parameters: Flo
         state[0] = x
         state[1] = 0.0
         state[2] = v
-    # a tiny share of the reference keeps the yield displacement above zero where the damper has no yield force
+    # a tiny share of the reference keeps the yield displacement above zero if the damper has no yield force
     ratio = max(wire[YIELD_FORCE] / parameters[4], 1e-9)
     length = max(parameters[0] * ratio ** parameters[3], 1e-15)
     share, power = parameters[1], parameters[2]
@@ -273,7 +273,7 @@ def growing_hysteresis_step(wire: FloatArray, state: FloatArray, parameters: Flo
 def growing_hysteresis(
     yield_displacement: float, gamma_share: float, exponent: float, growth: float, reference_force: float
 ) -> Step:
-    """Return Bouc-Wen's hysteresis with x_y = yield_displacement (F_y/reference_force)^growth [m], [N]."""
+    """Return the Bouc-Wen hysteresis with x_y = yield_displacement (F_y/reference_force)^growth [m], [N]."""
     numbers = np.array([yield_displacement, gamma_share, exponent, growth, reference_force], dtype=np.float64)
     return Step("growing-hysteresis", Phase.HYSTERESIS, growing_hysteresis_step, numbers, state_size=3)
 
@@ -303,7 +303,7 @@ def hysteresis_series(
     gamma_share: float = 0.5,
     exponent: float = 2.0,
 ) -> FloatArray:
-    """Return zeta, shape (n,), over recordings laid end to end.
+    """Return zeta, shape (n,), over concatenated recordings.
 
     Parameters
     ----------

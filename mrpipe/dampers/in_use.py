@@ -1,4 +1,4 @@
-"""The force that a damper gives at constant speed and drive, simulated: what inverses of a damper with effects need."""
+"""Simulated force of a damper at constant speed and drive, which inverses of a damper with effects need."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import FORCE, Chain, run_chain
 
 SPEED_SHARES = (0.0, 0.01, 0.03, 0.1, 0.25, 0.5, 0.75, 1.0)
-"""Speeds at which the force is simulated, as shares of the largest."""
+"""Speeds at which the force is simulated, as shares of the largest speed."""
 
 DRIVES = 11
-"""Drives at which it is simulated, from 0 to the limit."""
+"""Number of drives at which the force is simulated, from 0 to the limit."""
 
 STEP_S = 2e-3
-"""Longest step of these simulations."""
+"""Longest time step of these simulations [s]."""
 
 HALF_PERIOD_S = 0.5
-"""Longest time of one stroke; a drive is held for two of them before the force is taken, so that lags die out."""
+"""Longest duration of one stroke [s]. A drive is held for two strokes before the force is taken, so that lags decay."""
 
 
 def held_force(chain: Chain, speed: float, drive: float, before: float, stroke_m: float, half_period_s: float) -> float:
@@ -28,17 +28,17 @@ def held_force(chain: Chain, speed: float, drive: float, before: float, stroke_m
     chain
         Steps of the damper.
     speed
-        In both directions in turn [m/s].
+        Speed in both directions in turn [m/s].
     drive, before
-        Drive at which the force is taken, and that which was held before it.
+        Drive at which the force is taken, and drive that was held before it [A or V].
     stroke_m
         Half the largest peak-to-peak displacement [m].
     half_period_s
-        Longest time in one direction.
+        Longest time in one direction [s].
     """
     half = min(half_period_s, 2.0 * stroke_m / speed)
     dt = min(STEP_S, half / 40.0)
-    # the drive changes at a reversal, when a memory of it has had two half periods to build up
+    # the drive changes at a reversal, after two half periods in which a memory of the drive can build up
     change = 2.0 * np.ceil(half_period_s / half) * half
     time = np.arange(0.0, change + 2.0 * half_period_s + half, dt)
     turns = time / half
@@ -46,7 +46,7 @@ def held_force(chain: Chain, speed: float, drive: float, before: float, stroke_m
     out = np.mod(turns, 2.0) < 1.0
     x, v = speed * half * (0.5 - ramp), np.where(out, speed, -speed)
     force = run_chain(chain, x, v, np.zeros_like(x), np.where(time < change, before, drive), dt)[:, FORCE]
-    # about the middle of the stroke, so that springs drop out; the lag of the drive has died out by then
+    # around the middle of the stroke springs cancel, and the lag of the drive has decayed there
     part = (time > change + 0.2 * half_period_s) & (time < change + 2.0 * half_period_s) & (np.abs(ramp - 0.5) < 0.3)
     moved = force * np.sign(v)
     return 0.5 * float(np.mean(moved[part & out]) + np.mean(moved[part & ~out]))
@@ -57,7 +57,7 @@ def steady_force(
 ) -> FloatArray:
     """Return the post-yield force [N] of a chain at constant speeds and drives, which broadcast against each other.
 
-    It is simulated on a coarse grid and interpolated linearly.
+    The force is simulated on a coarse grid and interpolated linearly.
     """
     speed, u = np.broadcast_arrays(np.abs(np.asarray(velocity, dtype=np.float64)), np.asarray(drive, dtype=np.float64))
     fastest = max(float(speed.max()), 1e-9)

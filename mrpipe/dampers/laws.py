@@ -1,11 +1,11 @@
-"""How yield force and viscosity depend on the drive: polynomials and laws that saturate, none of them negative.
+"""Laws of the drive: yield force and viscosity as polynomials or saturating functions, none of them negative.
 
-A magnetic circuit saturates, so the yield force first rises with the drive and then levels off. Few measured levels
-support few coefficients; :mod:`mrpipe.fitting.drive_laws` chooses a law by leaving out whole levels.
+A magnetic circuit saturates, so the yield force first rises with the drive and then levels off. A few measured levels
+determine only a few coefficients; :mod:`mrpipe.fitting.drive_laws` chooses a law by leaving out whole levels.
 
-Every law is linear in its coefficients, except for one scale of the drive. Polynomials are in Bernstein's basis on
-0..limit: where its coefficients are not negative, neither is the polynomial on that range. Coefficients of the
-monotone basis (sums of Bernstein polynomials) that are not negative give a polynomial that does not fall.
+Every law is linear in its coefficients, except for one scale of the drive. Polynomials are in the Bernstein basis on
+0..limit. If their coefficients are not negative, the polynomial is not negative on that range. The monotone basis
+consists of sums of Bernstein polynomials; with coefficients that are not negative the polynomial does not fall.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from mrpipe.artifacts import FloatArray
 
 Kind = Literal["polynomial", "tanh", "langevin", "froehlich"]
 KINDS: tuple[Kind, ...] = ("polynomial", "tanh", "langevin", "froehlich")
-"""Kinds of a law with numbers; the place of each is its code in compiled steps."""
+"""Kinds of laws; the index of a kind is its code in compiled steps."""
 
 LARGEST_ORDER = 5
 LETTERS = "abcdef"
 LAW_SIZE = 2 + LARGEST_ORDER
-"""Numbers of a law in a compiled step: its code and up to six coefficients."""
+"""Number of values of a law in a compiled step: its code and up to six coefficients."""
 
 
 def saturation(kind: str, ratio: FloatArray | float) -> FloatArray:
-    """Return the saturating function of a kind at drive over scale: slope positive, limit 1.
+    """Return the saturating function of a kind at drive over scale; it rises to the limit 1.
 
     `tanh`; `langevin`: coth x - 1/x (Langevin 1905); `froehlich`: x/(1 + x) (Froehlich 1881, magnetisation of iron).
     """
@@ -47,7 +47,7 @@ def saturation(kind: str, ratio: FloatArray | float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Law:
-    """A law with its numbers.
+    """A law of the drive with its numbers.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Law:
     numbers: tuple[float, ...]
 
     def __call__(self, drive: FloatArray | float) -> FloatArray:
-        """Return the value at a drive, of its shape."""
+        """Return the value at a drive, with the shape of the drive."""
         u = np.asarray(drive, dtype=np.float64)
         if self.kind == "polynomial":
             return np.asarray(np.polynomial.polynomial.polyval(u, np.asarray(self.numbers)), dtype=np.float64)
@@ -71,7 +71,7 @@ class Law:
 
     @property
     def packed(self) -> FloatArray:
-        """Return code and numbers as compiled steps want them, shape (LAW_SIZE,)."""
+        """Return code and numbers in the layout of compiled steps, shape (LAW_SIZE,)."""
         found = np.zeros(LAW_SIZE)
         found[0] = KINDS.index(self.kind)
         found[1 : 1 + len(self.numbers)] = self.numbers
@@ -91,7 +91,7 @@ def constant_law(value: float) -> Law:
 
 @dataclass(frozen=True)
 class LawShape:
-    """A law without numbers: a basis that a fit is linear in.
+    """A law without numbers: basis functions whose coefficients are fitted.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class LawShape:
 
     @property
     def numbers(self) -> int:
-        """Number of all coefficients with the scale."""
+        """Number of coefficients, including the scale."""
         return self.count + int(self.saturates)
 
     @property
@@ -130,7 +130,7 @@ class LawShape:
         return f"{self.kind if self.kind == 'monotone' else 'polynomial'} of degree {self.order}"
 
     def basis(self, share: FloatArray, scale_share: float = 1.0) -> FloatArray:
-        """Return the columns at a share of the drive limit, shape (count, n); coefficients are not to be negative.
+        """Return the basis functions, shape (count, n); their coefficients must not be negative.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ def bernstein(share: FloatArray, order: int) -> list[FloatArray]:
     """Return the Bernstein polynomials of degree `order` at `share` (0..1 on the drive's range)."""
     rest = 1.0 - share
     ones = np.ones_like(share)
-    # repeated products: a power of every sample costs many times as much
+    # repeated products, because a power of every sample takes much longer
     rising = list(itertools.accumulate([ones] + order * [share], np.multiply))
     falling = list(itertools.accumulate([ones] + order * [rest], np.multiply))
     return [math.comb(order, k) * rising[k] * falling[order - k] for k in range(order + 1)]
@@ -216,5 +216,5 @@ def law_unit(block_unit: str, suffix: str, drive_unit: str) -> str:
 
 
 def for_blocks(laws: Sequence[LawShape], count: int) -> tuple[LawShape, ...]:
-    """Return one law for each of `count` blocks of a base form; the first law serves those beyond the laws given."""
+    """Return one law for each of `count` blocks of a base form; blocks beyond the given laws get the first one."""
     return (*laws[:count], *[laws[0]] * (count - len(laws)))

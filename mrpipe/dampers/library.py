@@ -1,4 +1,4 @@
-"""All base forms, found by walking `dampers/forms`; a user's own from files that the configuration names."""
+"""All base forms: those of the modules of `dampers/forms`, and those of files that the configuration names."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mrpipe.dampers.user_file import module_of_file
 from mrpipe.errors import UserError
 
 LOADS_FROM = ("mrpipe.dampers.forms",)
-"""Packages that are walked at run time: their modules belong to the code version of a stage."""
+"""Packages whose modules are found at run time; they are part of the code version of a stage."""
 
 
 @cache
@@ -32,7 +32,7 @@ def base_forms() -> dict[str, BaseForm]:
 
 
 def form_of_file(path: Path | str) -> BaseForm:
-    """Load the FORM of a user's own file.
+    """Load the FORM of a file of a user.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def form_of_file(path: Path | str) -> BaseForm:
 
 
 def forms_named(names: Sequence[str], files: Sequence[Path | str] = ()) -> dict[str, BaseForm]:
-    """Return the forms of these names (all where none), with those of the user's files.
+    """Return the forms of these names (all if none is given), and those of the user's files.
 
     Raises
     ------

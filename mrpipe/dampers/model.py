@@ -1,14 +1,14 @@
-"""A damper: a base form, its numbers, effects with theirs, and the chain of steps they make.
+"""A damper model: a base form, effects, their numbers, and the chain of steps.
 
-The hysteretic variable is normalised to its limit, so that the numbers are those which measurements determine: the
-yield force F_y(u) = alpha(u) z_max [N], the yield displacement x_y = z_max/A [m], the share g = gamma/(gamma + beta).
-With z_max = (A/(gamma + beta))^(1/n) the thesis' alpha, A, gamma, beta of (2.1) to (2.3) follow from these once one of
-them is chosen, because measurements determine only three of the four, see :func:`thesis_parameters`.
+The hysteretic variable is normalised to its limit, so that measurements determine all numbers: the yield force F_y(u) =
+alpha(u) z_max [N], the yield displacement x_y = z_max/A [m], the share g = gamma/(gamma + beta). With z_max = (A/(gamma
++ beta))^(1/n) the parameters alpha, A, gamma, beta of (2.1) to (2.3) in the thesis follow from these numbers once one
+of them is chosen, because measurements determine only three of the four, see :func:`thesis_parameters`.
 
-The numbers of every damper (SI; `u` is the drive in A or V): the laws of the drive `yield_force`, `c0` and, where the
-form has a second yielding part, that part's (see :func:`mrpipe.dampers.laws.law_names`: `yield_force_a` [N],
-`yield_force_b` [N/u], ...; coefficients that are left out are 0), `eta` [1/s] (left out: no lag; with `eta_fall` it
-is the rate of a rising drive only), and those that the form lists (`mrpipe/dampers/forms/<form>.py`).
+The numbers of every damper (SI; `u` is the drive in A or V) are the laws of the drive `yield_force`, `c0` and, if the
+form has a second yielding part, the law of that part (see :func:`mrpipe.dampers.laws.law_names`: `yield_force_a` [N],
+`yield_force_b` [N/u], ...; coefficients that are left out are 0), `eta` [1/s] (left out: no lag; with `eta_fall` it is
+the rate of a rising drive only), and those that the form lists (`mrpipe/dampers/forms/<form>.py`).
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ _BLOCK_UNITS = {"yield_force": "N", "c0": "N*s/m", "c1": "N*s/m", "alpha": "N/m"
 
 @dataclass(frozen=True)
 class Addition:
-    """An effect of a damper with its numbers.
+    """An effect of a damper, with its numbers.
 
     Attributes
     ----------
     name, form
-        Effect and its functional shape, as the library of effects names them.
+        Name and form of the effect in the library of effects.
     values
-        Its numbers, SI.
+        Parameter -> value, SI.
     units
-        Their units.
+        Parameter -> unit.
     sensor
-        A fault of sensors: it belongs to the records, not to the damper, and stays out of the chain.
+        Whether it is a fault of sensors, which belongs to the recordings and is not part of the chain.
     steps
         (values) -> steps of the chain.
     file
-        The user's own file that defines the effect; empty for effects of the library.
+        File of the user that defines the effect; empty for effects of the library.
     """
 
     name: str
@@ -65,27 +65,27 @@ class Addition:
 
 @dataclass(frozen=True)
 class DamperModel:
-    """A damper with its numbers.
+    """A damper model with its numbers.
 
     Attributes
     ----------
     form
         Name of a base form, see :mod:`mrpipe.dampers.library`.
     parameters
-        Name -> value, SI, named as this module says.
+        Name -> value, SI; the names are explained in this module.
     drive_unit
         `A` or `V`.
     drive_limit
-        Largest drive that the damper takes (and that the numbers hold for), in `drive_unit`.
+        Largest drive of the damper, up to which the numbers are valid, in `drive_unit`.
     laws
-        Block -> kind of its law of the drive; polynomials where left out.
+        Block -> kind of its law of the drive; blocks that are not listed have polynomials.
     effects
-        What acts in addition to the base form.
+        Effects that act in addition to the base form.
     stroke_m
-        Half the largest peak-to-peak displacement of the tests [m]: effects with a memory need it for the force at
+        Half the largest peak-to-peak displacement of the tests [m]; effects with a memory need it for the force at
         constant speed.
     form_file
-        The user's own file that defines the form; empty for forms of the library.
+        File of the user that defines the form; empty for forms of the library.
     """
 
     form: str
@@ -111,11 +111,11 @@ class DamperModel:
         return np.array([self.parameters.get(f"{name}_{letter}", 0.0) for letter in "abcd"])
 
     def yield_force(self, drive: FloatArray | float) -> FloatArray:
-        """Return F_y(u) [N] at rest of all lags, of the shape of `drive`."""
+        """Return F_y(u) [N] in steady state, with the shape of `drive`."""
         return self.law("yield_force")(drive)
 
     def viscosity(self, drive: FloatArray | float) -> FloatArray:
-        """Return c0(u) [N s/m], of the shape of `drive`."""
+        """Return c0(u) [N s/m], with the shape of `drive`."""
         return self.law("c0")(drive)
 
     def base_steps(self) -> list[Step]:
@@ -134,7 +134,7 @@ class DamperModel:
         return [*self.base_steps(), *added]
 
     def chain(self, extra: Sequence[Step] = ()) -> Chain:
-        """Return the chain of the damper's steps and `extra` ones."""
+        """Return the chain of the steps of the damper and of `extra` steps."""
         return build_chain([*self.steps(), *extra])
 
     def force(
@@ -157,11 +157,11 @@ class DamperModel:
         return run_chain(self.chain(), displacement, velocity, acceleration, drive, dt)[:, FORCE]
 
     def quasi_static_force(self, velocity: FloatArray | float, drive: FloatArray | float) -> FloatArray:
-        """Return the post-yield force [N]: the hysteresis fully yielded in the direction of motion, no lag.
+        """Return the post-yield force [N]: the hysteresis has yielded in the direction of motion, and there is no lag.
 
-        This is what inverses work with. `velocity` [m/s] and `drive` broadcast against each other. Springs are left
-        out, because they need the displacement. With effects the force is simulated over the stroke of the tests at
-        constant speed, the mean of both directions.
+        Inverses of the damper use this force. `velocity` [m/s] and `drive` broadcast against each other. Springs are
+        left out, because they need the displacement. With effects the force is simulated over the stroke of the tests
+        at constant speed, the mean of both directions.
         """
         if any(not item.sensor for item in self.effects):
             return steady_force(self.chain(), velocity, drive, self.stroke_m, self.drive_limit)
@@ -186,7 +186,7 @@ def parameter_unit(name: str, drive_unit: str, form: BaseForm | None = None) -> 
     drive_unit
         `A` or `V`.
     form
-        Form that the parameter belongs to; forms of the library are searched where it is left out.
+        Form that the parameter belongs to; by default all forms of the library are searched.
     """
     stem, _, suffix = name.rpartition("_")
     forms = list(base_forms().values()) if form is None else [form]
@@ -203,13 +203,13 @@ def parameter_unit(name: str, drive_unit: str, form: BaseForm | None = None) -> 
 def thesis_parameters(model: DamperModel, A: float = 1000.0) -> dict[str, float]:
     """Return alpha_a..alpha_d [N/m, N/m/A, ...], gamma, beta [1/m^n] and A of (2.2), (2.3) for a chosen A.
 
-    x_y = z_max/A gives z_max, z_max^n = A/(gamma + beta) the sum and the share the two; any other A describes the same
-    damper.
+    x_y = z_max/A gives z_max, then z_max^n = A/(gamma + beta) gives the sum gamma + beta, and the share of gamma gives
+    both. Any other A describes the same damper.
 
     Raises
     ------
     ValueError
-        If the form holds no Bouc-Wen hysteresis.
+        If the form has no Bouc-Wen hysteresis.
     """
     numbers = model.base.hysteresis
     if numbers is None:
@@ -224,18 +224,18 @@ def thesis_parameters(model: DamperModel, A: float = 1000.0) -> dict[str, float]
 
 
 def bouc_wen_limits(A: float, gamma: float, beta: float, n: float) -> tuple[float, float, float]:
-    """Return z_max [m], the yield displacement [m] and the share of gamma from the thesis' parameters."""
+    """Return z_max [m], the yield displacement [m] and the share of gamma from the parameters of the thesis."""
     z_max = (A / (gamma + beta)) ** (1.0 / n)
     return z_max, z_max / A, gamma / (gamma + beta)
 
 
 def damper_from_parameter_set(parameters: ParameterSet) -> DamperModel:
-    """Return the damper that a parameter set describes, in the thesis' notation or in that of this module.
+    """Return the damper that a parameter set describes, in the notation of the thesis or of this module.
 
     Raises
     ------
     UserError
-        If the model is not known or a parameter is missing.
+        If the model is unknown or a parameter is missing.
     """
     source = f"configs/dampers/{parameters.name}"
     given = {name: float(value) for name, value in parameters.values.items()}
@@ -302,11 +302,12 @@ def read_damper(
     Parameters
     ----------
     artifact
-        Artifact that holds it.
+        Artifact that contains the damper.
     group
         Group inside the artifact.
     effect
-        (name, form, file) -> the effect without its numbers; see :func:`mrpipe.effects.damper.read_damper`.
+        Function of (name, form, file) that returns the effect without its numbers; see
+        :func:`mrpipe.effects.damper.read_damper`.
 
     Raises
     ------
@@ -345,5 +346,5 @@ def write_tested(artifact: ArtifactWriter, largest: Mapping[str, float]) -> None
 
 
 def read_tested(artifact: Artifact) -> dict[str, float]:
-    """Return what :func:`write_tested` wrote; empty where nothing is known of the tests."""
+    """Return the values that :func:`write_tested` wrote; empty if the artifact has none."""
     return {name: artifact.scalar(f"tested/{name}") for name in artifact.members("tested")}

@@ -1,8 +1,8 @@
 """The modified Bouc-Wen model of Spencer et al. (P4 (1) to (5)): a dashpot c1 in series, springs k0 and k1.
 
-With w = x - y the inner equation reads (c0 + c1) w' = c1 x' - alpha z(w) - k0 w, and the force is
-alpha z + c0 w' + k0 w + k1 (x - x0), which is (1) again. z follows w without rate, in closed form, so a step solves one
-monotone scalar equation: the trapezoidal rule in w, stable however stiff the yield is.
+With w = x - y the inner equation reads (c0 + c1) w' = c1 x' - alpha z(w) - k0 w, and the force is alpha z + c0 w' + k0
+w + k1 (x - x0), which is (1) again. z is a rate-independent function of w with a closed form, so a step solves one
+monotone scalar equation. It is the trapezoidal rule in w, which is stable for any stiffness.
 """
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
@@ -49,9 +49,9 @@ def inner_increment(
     gamma_share: float,
     exponent: float,
 ) -> float:
-    """Return the change of w while the rod moves by `increment` [m] in `dt` [s].
+    """Return the change of w [m] while the rod moves by `increment` [m] in `dt` [s].
 
-    The residual grows with the change at a rate of at least c0 + c1, so bracketed Newton steps always end.
+    The residual grows with the change at a rate of at least c0 + c1, so bracketed Newton steps always converge.
     """
     total = viscosity + series_viscosity
     impulse = series_viscosity * increment
@@ -60,7 +60,7 @@ def inner_increment(
     high = impulse + dt * (yield_force * 0.5 * (1.0 - zeta) - stiffness * w)
     low = low / (total + 0.5 * dt * stiffness)
     high = high / (total + 0.5 * dt * stiffness)
-    # the tangent at the present state is a guess that is exact where the hysteresis has yielded
+    # the tangent at the present state is a first estimate, which is exact if the hysteresis has yielded
     direction = 1.0 if impulse - dt * (yield_force * zeta + stiffness * w) >= 0.0 else -1.0
     y = direction * zeta
     start = (1.0 - y**exponent if y >= 0.0 else 1.0 - (1.0 - 2.0 * gamma_share) * (-y) ** exponent) / yield_displacement
@@ -90,7 +90,7 @@ def inner_increment(
 
 @njit(STEP_SIGNATURE, cache=True)
 def series_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Put w' in the place of the velocity and zeta(w) on the wire.
+    """Replace the velocity on the wire by w', and write zeta(w) to the wire.
 
     Parameters: yield displacement, gamma share, exponent, c1_a, c1_b [N s/m, per A or V], k0 [N/m].
     State: last displacement, w, zeta.
@@ -127,7 +127,7 @@ def series_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt:
 
 @njit(STEP_SIGNATURE, cache=True)
 def inner_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: k0 [N/m]. Gives the wire its outer velocity back."""
+    """Parameters: k0 [N/m]. Restores the velocity of the rod on the wire."""
     force = parameters[0] * wire[INNER_DISPLACEMENT]
     wire[EXTRA_FORCE] += force
     wire[FORCE] += force
@@ -149,7 +149,7 @@ def series_dashpot(
     outer_stiffness: float = 0.0,
     rest_displacement: float = 0.0,
 ) -> list[Step]:
-    """Return the steps of the modified Bouc-Wen model (P4): hysteresis behind c1 and k0, and the force of each spring.
+    """Return the steps of the modified Bouc-Wen model (P4): hysteresis with c1 and k0, and the force of each spring.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Numbers of base forms and effects: their bounds and starts are multiples of scales that the campaign provides."""
+"""Parameters of base forms and effects; bounds and starts are multiples of scales of the campaign."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Scales:
-    """What bounds and starts of parameters are multiples of.
+    """Scales of a campaign, of which bounds and starts of parameters are multiples.
 
     Attributes
     ----------
     stroke
         Half the largest peak-to-peak displacement [m].
     speed, acceleration
-        Largest of the motions [m/s], [m/s^2].
+        Largest speed [m/s] and acceleration [m/s^2] of the motions.
     drive
         Largest drive [A or V].
     force
         RMS of the force [N].
     time
-        Longest test [s].
+        Duration of the longest test [s].
     """
 
     stroke: float
@@ -47,25 +47,26 @@ class Scales:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of a form.
+    """A parameter of a form.
 
     Attributes
     ----------
     name, unit
-        SI; `drive` stands for A or V.
+        Name, and unit in SI; `drive` in a unit stands for A or V.
     meaning
-        What it is, in a few words.
+        Meaning of the parameter, in a few words.
     scale
         Product of :class:`Scales` that `lower`, `upper` and `starts` are multiples of, such as `force/stroke`.
     lower, upper, starts
-        Bounds and starts. A strength starts at the first, a small value. Its other starts are for effects whose error
-        rises before it falls: a gap that is too small delays every reversal and explains none.
+        Bounds and starts. A strength starts at the first value, which is small. Its other starts are for effects whose
+        error first rises with the strength before it falls: a gap that is too small delays every reversal without
+        explaining any.
     role
         `shape` (searched), `strength` (searched; the effect vanishes at 0), `level` (searched; the effect acts only
         beyond it, and vanishes at 0), `amplitude` (a force proportional to it; the fit solves for it exactly; vanishes
         at 0) or `constant` (a reference that fixes the meaning of other numbers: the first start, never fitted).
     logarithmic
-        Searched as its logarithm.
+        Whether the search uses its logarithm.
     """
 
     name: str
@@ -99,7 +100,7 @@ def shape(
 def strength(
     name: str, unit: str, meaning: str, scale: str, lower: float, upper: float, start: float, *distant: float
 ) -> Parameter:
-    """Return a strength at which the effect vanishes for 0.
+    """Return a strength; at 0 the effect vanishes.
 
     Parameters
     ----------
@@ -114,10 +115,10 @@ def strength(
 
 
 def amplitude(name: str, unit: str, meaning: str, scale: str, lower: float = 0.0, upper: float = 50.0) -> Parameter:
-    """Return an amplitude that the force is proportional to; a lower bound below 0 allows either sign."""
+    """Return an amplitude, to which the force is proportional; a lower bound below 0 allows both signs."""
     return Parameter(name, unit, meaning, scale, lower, upper, (1.0,), "amplitude")
 
 
 def constant(name: str, unit: str, meaning: str, scale: str) -> Parameter:
-    """Return a reference that the scale fixes; it is never fitted."""
+    """Return a reference value that the scale determines; it is never fitted."""
     return Parameter(name, unit, meaning, scale, 1.0, 1.0, (1.0,), "constant")

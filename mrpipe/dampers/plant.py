@@ -4,12 +4,12 @@ A damper is an ordered tuple of *steps*. A step is a small numba function
 
     step(wire, state, parameters, dt)
 
-that reads and writes the `wire` (what flows along the chain at one instant), keeps its own memory in `state` (zeros at
-first) and has its numbers in `parameters`. All steps share one compiled signature, so that any chain runs in one
-compiled kernel without compiling again: steps are called through function pointers (about 5 ns each).
+that reads and writes the `wire` (an array of the quantities of one instant), stores its memory in `state` (zeros at the
+start) and reads its numbers from `parameters`. All steps have the same compiled signature and are called through
+function pointers (about 5 ns each), so that any chain runs in one compiled kernel without a new compilation.
 
 The same chain serves the bench (:func:`run_chain` over recorded motion) and the closed loop (the simulation calls
-:func:`advance` once a plant step). To try a step and take it back, copy `state` before and restore it after.
+:func:`advance` once a plant step). To try a step and reject it, copy `state` before and restore it afterwards.
 """
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
@@ -29,7 +29,7 @@ from mrpipe.dampers.borrowed import borrowed
 from mrpipe.dampers.timing import look_ahead
 from mrpipe.errors import UserError
 
-# numba calls function pointers experimental; the signature below is fixed, which is the case that is stable
+# numba warns that function pointers are experimental; with a fixed signature, as below, they are stable
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
 # --- the wire -------------------------------------------------------------------------------------------------------
@@ -46,68 +46,70 @@ HYSTERESIS = 9  # hysteretic variable normalised to its limit, -1..1
 HYSTERETIC_FORCE = 10  # YIELD_FORCE x HYSTERESIS [N]
 VISCOUS_FORCE = 11  # N
 EXTRA_FORCE = 12  # force of the base form that no linear coefficient scales, such as that of an inner spring [N]
-FORCE = 13  # at the load cell [N]; at the start of a step that of the step before
+FORCE = 13  # force at the load cell [N]; at the start of a step the force of the step before
 WORK = 14  # energy dissipated since the start [J]
 SLIP = 15  # path since the last reversal [m]
 SINCE_REVERSAL = 16  # time since the last reversal [s]
 PAST_CURRENT = 17  # largest |effective current| so far in this run [A]
 RATE_YIELD = 18  # factor 0..1 of YIELD_FORCE from rate-dependent base forms (1 where unused)
 PART_FORCE = 19  # force of a second yielding part [N], from its own law of the drive (0 where a form has none)
-PART = 20  # its normalised force, -1..1
+PART = 20  # normalised force of the second yielding part, -1..1
 SUM_VELOCITY = 21  # velocity that the sum of (2.1) used: that of the inner element where a form has one [m/s]
 INNER_DISPLACEMENT = 22  # deformation of an inner element [m]
-OUTER_VELOCITY = 23  # velocity of the rod while an inner element's stands in its place [m/s]
-YIELD_LOSS = 24  # share of the yield force that effects took away, such as warm fluid (0 where unused)
+OUTER_VELOCITY = 23  # velocity of the rod while VELOCITY holds that of an inner element [m/s]
+YIELD_LOSS = 24  # share of the yield force that effects remove, such as warm fluid (0 where unused)
 WIRE_SIZE = 25
 
 BOOKKEEPING = 6
-"""Numbers that :func:`advance` keeps behind the chain's own state: work, slip, time since the last reversal, largest
-current, last velocity other than 0, last force."""
+"""Number of values that :func:`advance` stores after the state of the steps: work, slip, time since the last reversal,
+largest current, last velocity other than 0, last force.
+"""
 
 STEP_SIGNATURE = void(float64[::1], float64[::1], float64[::1], float64)
 """The one compiled signature of a step: `@njit(STEP_SIGNATURE, cache=True)`."""
 
 CHAIN_LENGTH = 16
-"""Longest chain; shorter ones are padded with a step that does nothing."""
+"""Largest number of steps of a chain; shorter chains are padded with a step that does nothing."""
 
 
 class Phase(IntEnum):
-    """Where in the chain a step works; a chain is sorted by phase, then by order of mention."""
+    """Place of a step in the chain; a chain is sorted by phase, and within a phase by the given order."""
 
     MOTION = 10  # rod motion before the damper (bearing play, compliance)
     CURRENT = 20  # drive -> effective current (the base's lag)
-    CURRENT_EFFECT = 25  # what changes the effective current (remanence, second lag)
+    CURRENT_EFFECT = 25  # effects on the effective current (remanence, second lag)
     COEFFICIENTS = 30  # effective current -> yield force and viscosity
-    COEFFICIENT_EFFECT = 35  # what changes them (heating, Stribeck, migration)
+    COEFFICIENT_EFFECT = 35  # effects on both (heating, Stribeck, migration)
     HYSTERESIS = 40  # the hysteretic variable
     SUM = 50  # HYSTERETIC_FORCE + VISCOUS_FORCE
     FORCE_EFFECT = 60  # forces in parallel (accumulator, inertia, end stop)
-    SENSOR = 70  # what the load cell makes of it
+    SENSOR = 70  # effects of the load cell on the measured force
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step with its numbers.
+    """One step of a chain, with its numbers.
 
     Attributes
     ----------
     name
-        For messages.
+        Name for messages.
     phase
-        Where in the chain.
+        Place in the chain.
     function
         Compiled with :data:`STEP_SIGNATURE`.
     parameters
-        Its numbers, shape (p,), SI.
+        Numbers of the step, shape (p,), SI.
     state_size
-        Length of its memory.
+        Length of the memory of the step.
     ahead_s
-        Time by which it wants the motion from after the present instant [s]: a recorded displacement that is late. Only
-        recordings can give that; a closed loop runs without such steps.
+        Time [s] by which the step needs the motion after the present instant, because the recorded displacement is
+        late. Only recordings can provide it; a closed loop runs without such steps.
     back_s, kept
-        Time that it looks back [s], and how many samples its memory keeps for this.
+        Time [s] before the present instant that the step reads, and number of samples that its memory stores for this.
     filters_force
-        It replaces the force by a linear filter of the force. A fit then filters each part of the force separately.
+        Whether the step replaces the force by a linear filter of the force. A fit then filters each part of the force
+        separately.
     """
 
     name: str
@@ -123,20 +125,20 @@ class Step:
 
 @dataclass(frozen=True)
 class Chain:
-    """Steps in the form that compiled kernels take.
+    """Steps in the layout that compiled kernels read.
 
     Attributes
     ----------
     functions
-        Padded to :data:`CHAIN_LENGTH`.
+        Functions of the steps, padded to :data:`CHAIN_LENGTH`.
     parameters, parameter_offsets, state_offsets
-        Numbers of all steps in one array; where those of each step begin; where the memory of each step begins.
+        Numbers of all steps in one array; index of the first number, and of the first state, of each step.
     names
-        Of the steps.
+        Names of the steps.
     ahead_s, memories
         See :class:`Step`.
     filters
-        Places of the steps that filter the force.
+        Indices of the steps that filter the force.
     """
 
     functions: tuple[Any, ...]
@@ -149,7 +151,7 @@ class Chain:
     filters: tuple[int, ...] = ()
 
     def check_interval(self, dt: float) -> None:
-        """Raise UserError where a step looks back further than its memory reaches at this interval [s]."""
+        """Raise UserError if a step reads further back than its memory reaches at this interval [s]."""
         for name, back_s, kept in self.memories:
             if back_s > (kept - 2) * dt:
                 raise UserError(
@@ -175,8 +177,8 @@ class Chain:
 def change_yield_force(wire: FloatArray, factor: float) -> None:
     """Multiply the yield force by a factor before the damper yields, for steps of Phase.COEFFICIENT_EFFECT.
 
-    The result differs from a factor of the hysteretic force where the form has a spring in series with the slider, or a
-    yield velocity that grows with the yield force: there the yield force also decides when the damper yields.
+    The result differs from a factor on the hysteretic force if the form has a spring in series with the slider, or a
+    yield velocity that grows with the yield force, because the yield force then also determines when the damper yields.
     """
     wire[YIELD_FORCE] *= factor
     wire[YIELD_LOSS] = 1.0 - (1.0 - wire[YIELD_LOSS]) * factor
@@ -189,7 +191,7 @@ def idle_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
 
 @njit(STEP_SIGNATURE, cache=True)
 def sum_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Add up (2.1): f = alpha z + c0 v, with a second yielding part where the form has one."""
+    """Compute the sum (2.1): f = alpha z + c0 v, plus the second yielding part if the form has one."""
     wire[HYSTERETIC_FORCE] = wire[YIELD_FORCE] * wire[RATE_YIELD] * wire[HYSTERESIS] + wire[PART_FORCE] * wire[PART]
     wire[SUM_VELOCITY] = wire[VELOCITY]
     wire[VISCOUS_FORCE] = wire[VISCOSITY] * wire[VELOCITY]
@@ -202,7 +204,7 @@ def in_order(steps: Sequence[Step]) -> list[Step]:
 
 
 def build_chain(steps: Sequence[Step]) -> Chain:
-    """Sort the steps by phase and pack them; the sum of (2.1) is put in.
+    """Sort the steps by phase and pack them; the step of the sum (2.1) is added.
 
     Raises
     ------
@@ -232,7 +234,7 @@ def build_chain(steps: Sequence[Step]) -> Chain:
 
 
 CHAIN_FUNCTIONS = types.UniTuple(types.FunctionType(STEP_SIGNATURE), CHAIN_LENGTH)
-"""The compiled type of a chain's functions, for the signatures of kernels that run it."""
+"""Compiled type of the functions of a chain, for the signatures of kernels."""
 
 
 @njit(void(float64[::1], int64, float64[::1], float64), cache=True)
@@ -242,12 +244,12 @@ def begin_step(state: FloatArray, memory: int, wire: FloatArray, dt: float) -> N
     Parameters
     ----------
     state
-        Of the chain, with its bookkeeping from `memory` on: work, slip, time since reversal, largest current so far,
-        last velocity other than 0, last force.
+        State of the chain, followed by the bookkeeping from index `memory` on: work, slip, time since reversal, largest
+        current so far, last velocity other than 0, last force.
     memory
-        Length of the chain's own state.
+        Length of the state of the steps.
     wire
-        Holds time, mark of the first sample, displacement, velocity, acceleration and drive.
+        Contains time, mark of the first sample, displacement, velocity, acceleration and drive.
     dt
         Time since the last sample [s].
     """
@@ -276,7 +278,7 @@ def begin_step(state: FloatArray, memory: int, wire: FloatArray, dt: float) -> N
 
 @njit(void(float64[::1], int64, float64[::1], float64), cache=True)
 def end_step(state: FloatArray, memory: int, wire: FloatArray, dt: float) -> None:
-    """Bring the bookkeeping up to date after the steps of a chain; arguments as in :func:`begin_step`."""
+    """Update the bookkeeping after the steps of a chain; arguments as in :func:`begin_step`."""
     state[memory] += (wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]) * wire[VELOCITY] * dt
     state[memory + 3] = max(state[memory + 3], abs(wire[CURRENT]))
     state[memory + 5] = wire[FORCE]
@@ -297,10 +299,10 @@ def advance(
 ) -> None:
     """Advance the chain by one step: set TIME, FIRST and the motion and drive on the wire first, read FORCE after.
 
-    `state` holds the chain's state followed by numbers of bookkeeping (see :func:`new_state`); WORK, SLIP,
+    `state` contains the state of the steps followed by the bookkeeping (see :func:`new_state`); WORK, SLIP,
     SINCE_REVERSAL and PAST_CURRENT are kept here for all steps to read. WORK counts the force of the step before. At
     the start FORCE is the force of the step before, and everything else that steps write is 0: the force depends on
-    `state`, motion and drive alone, whatever a solver has tried on the same wire.
+    `state`, motion and drive alone, independent of trials of a solver on the same wire.
     """
     memory = state_offsets[-1]
     begin_step(state, memory, wire, dt)
@@ -356,7 +358,7 @@ def _run(
 
 
 def new_state(chain: Chain) -> FloatArray:
-    """Return a fresh state for :func:`advance`: the chain's own and :data:`BOOKKEEPING` more numbers."""
+    """Return an initial state for :func:`advance`: that of the steps, and :data:`BOOKKEEPING` more values."""
     return np.zeros(chain.state_size + BOOKKEEPING)
 
 

@@ -1,4 +1,4 @@
-"""Pieces of the two-stage Rosenbrock method ROS2, with which stiff base forms are integrated.
+"""Functions of the two-stage Rosenbrock method ROS2, which integrates stiff base forms.
 
 For z' = f(z, t) and the slope J = df/dz at the start of a step h,
 

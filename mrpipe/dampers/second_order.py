@@ -1,4 +1,4 @@
-"""A second-order low-pass filter in steps of time, for drives and for force channels."""
+"""A second-order low-pass filter in the time domain, for drives and for force channels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recorded motion at other instants than those of its samples."""
+"""Interpolation of recorded motion between its samples."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _shifted(
         for index in range(begin, last + 1):
             at = index + whole
             if at < begin or at >= last:
-                # beyond the record the motion goes on as at its end
+                # beyond the record the motion continues as at its end
                 end = begin if at < begin else last
                 rest = (at + part - end) * step
                 result[0, index] = displacement[end] + rest * velocity[end]
@@ -61,23 +61,23 @@ def look_ahead(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the motion `time_s` after (below 0: before) each sample.
 
-    Displacement by the cubic through values and velocities: micrometres count at reversal, and a series in the
-    derivatives would not reach over a quick motion.
+    The displacement follows the cubic through displacements and velocities, because micrometres matter at a reversal,
+    and a series in the derivatives would be inaccurate for fast motion.
 
     Parameters
     ----------
     displacement, velocity, acceleration
-        Tests laid end to end, shape (n,); m, m/s, m/s^2.
+        Concatenated tests, shape (n,); m, m/s, m/s^2.
     starts
         First sample of each test, and n; shape (tests + 1,).
     dt
         Sampling interval of each test [s], shape (tests,).
     time_s
-        Instants, shape (n,) [s].
+        Time shift of each sample, shape (n,) [s].
 
     Returns
     -------
-    The three, shape (n,).
+    Displacement, velocity and acceleration, shape (n,) each.
     """
     result = np.empty((3, len(displacement)))
     _shifted(displacement, velocity, acceleration, starts, dt, time_s, result)

@@ -1,4 +1,4 @@
-"""A user's own Python file, run as a module with a separate cache for compiled code."""
+"""Loading of a Python file of a user as a module, with a separate cache for compiled code."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from mrpipe.numba_cache import cache_for
 
 
 def check_is_file(path: Path, setting: str, remedy: str) -> None:
-    """Raise a UserError if there is no such file; arguments as in :func:`module_of_file`."""
+    """Raise a UserError if the file does not exist; arguments as in :func:`module_of_file`."""
     if not path.is_file():
         raise UserError(path, setting, "no such file", remedy)
 
 
 def module_of_file(path: Path, setting: str, remedy: str) -> ModuleType:
-    """Return the module of a file; its name holds a hash of its content, so that an edited file is a new module.
+    """Return the module of a file; its name contains a hash of the content, so that an edited file is a new module.
 
     Parameters
     ----------
     path
         File to be loaded.
     setting, remedy
-        Where the file was named and what it has to define, for messages.
+        Setting that names the file, and remedy, for messages.
 
     Raises
     ------
@@ -44,11 +44,12 @@ def module_of_file(path: Path, setting: str, remedy: str) -> ModuleType:
     sys.modules[name] = module
     try:
         with cache_for(name):
-            # not the loader: its byte code counts as current if size and second of the last change are the same
+            # the import loader is not used, because its byte code counts as current if size and second of the last
+            # change agree
             exec(compile(source, str(path), "exec"), module.__dict__)
     except Exception as error:
         del sys.modules[name]
-        # a compiler prints pages: the first line names the fault
+        # messages of a compiler are long: the first line names the fault
         said = next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)
         raise UserError(path, setting, f"cannot be run: {said}", "correct the file") from error
     return module

@@ -1,7 +1,7 @@
-"""Steps of yield that depends on speed: Bingham's jump, powers of the speed, a spring in series with a dashpot.
+"""Steps for a yield force that depends on speed: sign of the velocity, powers of the speed, spring and dashpot.
 
-On real recordings these forms gain more than any other refinement of the Bouc-Wen model, because the force of a real
-damper goes on rising with speed, steeply at first and then less and less.
+On recordings of real dampers these forms lower the error more than any other refinement of the Bouc-Wen model, because
+the force of a real damper continues to rise with speed, first steeply and then less.
 """
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
@@ -48,7 +48,7 @@ def sign_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
 
 
 def velocity_sign(transition_velocity: float = 0.0) -> Step:
-    """Return (6.1)'s sign of the velocity; a transition velocity [m/s] above 0 rounds it to a tanh."""
+    """Return the sign of the velocity in (6.1); with a transition velocity [m/s] above 0 it is a tanh."""
     return Step("velocity-sign", Phase.HYSTERESIS, sign_step, np.array([float(transition_velocity)]))
 
 
@@ -66,12 +66,12 @@ def power_of_velocity(reference_velocity: float, exponent: float) -> Step:
 
 @njit(STEP_SIGNATURE, cache=True)
 def outer_velocity_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Give the wire the rod's velocity back after an inner element's has stood in its place."""
+    """Restore the velocity of the rod on the wire after that of an inner element."""
     wire[VELOCITY] = wire[OUTER_VELOCITY]
 
 
 def outer_velocity() -> Step:
-    """Return the step that ends the part of a chain in which an inner element's velocity stands on the wire."""
+    """Return the step that ends the part of a chain in which the wire has the velocity of an inner element."""
     return Step("outer-velocity", Phase.FORCE_EFFECT, outer_velocity_step, np.zeros(0))
 
 
@@ -164,7 +164,7 @@ def _series(
 def dashpot_series(
     velocity: FloatArray, starts: IntArray, dt: FloatArray, stiffness: float, velocity_scale: float
 ) -> FloatArray:
-    """Return z, shape (n,), of :func:`advance_dashpot` over recordings laid end to end.
+    """Return z, shape (n,), of :func:`advance_dashpot` over concatenated recordings.
 
     `starts` and `dt` as in :func:`mrpipe.dampers.drive.lag_series`; velocity in m/s.
     """

@@ -1,8 +1,8 @@
 """Yield velocity of biviscous models, which grows with the drive.
 
-The viscosity before yield is about constant, so the velocity at which the damper yields grows with the yield force,
-therefore with the drive u: v_y = v (r + (1 - r) (1 - q) |u/u_max|^p). An effect that takes the share q of the
-yield force away, such as warm fluid, lowers the growing part with it.
+The viscosity before yield is approximately constant. The velocity at which the damper yields therefore grows with the
+yield force, and with the drive u: v_y = v (r + (1 - r) (1 - q) |u/u_max|^p). An effect that reduces the yield force by
+the share q, such as warm fluid, reduces the growing part by the same share.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from mrpipe.dampers.parameters import Values, constant, shape
 REST = shape(
     "rest_share", "1", "yield velocity without drive over that at the largest drive", "one", 0.02, 2.0, (0.3, 1.0)
 )
-BEND = shape("bend", "1", "power of the drive that the yield velocity grows with", "one", 0.3, 3.0, (1.0,))
-LARGEST_DRIVE = constant("largest_drive", "drive", "drive at which the yield velocity is given", "drive")
+BEND = shape("bend", "1", "exponent with which the yield velocity grows with the drive", "one", 0.3, 3.0, (1.0,))
+LARGEST_DRIVE = constant("largest_drive", "drive", "drive for which the yield velocity is given", "drive")
 
 
 @njit(float64(float64, float64, float64, float64, float64, float64), cache=True)
@@ -30,7 +30,7 @@ def yield_velocity(velocity: float, drive: float, loss: float, rest: float, bend
 
 
 def growth_of(values: Values) -> tuple[float, float, float]:
-    """Return share at rest, power and largest drive; the yield velocity is constant where they are left out."""
+    """Return share at zero drive, power and largest drive; by default the yield velocity is constant."""
     return values.get("rest_share", 1.0), values.get("bend", 1.0), values.get("largest_drive", 1.0)
 
 

@@ -50,14 +50,14 @@ def _gas(values: Values) -> list[Step]:
 
 
 _CURVATURE = amplitude("curvature", "N/m^2", "second-order stiffness", "force/stroke^2", -5.0, 5.0)
-_STIFFNESS = amplitude("stiffness", "N/m", "stiffness about the middle", "force/stroke", 0.0, 5.0)
+_STIFFNESS = amplitude("stiffness", "N/m", "stiffness around the middle of the stroke", "force/stroke", 0.0, 5.0)
 
 EFFECT = Effect(
     name="accumulator",
-    summary="a force that goes with displacement, with a preload",
+    summary="a force proportional to displacement, with a preload",
     physics="The rod displaces oil against a gas cushion, which acts as a spring in parallel with the damper.",
     remedy="Measure the force at rest at several positions; check the accumulator's charge, or declare its stiffness.",
-    residual="A straight line over displacement, the same at every drive and speed, with a constant part (preload).",
+    residual="A straight line over displacement, the same at every drive and speed, plus a constant (preload).",
     source="Spencer et al. 1997 (k1, x0 of the modified Bouc-Wen model); polytropic gas spring",
     acts_on="force",
     forms=(
@@ -89,7 +89,7 @@ EFFECT = Effect(
         ),
     ),
     separated_by={
-        "migration": Separation("dwell at several positions", ("positions",)),
+        "migration": Separation("rest at several positions of the stroke", ("positions",)),
         "inertia": Separation("the same stroke at several frequencies", ("frequencies",)),
         "end-stop": Separation("the same motion at a smaller amplitude", ("amplitudes",)),
     },

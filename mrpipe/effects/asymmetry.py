@@ -1,4 +1,4 @@
-"""Asymmetry: the damper pulls harder than it pushes."""
+"""Asymmetry: the force differs between the two directions of motion."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -55,7 +55,7 @@ def rounded_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
 def direction_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: amplitude, transition velocity [m/s], kind (0 yield, 1 both).
 
-    The flow's direction decides, not that of the force: after a reversal the two differ until it yields.
+    The direction of the flow decides, not that of the force: after a reversal the two differ until the damper yields.
     """
     v = wire[VELOCITY]
     direction = v / math.sqrt(v * v + parameters[1] * parameters[1])
@@ -116,10 +116,12 @@ _TRANSITION = shape(
 EFFECT = Effect(
     name="asymmetry",
     summary="forces differ between the two directions of motion",
-    physics="Piston areas differ between the chambers, a seal drags one way, or the rod leaves on one side.",
-    remedy="Test both ways round in the machine; if it turns with the damper it is the damper's, else the machine's.",
-    residual="A step over velocity between the two directions of motion, or a slope on one side only.",
-    source="differences of the chambers of a single-rod damper",
+    physics="The piston areas of the two chambers differ, a seal has more friction in one direction, or the rod "
+    "leaves the cylinder on one side only.",
+    remedy="Test the damper in both orientations. If the asymmetry turns with the damper, the damper causes it, "
+    "otherwise the machine.",
+    residual="A step between the two directions of motion, seen over velocity, or a slope in one direction only.",
+    source="general knowledge: the chambers of a single-rod damper differ",
     acts_on="force",
     forms=(
         EffectForm("yield", "F + s |alpha z|", (_SHARE,), _yield, {"share": 0}),
@@ -143,8 +145,10 @@ EFFECT = Effect(
             "own-coefficients",
             "F + |z| (a + b u) + c |v|",
             (
-                amplitude("friction", "N", "difference at no drive", "force", -2.0, 2.0),
-                amplitude("friction_rate", "N/drive", "its change with the drive", "force/drive", -2.0, 2.0),
+                amplitude("friction", "N", "difference without drive", "force", -2.0, 2.0),
+                amplitude(
+                    "friction_rate", "N/drive", "change of the difference with the drive", "force/drive", -2.0, 2.0
+                ),
                 amplitude("drag", "N*s/m", "difference of the viscosities", "force/speed", -2.0, 2.0),
             ),
             _own,
@@ -158,7 +162,18 @@ EFFECT = Effect(
         EffectForm(
             "rounded",
             "F + s (sqrt((alpha z + c v)^2 + f^2) - f)",
-            (_SHARE, shape("knee_force", "N", "force below which it fades", "force", 1e-3, 2.0, (0.03, 0.2))),
+            (
+                _SHARE,
+                shape(
+                    "knee_force",
+                    "N",
+                    "force below which the difference vanishes gradually",
+                    "force",
+                    1e-3,
+                    2.0,
+                    (0.03, 0.2),
+                ),
+            ),
             _rounded,
             {"share": 0},
         ),

@@ -15,8 +15,8 @@ from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, V
 def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: gap [m] between the flanks, stiffness share within the gap, kind. State: damper positions.
 
-    Kinds: 0 the damper stands still within the gap; 1 several plays of growing gap (a worn bearing); 2 the damper is
-    carried along with a share of the motion within the gap.
+    Kinds: 0 the damper rests within the gap; 1 several plays of increasing gap (a worn bearing); 2 the damper follows
+    with a share of the motion within the gap.
     """
     x = wire[DISPLACEMENT]
     gap, share, kind = parameters[0], parameters[1], parameters[2]
@@ -39,7 +39,7 @@ def play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
     state[4] = x
     state[3] += moved
     wire[DISPLACEMENT] = state[3]
-    # the damper's share of the rod's speed: without a gap the velocity is left as it is
+    # share of the speed of the rod with which the damper moves: without a gap the velocity is unchanged
     if rod != 0.0:
         wire[VELOCITY] *= min(max(moved / rod, 0.0), 1.0)
 
@@ -51,8 +51,8 @@ _PLAYS = 8
 def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: mean gap [m], spread of the gaps (0..1). State: plays, damper, rod.
 
-    A Prandtl-Ishlinskii operator: the mean of plays whose gaps lie evenly from g (1 - s) to g (1 + s), as where soft or
-    uneven flanks take the damper along little by little.
+    A Prandtl-Ishlinskii operator: the mean of plays with evenly spaced gaps from g (1 - s) to g (1 + s), as with soft
+    or uneven flanks, which engage gradually.
     """
     x = wire[DISPLACEMENT]
     gap, spread = parameters[0], parameters[1]
@@ -78,7 +78,7 @@ def graded_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
 def lost_motion_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: gap [m], transition velocity [m/s]. State: last smoothed sign.
 
-    The damper trails the rod by half the gap in the direction of motion; the change over is rounded with speed.
+    The damper lags the rod by half the gap in the direction of motion; the change of side is rounded over the speed.
     """
     v = wire[VELOCITY]
     sign = v / (abs(v) + parameters[1])
@@ -93,10 +93,10 @@ def lost_motion_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
 
 @njit(STEP_SIGNATURE, cache=True)
 def free_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: gap [m]. State: place in the gap, damper position, rod, last force, last damper position.
+    """Parameters: gap [m]. State: position in the gap, damper position, rod position, last force, last damper position.
 
-    A joint without friction: the flank stays in touch while the force presses on it, so the gap is crossed where the
-    force passes zero. Where that is between two samples follows from the slope of the force over the last step.
+    A joint without friction: the flank stays in contact while the force presses on it, so the gap is crossed when the
+    force passes zero. The instant between two samples follows from the slope of the force over the last step.
     """
     x = wire[DISPLACEMENT]
     half = 0.5 * parameters[0]
@@ -112,7 +112,7 @@ def free_play_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     left = rod
     moved = 0.0
     place = state[0]
-    # distance that the damper can still move with the flank that its force presses on
+    # distance that the damper can still move while its force presses on this flank
     if abs(place) >= half and force * place > 0.0 and rod * force < 0.0:
         change = state[1] - state[4]
         slope = (force - state[3]) / change if abs(change) > 1e-12 else 0.0
@@ -168,11 +168,11 @@ _GAP = strength("gap", "m", "distance between the flanks", "stroke", 0.0, 0.5, 0
 
 EFFECT = Effect(
     name="backlash",
-    summary="play between rod and damper: the damper stands still while the rod crosses the gap",
-    physics="A worn bearing or clevis lets the rod move freely before it takes the damper along.",
-    remedy="Fit a new bush or preload the joint; measure slow small triangles about reversal at two currents.",
-    residual="A spike after each reversal: the measured force stays where it was while the model already turns. "
-    "Its width in displacement is the gap.",
+    summary="play between rod and damper: the damper rests while the rod crosses the gap",
+    physics="With a worn bearing or clevis the rod moves freely through a gap before it moves the damper.",
+    remedy="Fit a new bush or preload the joint; measure small slow triangles at two currents.",
+    residual="A spike after each reversal: the measured force stays constant while the force of the model already "
+    "changes. The width of the spike in displacement is the gap.",
     source="play operator (Krasnoselskii and Pokrovskii 1989)",
     acts_on="rod motion",
     forms=(
@@ -182,7 +182,10 @@ EFFECT = Effect(
         EffectForm(
             "carried",
             "within the gap the damper follows with a share",
-            (_GAP, shape("carried_share", "1", "share of the motion that is passed on", "one", 0.02, 0.9, (0.3,))),
+            (
+                _GAP,
+                shape("carried_share", "1", "share of the motion that the damper follows", "one", 0.02, 0.9, (0.3,)),
+            ),
             _carried,
         ),
         EffectForm(
@@ -190,17 +193,30 @@ EFFECT = Effect(
             "x - g/2 v/(|v| + v_t)",
             (
                 _GAP,
-                shape("transition_velocity", "m/s", "speed that rounds the change", "speed", 0.001, 0.5, (0.03, 0.15)),
+                shape(
+                    "transition_velocity",
+                    "m/s",
+                    "speed over which the change of side is rounded",
+                    "speed",
+                    0.001,
+                    0.5,
+                    (0.03, 0.15),
+                ),
             ),
             _lost,
         ),
     ),
-    separated_by={"migration": Separation("slow small triangles about reversal at two currents", ("reversal",))},
+    separated_by={"migration": Separation("small slow triangles at two currents", ("reversal",))},
     refinements=(
         EffectForm(
             "graded",
             "mean of plays of gaps from g (1 - s) to g (1 + s)",
-            (_GAP, Parameter("spread", "1", "0: one gap, 1: gaps from 0 on", "one", 0.0, 1.0, (0.5,))),
+            (
+                _GAP,
+                Parameter(
+                    "spread", "1", "0: all gaps equal; 1: gaps from 0 to twice the mean", "one", 0.0, 1.0, (0.5,)
+                ),
+            ),
             _graded,
         ),
     ),

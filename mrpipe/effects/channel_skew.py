@@ -24,7 +24,7 @@ from mrpipe.dampers.timing import between
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
 
 INSTANTS = 1024
-"""Instants that the late force can look back."""
+"""Number of stored instants for the late force."""
 _KEPT = 4  # displacement, velocity, acceleration and drive of an instant
 
 
@@ -38,9 +38,9 @@ def _keep(wire: FloatArray, state: FloatArray, place: int) -> None:
 
 @njit(STEP_SIGNATURE, cache=True)
 def late_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: time [s] by which the force lies behind displacement and drive. State: ring of instants, its place.
+    """Parameters: time [s] by which the force is late. State: ring buffer of instants, write position.
 
-    The force is late by as much as motion and drive are taken from before.
+    The force is computed from motion and drive at an earlier time, and is therefore late by this time.
     """
     size = (state.shape[0] - 1) // _KEPT
     if wire[FIRST] > 0.5:
@@ -85,39 +85,41 @@ def _shift(values: Values) -> list[Step]:
 
 EFFECT = Effect(
     name="channel-skew",
-    summary="displacement and force do not belong to the same instant",
+    summary="displacement and force are not recorded at the same instant",
     physics="Channels are sampled one after another, or one of them goes through a filter that the other lacks.",
-    remedy="Check time stamps with a common step on both inputs; give both channels the same filter.",
-    residual="A loop over velocity that grows with frequency and vanishes where the force is constant; the "
-    "measured loop is turned against the model's.",
+    remedy="Apply the same step signal to both inputs and compare the time stamps; give both channels the same filter.",
+    residual="A loop over velocity that grows with frequency and vanishes where the force is constant; the measured "
+    "loop is rotated relative to that of the model.",
     source="multiplexed data loggers; amplifiers with a low-pass filter",
     acts_on="time base",
     forms=(
         EffectForm(
             "shift",
             "x(t + T)",
-            (strength("skew", "s", "time that displacement lies behind force", "one", -0.03, 0.03, 0.0005),),
+            (strength("skew", "s", "delay of the displacement relative to the force", "one", -0.03, 0.03, 0.0005),),
             _shift,
         ),
         EffectForm(
             "late-force",
             "F(t - T)",
-            (strength("skew", "s", "time that force lies behind displacement and drive", "one", 0.0, 0.03, 0.0005),),
+            (strength("skew", "s", "delay of the force relative to displacement and drive", "one", 0.0, 0.03, 0.0005),),
             _late,
         ),
         EffectForm(
             "filtered-force",
             "F_m'' + 2 zeta omega F_m' + omega^2 (F_m - F) = 0, T = 2 zeta/omega",
             (
-                strength("skew", "s", "time by which slow changes of the force are late", "one", 0.0, 0.03, 0.0005),
-                shape("damping_ratio", "1", "of the filter of the force channel", "one", 0.5, 2.0, (0.8,)),
+                strength("skew", "s", "delay of slow changes of the force", "one", 0.0, 0.03, 0.0005),
+                shape(
+                    "damping_ratio", "1", "damping ratio of the filter of the force channel", "one", 0.5, 2.0, (0.8,)
+                ),
             ),
             _filtered,
         ),
     ),
     sensor=True,
     separated_by={
-        "inertia": Separation("time-stamp check, frequency sweep", ("frequencies",)),
+        "inertia": Separation("check of the time stamps, frequency sweep", ("frequencies",)),
         "backlash": Separation("the same stroke at several frequencies", ("frequencies",)),
     },
 )

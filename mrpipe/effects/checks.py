@@ -1,7 +1,7 @@
-"""What is demanded of every effect file: of those that come with the program and of a user's own alike.
+"""Demands on every effect file, of the program and of users.
 
-The demands are those that fit, tracing and closed loop rely on. An effect of a damper is run in a chain behind a plain
-base form, on dampers of two sizes, because an effect that holds absolute numbers works on one size only.
+Fit, tracing and closed loop rely on these demands. An effect of a damper is run in a chain after a simple base form, on
+dampers of two sizes, because an effect with absolute numbers would be valid for one size only.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from mrpipe.units import conversion
 
 Values = dict[str, float]
 Test = Callable[[EffectForm, Size], str]
-"""Returns why a form does not meet a demand on a damper of one size; empty where it does."""
+"""Function that returns why a form does not meet a demand on a damper of one size; empty if it does."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ class Check:
     form
         Form that was checked; empty for the effect as a whole.
     demand
-        What is demanded, in a sentence.
+        The demand, a sentence.
     failure
-        Why it is not met; empty where it is.
+        Why it is not met; empty if it is.
     """
 
     form: str
@@ -64,7 +64,7 @@ class Check:
 
 
 def checks_of(effect: Effect, known: Sequence[str]) -> list[Check]:
-    """Return every demand on an effect of a damper, met or not.
+    """Return the result of every demand on an effect of a damper.
 
     Parameters
     ----------
@@ -76,14 +76,14 @@ def checks_of(effect: Effect, known: Sequence[str]) -> list[Check]:
     checks = [*described(effect), Check("", "Needs and separating tests are known", _unknown(effect, known))]
     forms = (*effect.forms, *effect.refinements)
     names = [form.name for form in forms]
-    checks.append(Check("", "There is a form, and each has its own name", _names(names)))
+    checks.append(Check("", "There is at least one form, and all forms have different names", _names(names)))
     for form in forms:
         checks += form_checks(form)
     return checks
 
 
 def described(effect: Described) -> Iterator[Check]:
-    """Yield the demands on the texts of an effect, be it one of a damper or of a structure."""
+    """Yield the demands on the texts of an effect of a damper or of a structure."""
     texts = {name: getattr(effect, name) for name in ("name", "summary", "physics", "remedy", "source")}
     short = [name for name, text in texts.items() if not isinstance(text, str) or len(text.strip()) < 3]
     yield Check(
@@ -113,7 +113,7 @@ def _names(names: Sequence[str]) -> str:
 
 
 def form_checks(form: EffectForm) -> list[Check]:
-    """Return every demand on one form of an effect of a damper, up to one without which the rest cannot be tried."""
+    """Return the result of the demands on one form; it ends with a failure that makes the other checks impossible."""
     demands: list[tuple[str, Test, bool]] = [
         ("Units, scales, bounds and starts of the parameters are sound", _parameters, True),
         ("Steps are compiled, write only to their memory and do not change their parameters", _steps, True),
@@ -143,7 +143,7 @@ def _each(test: Test, form: EffectForm) -> str:
                 failure = test(form, size)
         except UserError as error:
             failure = str(error)
-        except Exception as error:  # a user's own file may do anything
+        except Exception as error:  # the file of a user may raise any error
             failure = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
         if failure:
             return f"{failure} (damper of {size.scales.force:g} N, {size.scales.stroke:g} m)"
@@ -151,7 +151,7 @@ def _each(test: Test, form: EffectForm) -> str:
 
 
 def parameter_failure(item: Parameter, scales: EffectScales) -> str:
-    """Return what is wrong with a parameter, empty where nothing is."""
+    """Return what is wrong with a parameter; empty if nothing is."""
     if not item.meaning.strip():
         return f"{item.name}: the meaning is empty"
     try:
@@ -165,16 +165,16 @@ def parameter_failure(item: Parameter, scales: EffectScales) -> str:
     except (AttributeError, ValueError):
         return f"{item.name}: {item.scale!r} is not a product of {', '.join(EffectScales.__dataclass_fields__)}"
     if not (np.isfinite([low, high]).all() and low < high):
-        return f"{item.name}: the bounds {item.lower} and {item.upper} are not in order"
+        return f"{item.name}: the lower bound {item.lower} is not below the upper bound {item.upper}"
     if not starts:
-        return f"{item.name}: there is no start"
+        return f"{item.name}: no start is given"
     if item.role == "amplitude":
         return ""
     outside = [start for start in starts if not low <= start <= high]
     if outside:
         return f"{item.name}: starts outside the bounds"
     if item.logarithmic and low <= 0.0:
-        return f"{item.name}: is searched as a logarithm, so its lower bound must be above 0"
+        return f"{item.name}: is searched as its logarithm, so its lower bound must be above 0"
     if item.role == "strength" and not low <= 0.0 <= high:
         return f"{item.name}: is a strength, so 0 must lie within its bounds"
     return ""
@@ -220,7 +220,7 @@ def _steps(form: EffectForm, size: Size) -> str:
         return "steps(values) does not return a list of Step"
     beyond = [name for name, place in form.amplitude_steps.items() if not 0 <= place < len(steps)]
     if beyond:
-        return f"amplitude_steps of {', '.join(beyond)} is none of the {len(steps)} steps"
+        return f"amplitude_steps of {', '.join(beyond)} is not the index of one of the {len(steps)} steps"
     if len(steps) > CHAIN_LENGTH - len(size.base) - 1:
         return f"{len(steps)} steps are too many for a chain"
     build_chain([*size.base, *steps])
@@ -235,7 +235,7 @@ def _steps(form: EffectForm, size: Size) -> str:
 
 
 def _within_memory(step: Step, motion: Motion) -> str:
-    """Run the step uncompiled, where an index beyond its memory is an error and no damage to other memory."""
+    """Run the step uncompiled, so that an index beyond its memory raises an error instead of damage."""
     plain = getattr(step.function, "py_func", None)
     if plain is None:
         return "the function is not compiled: decorate it with @njit(STEP_SIGNATURE, cache=True)"
@@ -251,7 +251,7 @@ def _within_memory(step: Step, motion: Motion) -> str:
         except IndexError:
             return f"reads or writes beyond its memory (state_size {step.state_size}, {len(numbers)} parameters)"
     if not np.array_equal(numbers, before):
-        return "writes into its parameters: what it remembers belongs into its state"
+        return "writes into its parameters: numbers that it stores belong into its state"
     return ""
 
 
@@ -275,7 +275,7 @@ def _memory(form: EffectForm, size: Size) -> str:
     if first == again:
         return ""
     return (
-        f"the same step from the same state gives {first:.6g} N, then {again:.6g} N: something is remembered outside "
+        f"the same step from the same state gives {first:.6g} N, then {again:.6g} N: something is stored outside "
         "the state"
     )
 
@@ -302,7 +302,11 @@ def _linear(form: EffectForm, size: Size) -> str:
     doubled = {**values, **{item.name: 2.0 * values[item.name] for item in form.amplitudes}}
     once, twice = (_force(form, item, size, motion) - plain for item in (values, doubled))
     error = np.abs(twice - 2.0 * once).max()
-    return "" if error <= 1e-9 * size.scales.force else f"twice the amplitude misses twice the force by {error:.3g} N"
+    return (
+        ""
+        if error <= 1e-9 * size.scales.force
+        else f"with twice the amplitude the force differs from twice the force by {error:.3g} N"
+    )
 
 
 def _dissipative(form: EffectForm, size: Size) -> str:

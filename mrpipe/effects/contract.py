@@ -1,7 +1,8 @@
-"""What an effect is: the one narrow contract that every file of this package (and a user's own file) keeps.
+"""Definition of an effect: the contract that every file of this package (and of a user) fulfils.
 
-A file defines `EFFECT = Effect(...)` and nothing else knows of it. An effect has one or several *forms*: functional
-shapes of the same physics. A form turns parameter values into steps of a chain (:mod:`mrpipe.dampers.plant`).
+A file defines `EFFECT = Effect(...)`; no other module has to be changed. An effect has one or several *forms*:
+functional shapes of the same physics. A form turns parameter values into steps of a chain
+(:mod:`mrpipe.dampers.plant`).
 """
 
 from __future__ import annotations
@@ -31,9 +32,10 @@ Needs = Literal["varying-drive", "varying-speed", "several-frequencies", "severa
 TestKind = Literal[
     "speeds", "steps", "positions", "middle", "frequencies", "amplitudes", "long", "reversal", "constants", "rest"
 ]
-"""Kinds of bench test: triangles at several speeds; steps of the drive; dwells at several positions; motion about
-another middle; several frequencies; other amplitudes; a long run with a pause; slow small triangles about reversal;
-constant drives at several speeds; rest at several drives."""
+"""Kinds of bench test, in the order of the names: triangles at several speeds; steps of the drive; rest at several
+positions; motion about another mean position; several frequencies; other amplitudes; a long run with a pause; small
+slow triangles; constant drives at several speeds; rest at several drives.
+"""
 TESTS_FOR: Mapping[Needs, TestKind] = {
     "varying-drive": "steps",
     "varying-speed": "speeds",
@@ -51,15 +53,15 @@ class EffectForm:
     Attributes
     ----------
     name, summary
-        Key within the effect; the law in a line.
+        Key within the effect; the law in one line.
     parameters
-        Its numbers.
+        Parameters of the form.
     steps
         (values) -> steps of the chain. Every amplitude has one step, at the place of `amplitude_steps`.
     amplitude_steps
-        Amplitude -> index in what `steps` returns.
+        Amplitude -> index of its step in the list that `steps` returns.
     dissipative
-        With parameters within bounds the force it adds or changes never feeds energy over a closed cycle.
+        Whether, with parameters within their bounds, the form never feeds energy into a closed cycle.
     """
 
     name: str
@@ -86,14 +88,14 @@ class EffectForm:
 
 @dataclass(frozen=True)
 class Separation:
-    """A test that separates an effect from another one that looks alike.
+    """A test that separates an effect from another one with a similar residual.
 
     Attributes
     ----------
     advice
-        A sentence for people.
+        Advice for the reader, a sentence.
     kinds
-        Kinds of bench test that `close-loop` then proposes; empty where no bench test does it.
+        Kinds of bench test that `close-loop` then proposes; empty if no bench test separates them.
     """
 
     advice: str
@@ -102,18 +104,18 @@ class Separation:
 
 @dataclass(frozen=True)
 class Described:
-    """What every effect says of itself, be it one of a damper or of a structure.
+    """Texts of an effect of a damper or of a structure.
 
     Attributes
     ----------
     name, summary
-        Key of the effect; what it does, in a line.
+        Key of the effect; the effect in one line.
     physics, remedy
-        Sentences for the report: where it comes from, and what to do on the rig.
+        Sentences for the report: the physical cause, and what to do on the rig.
     source
-        Where the law is described.
+        Publication that describes the law.
     residual
-        What the residual of a model without the effect looks like, for docs/effects.md.
+        Appearance of the residual of a model without the effect, for docs/effects.md.
     """
 
     name: str
@@ -131,22 +133,24 @@ class Effect(Described):
     Attributes
     ----------
     acts_on
-        What it modifies (`rod motion`, `effective drive`, `yield force`, `viscous force`, `force`, `time base`).
+        Quantity that it modifies (`rod motion`, `effective drive`, `yield force`, `viscous force`, `force`, `time
+        base`).
     forms
         One or several functional shapes.
     needs
-        What a campaign must hold for the effect to show at all.
+        Needs: tests that a campaign must contain to show the effect at all.
     sensor
-        A fault of sensors or time base: corrected in prepare, never put into the plant.
+        Whether it is a fault of sensors or of the time base, which prepare corrects and which is never part of the
+        plant.
     rig
         `damper` or `frame`.
     separated_by
         Other effect -> test that separates the two.
     refinements
-        Richer forms of the same physics, too supple to name it by: once it is named, one of them takes the form's place
-        where it is better on tests left out.
+        Richer forms of the same physics, which are too flexible to identify the effect. Once it is named, one of them
+        replaces the form if it is better on tests left out.
     law_of_drive
-        It bends the drive, so that a law of the drive that levels off does much the same.
+        Whether it limits the drive, so that a saturating law of the drive has a similar result.
     """
 
     acts_on: str

@@ -1,4 +1,4 @@
-"""Dampers with effects: read from an artifact, where the library of effects turns names into steps, or named."""
+"""Dampers with effects, from an artifact or by name; the library of effects converts names to steps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def read_damper(artifact: Artifact, group: str = "damper") -> DamperModel:
     Raises
     ------
     UserError
-        If an effect is not known, or the file that defines it is missing.
+        If an effect is unknown, or the file that defines it is missing.
     """
 
     def effect(name: str, form: str, file: str) -> Addition:
@@ -42,7 +42,7 @@ def damper_named(name: str, artifacts: Mapping[str, Callable[[], Artifact]]) -> 
         A key of `artifacts` (`identified`, `traced`), an artifact file (`.h5`) such as that of another run, a set of
         configs/dampers, or its YAML file.
     artifacts
-        Name -> opens the artifact of this run that holds the damper.
+        Name -> function that opens the artifact of this run that contains the damper.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Delay: the drive lags more than the model's first-order lag."""
+"""Delay: the drive acts later than with the first-order lag of the model."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from mrpipe.dampers.second_order import second_order_filter
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, shape, strength
 
 BUFFER = 6144
-"""Samples of effective drive that the dead time can look back."""
+"""Number of stored samples of the effective drive for the dead time."""
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def dead_time_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: dead time [s]. State: ring of past effective drives, and where it stands."""
+    """Parameters: dead time [s]. State: ring buffer of past effective drives, write position."""
     size = state.shape[0] - 1
     u = wire[CURRENT]
     if wire[FIRST] > 0.5:
@@ -102,11 +102,11 @@ def _fall(values: Values) -> list[Step]:
 
 EFFECT = Effect(
     name="delay",
-    summary="the drive acts later than the model's lag says",
-    physics="Power electronics, eddy currents and the build-up of chains add dead time or a second lag.",
-    remedy="Record the coil current itself at the damper, step it up and down at constant velocity, declare the lag.",
-    residual="A residual where the drive changes: the measured force follows steps of the drive later than the "
-    "model. Nothing at constant drive.",
+    summary="the drive acts later than with the lag of the model",
+    physics="Power electronics, eddy currents and the formation of particle chains cause dead time or a second lag.",
+    remedy="Record the coil current at the damper, measure steps up and down at constant velocity, declare the lag.",
+    residual="The measured force follows steps of the drive later than the model. At constant drive there is no "
+    "residual.",
     source="Koo et al. 2006 on response time of MR dampers; eddy currents as a second pole",
     acts_on="effective drive",
     forms=(
@@ -151,7 +151,7 @@ EFFECT = Effect(
     needs=("varying-drive",),
     separated_by={"remanence": Separation("current steps up and down at constant velocity", ("steps",))},
     refinements=(
-        # a chain of lags of any number is near to a dead time before a filter of second order
+        # a chain of any number of lags is similar to a dead time followed by a second-order filter
         EffectForm(
             "dead-time-and-second-order",
             "w'' + 2 zeta omega w' + omega^2 (w - u(t - T + s T)) = 0, s T = 2 zeta/omega",

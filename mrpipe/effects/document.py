@@ -14,9 +14,9 @@ from mrpipe.effects.structural.library import all_structural_effects
 _HEAD = """\
 # Effects
 
-Every effect that `mrpipe close-loop` can name: what it is, what the residual of a model without it looks like, which
-tests reveal it, and what to do on the rig. Effects of a damper are found on a bench campaign; effects of a structure on
-a shear-frame campaign. Your own effects work the same way: [write-an-effect.md](write-an-effect.md).
+Every effect that `mrpipe close-loop` can name: its physics, the residual of a model without it, the tests that reveal
+it, and what to do on the rig. Effects of a damper are found on a bench campaign; effects of a structure on a
+shear-frame campaign. Your own effects work the same way: [write-an-effect.md](write-an-effect.md).
 
 This page is written by `python -m mrpipe.effects.document > docs/effects.md`.
 """
@@ -77,7 +77,7 @@ def _head(effect: Effect | StructuralEffect) -> str:
 def _tests(separated_by: Mapping[str, Separation]) -> str:
     if not separated_by:
         return ""
-    rows = "".join(f"- from {name}: {item.advice}\n" for name, item in separated_by.items())
+    rows = "\n".join(f"- from {name}: {item.advice}" for name, item in separated_by.items())
     return f"\n\n**Tests that separate it:**\n\n{rows}"
 
 

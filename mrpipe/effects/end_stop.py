@@ -87,7 +87,7 @@ _STIFFNESS = amplitude("stiffness", "N/m", "stiffness of the contact", "force/st
 
 EFFECT = Effect(
     name="end-stop",
-    summary="the force shoots up near the end of the stroke",
+    summary="the force rises steeply near the end of the stroke",
     physics="The piston touches a bump stop, a seal carrier or the end of the cylinder.",
     remedy="Shorten the stroke or centre the damper; declare free travel and stiffness.",
     residual="A steep rise beyond one or both ends of the stroke; nothing in the middle.",
@@ -107,7 +107,7 @@ EFFECT = Effect(
         ),
         EffectForm(
             "two-sided",
-            "own stiffness at either end",
+            "separate stiffness at each end",
             (
                 _FREE,
                 amplitude("stiffness_out", "N/m", "stiffness at positive displacement", "force/stroke", 0.0, 1e4),
@@ -118,7 +118,7 @@ EFFECT = Effect(
         ),
         EffectForm(
             "two-sided-progressive",
-            "own curvature at either end",
+            "separate curvature at each end",
             (
                 _FREE,
                 amplitude("stiffness_out", "N/m^2", "curvature at positive displacement", "force/stroke^2", 0.0, 1e5),
@@ -133,15 +133,15 @@ EFFECT = Effect(
     refinements=(
         EffectForm(
             "contact",
-            "(k + d v) ((|x| - x0)/x0)^n beyond x0, k of either end, after Hunt and Crossley 1975",
+            "(k + d v) ((|x| - x0)/x0)^n beyond x0, separate k at each end, after Hunt and Crossley 1975",
             (
                 _FREE,
-                shape("exponent", "1", "power of the indentation", "one", 0.7, 4.0, (1.5, 2.5)),
+                shape("exponent", "1", "exponent of the indentation", "one", 0.7, 4.0, (1.5, 2.5)),
                 amplitude(
-                    "stiffness_out", "N", "at positive displacement, for an indentation of x0", "force", 0.0, 1e6
+                    "stiffness_out", "N", "spring at positive displacement, for an indentation of x0", "force", 0.0, 1e6
                 ),
                 amplitude("stiffness_in", "N", "at negative displacement", "force", 0.0, 1e6),
-                amplitude("damping", "N s/m", "loss of the contact", "force/speed", 0.0, 1e6),
+                amplitude("damping", "N s/m", "damping of the contact", "force/speed", 0.0, 1e6),
             ),
             _contact,
             {"stiffness_out": 0, "stiffness_in": 1, "damping": 2},

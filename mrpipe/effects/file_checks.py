@@ -1,4 +1,4 @@
-"""Checks of a user's own effect file, whatever it acts on."""
+"""Checks of an effect file of a user, for effects of dampers and of structures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mrpipe.errors import UserError
 
 
 def check_file(path: Path) -> tuple[Effect | StructuralEffect, list[Check]]:
-    """Load the EFFECT of a file and return it with every demand on it, met or not.
+    """Load the EFFECT of a file, and return it with the result of every demand on it.
 
     Raises
     ------

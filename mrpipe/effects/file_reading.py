@@ -1,6 +1,6 @@
-"""What a user's effect file says, read without running it.
+"""Reading of an effect file of a user without running it.
 
-`mrpipe check` may be given somebody else's configuration, so it must not run the Python files that it names. Commands
+A configuration may come from somebody else, so `mrpipe check` must not run the Python files that it names. Commands
 that trace effects (`run`, `close-loop`) and `check-effect` run them.
 """
 
@@ -13,7 +13,7 @@ from mrpipe.dampers.user_file import check_is_file
 from mrpipe.errors import UserError
 
 REMEDY = "name a Python file that defines EFFECT"
-"""What a user can do about a file that defines no effect."""
+"""Remedy for a file that defines no effect."""
 
 
 def name_in_file(path: Path, setting: str = "close_loop.effect_files") -> str:
@@ -24,7 +24,7 @@ def name_in_file(path: Path, setting: str = "close_loop.effect_files") -> str:
     path
         Python file.
     setting
-        Where it was named, for messages.
+        Setting that names the file, for messages.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def name_in_file(path: Path, setting: str = "close_loop.effect_files") -> str:
 
 
 def _effect(statement: ast.stmt) -> ast.expr | None:
-    """Return what a statement assigns to EFFECT, None where it assigns something else."""
+    """Return the expression that a statement assigns to EFFECT; None for other statements."""
     targets: list[ast.expr] = []
     if isinstance(statement, ast.Assign):
         targets = statement.targets

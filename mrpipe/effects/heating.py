@@ -1,4 +1,4 @@
-"""Heating: dissipated work warms the fluid, which yields and flows more easily."""
+"""Heating: dissipated work warms the fluid, which lowers yield force and viscosity."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, V
 
 @njit(void(float64[::1], float64[::1], float64, float64), cache=True)
 def _warm(wire: FloatArray, state: FloatArray, cooling_rate: float, dt: float) -> None:
-    """Advance the heat [J] in the state by the work of a step, less what cools at a rate [1/s]; then the last work."""
+    """Advance the heat [J] by the work of a step minus cooling at a rate [1/s], and store the work."""
     if wire[FIRST] > 0.5:
         state[0] = 0.0
         state[1] = wire[WORK]
@@ -26,7 +26,7 @@ def _warm(wire: FloatArray, state: FloatArray, cooling_rate: float, dt: float) -
 def heating_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: loss for each joule, cooling rate [1/s], kind (0 both, 1 yield, 2 viscosity), law (0, 1).
 
-    State: heat [J], last work [J]. Heat is that of the simulated force, never of a measured one.
+    State: heat [J], last work [J]. The heat follows from the simulated force, never from a measured one.
     """
     _warm(wire, state, parameters[1], dt)
     loss = parameters[0] * state[0]
@@ -91,9 +91,11 @@ _TIME = shape("cooling_time", "s", "time constant of cooling", "time", 0.1, 30.0
 EFFECT = Effect(
     name="heating",
     summary="forces fall as work is dissipated within a test",
-    physics="The dissipated work stays in the fluid for minutes; a warm carrier is thinner and the chains are weaker.",
-    remedy="Measure the temperature, pause between tests, repeat the first test at the end.",
-    residual="Grows with the dissipated work within a test, in proportion to the force, and starts anew after a pause.",
+    physics="The dissipated heat stays in the fluid for minutes; in a warm fluid the viscosity is lower and the "
+    "particle chains are weaker.",
+    remedy="Measure the temperature, pause between tests, and repeat the first test at the end.",
+    residual="Proportional to the force, grows with the dissipated work within a test, and starts from zero after a "
+    "pause.",
     source="Dogruoz et al. 2003; Wilson and Wereley 2013 on temperature of MR dampers",
     acts_on="yield force",
     forms=(
@@ -104,8 +106,8 @@ EFFECT = Effect(
         EffectForm("rational", "alpha/(1 + b W)", (_LOSS,), _rational),
     ),
     separated_by={
-        "offset": Separation("a long run, a cooling dwell, a repeat", ("long",)),
-        "migration": Separation("a long run with a cooling dwell", ("long",)),
+        "offset": Separation("a long run, a pause for cooling, a repeat", ("long",)),
+        "migration": Separation("a long run with a pause for cooling", ("long",)),
     },
     refinements=(
         EffectForm(

@@ -56,11 +56,12 @@ _MASS = amplitude("mass", "kg", "moving mass", "force/acceleration", 0.0, 10.0)
 
 EFFECT = Effect(
     name="inertia",
-    summary="a force that goes with acceleration",
-    physics="Rod, clevis and fluid between load cell and piston have to be accelerated.",
-    remedy="Weigh what moves beyond the load cell and subtract mass times acceleration, or move the cell.",
-    residual="A straight line over acceleration: over displacement it looks like a negative spring that grows with "
-    "the square of the frequency.",
+    summary="a force proportional to acceleration",
+    physics="The load cell also measures the force that accelerates rod, clevis and fluid between load cell and "
+    "piston.",
+    remedy="Weigh the moving parts beyond the load cell and subtract mass times acceleration, or move the load cell.",
+    residual="A straight line over acceleration. Over displacement it looks like a spring with negative stiffness "
+    "proportional to the square of the frequency.",
     source="Newton; fluid inertance as in Wang and Wereley",
     acts_on="force",
     forms=(
@@ -68,7 +69,12 @@ EFFECT = Effect(
         EffectForm(
             "mass-with-drive",
             "F + (m + m1 u) a",
-            (_MASS, amplitude("mass_rate", "kg/drive", "its change with the drive", "force/acceleration/drive", -5.0)),
+            (
+                _MASS,
+                amplitude(
+                    "mass_rate", "kg/drive", "change of the mass with the drive", "force/acceleration/drive", -5.0
+                ),
+            ),
             _with_drive,
             {"mass": 0, "mass_rate": 1},
         ),
@@ -91,9 +97,16 @@ EFFECT = Effect(
             "F + (m + m1 x + m2 x^2) a",
             (
                 _MASS,
-                amplitude("mass_slope", "kg/m", "its change along the stroke", "force/acceleration/stroke", -5.0, 5.0),
                 amplitude(
-                    "mass_curvature", "kg/m^2", "its rise towards both ends", "force/acceleration/stroke^2", -5.0, 5.0
+                    "mass_slope", "kg/m", "change of the mass along the stroke", "force/acceleration/stroke", -5.0, 5.0
+                ),
+                amplitude(
+                    "mass_curvature",
+                    "kg/m^2",
+                    "rise of the mass towards both ends",
+                    "force/acceleration/stroke^2",
+                    -5.0,
+                    5.0,
                 ),
             ),
             _by_place,

@@ -1,4 +1,4 @@
-"""All effects, found by walking the package; a user's own from files that the configuration names."""
+"""All effects: those of the modules of the package, and those of files that the configuration names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mrpipe.effects.file_reading import REMEDY
 from mrpipe.errors import UserError
 
 LOADS_FROM = ("mrpipe.effects",)
-"""Packages that are walked at run time: their modules belong to the code version of a stage."""
+"""Packages whose modules are found at run time; they are part of the code version of a stage."""
 Kind = TypeVar("Kind")
 
 
@@ -45,14 +45,14 @@ def damper_effects() -> dict[str, Effect]:
 
 
 def effect_of_file(path: Path, setting: str = "close_loop.effect_files") -> object:
-    """Run a user's own file and return its EFFECT, of whatever kind; None where it defines none.
+    """Run a file of a user and return its EFFECT of any kind; None if it defines none.
 
     Parameters
     ----------
     path
         The file.
     setting
-        Where it was named, for messages.
+        Setting that names the file, for messages.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def effect_of_file(path: Path, setting: str = "close_loop.effect_files") -> obje
 
 
 def load_effect_file(path: Path) -> Effect:
-    """Load the EFFECT of a user's own file.
+    """Load the EFFECT of a file of a user.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def load_effect_file(path: Path) -> Effect:
 
 
 def effects_named(names: Sequence[str], files: Sequence[Path] = ()) -> dict[str, Effect]:
-    """Return the damper effects of these names (all where none), with those of the user's files.
+    """Return the damper effects of these names (all if none is given), and those of the user's files.
 
     Raises
     ------

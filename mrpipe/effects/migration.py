@@ -1,4 +1,4 @@
-"""Migration: after a reversal the force rises slowly, as particles move back into the gap."""
+"""Migration: after a reversal the force rises slowly, while particles move back into the gap."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from mrpipe.effects.profiles import PATH, RISING, SINCE, free_profile
 def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: amplitude, length [m] or time [s], kind of rise (0..6), of amplitude (0 yield, 1, 2 with drive), p.
 
-    State: a variable that follows the direction of motion with slip, its direction memory.
+    State: a variable that follows the direction of motion along the path, and the last direction.
     """
     kind = parameters[2]
     if kind == 0.0:
@@ -70,8 +70,8 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
 def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: share, length [m] or time [s], exponent, kind of rise (0 slip, 1 time), speed of a reversal [m/s].
 
-    State: rise at the last sample, rise before the last reversal, share of it that is gone. The flow must reach a speed
-    before it moves the particles: below it the rise from before the reversal remains.
+    State: rise at the last sample, rise before the last reversal, and its share that has vanished. The flow must reach
+    a least speed to move the particles; below it the rise from before the reversal remains.
     """
     if wire[FIRST] > 0.5:
         state[:] = 0.0
@@ -133,20 +133,22 @@ def _own(values: Values) -> list[Step]:
     return [_step(values["friction"], length, 0.0, 1.0), _step(values["friction_rate"], length, 0.0, 2.0)]
 
 
-_LENGTH = shape("slip_length", "m", "path over which the force comes back", "stroke", 0.02, 0.9, (0.06, 0.15, 0.4))
-_TIME = shape("rise_time", "s", "time over which the force comes back", "stroke/speed", 0.05, 20.0, (0.2, 0.5, 2.0))
-_POWER = shape("exponent", "1", "below 1 a steep rise and a long tail", "one", 0.3, 2.0, (0.6,))
+_LENGTH = shape("slip_length", "m", "path over which the force returns", "stroke", 0.02, 0.9, (0.06, 0.15, 0.4))
+_TIME = shape("rise_time", "s", "time over which the force returns", "stroke/speed", 0.05, 20.0, (0.2, 0.5, 2.0))
+_POWER = shape("exponent", "1", "below 1: a steep rise and a long tail", "one", 0.3, 2.0, (0.6,))
 _RATIONAL = shape("power", "1", "1: rational, large: exponential", "one", 0.2, 20.0, (1.0, 4.0))
 _REVERSAL = shape("reversal_speed", "m/s", "speed from which a reversal counts", "speed", 1e-4, 0.1, (0.01,))
-_LATE = strength("share", "1", "share of the yield force that comes late", "one", 0.0, 30.0, 0.05)
-_SHARE = amplitude("share", "1", "share of the yield force that comes late", "one", 0.0, 30.0)
+_LATE = strength("share", "1", "late share of the yield force", "one", 0.0, 30.0, 0.05)
+_SHARE = amplitude("share", "1", "late share of the yield force", "one", 0.0, 30.0)
 
 EFFECT = Effect(
     name="migration",
     summary="the force rises slowly after every reversal",
-    physics="Particles settle or leave the gap as the flow turns; the field needs a path or a time to bring them back.",
-    remedy="Run triangles at several speeds with dwells after reversal; agitate, refill, or declare length or time.",
-    residual="Negative after each reversal and rising back over a travel or a time; largest after long half cycles.",
+    physics="Particles settle or leave the gap when the flow reverses; the field needs a path or a time to bring them "
+    "back.",
+    remedy="Measure triangles at several speeds with pauses after the reversal; stir or replace the fluid, or declare "
+    "the length or time.",
+    residual="Negative after each reversal; it vanishes over a path or a time, and is largest after long half cycles.",
     source="Sahin et al. 2010 on response after reversal; second hysteretic variable of longer yield displacement",
     acts_on="yield force",
     forms=(
@@ -181,17 +183,19 @@ EFFECT = Effect(
             "alpha + (a + b u) (1 - exp(-slip/L))",
             (
                 _LENGTH,
-                amplitude("friction", "N", "what comes late, no drive", "force", -0.05, 5.0),
-                amplitude("friction_rate", "N/drive", "its rise with the drive", "force/drive", -0.1, 5.0),
+                amplitude("friction", "N", "late part of the force without drive", "force", -0.05, 5.0),
+                amplitude(
+                    "friction_rate", "N/drive", "change of the late part with the drive", "force/drive", -0.1, 5.0
+                ),
             ),
             _own,
             {"friction": 0, "friction_rate": 1},
         ),
     ),
     separated_by={
-        "accumulator": Separation("dwell at several positions", ("positions",)),
-        "backlash": Separation("slow small triangles about reversal at two currents", ("reversal",)),
-        "heating": Separation("a long run with a cooling dwell", ("long",)),
+        "accumulator": Separation("rest at several positions of the stroke", ("positions",)),
+        "backlash": Separation("small slow triangles at two currents", ("reversal",)),
+        "heating": Separation("a long run with a pause for cooling", ("long",)),
     },
     refinements=(
         EffectForm(
@@ -218,7 +222,7 @@ EFFECT = Effect(
             "alpha (1 + sum s_k (1 - exp(-slip/L_k)))",
             PATH,
             RISING,
-            shape("path_scale", "m", "path that the rises of the profile are multiples of", "stroke", 0.1, 3.0, (0.5,)),
+            shape("path_scale", "m", "path whose multiples are the lengths of the profile", "stroke", 0.1, 3.0, (0.5,)),
             _SHARE,
         ),
         free_profile(
@@ -229,7 +233,7 @@ EFFECT = Effect(
             shape(
                 "time_scale",
                 "s",
-                "time that the rises of the profile are multiples of",
+                "time whose multiples are the times of the profile",
                 "stroke/speed",
                 0.2,
                 20.0,

@@ -1,4 +1,4 @@
-"""Load cell offset that depends on the drive; the fit of the records finds an offset that changes between tests."""
+"""Offset of the load cell that depends on drive or time; offsets that change between tests are fitted separately."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -65,10 +65,11 @@ _RATE = amplitude("rate", "N/drive", "offset for each unit of drive", "force/dri
 
 EFFECT = Effect(
     name="offset",
-    summary="the zero of the load cell moves from test to test or with the drive",
-    physics="Current leaks into the bridge of the load cell, or its amplifier is zeroed anew between tests.",
-    remedy="Zero the load cell before every test with the coil on, separate the coil's cable from the bridge's.",
-    residual="A constant that differs between tests or moves with the drive, without any dependence on motion.",
+    summary="the zero of the load cell changes from test to test or with the drive",
+    physics="The coil current couples into the bridge of the load cell, or its amplifier is zeroed again between "
+    "tests.",
+    remedy="Zero the load cell before every test with the coil current on; separate the cables of coil and bridge.",
+    residual="A constant that differs between tests or depends on the drive, but not on the motion.",
     source="sensor practice",
     acts_on="force",
     forms=(
@@ -94,7 +95,7 @@ EFFECT = Effect(
             "with-drive-power",
             "F + b |i|^p",
             (
-                amplitude("rate", "N/drive^p", "offset at a drive of one", "force/drive", -5.0, 5.0),
+                amplitude("rate", "N/drive^p", "offset at a drive of 1 A or 1 V", "force/drive", -5.0, 5.0),
                 shape("power", "1", "power of the drive", "one", 0.5, 3.0, (1.5,)),
             ),
             _with_power,

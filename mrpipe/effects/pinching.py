@@ -1,4 +1,4 @@
-"""Pinching: the yield force is lower about the middle of the stroke."""
+"""Pinching: the yield force is lower around the middle of the stroke."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -114,17 +114,17 @@ def _aside(kind: float) -> Callable[[Values], list[Step]]:
 
 _PLACES = tuple(f"depth_{number}" for number in range(1, 8))
 _WIDTH = shape("width", "m", "half width of the dip", "stroke", 0.02, 1.0, (0.12, 0.4))
-_MIDDLE = Parameter("middle", "m", "where the dip is deepest", "stroke", -0.8, 0.8, (-0.3, 0.3))
+_MIDDLE = Parameter("middle", "m", "position of the lowest yield force", "stroke", -0.8, 0.8, (-0.3, 0.3))
 _NEAR_MIDDLE = replace(_MIDDLE, starts=(0.0,))
 _FLATNESS = shape("exponent", "1", "flatness", "one", 1.0, 12.0, (3.0,))
-_DEPTH = amplitude("depth", "1", "share of the yield force that is missing in the middle", "one", 0.0, 1.0)
+_DEPTH = amplitude("depth", "1", "missing share of the yield force in the middle", "one", 0.0, 1.0)
 
 EFFECT = Effect(
     name="pinching",
-    summary="loops are narrow about the middle of the stroke",
-    physics="Wear where the piston passes most often widens the gap, or parts slip before they grip.",
-    remedy="Move the middle of the stroke on the bench; renew the bore or the pads.",
-    residual="Opposes the force about the middle of the stroke and vanishes towards its ends: loops with a waist.",
+    summary="loops are narrow around the middle of the stroke",
+    physics="Wear widens the gap where the piston passes most often, or parts slip before they engage.",
+    remedy="Test about another mean position; renew the bore or the pads.",
+    residual="Opposite to the force around the middle of the stroke, and zero towards its ends: loops with a waist.",
     source="Baber and Noori 1985",
     acts_on="yield force",
     forms=(
@@ -139,14 +139,16 @@ EFFECT = Effect(
             "alpha - (a + b u) exp(-(x/w)^2)",
             (
                 _WIDTH,
-                amplitude("friction", "N", "what is missing, no drive", "force", -0.05, 5.0),
-                amplitude("friction_rate", "N/drive", "its rise with the drive", "force/drive", -0.1, 5.0),
+                amplitude("friction", "N", "missing force without drive", "force", -0.05, 5.0),
+                amplitude(
+                    "friction_rate", "N/drive", "change of the missing force with the drive", "force/drive", -0.1, 5.0
+                ),
             ),
             _own,
             {"friction": 0, "friction_rate": 1},
         ),
     ),
-    separated_by={"migration": Separation("the same motion about another middle", ("middle",))},
+    separated_by={"migration": Separation("the same motion about another mean position", ("middle",))},
     refinements=(
         EffectForm("cusp", "alpha (1 - d exp(-|x - m|/w))", (_WIDTH, _NEAR_MIDDLE, _DEPTH), _aside(2.0), {"depth": 0}),
         EffectForm(
@@ -163,7 +165,7 @@ EFFECT = Effect(
                 _WIDTH,
                 _NEAR_MIDDLE,
                 _FLATNESS,
-                strength("depth", "1", "share of the yield force that is missing in the middle", "one", 0.0, 1.0, 0.05),
+                strength("depth", "1", "missing share of the yield force in the middle", "one", 0.0, 1.0, 0.05),
             ),
             _yield_force,
         ),
@@ -171,13 +173,15 @@ EFFECT = Effect(
             "yield-force-profile",
             "F_y (1 - d(x)) before the damper yields, d a free profile",
             (
-                shape("distance", "m", "distance of the places of the profile", "stroke", 0.05, 0.5, (0.15, 0.3)),
+                shape(
+                    "distance", "m", "distance between the positions of the profile", "stroke", 0.05, 0.5, (0.15, 0.3)
+                ),
                 _NEAR_MIDDLE,
                 *(
                     strength(
                         name,
                         "1",
-                        f"share of the yield force that is missing at place {name[6:]}",
+                        f"missing share of the yield force at position {name[6:]}",
                         "one",
                         0.0,
                         0.95,

@@ -1,10 +1,10 @@
-"""Free profiles: what an effect does as a function of one quantity, without a formula.
+"""Free profiles: forms of an effect that are a free function of one quantity.
 
-The forms of an effect are formulas. A real damper follows none of them exactly. Once an effect is named, its profile
-can be estimated instead: a sum of fixed basis functions whose coefficients are not negative. This keeps what the
-physics says (the friction falls with the speed, the drag rises faster than the speed, the force comes back after a
-reversal) and leaves the rest to the measurement. The fit solves for all coefficients at once, because the force is
-linear in them.
+The other forms of an effect are formulas, and a real damper follows none of them exactly. Once an effect is named, its
+profile can be estimated instead: a sum of fixed basis functions with coefficients that are not negative. The profile
+keeps the physical constraints (the friction falls with the speed, the drag rises faster than the speed, the force
+returns after a reversal), and the measurement determines the rest. The fit solves for all coefficients at once, because
+the force is linear in them.
 """
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
@@ -64,7 +64,7 @@ def profile_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
     elif parameters[4] == 1.0:
         value = wire[HYSTERETIC_FORCE] * (1.0 - math.exp(-quantity / parameters[1]))
     else:
-        # zero before its place, a parabola over its width, then a straight line: their sums are convex and smooth
+        # zero before its position, a parabola over its width, then a straight line: sums of them are convex and smooth
         beyond = min(max(quantity - parameters[1], 0.0), parameters[2])
         value = 0.5 * beyond * beyond / parameters[2] + max(quantity - parameters[1] - parameters[2], 0.0)
         if wire[VELOCITY] < 0.0:
@@ -80,13 +80,13 @@ def free_profile(
     Parameters
     ----------
     name, summary
-        Of the form.
+        Name and summary of the form.
     quantity
         :data:`SPEED`, :data:`PATH` or :data:`SINCE`.
     kind
         :data:`FALLING` or :data:`RISING` (factors of the hysteretic force) or :data:`CONVEX` (a force [N]).
     scale
-        Value of the quantity that the places are multiples of; it is searched.
+        Parameter whose value is the unit of the positions; it is searched.
     coefficient
         Unit, meaning and bounds of each coefficient.
     """

@@ -54,11 +54,11 @@ _DRAG = amplitude("drag", "N*s^2/m^2", "force at 1 m/s", "force/speed^2", 0.0, 2
 
 EFFECT = Effect(
     name="quadratic-drag",
-    summary="a force that goes with the square of speed",
-    physics="Fluid is throttled in valve and gap; its kinetic energy is lost behind them.",
-    remedy="Test up to the largest speed; widen the bypass, or declare the coefficient.",
-    residual="Proportional to the square of the speed with the sign of the velocity: small at mid speed, steep at "
-    "the highest.",
+    summary="a force proportional to the square of the speed",
+    physics="The fluid is throttled in valve and gap, and its kinetic energy is lost behind them.",
+    remedy="Test up to the largest speed; widen the bypass, or declare the coefficient of the drag.",
+    residual="Proportional to the square of the speed, with the sign of the velocity: small at medium speed, large at "
+    "the highest speed.",
     source="Bernoulli and Borda; orifice flow",
     acts_on="viscous force",
     forms=(
@@ -68,7 +68,9 @@ EFFECT = Effect(
             "F + (c + d u) v|v|",
             (
                 _DRAG,
-                amplitude("drag_rate", "N*s^2/m^2/drive", "its change with the drive", "force/speed^2/drive", -5.0),
+                amplitude(
+                    "drag_rate", "N*s^2/m^2/drive", "change of the drag with the drive", "force/speed^2/drive", -5.0
+                ),
             ),
             _with_drive,
             {"drag": 0, "drag_rate": 1},
@@ -104,9 +106,15 @@ EFFECT = Effect(
             SPEED,
             CONVEX,
             shape(
-                "speed_scale", "m/s", "speed that the places of the profile are multiples of", "speed", 0.3, 1.5, (1.0,)
+                "speed_scale",
+                "m/s",
+                "speed whose multiples are the positions of the profile",
+                "speed",
+                0.3,
+                1.5,
+                (1.0,),
             ),
-            amplitude("drag", "N*s/m", "rise of the slope", "force/speed", 0.0, 20.0),
+            amplitude("drag", "N*s/m", "increase of the slope", "force/speed", 0.0, 20.0),
         ),
     ),
 )

@@ -1,4 +1,4 @@
-"""Remanence: the core stays magnetised after the current has gone."""
+"""Remanence: the core stays magnetised after the current has fallen."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -32,7 +32,7 @@ def remanence_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
         state[0] = max(u, u + (state[0] - u) * math.exp(-path / size))
         wire[CURRENT] = u + gain * (state[0] - u)
     elif kind >= 5.0:
-        # a memory that time and slip break together: of what lies above the drive (5), or down to nothing (6 to 9)
+        # a memory that time and slip reduce together: to the drive (5), or to zero (6 to 9)
         path = abs(wire[VELOCITY]) * dt / size + dt / parameters[3]
         floor = u if kind == 5.0 else 0.0
         state[0] = max(u, floor + (state[0] - floor) * math.exp(-path))
@@ -85,11 +85,11 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
 
     State: m, peak, path.
 
-    The memory m fades with time and slip together, fast at first and ever slower: it falls by m^2 (kind 0), as
-    peak/(1 + path) (1) or exponentially (2, 4); or it follows the drive both ways (3). What it holds up is what the
-    drive itself does not do: the larger of the two, with a rounded corner (0, 4); the same, the remanence limited (1);
-    added to the drive, less the larger that is (2); what the memory is above the drive, less the larger the drive is
-    (3).
+    The memory m fades with time and slip together. It falls at a rate proportional to m^2 (kind 0), as peak/(1 + path)
+    (1), or exponentially (2, 4); or it follows the drive in both directions (3). The effective drive is the larger of
+    drive and memory, with a rounded corner (0, 4) or with a limited memory (1); the drive plus a part of the memory
+    that decreases with the drive (2); or the drive plus a part of the excess of the memory over the drive that
+    decreases with the drive (3).
     """
     u = wire[CURRENT]
     gain, size, kind = parameters[0], parameters[3], parameters[5]
@@ -114,7 +114,7 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     held = gain * state[0]
     if held <= 0.0:
         return
-    # a recorded drive of zero has noise of both signs, and the remanence stays where it is below zero
+    # a recorded drive of zero has noise of both signs, and the remanence is unchanged below zero
     positive = max(u, 0.0)
     if kind == 0.0 or kind == 4.0:
         larger, ratio = max(positive, held), min(positive, held) / max(positive, held)
@@ -131,10 +131,10 @@ def remanent_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
 def charging_field_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: gain, limit [A], charging time [s], length [m], time [s], power of fading, corner.
 
-    State: what is kept.
+    State: remanent field.
 
-    What the drive can leave behind saturates; it is taken on with a lag, and fades by slip and time, the faster the
-    more there is of it. The core has the larger of drive and what is kept, with a rounded corner.
+    The remanent field follows a saturating function of the drive with a lag, and fades with slip and time, faster if it
+    is larger. The effective drive is the larger of drive and remanent field, with a rounded corner.
     """
     u = wire[CURRENT]
     gain, limit, corner = parameters[0], parameters[1], parameters[6]
@@ -157,9 +157,9 @@ def charging_field_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
 
 @njit(STEP_SIGNATURE, cache=True)
 def two_memories_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: gain, length [m], time [s], share of the memory that time breaks. State: the two memories.
+    """Parameters: gain, length [m], time [s], share of the memory that fades with time. State: the two memories.
 
-    Chains of particles are broken by slip, the magnetisation of the core fades with time.
+    Slip breaks the chains of particles, and the magnetisation of the core fades with time.
     """
     u = wire[CURRENT]
     if wire[FIRST] > 0.5:
@@ -232,37 +232,38 @@ def _loop(values: Values) -> list[Step]:
     return _step(values["gain"], values["width"], 4.0)
 
 
-_GAIN = strength("gain", "1", "share of the surplus of the past drive that stays", "one", 0.0, 1.0, 0.03)
+_GAIN = strength("gain", "1", "share of the excess of the past drive that remains", "one", 0.0, 1.0, 0.03)
 
-_HELD = strength("gain", "1", "share of the past drive that stays", "one", 0.0, 1.0, 0.3)
-"""A remanence that acts only where it is the larger shows nothing at a small gain: the search starts at a fair one."""
+_HELD = strength("gain", "1", "share of the past drive that remains", "one", 0.0, 1.0, 0.3)
+"""Starts of the gain for forms that act only if the memory exceeds the drive: a small gain would have no effect."""
 
 _PLAY_GAIN = strength("gain", "1", "height of the loop over its width", "one", 0.0, 1.5, 0.03)
-"""1 is the flux that follows the drive with a coercive width: no bound may lie there."""
+"""Gain of a play. A gain of 1 is a flux that follows the drive with a coercive width, so no bound lies at 1.
+"""
 
-_LENGTH = shape("slip_length", "m", "path that breaks it", "stroke", 0.05, 100.0, (2.0, 8.0))
-_TIME = shape("relaxation_time", "s", "time that breaks it", "time", 0.008, 12.0, (0.06, 0.3))
+_LENGTH = shape("slip_length", "m", "path over which it fades", "stroke", 0.05, 100.0, (2.0, 8.0))
+_TIME = shape("relaxation_time", "s", "time over which it fades", "time", 0.008, 12.0, (0.06, 0.3))
 
 EFFECT = Effect(
     name="remanence",
-    summary="the damper remembers a larger current: after it the force stays higher",
-    physics="Iron core and particle chains keep part of their magnetisation until motion or time breaks it.",
-    remedy="Demagnetise with a decaying alternating current, or declare the memory; step the current up and down.",
-    residual="Positive where the drive falls or has been larger before; it fades with motion or time. Nothing when "
-    "the drive only rises from zero.",
+    summary="the force stays higher after a larger current",
+    physics="Iron core and particle chains keep a part of their magnetisation, which motion or time reduces.",
+    remedy="Demagnetise with a decaying alternating current, or declare the effect; measure current steps up and down.",
+    residual="Positive while the drive falls or after it has been larger; it fades with motion or time. There is none "
+    "while the drive only rises from zero.",
     source="An and Kwon 2003 on hysteresis of MR actuators; thesis P2 residual force 22 to 30 N",
     acts_on="effective drive",
     forms=(
         EffectForm(
             "relaxing-with-slip",
             "u + g (m - u), m decays to u over the slip L",
-            (_GAIN, shape("slip_length", "m", "path that breaks it", "stroke", 0.05, 60.0, (0.5, 3.0, 12.0))),
+            (_GAIN, shape("slip_length", "m", "path over which it fades", "stroke", 0.05, 60.0, (0.5, 3.0, 12.0))),
             _slip,
         ),
         EffectForm(
             "relaxing-with-time",
             "u + g (m - u), m decays to u over the time tau",
-            (_GAIN, shape("relaxation_time", "s", "time that breaks it", "time", 0.008, 6.0, (0.05, 0.2, 1.0))),
+            (_GAIN, shape("relaxation_time", "s", "time over which it fades", "time", 0.008, 6.0, (0.05, 0.2, 1.0))),
             _time,
         ),
         EffectForm("relaxing", "u + g (m - u), m decays to u over L and tau", (_GAIN, _LENGTH, _TIME), _together(5.0)),
@@ -289,13 +290,23 @@ EFFECT = Effect(
         EffectForm(
             "fading-beside",
             "u + g m exp(-u/w), m decays to 0 over L and tau",
-            (_GAIN, _LENGTH, _TIME, shape("width", "drive", "drive that outdoes it", "drive", 0.01, 2.0, (0.08,))),
+            (
+                _GAIN,
+                _LENGTH,
+                _TIME,
+                shape("width", "drive", "drive above which it is small", "drive", 0.01, 2.0, (0.08,)),
+            ),
             _field(2.0, "width"),
         ),
         EffectForm(
             "lagging",
             "u + g (m - u)/(1 + (u/w)^2) where m > u, m follows u over L and tau",
-            (_HELD, _LENGTH, _TIME, shape("width", "drive", "drive that outdoes it", "drive", 0.01, 20.0, (0.1, 0.5))),
+            (
+                _HELD,
+                _LENGTH,
+                _TIME,
+                shape("width", "drive", "drive above which it is small", "drive", 0.01, 20.0, (0.1, 0.5)),
+            ),
             _field(3.0, "width"),
         ),
         EffectForm("fading-root", "sqrt(u^2 + (g m)^2), m decays to 0", (_GAIN, _LENGTH, _TIME), _together(9.0)),
@@ -311,7 +322,9 @@ EFFECT = Effect(
             "u - g w m, dm = (sign du - m) |du|/w",
             (
                 strength("gain", "1", "size of the loop over its width", "one", 0.0, 1.0, 0.03),
-                shape("width", "drive", "change of drive that turns the memory", "drive", 0.01, 1.5, (0.08, 0.3)),
+                shape(
+                    "width", "drive", "change of the drive that reverses the memory", "drive", 0.01, 1.5, (0.08, 0.3)
+                ),
             ),
             _loop,
         ),
@@ -324,11 +337,11 @@ EFFECT = Effect(
     refinements=(
         EffectForm(
             "many-plays",
-            "u + g sum of w_k (play_k(u) - u), w_k = (width_k/width)^n: domains that turn at their own threshold",
+            "u + g sum of w_k (play_k(u) - u), w_k = (width_k/width)^n: domains with different switching thresholds",
             (
                 replace(_PLAY_GAIN, starts=(0.6,)),
                 shape("width", "drive", "width of the largest play", "drive", 0.01, 1.5, (0.3, 0.6)),
-                Parameter("exponent", "1", "which plays weigh most", "one", -2.0, 6.0, (0.0,)),
+                Parameter("exponent", "1", "weighting of narrow and wide plays", "one", -2.0, 6.0, (0.0,)),
             ),
             _plays,
         ),
@@ -339,7 +352,7 @@ EFFECT = Effect(
                 _GAIN,
                 shape("slip_length", "m", "path that breaks the chains", "stroke", 0.05, 100.0, (1.0, 4.0)),
                 shape("relaxation_time", "s", "time in which the core's part fades", "time", 0.008, 12.0, (0.1, 0.5)),
-                Parameter("time_share", "1", "share of the memory that time breaks", "one", 0.0, 1.0, (0.5,)),
+                Parameter("time_share", "1", "share of the memory that fades with time", "one", 0.0, 1.0, (0.5,)),
             ),
             _two_memories,
         ),
@@ -354,11 +367,11 @@ EFFECT = Effect(
             "(u^p + k^p)^(1/p); k follows g u/(1 + u/s) with a lag and fades over L and tau, as (k/s)^m",
             (
                 replace(_HELD, upper=2.0),
-                shape("limit", "drive", "drive at which half of it is reached", "drive", 0.1, 20.0, (1.0,)),
-                shape("charging_time", "s", "lag with which it is taken on", "time", 2e-4, 0.05, (0.003,)),
+                shape("limit", "drive", "drive at which half of the limit is reached", "drive", 0.1, 20.0, (1.0,)),
+                shape("charging_time", "s", "lag with which the field builds up", "time", 2e-4, 0.05, (0.003,)),
                 _LENGTH,
                 _TIME,
-                Parameter("fading_power", "1", "0: at an even rate; above 0 fast first", "one", 0.0, 2.0, (0.5,)),
+                Parameter("fading_power", "1", "0: constant rate; above 0: faster at first", "one", 0.0, 2.0, (0.5,)),
                 shape("corner", "1", "sharpness of the corner", "one", 2.0, 20.0, (7.0,)),
             ),
             _charging,

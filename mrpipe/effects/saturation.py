@@ -1,4 +1,4 @@
-"""Saturation: beyond some current the field grows no more."""
+"""Saturation: beyond some current the field no longer grows."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -52,7 +52,7 @@ def soft_driver_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
 
 @njit(STEP_SIGNATURE, cache=True)
 def slewing_driver_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: inverse of the largest command [1/A], largest rate [A/s]. State: what the driver gives."""
+    """Parameters: inverse of the largest command [1/A], largest rate [A/s]. State: output of the driver."""
     inverse = parameters[0]
     wanted = wire[DRIVE]
     if inverse > 0.0:
@@ -82,7 +82,7 @@ def _knee(values: Values) -> list[Step]:
 
 
 def _command(values: Values) -> list[Step]:
-    # before the lag of the base: currents that the driver never demands
+    # before the lag of the base form: currents that the driver never supplies
     return [Step("command-limit", Phase.MOTION, command_limit_step, np.array([values["inverse_limit"]]))]
 
 
@@ -103,7 +103,7 @@ def _tanh(values: Values) -> list[Step]:
 _INVERSE = Parameter(
     "inverse_limit",
     "1/drive",
-    "one over the drive of saturation",
+    "inverse of the drive at saturation",
     "one/drive",
     0.5,
     6.0,
@@ -114,7 +114,7 @@ _INVERSE = Parameter(
 _SOFT = Parameter(
     "inverse_limit",
     "1/drive",
-    "one over the drive of saturation",
+    "inverse of the drive at saturation",
     "one/drive",
     0.05,
     6.0,
@@ -126,11 +126,11 @@ _SHARPNESS = shape("exponent", "1", "sharpness of the knee", "one", 1.0, 40.0, (
 
 EFFECT = Effect(
     name="saturation",
-    summary="beyond some drive the force rises no more",
-    physics="The steel of the flux path saturates, or the driver cannot bring the commanded current.",
+    summary="the force no longer rises beyond some drive",
+    physics="The steel of the flux path saturates, or the driver cannot supply the commanded current.",
     remedy="Record the coil current; measure constant drives up to the largest; lower the limit of the controller.",
-    residual="Negative at the largest drives and positive in between, in proportion to the yield force; no "
-    "dependence on the drive's past.",
+    residual="Proportional to the yield force, negative at the largest drives and positive at medium ones; "
+    "independent of the past of the drive.",
     source="B-H curve of the flux path",
     acts_on="effective drive",
     law_of_drive=True,
@@ -148,7 +148,7 @@ EFFECT = Effect(
     ),
     separated_by={
         "remanence": Separation("current steps up and down", ("steps",)),
-        "heating": Separation("constant drives, each begun cold", ("constants",)),
+        "heating": Separation("constant drives, each started with a cold damper", ("constants",)),
     },
     refinements=(
         EffectForm(

@@ -87,20 +87,24 @@ def _stretched(values: Values) -> list[Step]:
     return [_step(values["share"], values["velocity_scale"], 3.0, 0.0, values["exponent"])]
 
 
-_SCALE = shape("velocity_scale", "m/s", "speed at which the surplus has fallen", "speed", 0.004, 0.7, (0.06, 0.2))
-_SHARE = amplitude("share", "1", "surplus of the yield force at rest", "one", 0.0, 5.0)
-_POWER = shape("exponent", "1", "below 1 a cusp at rest", "one", 0.2, 4.0, (0.6, 1.5))
+_SCALE = shape(
+    "velocity_scale", "m/s", "speed over which the additional friction falls", "speed", 0.004, 0.7, (0.06, 0.2)
+)
+_SHARE = amplitude("share", "1", "additional yield force at zero speed", "one", 0.0, 5.0)
+_POWER = shape("exponent", "1", "below 1: a cusp at zero speed", "one", 0.2, 4.0, (0.6, 1.5))
 _OWN = (
-    amplitude("friction", "N", "surplus at rest without drive", "force", -0.05, 10.0),
-    amplitude("friction_rate", "N/drive", "its rise with the drive", "force/drive", -10.0, 10.0),
+    amplitude("friction", "N", "additional friction at zero speed without drive", "force", -0.05, 10.0),
+    amplitude(
+        "friction_rate", "N/drive", "change of the additional friction with the drive", "force/drive", -10.0, 10.0
+    ),
 )
 
 EFFECT = Effect(
     name="stribeck",
-    summary="more friction at low speed than at high",
-    physics="At low speed seals and guides touch, at high speed they swim on the fluid.",
-    remedy="Run slow triangles at log-spaced speeds; change seals or guides, or declare the surplus.",
-    residual="A peak over velocity near zero speed in both directions that decays towards higher speed.",
+    summary="the friction is larger at low speed than at high speed",
+    physics="At low speed seals and guides are in contact; at high speed a film of fluid separates them.",
+    remedy="Measure slow triangles at log-spaced speeds; replace seals or guides, or declare the additional friction.",
+    residual="A peak near zero speed in both directions, which decays towards higher speed.",
     source="Stribeck 1902; Armstrong-Helouvry et al. 1994",
     acts_on="yield force",
     forms=(
@@ -133,7 +137,7 @@ EFFECT = Effect(
         EffectForm(
             "yield-force",
             "F_y (1 + s exp(-(|v|/vs)^n)) before the damper yields",
-            (_SCALE, _POWER, strength("share", "1", "surplus of the yield force at rest", "one", 0.0, 5.0, 0.05)),
+            (_SCALE, _POWER, strength("share", "1", "additional yield force at zero speed", "one", 0.0, 5.0, 0.05)),
             _yield_force,
         ),
         free_profile(
@@ -142,7 +146,7 @@ EFFECT = Effect(
             SPEED,
             FALLING,
             shape(
-                "speed_scale", "m/s", "speed that the steps of the profile are multiples of", "speed", 0.1, 3.0, (0.5,)
+                "speed_scale", "m/s", "speed whose multiples are the positions of the steps", "speed", 0.1, 3.0, (0.5,)
             ),
             _SHARE,
         ),

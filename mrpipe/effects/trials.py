@@ -1,4 +1,4 @@
-"""Dampers of two sizes that effects are tried on, and steps that are tried, taken back and done again."""
+"""Dampers of two sizes for trials of effects, and steps that are tried, rejected and repeated."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Motion = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
 
 @dataclass(frozen=True)
 class Size:
-    """A damper that effects are tried on: scales, and the steps of a plain base form of the same size."""
+    """A damper for trials of effects: scales, and the steps of a simple base form of the same size."""
 
     scales: EffectScales
     frequency_hz: float
@@ -53,7 +53,7 @@ SIZES = (
         (polynomial_coefficients([2e4, 1.5e4], [2e5, 1e4]), driver_lag(20.0), hysteresis(4e-3, 0.5, 2)),
     ),
 )
-"""A laboratory damper of 0.1 kN and 10 mm, and a damper of a building of 150 kN and 100 mm."""
+"""A laboratory damper (0.1 kN, 10 mm) and a damper of a building (150 kN, 100 mm)."""
 RATE_HZ = 1000.0
 
 
@@ -88,7 +88,7 @@ def _twice(
     places = (DISPLACEMENT, VELOCITY, ACCELERATION, DRIVE)
     for index in range(motion.shape[1]):
         before[:] = state
-        # the step, another one that a solver only tries, and the step again
+        # the step, another step that a solver rejects, and the step again
         for trial in range(3):
             state[:] = before
             wire[TIME] = index * dt
@@ -108,11 +108,11 @@ def _twice(
 
 
 def tried_twice(chain: Chain, size: Size, motion: Motion) -> tuple[float, float]:
-    """Do every step of a motion twice from the same state, with another trial between, as the closed loop does.
+    """Do every step of a motion twice from the same state, with another trial in between, like the closed loop.
 
     Returns
     -------
-    The first pair of forces [N] (or of numbers of the state) that differ; equal numbers where none do.
+    The first pair of forces [N] (or of numbers of the state) that differ; two equal numbers if none differ.
     """
     x, v, a, drive, dt = motion
     scales = size.scales

@@ -1,4 +1,4 @@
-"""What the C files of all exports share: either precision from one source, tables of numbers, the self test."""
+"""Parts that the C files of all exports share: both precisions from one source, tables of numbers, self test."""
 
 from __future__ import annotations
 

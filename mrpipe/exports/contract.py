@@ -1,7 +1,7 @@
-"""What an export format is: the one narrow contract that every file of `exports/formats` keeps.
+"""Definition of an export format: the contract that every file of `exports/formats` fulfils.
 
-A file defines `FORMAT = ExportFormat(...)` and nothing else knows of it. It turns a model and its test vectors into the
-files of a folder.
+A file defines `FORMAT = ExportFormat(...)`; no other module has to be changed. It converts a model and its test vectors
+into the files of a folder.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class Subject:
 
     @property
     def left_out(self) -> Sequence[str]:
-        """What the model does not contain, one sentence each."""
+        """Effects that the model does not contain, one sentence each."""
         return tuple(self.details.get("left_out", ()))
 
 

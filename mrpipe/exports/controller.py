@@ -79,9 +79,9 @@ def controller_files(controller: Controller, prefix: str, details: dict[str, Any
     Parameters
     ----------
     controller
-        What to export.
+        Controller to export.
     prefix
-        Of the C names.
+        Prefix of the C names.
     details
         Further entries of controller.json (where gains come from, units).
     """

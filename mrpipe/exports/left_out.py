@@ -1,4 +1,4 @@
-"""What an exported model does not contain, one sentence each: for the warnings, the README and the JSON file."""
+"""Effects that an exported model does not contain, one sentence each, for warnings, README and JSON file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def effects_left_out(summary: Mapping[str, Any], where: str, remedy: str) -> lis
     where
         `structure` or `plant`: where the effects are corrected.
     remedy
-        What the user can do.
+        Sentence on what the user can do.
     """
     names = [
         f"{item['name']} ({item['place']})" if item.get("place") else str(item["name"])

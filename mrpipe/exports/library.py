@@ -31,7 +31,7 @@ def formats_of(kind: str) -> dict[str, ExportFormat]:
 
 
 def chosen_formats(kind: str, names: Iterable[str]) -> list[ExportFormat]:
-    """Return the formats that a user named; all whose packages are installed where none is named.
+    """Return the formats that a user named; without names, all formats whose packages are installed.
 
     Raises
     ------

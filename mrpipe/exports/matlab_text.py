@@ -1,4 +1,4 @@
-"""What the MATLAB files of all exports share: the data file and the self test."""
+"""Parts that the MATLAB files of all exports share: data file and self test."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The virtual rig: it stands in for the hardware and is known to its own stages alone.
+"""The virtual rig: it simulates the hardware, and only the stages `record` import it.
 
-Its physics are its own: no equation is shared with the estimators, and planted effects have other forms than the
-candidates that the program traces.
+Its equations are independent of the estimators, and its planted effects have other forms than the candidates that the
+program traces.
 """

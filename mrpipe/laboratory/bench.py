@@ -37,7 +37,7 @@ _CALIBRATION_SAMPLES = 1_500_000
 
 @dataclass(frozen=True)
 class BenchRecord:
-    """A campaign ready to be written, and its truth."""
+    """Recorded campaign and its truth, before they are written."""
 
     tests: list[TestFile]
     truth: dict[str, Any]
@@ -45,7 +45,7 @@ class BenchRecord:
 
 
 def fine_motion(test: BenchTest, rig: BenchRig, seed: int) -> FineMotion:
-    """Return what the machine does in a test; a test and its repeat have the same command."""
+    """Return the motion of the machine in a test; a test and its repeat have the same command."""
     key = zlib.crc32((test.repeat_of or test.name).encode())
     rng = np.random.default_rng([seed, key])
     step = 1.0 / (rig.sampling_rate_hz * rig.fine_steps)
@@ -70,7 +70,7 @@ def noise(size: int, deviation: float, colour: str, rate_hz: float, rng: np.rand
 
 
 def _knocks(response: FineResponse, step: float) -> FloatArray:
-    """Return the acceleration that closing of the play rings up [m/s2] on the fine clock."""
+    """Return the ringing acceleration that each closure of the play excites [m/s2], on the fine clock."""
     if not np.any(response.knock):
         return np.zeros(response.force.size)
     time = np.arange(0.0, 6.0 * _KNOCK_DECAY_S, step)
@@ -134,22 +134,23 @@ def record_bench(
     Parameters
     ----------
     damper
-        Effects with a `strength_share` get the strength that reaches it on the training tests.
+        True damper. The strength of an effect with a `strength_share` is scaled so that the effect has this share on
+        the training tests.
     tests
-        The plan.
+        Tests of the campaign.
     rig
         Servo, sensors, clock.
     rng
-        Generator: one number is drawn, from which each test has its own.
+        Random generator; it gives one seed, from which the generators of all tests are derived.
     progress
-        Called with the share done and a text.
+        Called with the completed share and a text.
     jobs
-        Threads; the result does not depend on their number.
+        Number of threads; the result does not depend on it.
 
     Raises
     ------
     UserError
-        If a share is out of reach.
+        If no strength gives the share of an effect.
     """
     seed = int(rng.integers(2**62))
     motions = [fine_motion(test, rig, seed) for test in tests]
@@ -197,13 +198,13 @@ def record_bench(
 
 
 def _at_first(tests: Sequence[BenchTest], motions: Sequence[FineMotion]) -> list[FineMotion]:
-    """Return the motions that shares of effects refer to; later tests do not count, so the damper stays the same."""
+    """Return the motions to which shares of effects refer; later tests are excluded, so that the damper is the same."""
     first = [motion for test, motion in zip(tests, motions, strict=True) if not test.later]
     return first or list(motions)
 
 
 class _Shares:
-    """What each effect is of the force, summed up test by test."""
+    """Share of each effect in the force, summed over the tests."""
 
     def __init__(self, damper: TrueDamper) -> None:
         effects = damper.effects
@@ -213,23 +214,23 @@ class _Shares:
     def of(self, motion: FineMotion, force: FloatArray) -> FloatArray:
         """Return sums over a test, whose force with all effects is `force`, for each effect, shape (2, effects).
 
-        They are the squares of the change by the effect and of the force without it.
+        The sums are those of the squared change by the effect and of the squared force without it.
         """
         plain = [respond(damper, motion).force for damper in self._without]
         return np.array([[np.sum((force - item) ** 2) for item in plain], [np.sum(item**2) for item in plain]])
 
     def add(self, sums: FloatArray) -> None:
-        """Add the sums of a test."""
+        """Add the sums of one test."""
         self._sums += sums
 
     def shares(self) -> list[float]:
-        """Return RMS of each effect over the RMS of the force without it."""
+        """Return the ratio of the RMS of each effect to the RMS of the force without it."""
         change, force = self._sums
         return [float(value) for value in np.sqrt(change / np.maximum(force, 1e-300))]
 
 
 def calibrated(damper: TrueDamper, motions: Sequence[FineMotion]) -> TrueDamper:
-    """Return the damper with all strengths that are given as shares solved for, in order."""
+    """Return the damper with the strengths of all effects that are given as shares, computed one after the other."""
     long = sum(motion.force_samples for motion in motions) > _CALIBRATION_SAMPLES
     some = _spread(motions, _CALIBRATION_TESTS) if long else list(motions)
     for index, effect in enumerate(damper.effects):
@@ -240,7 +241,7 @@ def calibrated(damper: TrueDamper, motions: Sequence[FineMotion]) -> TrueDamper:
         for _ in range(3 if long else 1):
             damper = calibrate_strength(damper, index, some, share=asked)
             if long:
-                # some tests stand for all: ask of them what gives the share on all
+                # a part of the tests is simulated, with a target that gives the share over all tests
                 asked *= wanted / effect_share(damper, index, motions)
                 if abs(asked / wanted - 1.0) < 0.01:
                     break
@@ -250,7 +251,7 @@ def calibrated(damper: TrueDamper, motions: Sequence[FineMotion]) -> TrueDamper:
 def calibrated_on(
     damper: TrueDamper, tests: Sequence[BenchTest], rig: BenchRig, rng: np.random.Generator
 ) -> TrueDamper:
-    """Return the damper as :func:`record_bench` with the same arguments has it, without recording."""
+    """Return the damper that :func:`record_bench` uses for the same arguments, without a recording."""
     if all(effect.strength_share is None for effect in damper.effects):
         return damper
     seed = int(rng.integers(2**62))

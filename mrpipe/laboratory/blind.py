@@ -1,4 +1,4 @@
-"""Blind campaigns for tests and benchmarks: a rig drawn from a seed, its effects kept back, its truth sealed."""
+"""Blind campaigns for tests and benchmarks: a rig drawn from a seed, with undeclared effects and a sealed truth."""
 
 from __future__ import annotations
 
@@ -62,19 +62,19 @@ def record_blind(
     final
         Directory of the campaign; the truth goes to `<final>.truth/sealed.json`.
     seed
-        Everything follows from it.
+        Seed of all random numbers.
     names
         Effects to draw from (`unfamiliar` for shapes of no family), without repetition.
     share
-        RMS of each effect over RMS of the force; a pair is a range.
+        Ratio of the RMS of each effect to the RMS of the force; a pair is a range.
     count
-        How many; 0 records a clean rig.
+        Number of effects; 0: a rig without effects.
     plan, tests
-        Which tests: a plan's name, or a list in its place.
+        Name of a plan, and list of tests that replaces it.
     rig
         Machine and sensors.
     vary
-        Log-normal spread of the damper's numbers about its set.
+        Log-normal spread of the parameters of the damper around its parameter set.
     damper
         The true damper.
     declared
@@ -83,7 +83,7 @@ def record_blind(
     Raises
     ------
     UserError
-        If no draw reaches the share on these tests.
+        If no drawn effect can have the share on these tests.
     """
     rng = np.random.default_rng([seed, 977])
     rig = rig or BenchRig()

@@ -1,4 +1,4 @@
-"""The shaking table with damper and controller: the closed loop of Figure 5.3 on the true rig."""
+"""Shaking table with damper and controller: the closed loop of Figure 5.3 on the virtual rig."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from mrpipe.laboratory.structure import TrueStructure, assemble
 
 @dataclass(frozen=True)
 class LoopHistories:
-    """True histories on the recorder's clock, shape (samples,) or (samples, floors), SI."""
+    """True histories at the sampling times of the recorder, shape (samples,) or (samples, floors), SI."""
 
     time_s: FloatArray
     ground: FloatArray
@@ -57,22 +57,22 @@ def run_loop(
     Parameters
     ----------
     damper, structure
-        The hardware.
+        True damper and true structure.
     controller
-        The program's own.
+        Controller of the program under test.
     ground
         Ground acceleration on the fine clock, shape (m,) [m/s2].
     rig
-        Clock and sensors; the noise of its sensors enters the controller.
+        Sampling and sensors; the noise of the sensors acts on the controller.
     rng
-        Generator of that noise.
+        Random generator of this noise.
 
     Raises
     ------
     UserError
-        If the controller's rate does not divide that of the fine clock.
+        If the rate of the fine clock is not a multiple of the rate of the controller.
     DivergedError
-        If the rig's motion grows without bound.
+        If the motion of the rig grows without bound.
     """
     ratio = controller.sample_time_s / rig.step_s
     every = round(ratio)
@@ -116,7 +116,7 @@ def run_loop(
 
 
 def gains_of(controller: Controller) -> dict[str, float]:
-    """Return the gains of a test for campaign.yaml; gains of 0 are left out."""
+    """Return the gains of a test for campaign.yaml, without gains of 0."""
     return {key: value for key, value in controller.gains.items() if value != 0.0}
 
 
@@ -133,15 +133,15 @@ def record_closed_loop(
     Parameters
     ----------
     damper, structure
-        The hardware with what nobody declared.
+        True damper and true structure, including undeclared effects.
     controllers
-        Law -> the program's own controller.
+        Law -> controller of the program.
     rig
         Table, sensors, excitation.
     rng
         Generator.
     progress
-        Called with the share done and a text.
+        Called with the completed share and a text.
     """
     floors = structure.frame.floors
     lasers = tuple(floor for floor in rig.laser_floors if 1 <= floor <= floors)

@@ -1,4 +1,4 @@
-"""Planted effects on yield force and viscosity, forces in parallel, and shapes that belong to no family."""
+"""Planted effects on yield force and viscosity, parallel forces, and shapes that belong to no family of effects."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _end_stop(code: int, numbers: FloatArray, x: float, v: float) -> float:
 
 @njit(cache=True)
 def _unfamiliar(code: int, numbers: FloatArray, x: float, v: float, u: float, time: float) -> float:
-    """Return a force of a shape that is in no library."""
+    """Return a force whose shape is in no library of effects."""
     if code == COGGING:
         return numbers[0] * math.sin(2.0 * math.pi * x / numbers[1] + numbers[2])
     if code == FIELD_PARITY:
@@ -139,7 +139,7 @@ def parallel_force(
         elif code == INERTIA_PLAIN:
             force += numbers[0] * a * (1.0 + (x / numbers[1]) ** 2)
         elif code == INERTIA_GROWTH:
-            # the remaining part, if the constant part moves as a mass of the structure
+            # the variable part, if the constant part is a mass of the structure
             force += numbers[0] * a * (x / numbers[1]) ** 2
         elif code == DRAG_POWER:
             force += numbers[0] * v * abs(v) ** (numbers[1] - 1.0)

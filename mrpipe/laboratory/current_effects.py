@@ -1,4 +1,4 @@
-"""Planted effects on the way from the drive to the field in the fluid."""
+"""Planted effects between the drive and the magnetic field in the fluid."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RATED_CURRENT = 4.0
 
 @njit(cache=True)
 def _dead_time(numbers: FloatArray, own: FloatArray, ring: FloatArray, current: float, h: float) -> float:
-    """Return the current of `numbers[0]` seconds ago (linear between the samples kept)."""
+    """Return the current `numbers[0]` seconds ago, interpolated linearly between the stored samples."""
     size = ring.shape[0]
     head = int(own[0])
     ring[head] = current
@@ -28,7 +28,7 @@ def _dead_time(numbers: FloatArray, own: FloatArray, ring: FloatArray, current: 
 
 @njit(cache=True)
 def _second_order(numbers: FloatArray, own: FloatArray, current: float, h: float) -> float:
-    """Return the current behind a driver loop of second order with the low-frequency delay `numbers[0]`."""
+    """Return the output current of a second-order driver with the low-frequency delay `numbers[0]`."""
     if numbers[0] <= 0.0:
         return current
     omega = 2.0 * numbers[1] / numbers[0]
@@ -43,7 +43,7 @@ def _second_order(numbers: FloatArray, own: FloatArray, current: float, h: float
 
 @njit(cache=True)
 def _driver(numbers: FloatArray, own: FloatArray, current: float, h: float) -> float:
-    """Return what a driver of limited current and limited rate gives."""
+    """Return the output current of a driver with limited current and limited rate."""
     limit = RATED_CURRENT / max(numbers[0], 1e-9)
     wanted = min(max(current, -limit), limit)
     if own[1] < 0.5:
@@ -55,8 +55,8 @@ def _driver(numbers: FloatArray, own: FloatArray, current: float, h: float) -> f
 
 @njit(cache=True)
 def _relaxing(numbers: FloatArray, own: FloatArray, u: float, v: float, h: float) -> float:
-    """Return the field's current with a remanence that saturates, charges fast and fades by time and by slip."""
-    # the field that stays is always less than the one that was
+    """Return the current of the field with a remanence that saturates and decays with time and with slip."""
+    # the remanent field is always smaller than the field before
     level = min(numbers[0] * u / (1.0 + u / numbers[1]), 0.97 * u)
     kept = own[0]
     if level > kept:
@@ -64,7 +64,7 @@ def _relaxing(numbers: FloatArray, own: FloatArray, u: float, v: float, h: float
     else:
         fade = 1.0 / numbers[3] + abs(v) / numbers[4]
         excess = (kept - level) / numbers[1]
-        # faster from high excess: a power law and no exponential
+        # the decay is faster at a high excess: a power law, not an exponential
         kept -= (kept - level) * (1.0 - math.exp(-h * fade * (0.3 + 2.0 * excess)))
     own[0] = kept
     size = max(u, 1e-12)
@@ -73,7 +73,7 @@ def _relaxing(numbers: FloatArray, own: FloatArray, u: float, v: float, h: float
 
 @njit(cache=True)
 def _domains(numbers: FloatArray, own: FloatArray, u: float) -> float:
-    """Return the field's current behind three plays of the current: domains that turn at their own threshold."""
+    """Return the current of the field after three play elements, which model domains with different thresholds."""
     total = 0.0
     for k in range(3):
         width = numbers[1] * (0.4 + 0.6 * k)
@@ -93,7 +93,7 @@ def effective_current(
     h: float,
     place: int,
 ) -> float:
-    """Return the current after the effects before (`place` 0) or after (1) the lag (2.4)."""
+    """Return the current after the effects that precede (`place` 0) or follow (`place` 1) the lag (2.4)."""
     for k in range(codes.shape[0]):
         code = codes[k]
         if place == 0:

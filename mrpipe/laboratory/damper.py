@@ -1,4 +1,4 @@
-"""The true damper: base numbers, planted effects, and the strength that gives an effect its share of the force."""
+"""True damper: base parameters, planted effects, and the strength that gives an effect its share of the force."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from mrpipe.laboratory.kernel import BASE, run_damper
 
 @dataclass(frozen=True)
 class TrueDamper:
-    """A damper with what nobody declared.
+    """Damper with its undeclared effects.
 
     Attributes
     ----------
     base
-        Shape (11,), the numbers of :data:`~mrpipe.laboratory.kernel.BASE`, SI.
+        Parameters in the order of :data:`~mrpipe.laboratory.kernel.BASE`, shape (11,), SI.
     effects
         Planted effects.
     name
-        Of the base set.
+        Name of the base set.
     """
 
     base: FloatArray
@@ -38,13 +38,13 @@ class TrueDamper:
         return replace(self, effects=tuple(effects))
 
     def numbers(self) -> dict[str, float]:
-        """Return the base by name."""
+        """Return the base parameters by name."""
         return dict(zip(BASE, self.base.tolist(), strict=True))
 
 
 @dataclass(frozen=True)
 class FineMotion:
-    """Motion and current of one test on the fine clock, shape (n,), SI; `offset_draw` is this test's own number."""
+    """Motion and current of one test on the fine clock, shape (n,), SI; `offset_draw` is drawn for each test."""
 
     name: str
     role: str
@@ -85,7 +85,10 @@ def damper_from_set(name: str) -> TrueDamper:
 
 
 def draw_damper(rng: np.random.Generator, around: TrueDamper, spread: float = 0.2) -> TrueDamper:
-    """Return a damper whose numbers differ from another's by log-normal factors (n stays, alpha scales as a whole)."""
+    """Return a damper whose parameters differ from those of another by random factors.
+
+    All coefficients of alpha have the same factor, and n is not changed.
+    """
     base = around.base.copy()
     base[:4] *= np.exp(spread * rng.standard_normal())
     base[4:6] *= np.exp(spread * rng.standard_normal(2))
@@ -98,7 +101,7 @@ def draw_damper(rng: np.random.Generator, around: TrueDamper, spread: float = 0.
 
 
 def packed_for(damper: TrueDamper, offset_draw: float) -> tuple[IntArray, FloatArray]:
-    """Return codes (k,) and numbers (k, 8) of the effects for one test; `offset_draw` is the test's own offset."""
+    """Return codes (k,) and numbers (k, 8) of the effects for one test; `offset_draw` is the offset of this test."""
     codes, values = packed(damper.effects)
     for row in np.flatnonzero(codes == OFFSET_PER_TEST):
         values[row, 1] = offset_draw
@@ -106,7 +109,7 @@ def packed_for(damper: TrueDamper, offset_draw: float) -> tuple[IntArray, FloatA
 
 
 def respond(damper: TrueDamper, motion: FineMotion) -> FineResponse:
-    """Return what the damper answers to a motion, without noise."""
+    """Return the response of the damper to a motion, without noise."""
     codes, values = packed_for(damper, motion.offset_draw)
     force, knock, _ = run_damper(
         damper.base,
@@ -125,7 +128,7 @@ def respond(damper: TrueDamper, motion: FineMotion) -> FineResponse:
 
 
 def _skewed(force: FloatArray, effect: Planted, step_s: float) -> FloatArray:
-    """Return the force as a channel that lags gives it: a pure shift, or the filter of another amplifier."""
+    """Return the force as a delayed channel records it: with a pure delay, or with the filter of another amplifier."""
     if effect.strength <= 0.0:
         return force
     if effect.form.code == CHANNEL_SKEW_CONSTANT:
@@ -138,7 +141,7 @@ def _skewed(force: FloatArray, effect: Planted, step_s: float) -> FloatArray:
 
 
 def effect_share(damper: TrueDamper, index: int, motions: Sequence[FineMotion]) -> float:
-    """Return the RMS of one effect's part of the force over the RMS of the force without it, pooled over tests."""
+    """Return the ratio of the RMS of an effect to the RMS of the force without it, pooled over tests."""
     without = damper.with_effects([item for place, item in enumerate(damper.effects) if place != index])
     return _share(damper, motions, [respond(without, motion).force for motion in motions])
 
@@ -159,25 +162,25 @@ def calibrate_strength(
     share: float | None = None,
     tolerance: float = 0.01,
 ) -> TrueDamper:
-    """Return the damper with the strength of one effect such that it reaches its share of the force RMS.
+    """Return the damper with the strength of one effect at which the effect has its share of the RMS force.
 
     Parameters
     ----------
     damper
-        With the effect in place; its `strength_share` is what is wanted.
+        Damper with the effect, whose `strength_share` is the target.
     index
-        Which effect.
+        Index of the effect.
     motions
-        Tests to pool.
+        Motions of the tests over which the share is pooled.
     share
-        In place of the effect's own `strength_share`.
+        Wanted share; None: the `strength_share` of the effect.
     tolerance
-        Of the share, relative.
+        Relative tolerance of the share.
 
     Raises
     ------
     UserError
-        If the share is out of reach on these tests.
+        If no strength gives the share on these tests.
     """
     effect = damper.effects[index]
     wanted = effect.strength_share if share is None else share
@@ -196,7 +199,7 @@ def calibrate_strength(
         raise UserError(
             f"effect {effect.name} ({effect.form.form})",
             "strength_share",
-            f"{wanted:g} is out of reach on these tests",
+            f"{wanted:g} cannot be reached on these tests",
             "choose a smaller share, or tests that excite the effect",
         )
     return damper.with_effects([*others[:index], effect.with_strength(strength), *others[index + 1 :]])
@@ -205,7 +208,7 @@ def calibrate_strength(
 def solve_strength(
     share_at: Callable[[float], float], wanted: float, guess: float, strongest: float, tolerance: float
 ) -> float | None:
-    """Return the strength by bracketing and regula falsi on logarithms; None where it is out of reach."""
+    """Return the strength by bracketing and regula falsi on logarithms; None if it cannot be reached."""
     low, high = 0.0, 0.0
     low_share, high_share = 0.0, 0.0
     strength = min(guess, strongest) or 1e-6

@@ -1,4 +1,4 @@
-"""What can be planted in the virtual damper: names as in docs/effects.md, their forms, parameters and ranges."""
+"""Effects that can be planted in the virtual damper: names as in docs/effects.md, forms, parameters and ranges."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SENSOR_CODES = (CHANNEL_SKEW_CONSTANT, CHANNEL_SKEW_FILTER)
 
 @dataclass(frozen=True)
 class Number:
-    """One number of a form: default, range of the draw, unit."""
+    """Parameter of a form: default, range of the draw, unit."""
 
     name: str
     unit: str
@@ -31,20 +31,20 @@ class Number:
 
 @dataclass(frozen=True)
 class Form:
-    """One functional form of an effect.
+    """Functional form of an effect.
 
     Attributes
     ----------
     effect, form
-        Names; unfamiliar shapes have effect `unfamiliar`.
+        Names; an unfamiliar shape has the effect `unfamiliar`.
     code
-        Of the kernel.
+        Code in the kernel.
     numbers
-        In the kernel's order; the first is the strength.
+        Parameters in the order of the kernel; the first one is the strength.
     strongest
-        Largest strength that makes sense.
+        Largest strength that is physically reasonable.
     needs
-        `varying-drive` where nothing shows at constant current.
+        `varying-drive` if the effect cannot be observed at constant current.
     """
 
     effect: str
@@ -225,18 +225,19 @@ def find_form(effect: str, form: str = "", *, source: str = "laboratory.effects"
 
 @dataclass(frozen=True)
 class Planted:
-    """An effect of the true damper.
+    """Effect of the true damper.
 
     Attributes
     ----------
     form
-        Which equation.
+        Form of the effect.
     values
-        Number -> value, SI; those left out take their defaults.
+        Parameter -> value, SI; missing parameters have their defaults.
     strength_share
-        RMS of the effect over RMS of the force that the strength is to be scaled to; None: as `values` says.
+        Ratio of the RMS of the effect to the RMS of the force, to which the strength is scaled; None: the strength is
+        that of `values`.
     declared
-        Named in campaign.yaml.
+        Whether campaign.yaml names the effect.
     """
 
     form: Form
@@ -257,21 +258,21 @@ class Planted:
 
     @property
     def strength(self) -> float:
-        """The first number."""
+        """Value of the first parameter."""
         return self.number(0)
 
     def number(self, index: int) -> float:
-        """Return one number by its place."""
+        """Return a parameter by its index."""
         number = self.form.numbers[index]
         return float(self.values.get(number.name, number.default))
 
     def with_strength(self, strength: float) -> Planted:
-        """Return the effect at another strength."""
+        """Return the effect with another strength."""
         values = {**self.values, self.form.numbers[0].name: float(strength)}
         return Planted(self.form, values, self.strength_share, self.declared)
 
     def described(self) -> dict[str, Any]:
-        """Return the effect as the sealed file holds it."""
+        """Return the effect in the form of the sealed file."""
         return {
             "name": self.name,
             "form": self.form.form,
@@ -285,7 +286,7 @@ class Planted:
 
 
 def packed(effects: tuple[Planted, ...]) -> tuple[IntArray, FloatArray]:
-    """Return codes (k,) and numbers (k, 8) for the kernel; effects of the sensors are left out."""
+    """Return codes (k,) and numbers (k, 8) for the kernel, without the effects of the sensors."""
     inside = [effect for effect in effects if effect.form.code not in SENSOR_CODES]
     values = np.zeros((len(inside), kernel.PARAMETERS))
     for row, effect in enumerate(inside):
@@ -299,7 +300,7 @@ def draw_hidden_effect(
     names: tuple[str, ...] = EFFECT_NAMES,
     share: float | tuple[float, float] | None = None,
 ) -> Planted:
-    """Draw an undeclared effect: name, form and numbers, and the share of the force RMS it is to reach.
+    """Draw an undeclared effect: name, form and parameters, and its share of the RMS force.
 
     Parameters
     ----------
@@ -308,7 +309,8 @@ def draw_hidden_effect(
     names
         Effects to draw from (`unfamiliar` for shapes of no family).
     share
-        RMS of the effect over RMS of the force; a pair is a range to draw from; None keeps the drawn strength.
+        Ratio of the RMS of the effect to the RMS of the force; a pair: a range to draw from; None: the drawn strength
+        is used.
     """
     name = names[int(rng.integers(len(names)))]
     forms = [form for form in FORMS if form.effect == name]

@@ -1,4 +1,4 @@
-"""The frame on its shaking table: sweeps, a free decay for each mode, random motion; sensors in volts."""
+"""Frame on its shaking table: sweeps, a free decay of each mode, random motion; sensors in volts."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _CALIBRATION_S = 40.0
 
 @dataclass(frozen=True)
 class FrameTestOrder:
-    """One test of the frame: ground acceleration on the fine clock, shape (m,)."""
+    """Test of the frame: ground acceleration on the fine clock, shape (m,)."""
 
     name: str
     role: str
@@ -42,7 +42,7 @@ class FrameTestOrder:
 
 @dataclass(frozen=True)
 class TableRecord:
-    """A campaign of the shaking table ready to be written, and its truth."""
+    """Recorded campaign of the shaking table and its truth, before they are written."""
 
     tests: list[TestFile]
     channels: dict[str, tuple[str, str]]
@@ -89,8 +89,8 @@ def random_ground(rig: FrameRig, low_hz: float, high_hz: float, rng: np.random.G
 def decay_ground(rig: FrameRig, structure: TrueStructure, mode: int, rng: np.random.Generator) -> FloatArray:
     """Return ground acceleration at the resonance of a mode (from 1), then rest for its decay, shape (m,).
 
-    The amplitude is such that the strongest floor reaches `decay_acceleration_m_s2`; the operator's tuning is off by a
-    thousandth or so.
+    The amplitude is such that the largest floor acceleration is `decay_acceleration_m_s2`. The frequency deviates from
+    the resonance by about a thousandth, as with manual tuning.
     """
     frame = structure.frame
     modes = natural_modes(frame)
@@ -110,7 +110,7 @@ def decay_ground(rig: FrameRig, structure: TrueStructure, mode: int, rng: np.ran
 
 
 def frame_tests(structure: TrueStructure, rig: FrameRig, rng: np.random.Generator) -> list[FrameTestOrder]:
-    """Return the orders of a frame campaign: sweeps, decays, random motion."""
+    """Return the tests of a frame campaign: sweeps, decays, random motion."""
     frequencies = natural_modes(structure.frame).frequencies_hz
     low, high = 0.4 * float(frequencies[0]), 1.3 * float(frequencies[-1])
     orders = []
@@ -150,7 +150,7 @@ def record_frame(
     rng
         Generator of offsets, noise and random motion.
     progress
-        Called with the share done and a text.
+        Called with the completed share and a text.
     """
     assembled = assemble(structure, rig.step_s)
     n = structure.frame.floors
@@ -204,14 +204,15 @@ def record_frame(
 
 
 def calibrated_structure(structure: TrueStructure, rig: FrameRig) -> TrueStructure:
-    """Return the structure with all strengths that are given as shares solved for, in order.
+    """Return the structure with the strengths of all effects that are given as shares, computed one after the other.
 
-    The share is the RMS of the change of all floor accelerations over their RMS, on a short sweep to the third mode.
+    The share is the ratio of the RMS of the change of all floor accelerations to their RMS, in a short sweep up to the
+    third mode.
 
     Raises
     ------
     UserError
-        If a share is out of reach, or belongs to an effect that shows with a damper only.
+        If no strength gives the share, or the effect can be observed with a damper only.
     """
     frequencies = natural_modes(structure.frame).frequencies_hz
     short = rig.changed(sweep_s=_CALIBRATION_S)
@@ -244,5 +245,5 @@ def calibrated_structure(structure: TrueStructure, rig: FrameRig) -> TrueStructu
 
 
 def floor_masses(structure: TrueStructure) -> Sequence[float]:
-    """Return the masses that are written into campaign.yaml: weighed, so they are known [kg]."""
+    """Return the masses that campaign.yaml contains, because they were weighed [kg]."""
     return [float(mass) for mass in np.diag(structure.frame.mass)]

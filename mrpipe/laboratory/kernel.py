@@ -1,4 +1,4 @@
-"""The true damper of the virtual rig: the ordinary differential equations (2.1) to (2.4) in fine time steps.
+"""True damper of the virtual rig: the ordinary differential equations (2.1) to (2.4) in fine time steps.
 
 One compiled step integrates the rod's play, the current, the coefficients, the hysteretic variable (Runge-Kutta of
 order four) and the parallel forces, with any number of planted effects; :mod:`mrpipe.laboratory.effects` names them.
@@ -28,7 +28,7 @@ BACKLASH_FREE, BACKLASH_HELD = 50, 51
 
 @njit(cache=True, inline="always")
 def _rate(z: float, v: float, base: FloatArray, creep: float) -> float:
-    """Return z' of (2.2), less what the chains creep under load (a planted effect; 0 without)."""
+    """Return z' of (2.2) minus the creep rate of the particle chains under load (a planted effect; 0 without it)."""
     size = abs(z)
     power = size if base[9] == 2.0 else size ** (base[9] - 1.0)
     return base[6] * v - base[7] * abs(v) * z * power - base[8] * v * size * power - creep * z * size * size
@@ -47,7 +47,7 @@ def _hysteresis(z: float, v0: float, v1: float, h: float, base: FloatArray, cree
 
 @njit(cache=True)
 def _rod_held(state: FloatArray, parameters: FloatArray, x1: float, v1: float, h: float) -> float:
-    """Return the rod's speed where friction holds it inside the play: it is taken along ever more near the flank."""
+    """Return the speed of the rod inside the play with friction; it approaches that of the flank near contact."""
     half = 0.5 * parameters[0]
     if half <= 0.0:
         return v1
@@ -93,7 +93,8 @@ def damper_step(
     codes, values
         Planted effects, shape (k,), and their numbers, shape (k, 8).
     state, memory, ring
-        Own memory, shapes (12,), (k, 8), (k, 1024), zeros at first.
+        State of the damper, of the effects, and of their delay lines, shapes (12,), (k, 8), (k, 1024); zeros at the
+        start.
     x1, v0, v1, a1
         Motion of the actuator at the end (v0: start) of the step [m], [m/s], [m/s2].
     drive
@@ -152,7 +153,7 @@ def damper_step(
         if state[CONTACT] == 0.0:
             core = 0.0
         elif core * state[CONTACT] < 0.0:
-            # the flank only pushes: the contact opens and the rod finds its balance without force
+            # the flank can only push: the contact opens, and the force of the rod is zero
             state[CONTACT] = 0.0
             core = 0.0
     state[POWER] = abs(core * speed1)
@@ -163,7 +164,7 @@ def damper_step(
 def _rod_free(
     state: FloatArray, gap: float, x1: float, v1: float, alpha: float, c0: float, base: FloatArray, h: float
 ) -> float:
-    """Return the rod's speed where nothing holds it inside the play: its force is zero until a flank is met."""
+    """Return the speed of the rod where it is free inside the play, so that its force is zero until contact."""
     half = 0.5 * gap
     if state[CONTACT] != 0.0:
         rod = x1 - state[CONTACT] * half
@@ -203,7 +204,7 @@ def run_damper(
 
     Returns
     -------
-    Force [N], speed of closure of the play where a flank is met [m/s] (else 0) and rod position [m], shape (n,).
+    Force [N], closing speed of the play at contact [m/s] (otherwise 0) and rod position [m], each of shape (n,).
     """
     n = x.shape[0]
     force = np.zeros(n)

@@ -16,38 +16,38 @@ CurrentKind = Literal["constant", "half-sine", "steps", "random"]
 
 
 _ORDERED = CustomTest(name="")
-"""The defaults that a test shares with the settings."""
+"""Source of the defaults, so that tests and settings have the same ones."""
 
 
 @dataclass(frozen=True)
 class BenchTest:
-    """One test of a plan.
+    """Test of a plan.
 
     Attributes
     ----------
     name, role
-        As in campaign.yaml.
+        Name and role, as in campaign.yaml.
     motion
         `sine`, `triangle`, `random`, `earthquake`; `dwell` (a slow sine about several positions in turn); `hold`
         (a sine that pauses).
     amplitude_m
-        Amplitude; of random motions the largest excursion.
+        Amplitude [m]; for random motions the largest displacement.
     frequency_hz
-        Of the motion; upper end of the band of random motions.
+        Frequency of the motion [Hz]; for random motions the upper end of the band.
     current
         `constant`, `half-sine` (|sin|, at the frequency of the motion), `steps`, `random`.
     current_a
-        Level, amplitude, or largest value.
+        Level, amplitude, or largest value of the current [A].
     duration_s
-        0: `cycles` and the soft start.
+        Duration [s]; 0: that of `cycles` and the soft start.
     repeat_of
-        Name of the test that this one repeats: same command, another recording.
+        Name of the test that this test repeats with the same command.
     pause_s
-        Pause in the middle (hold), or time between steps of current.
+        Pause in the middle of the test (hold), or time between steps of the current [s].
     middle_m
         Position about which the test moves [m].
     later
-        The test was made after the others: strengths given as shares are those of the others.
+        Whether the test was made after the others. Shares of effects then refer to the other tests.
     """
 
     name: str

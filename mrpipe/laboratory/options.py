@@ -1,4 +1,4 @@
-"""Options of the virtual rigs: bench, shaking table, closed loop. They hold nothing of the rigs' hidden effects."""
+"""Options of the virtual rigs: bench, shaking table, closed loop. They do not contain the hidden effects."""
 
 from __future__ import annotations
 
@@ -27,54 +27,57 @@ class BenchSensors(Section):
 
 
 class Servo(Section):
-    """How the testing machine deviates from its command."""
+    """Deviations of the testing machine from its command."""
 
     amplitude_error: float = Field(0.005, ge=0.0, description="Standard deviation of the amplitude error [1].")
     harmonic_share: float = Field(
         0.004, ge=0.0, description="Standard deviation of second and third harmonic over the amplitude [1]."
     )
-    smoothing_s: float = Field(0.004, gt=0.0, description="Width of the machine's own smoothing [s].")
+    smoothing_s: float = Field(0.004, gt=0.0, description="Width of the smoothing by the machine [s].")
 
 
 class BenchRig(Section):
-    """The testing machine around the damper, and its recorder."""
+    """Testing machine and recorder of the damper tests."""
 
     sampling_rate_hz: float = Field(1000.0, ge=100.0, description="Rate of the recorder [Hz].")
-    fine_steps: int = Field(4, ge=1, le=32, description="Integration steps a sample of the true damper.")
+    fine_steps: int = Field(4, ge=1, le=32, description="Number of integration steps per sample of the true damper.")
     current_phase_spread_rad: float = Field(
         1.5707963,
         ge=0.0,
-        description="Half width of the draw of the half-sine current's phase about the velocity's.",
+        description="Half width of the random phase of the half-sine current relative to the velocity [rad].",
     )
     sensors: BenchSensors = Field(BenchSensors(), description="Noise and offsets.")
     servo: Servo = Field(Servo(), description="The testing machine.")
 
 
 class FrameRig(Section):
-    """The shaking table, its sensors and the tests of the frame."""
+    """Shaking table, its sensors and the tests of the frame."""
 
     sampling_rate_hz: float = Field(200.0, ge=50.0, description="Rate of the recorder [Hz].")
-    fine_steps: int = Field(5, ge=1, le=64, description="Integration steps a sample of the true frame.")
+    fine_steps: int = Field(5, ge=1, le=64, description="Number of integration steps per sample of the true frame.")
     acceleration_noise_m_s2: float = Field(0.01, ge=0.0, description="Noise of the accelerometers [m/s2].")
     displacement_noise_m: float = Field(20e-6, ge=0.0, description="Noise of the lasers [m].")
     acceleration_offset_m_s2: float = Field(0.05, ge=0.0, description="Offset of the accelerometers [m/s2].")
     displacement_offset_m: float = Field(5e-4, ge=0.0, description="Offset of the lasers [m].")
     laser_floors: tuple[int, ...] = Field((1, 2, 5), description="Floors whose displacement is measured.")
     sweep_s: float = Field(300.0, gt=10.0, description="Duration of a sweep, a fifth of it rest [s].")
-    sweeps: int = Field(2, ge=1, description="Number of sweeps; the second runs down.")
+    sweeps: int = Field(2, ge=1, description="Number of sweeps; the second one has a falling frequency.")
     random_s: float = Field(240.0, ge=0.0, description="Duration of the random test [s]; 0 leaves it out.")
     sweep_acceleration_m_s2: float = Field(
-        0.06, gt=0.0, description="Amplitude of the sweep at the first frequency, rising with its root [m/s2]."
+        0.06,
+        gt=0.0,
+        description="Amplitude of the sweep at the first frequency; it rises with the square root of the frequency "
+        "[m/s2].",
     )
     random_acceleration_m_s2: float = Field(0.15, gt=0.0, description="RMS of the random test [m/s2].")
     decay_acceleration_m_s2: float = Field(
-        1.5, gt=0.0, description="Largest floor acceleration when a decay test lets go [m/s2]."
+        1.5, gt=0.0, description="Largest floor acceleration at the release of a decay test [m/s2]."
     )
     sensitivity_error: float = Field(
-        0.0, ge=0.0, description="Standard deviation of the conversion factors' error [1]."
+        0.0, ge=0.0, description="Standard deviation of the error of the conversion factors [1]."
     )
     support_share: float = Field(
-        0.06, ge=0.0, description="Participation of a flexible-support mode above the band [1]; 0 leaves it out."
+        0.06, ge=0.0, description="Participation of a mode of the flexible support above the band [1]; 0: no such mode."
     )
 
     @property
@@ -84,11 +87,14 @@ class FrameRig(Section):
 
 
 class LoopRig(Section):
-    """The shaking table, its sensors and the base motion of the closed-loop tests."""
+    """Shaking table, its sensors and the base motion of the closed-loop tests."""
 
     frequency_rad_s: float = Field(8.0, gt=0.0, description="Frequency of the base [rad/s].")
     base_amplitude_m_s2: float = Field(
-        0.788, gt=0.0, description="Amplitude of the base's acceleration [m/s2]; 0.788 gives vd about 24 mm on top."
+        0.788,
+        gt=0.0,
+        description="Amplitude of the base acceleration [m/s2]; with 0.788 the RMS top displacement of vd is about 24 "
+        "mm.",
     )
     rest_s: float = Field(1.0, ge=0.0, description="Rest before the motion [s].")
     shaking_s: float = Field(32.0, gt=5.0, description="Harmonic motion of the base [s].")
@@ -97,7 +103,7 @@ class LoopRig(Section):
         0.85, gt=0.0, description="Amplitude of the validation test of each law over that of the training test."
     )
     sampling_rate_hz: float = Field(500.0, ge=50.0, description="Rate of the recorder [Hz].")
-    fine_steps: int = Field(16, ge=4, le=64, description="Integration steps a sample of the true rig.")
+    fine_steps: int = Field(16, ge=4, le=64, description="Number of integration steps per sample of the true rig.")
     acceleration_noise_m_s2: float = Field(0.05, ge=0.0, description="Noise of the accelerometers [m/s2].")
     displacement_noise_m: float = Field(20e-6, ge=0.0, description="Noise of the lasers [m].")
     force_noise_n: float = Field(0.5, ge=0.0, description="Noise of the load cell [N].")
@@ -113,7 +119,7 @@ class LoopRig(Section):
 
 
 class CustomTest(Section):
-    """One test of a custom plan."""
+    """Test of a custom plan."""
 
     name: str = Field(description="Name of the test.")
     role: Literal["training", "validation", "repeat"] = Field("training", description="Role of the test.")
@@ -121,13 +127,15 @@ class CustomTest(Section):
         "sine", description="Motion; `dwell` visits several positions, `hold` pauses in the middle."
     )
     amplitude_m: float = Field(0.010, gt=0.0, description="Amplitude or largest excursion [m].")
-    middle_m: float = Field(0.0, description="Position about which it moves [m].")
+    middle_m: float = Field(0.0, description="Mean position of the motion [m].")
     frequency_hz: float = Field(1.0, gt=0.0, description="Frequency, or upper end of the band of random motion [Hz].")
     current: Literal["constant", "half-sine", "steps", "random"] = Field("constant", description="Kind of current.")
     current_a: float = Field(0.0, ge=0.0, description="Level, amplitude or largest value of the current [A].")
     duration_s: float = Field(10.0, gt=0.0, description="Duration [s].")
     repeat_of: str = Field("", description="Test whose command is repeated.")
     later: bool = Field(
-        False, description="Made after the others: the strength of effects given as shares is that of the others."
+        False,
+        description="Whether the test is made after the others; effects given as shares then have the strength of the "
+        "other tests.",
     )
     pause_s: float = Field(0.4, gt=0.0, description="Pause of `hold`, or time between steps of current [s].")

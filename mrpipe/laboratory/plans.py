@@ -1,4 +1,4 @@
-"""The tests of a bench campaign."""
+"""Test plans of a bench campaign."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def table_2_1(cycles: int = 10, frequencies_hz: tuple[float, ...] = FREQUENCIES_
 
 
 def compact(duration_s: float = 5.0) -> list[BenchTest]:
-    """Return 44 short tests of unlike motions; validation repeats some kinds of motion and brings others."""
+    """Return 44 short tests with different motions; validation tests have some of these kinds of motion and others."""
     mm = 1e-3
     d = duration_s
     rows: list[BenchTest] = []

@@ -1,4 +1,4 @@
-"""Putting a recorded campaign and its sealed truth in place."""
+"""Writing of a recorded campaign and its sealed truth."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def campaign_directory(final: Path) -> Iterator[Path]:
     try:
         yield temporary
         if final.exists():
-            # two renames: a kill between them leaves no campaign, which the next call records again
+            # two renames: after an interruption between them there is no campaign, and the next call records it again
             aside = final.with_name(f".{final.name}.{os.getpid()}.old.tmp")
             final.rename(aside)
             temporary.rename(final)
@@ -52,7 +52,7 @@ def write_scales(folder: Path, scales: Mapping[str, float]) -> None:
 
 
 def sealed_path(campaign: Path) -> Path:
-    """Return where the truth of a campaign lies: next to the campaign, never inside it."""
+    """Return the path of the truth of a campaign: next to the campaign, never inside it."""
     campaign = Path(campaign)
     return campaign.with_name(f"{campaign.name}.truth") / SEALED
 

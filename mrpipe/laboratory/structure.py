@@ -1,4 +1,4 @@
-"""The true structure: frame, what nobody declared of it, and its exact step."""
+"""True structure: frame, undeclared effects, and exact time step."""
 
 from __future__ import annotations
 
@@ -66,12 +66,12 @@ FRAME_EFFECT_NAMES = tuple(dict.fromkeys(form.effect for form in FRAME_FORMS))
 
 @dataclass(frozen=True)
 class TrueStructure:
-    """A frame with its undeclared effects.
+    """Frame with its undeclared effects.
 
     Attributes
     ----------
     frame
-        The linear part.
+        Linear part of the structure.
     effects
         Planted effects of the structure (and the controller's delay).
     """
@@ -89,7 +89,7 @@ class TrueStructure:
 
     @property
     def control_delay_s(self) -> float:
-        """How late the controller's command is [s]."""
+        """Delay of the command of the controller [s]."""
         effect = self.find(CONTROLLER_DELAY)
         return 0.0 if effect is None else effect.strength
 
@@ -100,7 +100,7 @@ def find_frame_form(effect: str, form: str = "", *, source: str = "laboratory.fr
     Raises
     ------
     UserError
-        If there is none of that name.
+        If no form has this name.
     """
     found = [item for item in FRAME_FORMS if item.effect == effect and form in ("", item.form)]
     if not found:
@@ -113,7 +113,7 @@ def find_frame_form(effect: str, form: str = "", *, source: str = "laboratory.fr
 def draw_frame_effect(
     rng: np.random.Generator, names: tuple[str, ...] = FRAME_EFFECT_NAMES, share: float | None = None
 ) -> Planted:
-    """Draw an undeclared effect of the structure: name, form and numbers."""
+    """Draw an undeclared effect of the structure: name, form and parameters."""
     name = names[int(rng.integers(len(names)))]
     forms = [form for form in FRAME_FORMS if form.effect == name]
     form = forms[int(rng.integers(len(forms)))]
@@ -133,7 +133,7 @@ def random_frame(rng: np.random.Generator, floors: int) -> Frame:
 
 @dataclass(frozen=True)
 class Assembled:
-    """The structure as the kernel takes it."""
+    """Structure in the form that the kernel reads."""
 
     A: FloatArray
     B: FloatArray
@@ -162,8 +162,8 @@ def exact_step(A: FloatArray, B: FloatArray, h: float) -> tuple[FloatArray, Floa
 def assemble(structure: TrueStructure, h: float, *, added_mass_kg: float = 0.0) -> Assembled:
     """Return the structure on a fine clock of step `h` [s].
 
-    Degrees of freedom are the floors (relative to the ground), then a brace node and a rocking angle where these
-    effects are planted. `added_mass_kg` moves with the damper's rod.
+    Degrees of freedom are the floors (relative to the ground), then a brace node and a rocking angle if these effects
+    are planted. `added_mass_kg` moves with the damper's rod.
     """
     frame = structure.frame
     n = frame.floors
@@ -195,7 +195,7 @@ def assemble(structure: TrueStructure, h: float, *, added_mass_kg: float = 0.0) 
         heights[:n] = STOREY_HEIGHT_M * np.arange(1, n + 1)
         stiffness = 1.0 / max(rocking.strength, 1e-9)
         inertia = _ROCKING_INERTIA_SHARE * float(np.sum(np.diag(frame.mass) * heights[:n] ** 2))
-        # the columns bend by the motion of the floors less the rotation of the base
+        # the deformation of the columns is the motion of the floors minus that due to the rotation of the base
         for matrix in (K, C):
             inner = matrix[:-1, :-1]
             matrix[:-1, -1] = matrix[-1, :-1] = -inner @ heights
@@ -225,6 +225,6 @@ def assemble(structure: TrueStructure, h: float, *, added_mass_kg: float = 0.0) 
 def _grown(
     M: FloatArray, C: FloatArray, K: FloatArray, load: FloatArray, drift_rows: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return all with one more degree of freedom, still empty."""
+    """Return all matrices with one additional degree of freedom whose entries are zero."""
     larger = [np.pad(matrix, ((0, 1), (0, 1))) for matrix in (M, C, K)]
     return larger[0], larger[1], larger[2], np.append(load, 0.0), np.pad(drift_rows, ((0, 0), (0, 1)))

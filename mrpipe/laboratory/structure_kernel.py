@@ -1,4 +1,4 @@
-"""The shaken structure of the virtual rig in exact steps, with damper, controller and nonlinear storeys."""
+"""Structure of the virtual rig in exact time steps, with damper, controller and nonlinear storeys."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _storey_forces(
             force = 0.0
             if code == JOINT_FRICTION_DAHL:
                 stuck = sliding[k, storey]
-                # exact over a step of constant speed: the spring of the joint yields towards its limit
+                # exact for constant speed in the step, because the spring of the joint yields towards its limit
                 way = rate * h / numbers[1]
                 side = 1.0 if way > 0.0 else -1.0
                 stuck = side + (stuck - side) * math.exp(-abs(way))
@@ -144,7 +144,7 @@ def run_structure(
         State space z = [q, q'] with u = [ground acceleration, load on each degree of freedom], and its exact step for
         inputs linear within the step `h` [s].
     w, drift_rows
-        Damper's connectivity, shape (d,), and drift of each storey, shape (floors, d).
+        Connectivity vector of the damper, shape (d,), and rows of the storey drifts, shape (floors, d).
     floors
         Number of floors.
     ground
@@ -152,17 +152,18 @@ def run_structure(
     h
         Time step [s].
     every
-        Fine steps a recorded sample.
+        Number of fine steps per recorded sample.
     storey_codes, storey_values
-        Nonlinear forces of the structure.
+        Codes and numbers of the nonlinear forces of the structure.
     damped, base, codes, values
-        Whether there is a damper, and which (see :mod:`mrpipe.laboratory.kernel`).
+        Whether the structure has a damper, and the damper (see :mod:`mrpipe.laboratory.kernel`).
     control_every, delay_steps
-        Fine steps a controller sample (0: none, the drive is 0), and by how many its command is late.
+        Number of fine steps per controller sample (0: no controller, the drive is 0), and delay of its command in fine
+        steps.
     law, numbers, layout, memory_of_controller
-        Of :class:`~mrpipe.control.controller.Controller`.
+        Force, arrays and state of :class:`~mrpipe.control.controller.Controller`.
     sensor_noise
-        What the controller's sensors add, shape (ticks, 4 + floors), in the order of its measurements.
+        Noise of the sensors of the controller, shape (ticks, 4 + floors), in the order of its measurements.
 
     Returns
     -------

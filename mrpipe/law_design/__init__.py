@@ -1,1 +1,1 @@
-"""Design of the control law: the law and gains with the smallest largest response of the real loop."""
+"""Design of the control law: the law and gains whose largest response in the real loop is smallest."""

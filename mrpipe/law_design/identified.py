@@ -1,4 +1,4 @@
-"""How uncertain structure and damper are, read from the artifacts of their identification."""
+"""Uncertainty of structure and damper, from the artifacts of their identification."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def frame_uncertainty(artifact: Artifact, frame: Frame) -> FrameUncertainty:
 
 
 def damper_uncertainty(artifact: Artifact) -> DamperUncertainty:
-    """Return the covariance of the parameters in damper.h5, and the model error on tests that no fit has seen."""
+    """Return the covariance of the parameters in damper.h5, and the model error on tests not used in the fit."""
     members = set(artifact.members())
     error = 0.0
     if "comparison" in members:
@@ -43,7 +43,7 @@ def damper_uncertainty(artifact: Artifact) -> DamperUncertainty:
 
 
 def traced_damper_uncertainty(identified: Artifact, traced: Artifact) -> DamperUncertainty:
-    """Return how uncertain a traced damper is.
+    """Return the uncertainty of a traced damper.
 
     The covariance of the base form is that of its identification; there is none where the tracing has taken another
     base form. The effects have the 95 % intervals of their parameters, and the model error is that after the tracing.

@@ -1,4 +1,4 @@
-"""Laws under design and what was found for each, kept on disk so that an interrupted design goes on where it ended."""
+"""Results of laws under design, stored on disk so that an interrupted design continues where it ended."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mrpipe.simulation.windows import QUANTITIES
 
 @dataclass(frozen=True)
 class LawUnderDesign:
-    """A law with the gains that may change.
+    """A law with the gains that are searched.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class LawUnderDesign:
 
 @dataclass(frozen=True)
 class Designed:
-    """What the study found for one law.
+    """Result of the study for one law.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a design minimises: the largest response over a frequency band, amplitudes and recorded motions."""
+"""Objective of a design: the largest response over a frequency band, amplitudes and recorded motions."""
 
 from __future__ import annotations
 
@@ -20,13 +20,16 @@ RunOf = Callable[[str, Gains], Run]
 """From a law and its gains to the function that runs the loop under an excitation."""
 
 UNACCEPTABLE = 1e6
-"""Value of the objective where the response grows without bound, in multiples of the reference. It is finite because a
-simplex of an optimiser must be able to compare it; any stable loop is far below."""
+"""Value of the objective where the response grows without bound, in multiples of the reference. It is finite, because
+an optimiser must be able to compare it; the value of every stable loop is far below.
+"""
 
 
 PENALTY = 10.0
-"""Factor on the excess over a limit. A design gives way to one that keeps the limit unless its objective is smaller by
-more than ten times the excess; the response of a structure never depends so strongly on one of these quantities."""
+"""Factor on the excess over a limit. A design that keeps the limit is preferred unless the objective of the other one
+is smaller by more than ten times the excess. The response of a structure never depends so strongly on one of these
+quantities.
+"""
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Limits:
         return cls(*(math.inf if value is None else value for value in given))
 
     def excess(self, peaks: Mapping[str, float]) -> dict[str, float]:
-        """Return by how much a design exceeds each limit, relative to it [1]; 0 where it keeps the limit."""
+        """Return the excess of a design over each limit, relative to the limit [1]; 0 if it keeps the limit."""
         pairs = {
             "max_stroke_m": self.stroke_m,
             "max_force_n": self.force_n,
@@ -82,7 +85,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Load:
-    """Everything that the structure is exposed to.
+    """Excitations for which the structure is designed.
 
     Attributes
     ----------
@@ -101,7 +104,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Objective:
-    """How responses become one number.
+    """Function from responses to one number.
 
     Attributes
     ----------
@@ -132,7 +135,7 @@ class Evaluation:
     Attributes
     ----------
     law, gains
-        What was run.
+        Law and gains of the evaluation.
     curves
         Response over frequency, one per amplitude.
     motions
@@ -206,7 +209,7 @@ def evaluate(
     Parameters
     ----------
     run_of
-        Gives the loop of a law.
+        Function that returns the loop of a law.
     law, gains
         Of the design.
     load, objective
@@ -214,7 +217,7 @@ def evaluate(
     options
         Of the response curves.
     known
-        Responses of this loop that were measured before; the new ones are put in.
+        Responses of this loop that were measured before; new responses are added.
     """
     run = run_of(law, gains)
     known = known or Known()

@@ -19,7 +19,7 @@ class MotionSettings(Section):
     unit: str = Field("m/s^2", description="Unit of the histories in a text file, for forces such as kN.")
     force_at: dict[str | int, float] = Field(
         {},
-        description="Degrees of freedom on which forces act in place of ground motion (wind, shaker), each with a "
+        description="Degrees of freedom on which forces act instead of ground motion (wind, shaker), each with a "
         "factor, as in `simulate.excitation`.",
     )
     file_channels: tuple[str | int, ...] = Field(
@@ -29,10 +29,10 @@ class MotionSettings(Section):
 
 
 class DesignSettings(Section):
-    """The law and gains with the smallest largest response of the real loop."""
+    """Search of the law and gains whose largest response in the real loop is smallest."""
 
     laws: tuple[str, ...] = Field(
-        (), description="Laws in the race; empty: all that are calibrated, and the passive ones."
+        (), description="Laws that are compared; empty: all calibrated laws, and the passive ones."
     )
     weights: dict[str, float] = Field(
         {"rms_x_top_m": 1.0},
@@ -49,7 +49,9 @@ class DesignSettings(Section):
     band_rad_s: tuple[float, float] | None = Field(
         None, description="Lowest and highest frequency; null: that of `resonance`, by default around the target mode."
     )
-    motions: tuple[MotionSettings, ...] = Field((), description="Recorded base motions, in addition.")
+    motions: tuple[MotionSettings, ...] = Field(
+        (), description="Recorded base motions or forces, in addition to the harmonic motion."
+    )
     stroke_limit_m: float | None = Field(
         None, gt=0.0, description="Limit of the largest displacement across the damper; null: not limited."
     )
@@ -66,10 +68,15 @@ class DesignSettings(Section):
         {}, description="Gains that are not searched: law -> gain -> value, such as {vdns: {k_n_m: -4500}}."
     )
     also_free: bool = Field(
-        False, description="Search laws with fixed gains a second time with all gains free; reported as `unrestricted`."
+        False,
+        description="Whether laws with fixed gains are searched a second time with all gains free; the result is "
+        "`unrestricted`.",
     )
-    grid: int = Field(7, ge=3, description="Values of a single gain before the local search.")
-    evaluations: int = Field(14, ge=3, description="Most evaluations of the local search per free gain.")
+    grid: int = Field(7, ge=3, description="Number of values of a single gain before the local search.")
+    evaluations: int = Field(14, ge=3, description="Largest number of evaluations of the local search per free gain.")
     draws: int = Field(
-        24, ge=0, description="Structures and dampers drawn from their uncertainty, for the probability of each law."
+        24,
+        ge=0,
+        description="Number of structures and dampers that are drawn from their uncertainty, for the probability of "
+        "each law.",
     )

@@ -1,4 +1,4 @@
-"""The design problem of a run: its loop, the laws in the race, and what is uncertain."""
+"""The design problem of a run: its loop, the laws that are compared, and the uncertain quantities."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.steady_state import Run
 
 SMALLEST_SHARE = 0.02
-"""Where a gain may be zero, the search on logarithms ends at this share of its largest value."""
+"""If a gain may be zero, the search over logarithms ends at this share of its largest value."""
 
 
 @dataclass(frozen=True)
 class LoopOf:
-    """Gives the loop of a law.
+    """Function that returns the loop of a law.
 
     Attributes
     ----------
     rig
-        Structure, damper, controllers and options. The controllers know the nominal damper.
+        Structure, damper, controllers and options. The controllers are those for the nominal damper.
     seed
         Of the sensor noise, which is the same in all runs, so that gains are compared under the same conditions.
     """
@@ -52,7 +52,7 @@ class LoopOf:
         return run
 
     def at_rate(self, factor: float) -> LoopOf:
-        """Return the loop with other steps of the plant: their number a second times a factor."""
+        """Return the loop with the plant rate times a factor."""
         options = self.rig.options
         rate = factor * options.plant_rate_hz
         options = replace(options, plant_rate_hz=rate, record_rate_hz=min(options.record_rate_hz, rate))
@@ -86,7 +86,7 @@ def scaled_force(damper: DamperModel, factor: float) -> DamperModel:
 def laws_in_the_race(
     settings: DesignSettings, plant: Plant, calibrated: Mapping[str, Gains]
 ) -> tuple[list[LawUnderDesign], list[LawUnderDesign], dict[str, str]]:
-    """Return the laws under design, the same with all gains free where some are fixed, and why laws are left out.
+    """Return the laws under design, laws with fixed gains again with all gains free, and why laws are left out.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def laws_in_the_race(
 
 
 def _free(gain: GainRange, plant: Plant) -> FreeGain:
-    """Return the range of a gain without zero, which has no logarithm."""
+    """Return the range of a gain without zero, because zero has no logarithm."""
     low, high = gain.bounds(plant)
     largest = max(abs(low), abs(high))
     sign = math.copysign(1.0, high if abs(high) >= abs(low) else low)

@@ -1,4 +1,4 @@
-"""A whole design: from settings, rig and uncertainties to the best laws, their ranking and its confirmation."""
+"""A complete design: from settings, rig and uncertainties to the best laws, their ranking and confirmation."""
 
 from __future__ import annotations
 
@@ -30,28 +30,31 @@ from mrpipe.simulation.windows import QUANTITIES
 from mrpipe.structures import Frame
 
 AROUND = (0.97, 1.0, 1.03)
-"""Frequencies over the resonance at which a drawn loop is run: a draw moves the resonance by a few percent."""
+"""Frequencies, relative to the resonance, at which a drawn loop is run, because a draw shifts the resonance by a few
+percent.
+"""
 
 LAW_OF_REFERENCE = "vd"
 
 
 STANDARD_ERROR, AVERAGED_CYCLES = 5e-4, 120
 """Relative standard error of the largest values of a result, and most cycles over which one of them is averaged. The
-minimum over a gain is so flat that an error of 0.1 % moves it by several per cent of the gain. So few cycles average
-sensor noise; a response that does not become periodic keeps the error of a single run, 1 to 2 %."""
+minimum over a gain is so flat that an error of 0.1 % moves it by several per cent of the gain. These cycles are
+sufficient to average sensor noise; a response that does not become periodic keeps the error of a single run, 1 to 2 %.
+"""
 
 SEARCH_RATE = 0.5
-"""Plant steps a second during the search, over those of the settings: peaks change by less than half a percent."""
+"""Plant rate during the search, relative to the settings; it changes peaks by less than 0.5 %."""
 
 CONFIRMING_RATE = 2.0
-"""The same when the result is confirmed, with other sensor noise."""
+"""Plant rate of the confirmation, relative to the settings, with other sensor noise."""
 
 DRAWN_SHARE = 0.9
 """Local maxima of a response curve above this share of the largest are run in every draw: one of them may be the
 largest in a drawn structure."""
 
 APART = 0.04
-"""Maxima whose frequencies differ by less than this share are one."""
+"""Maxima whose frequencies differ by less than this share count as one."""
 
 
 @dataclass(frozen=True)
@@ -73,18 +76,18 @@ class Confirmation:
     same_law: Evaluation
 
     def improvement(self, quantity: str) -> float:
-        """Return by how much the largest value of a quantity is smaller than with the best calibrated gains [1]."""
+        """Return the relative reduction of the largest value of a quantity against the best calibrated gains [1]."""
         return 1.0 - self.design.peaks[quantity] / self.calibrated.peaks[quantity]
 
 
 @dataclass(frozen=True)
 class Untraced:
-    """The design for the damper as identified, before effects were traced, and what it does with the traced damper.
+    """The design for the identified damper, before effects were traced, and its result with the traced damper.
 
     Attributes
     ----------
     design
-        The best design with the identified damper in the loop, as the search saw it.
+        The best design with the identified damper in the loop, with the coarse curves of the search.
     with_traced
         The same law and gains with the traced damper in the loop, with accurate response curves.
     regret
@@ -98,20 +101,20 @@ class Untraced:
 
 @dataclass(frozen=True)
 class Result:
-    """Everything that a design found.
+    """Result of a design.
 
     Attributes
     ----------
     designed
-        Law -> what was found for it.
+        Law -> result.
     free
-        Law -> the same with all gains free, where some are fixed.
+        Law -> result with all gains free, for laws with fixed gains.
     best
         Law with the smallest objective, of those in `designed`.
     reference
         The evaluation that scales the objective.
     front
-        Designs that no other beats in both top displacement and top acceleration.
+        Designs for which no other is better in both top displacement and top acceleration (Pareto front).
     ranking
         Under uncertainty; None without draws.
     confirmation
@@ -119,7 +122,7 @@ class Result:
     left_out
         Law -> why it is not compared.
     load
-        What the design was exposed to.
+        Excitations of the design.
     untraced
         The design for the damper before it was traced; None where the damper of the design is not a traced one.
     """
@@ -139,7 +142,7 @@ class Result:
 def load_of(
     settings: DesignSettings, amplitude_m_s2: float, band_rad_s: tuple[float, float], frame: Frame | None = None
 ) -> Load:
-    """Return what the structure is exposed to.
+    """Return the excitations of the design.
 
     Motions with two components act in both directions of `frame` where it has two; else their first component acts.
 
@@ -186,7 +189,7 @@ def load_of(
 
 
 def accurate_curves(settings: DesignSettings, *, absolute: bool) -> CurveOptions:
-    """Return how the curves of results are measured: the maxima of all quantities of the objective are refined."""
+    """Return the options of accurate curves: the maxima of all quantities of the objective are refined."""
     plain = CurveOptions(
         points=15,
         tolerance=5e-3,
@@ -217,7 +220,7 @@ def run_design(
     Parameters
     ----------
     rig, plant
-        The loop, and what gives the bounds of the gains.
+        The loop, and the plant that gives the bounds of the gains.
     settings, load
         Of the design.
     uncertainty
@@ -235,7 +238,7 @@ def run_design(
     identified
         Where `rig` has a traced damper: the same rig with the damper before the tracing, for the design without it.
     """
-    # the threads share the processors; a second level of threads inside the linear algebra would only take time
+    # the threads use all processors; a second level of threads inside the linear algebra would only slow them down
     with threadpool_limits(1):
         return _run_design(
             rig, plant, settings, load, uncertainty, absolute, rng, jobs, progress, kept or Kept(), identified

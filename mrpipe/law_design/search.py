@@ -13,16 +13,16 @@ from mrpipe.control.gains import Gains
 from mrpipe.law_design.options import DesignSettings
 
 STARTS = 2
-"""Points of the coarse grid, the best ones, from which the search of several gains starts."""
+"""Number of best points of the coarse grid from which the search of several gains starts."""
 
 NEAR = 0.3
-"""The second search looks at gains within this distance of the first result, in logarithms."""
+"""Largest distance of gains in the second search from the first result, in logarithms."""
 
 NEAR_STEP = 0.12
-"""First step of its simplex, in logarithms."""
+"""First step of the simplex of the second search, in logarithms."""
 
 NEAR_EVALUATIONS = 7
-"""Its most evaluations per free gain."""
+"""Largest number of evaluations of the second search per free gain."""
 
 Value = Callable[[Gains], float]
 AtPoint = Callable[[FloatArray], float]
@@ -82,8 +82,9 @@ class SearchOptions:
 def search(value: Value, free: Sequence[FreeGain], fixed: Mapping[str, float], options: SearchOptions) -> Gains:
     """Return the gains with the smallest value that was found.
 
-    A coarse grid over the whole range of each gain finds the valley, because the response of a clipped law can have
-    several. A bounded local search then refines it: Brent's method for one gain, Nelder-Mead for several.
+    A coarse grid over the whole range of each gain finds the region of the minimum, because the response of a clipped
+    law can have several minima. A bounded local search then refines it: Brent's method for one gain, Nelder-Mead for
+    several.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ def _search_one(at: AtPoint, free: Sequence[FreeGain], fixed: Mapping[str, float
 
 
 def _search_several(at: AtPoint, free: Sequence[FreeGain], fixed: Mapping[str, float], options: SearchOptions) -> Gains:
-    """Search from several points: the largest response over frequency has kinks, where a simplex may come to rest."""
+    """Search from several points, because the largest response has kinks at which a simplex may stop."""
     bounds = [gain.logarithms for gain in free]
     inside = 4 if len(free) == 2 else 3
     axes = [np.linspace(low, high, inside + 2)[1:-1] for low, high in bounds]
@@ -189,7 +190,7 @@ def _search_several(at: AtPoint, free: Sequence[FreeGain], fixed: Mapping[str, f
 
 
 def _bounded(at: AtPoint, bounds: tuple[float, float], tolerance: float, most: int) -> tuple[float, FloatArray]:
-    """Return the smallest value that Brent's bounded method finds for one gain, and where."""
+    """Return the smallest value that Brent's bounded method finds for one gain, and its place."""
     found = minimize_scalar(
         lambda part: at(np.array([part])),
         bounds=bounds,
@@ -207,7 +208,7 @@ def simplex_search(
     tolerance: float,
     most: int,
 ) -> tuple[float, FloatArray]:
-    """Return the smallest value that Nelder and Mead's simplex reaches from a point, and where.
+    """Return the smallest value that the simplex of Nelder and Mead reaches from a point, and its place.
 
     Parameters
     ----------

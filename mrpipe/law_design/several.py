@@ -1,4 +1,4 @@
-"""Design of several dampers: factors on the gains of all dampers with the smallest largest response."""
+"""Design of several dampers: factors on the gains of all dampers whose largest response is smallest."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def design_dampers(
         _search(value, len(free), settings.evaluations)
         found = min(tried, key=lambda item: item.value)
         best = evaluate(run_of, TOGETHER, found.gains, load, objective, final)
-    # the accurate curves decide; the search saw the coarse ones
+    # the accurate curves decide; the search used coarse ones
     best = min(best, calibrated, key=lambda item: item.value)
     return DampersDesign(Designed(entry, best, calibrated, tuple(tried)), reference)
 

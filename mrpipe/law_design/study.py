@@ -1,4 +1,4 @@
-"""The design study: search the gains of every law, compare the laws, and say how sure the choice is."""
+"""The design study: search of the gains of every law, and comparison of the laws."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ COARSE = CurveOptions(
     refinements=5,
     refined=("rms_x_top_m",),
 )
-"""Response curves during the search: peaks are accurate to about half a percent, at a tenth of the cost of the final
-ones."""
+"""Response curves during the search: peaks are accurate to about 0.5 %, in a tenth of the time of the final ones."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class Loops:
     Attributes
     ----------
     accurate
-        Gives the loop of a law as the settings describe it.
+        Function that returns the loop of a law with the settings.
     searched
         The same with a larger step of the plant, for the search.
     known
@@ -101,7 +100,7 @@ def design_law(
         return Designed(entry, calibrated, calibrated, ())
     found = search(value, entry.free, fixed, options)
     near = replace(final, refined=coarse.refined)
-    # without accurate curves there is nothing to refine with
+    # without accurate curves a refinement is not possible
     if final.tolerance < coarse.tolerance:
         found = refine(
             lambda gains: accurate(gains, searched, near).value,
@@ -111,7 +110,7 @@ def design_law(
         )
     best = accurate(found, load, final)
     if calibrated.value < best.value:
-        # the accurate curves decide; the search saw the coarse ones
+        # the accurate curves decide; the search used coarse ones
         best = calibrated
     return Designed(entry, best, calibrated, tuple(archive.items))
 
@@ -173,7 +172,7 @@ def design_all(
             kept.write(known)
         return entry.label, known
 
-    # the longest searches first, so that the threads end together
+    # the longest searches start first, so that the threads end at about the same time
     ordered = sorted(entries, key=lambda entry: -len(entry.free))
     total = sum(1 + len(entry.free) ** 2 for entry in entries)
     runner = Parallel(n_jobs=max(1, jobs), backend="threading", return_as="generator_unordered")
@@ -189,7 +188,7 @@ def design_all(
 def pareto_front(
     items: Sequence[Evaluation], first: str = "rms_x_top_m", second: str = "rms_a_top_m_s2"
 ) -> list[Evaluation]:
-    """Return the designs that no other design beats in both quantities, ascending in the first.
+    """Return the designs for which no other design is better in both quantities, ascending in the first one.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Frames and dampers drawn from what their identification leaves uncertain."""
+"""Random draws of frames and dampers from the uncertainty of their identification."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def _kept_sign(nominal: float, changed: float) -> float:
 
 @dataclass(frozen=True)
 class Ranking:
-    """How sure the choice of the law is.
+    """Certainty of the choice of the law.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ class Ranking:
     regret
         Mean excess of the chosen law's objective over the best one of each draw [1].
     regret_p90
-        The same, exceeded in one draw of ten.
+        Regret that one draw in ten exceeds [1].
     sensitivities
         Uncertain quantity -> rank correlation with the lead of the chosen law over the runner-up, largest first.
     values
@@ -201,7 +201,7 @@ def rank(laws: Sequence[str], chosen: str, draws: Sequence[Draw], values: FloatA
     laws, chosen
         Laws that are compared, and the one that the design chose.
     draws
-        Realisations; every law sees the same ones.
+        Realisations, which are the same for all laws.
     values
         Objective of each law in each draw, shape (draws, laws).
     """
@@ -246,5 +246,5 @@ def test_for(parameter: str) -> str:
         return "triangular motion of the damper at several speeds, at the drive of operation"
     if "." in parameter:
         effect = parameter.partition(".")[0]
-        return f"more bench tests that excite {effect}; the documentation of the effects says which"
+        return f"more bench tests that excite {effect}; the page on effects lists suitable tests"
     return "slow triangular motion of the damper at drives between zero and the limit"

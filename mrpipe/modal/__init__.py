@@ -1,1 +1,1 @@
-"""Modal parameters from measured frequency responses and decays."""
+"""Modal parameters and matrices of structures from forced, ambient and free-decay tests."""

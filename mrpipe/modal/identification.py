@@ -20,7 +20,7 @@ from mrpipe.structures import Frame
 
 @dataclass(frozen=True)
 class GivenShapes:
-    """Mode shapes to use in place of the measured ones, shape (n, n), and their name for messages."""
+    """Mode shapes to use instead of the measured ones, shape (n, n), and their name for messages."""
 
     shapes: FloatArray
     name: str = ""
@@ -28,31 +28,31 @@ class GivenShapes:
 
 @dataclass(frozen=True)
 class FrameIdentification:
-    """Everything that identification found, n floors and r modes.
+    """Result of the identification, for n floors and r modes.
 
     Attributes
     ----------
     frame
-        M, C, K; None where the data determine modes only.
+        M, C, K; None if the data determine modes only.
     frequencies
         Natural angular frequencies with intervals [rad/s].
     damping
-        Damping ratios that went into C, with intervals.
+        Damping ratios that were used for C, with intervals.
     damping_source
-        `decay`, `sweep`, or `decay and sweep` where the decay is uncertain, a mode.
+        For each mode `decay`, `sweep`, or `decay and sweep` if the decay is uncertain.
     sweep_damping
         Damping ratios of the multi-mode fit of the forced tests: the second method.
     mode_shapes
-        Shape (n, r), largest element of a mode +1; nan at floors where nothing determines it. With several directions:
-        a row a sensor.
+        Shape (n, r), largest element of a mode +1; NaN at floors at which it is not determined. With several
+        directions: one row per sensor.
     mac
-        Shape (r, r): measured shapes against the same modes of the frame (against themselves without a frame).
+        Shape (r, r): MAC of measured shapes with the modes of the frame (with themselves without a frame).
     decays
-        One a mode at most (the most certain one); modes without a decay are missing.
+        At most one decay per mode (the most certain one); modes without a decay are missing.
     fit, tridiagonal, in_time, in_frequency
-        Parts, for the artifact and the report; None or empty without a frame.
+        Intermediate results for the artifact and the report; None or empty without a frame.
     phase_scatter
-        Shape (n,): largest imaginary part of a mode's residues over the largest residue.
+        Shape (n,): largest imaginary part of the residues of a mode over the largest residue.
     tests
         The forced tests, those of the fit first; all are simulated for verification.
     band_hz
@@ -70,7 +70,7 @@ class FrameIdentification:
     masses, mass_intervals
         Shape (n,) and (n, 2) [kg]; nan where unknown.
     amplitude, amplitude_in_time
-        Modes over amplitude and their simulation of each forced test; None and empty where constant modes predict as
+        Amplitude-dependent modes and their simulation of each forced test; None and empty if constant modes predict as
         well.
     shape_errors
         Standard errors of the measured rows of `mode_shapes`, in their scale, shape (n, r); nan at rows that no sensor

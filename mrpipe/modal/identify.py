@@ -84,7 +84,7 @@ def _delay_text(clock: SensorClock) -> str:
 
 
 def _check_coherence(fit: MultiModeFit, tests: FrameTests) -> list[str]:
-    """Raise where a mode is mostly noise; return warnings for single floors."""
+    """Raise UserError if a mode is mostly noise; return warnings for single floors."""
     findings = []
     frequency = fit.angular_frequencies / (2.0 * np.pi)
     floors = [sensor.floor for sensor in fit.sensors]
@@ -95,7 +95,7 @@ def _check_coherence(fit: MultiModeFit, tests: FrameTests) -> list[str]:
         mode = int(weak[0])
         place = f"mode {mode + 1} at {frequency[mode]:.3g} Hz"
         problem = f"coherence at the peak is {pooled[mode]:.2f}, below {LEAST_COHERENCE:g}"
-        raise UserError(tests.source, place, problem, "excite it harder or longer, or reduce the noise")
+        raise UserError(tests.source, place, problem, "excite this mode more strongly or longer, or reduce the noise")
     shape = np.abs(fit.residues) / np.abs(fit.residues).max(axis=0)
     for row, mode in np.argwhere((fit.coherence < LEAST_COHERENCE) & (shape > 0.3)):
         value = fit.coherence[row, mode]
@@ -111,7 +111,9 @@ def _check_shapes(shapes: FloatArray, mass: FloatArray, given: GivenShapes | Non
     if given is None:
         return [f"measured mode shapes: {message}"]
     wrong = [item for item in found if item.kind in {"wrong-sign", "singular"}]
-    remedy = "turn the sign of those elements" if wrong and wrong[0].elements else "give shapes orthogonal to the mass"
+    remedy = (
+        "change the sign of those elements" if wrong and wrong[0].elements else "give shapes orthogonal to the mass"
+    )
     raise UserError(f"mode matrix {given.name}", "", message, remedy)
 
 
@@ -132,7 +134,7 @@ def identify_frame(
     progress
         Called with the share that is done.
     given_shapes
-        Mode shapes to use in place of the measured ones.
+        Mode shapes to use instead of the measured ones.
 
     Raises
     ------
@@ -140,7 +142,7 @@ def identify_frame(
         If no mode is found, the coherence at a peak is below 0.5, or a given mode matrix is singular or not
         orthogonal to the mass.
     """
-    # tall matrices of a few columns gain nothing from threads, and slow down where other work shares the cores
+    # threads do not accelerate tall matrices with a few columns, and are slower if other work uses the cores
     with threadpool_limits(1):
         return _identify(tests, options or IdentificationOptions(), progress, given_shapes)
 
@@ -185,7 +187,7 @@ def _identify(
         chosen = ChosenTests(contested(chosen.search, chosen.tests, layout), chosen.tests)
     if forced:
         sharp = sharpened(chosen.search, chosen.tests)
-        # a fit of the forced tests alone does not have what decay tests show better
+        # a fit of the forced tests alone does not contain the modes that decay tests show better
         whole = with_decays(with_own_residues(sharp.fit), tests.decays)
         chosen = ChosenTests(replace(sharp, fit=whole), chosen.tests)
     if options.modes_from == "peak-picking" and chosen.tests:
@@ -274,14 +276,14 @@ def _identify(
 def _verified(
     frame: Frame, test: FrameTest, band_hz: tuple[float, float], positions: Mapping[str, tuple[float, float]] | None
 ) -> TimeVerification:
-    """Simulate a forced test with the identified frame; `positions` are those of the sensors on rigid floors."""
+    """Simulate a forced test with the identified frame; `positions`: positions of the sensors on rigid floors."""
     if positions is None:
         return verify_in_time(frame, test, band_hz)
     return compare_in_time(rigid_response(frame, test, positions), test, band_hz)
 
 
 def _shown(forced: Sequence[FrameTest], chosen: ChosenTests, clocks: Sequence[SensorClock]) -> tuple[FrameTest, ...]:
-    """Return the forced tests with the delays of their sensors taken out, also those that were not fitted."""
+    """Return the forced tests with corrected delays of their sensors, also those that were not fitted."""
     fitted = {test.name: test for test in chosen.tests}
     others = [test for test in forced if test.name not in fitted]
     delays = expected_clocks(clocks, chosen.tests, others)
@@ -310,7 +312,7 @@ def _assemble(
     given: GivenShapes | None,
     scale: Scale,
 ) -> tuple[Assembly, list[str]]:
-    """Return the structure: by (3.14) to (3.18) where modes and sensors are complete, else by a storey model."""
+    """Return the structure: by (3.14) to (3.18) if modes and sensors are complete, else by a storey model."""
     fit = search.fit
     if layout.masses is None and given is None:
         masses = masses_of(fit, layout, tests.floor_masses, scale)
@@ -353,7 +355,7 @@ def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout, scale: Scale)
         return PartialModes(fit.angular_frequencies, zeta, fit.residues.real, fit.residue_errors, rows, open_numbers)
     shapes, errors = floor_shapes(fit, layout)
     measured = tuple(sorted({sensor.floor - 1 for sensor in fit.sensors}))
-    # the numbers of the search rise; ranges that leave them out can contradict each other
+    # the mode numbers of the search rise; ranges without this condition can contradict each other
     ranges = zip(sign_ranges(fit, layout, _LOOSE_SIGNS), search.numbers, strict=True)
     possible = tuple((min(low + 1, number), max(high + 1, number)) for (low, high), number in ranges)
     if len(search.numbers) == layout.floors:
@@ -373,7 +375,7 @@ def _partial(search: ModeSearch, zeta: FloatArray, layout: Layout, scale: Scale)
 
 
 def _assurance(fit: MultiModeFit, layout: Layout, assembly: Assembly, rigid: RigidShapes | None = None) -> FloatArray:
-    """Return the modal assurance of measured shapes against the same modes of the frame, at the measured floors."""
+    """Return the modal assurance (MAC) of measured shapes with the modes of the frame, at the measured floors."""
     if rigid is not None and assembly.frame is not None:
         return modal_assurance(rigid.shapes, natural_modes(assembly.frame).mode_shapes)
     if assembly.frame is None:

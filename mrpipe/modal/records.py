@@ -20,14 +20,14 @@ DISPLACEMENT = "floor_displacement"
 
 
 class Place(NamedTuple):
-    """A floor (0 is the ground) and a direction (empty where the campaign has one direction only)."""
+    """A floor (0 is the ground) and a direction (empty if the campaign has one direction only)."""
 
     floor: int
     direction: str = ""
 
 
 class Sensor(NamedTuple):
-    """What a sensor measures and where."""
+    """Position and quantity of a sensor."""
 
     floor: int
     direction: str
@@ -55,17 +55,17 @@ class FrameTest:
     shaker_floor
         0 for excitation by the base.
     mode
-        Mode of a decay test, from 1; 0 where the campaign does not name it.
+        Mode of a decay test, from 1; 0 if the campaign does not state it.
     displacements
         Floor (from 1) and displacement [m], shape (m,), for floors with a laser in addition to accelerometers.
     role
         training, validation or repeat; validation tests are kept for verification if other tests exist.
     places
-        Place of each column of `responses`; empty where column i is floor i + 1.
+        Place of each column of `responses`; empty: column i is floor i + 1.
     further_inputs
         Place and values of the further excitations.
     direction
-        Direction of the first excitation; empty where the campaign has one direction only.
+        Direction of the first excitation; empty if the campaign has one direction only.
     added_masses
         Floor (from 1) and known mass [kg] that was added to it in this test.
     note
@@ -219,7 +219,7 @@ def frame_test(recording: Recording, source: Path, floors: int = 0) -> FrameTest
     sensors = _sensors(recording)
     place = f"tests.{recording.name}.channels"
     if not sensors:
-        raise UserError(source, place, f"no {ACCELERATION}_1", "one floor at least needs a channel")
+        raise UserError(source, place, f"no {ACCELERATION}_1", "at least one floor needs a channel")
     n = floors or max(sensor.floor for sensor in sensors)
     beyond = [name for sensor, name in sensors.items() if sensor.floor > n]
     if beyond:

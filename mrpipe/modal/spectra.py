@@ -36,18 +36,18 @@ class FrequencyResponses:
 
 @dataclass(frozen=True)
 class RecordSpectrum:
-    """Spectrum of a whole record inside the band, without window: leakage is modelled, not tapered.
+    """Spectrum of a whole record inside the band without window, because the fit models the leakage.
 
     Attributes
     ----------
     omega
         Shape (m,) [rad/s].
     excitations
-        Shape (m, k), a column an input.
+        Shape (m, k), one column per input.
     inputs
         Where each input acts; floor 0 is the ground.
     responses
-        Shape (m, s), a column a sensor.
+        Shape (m, s), one column per sensor.
     sensors
         Place and kind of each sensor.
     dt
@@ -82,7 +82,7 @@ class RecordSpectrum:
         )
 
     def every(self, stride: int) -> RecordSpectrum:
-        """Return each `stride`-th line: the model of the fit holds at every line by itself."""
+        """Return each `stride`-th line, because the model of the fit is valid at every line separately."""
         return replace(
             self,
             omega=self.omega[::stride],
@@ -92,7 +92,7 @@ class RecordSpectrum:
 
 
 def thinned(spectra: Sequence[RecordSpectrum], lines: int) -> tuple[RecordSpectrum, ...]:
-    """Return spectra with about `lines` lines in all where they have more; long records then cost no more time."""
+    """Return spectra with at most about `lines` lines in total, so that long records do not take more time."""
     stride = max(1, round(sum(item.omega.size for item in spectra) / lines))
     return tuple(item.every(stride) for item in spectra)
 
@@ -101,7 +101,7 @@ def averaged_responses(test: FrameTest, segment_s: float) -> FrequencyResponses:
     """Return P_gi/P_gg (3.4) and coherence by Welch's method with Hann segments that overlap by three quarters.
 
     Lightly damped peaks are narrower than the segment's resolution, so amplitude and coherence at a peak suffer from
-    leakage; frequencies and signs do not. The multi-mode fit takes no such average.
+    leakage; frequencies and signs do not. The multi-mode fit does not use this average.
 
     Parameters
     ----------
@@ -147,8 +147,8 @@ def record_spectrum(test: FrameTest, band_hz: tuple[float, float]) -> RecordSpec
 def excited_band(tests: tuple[FrameTest, ...], share: float = 0.03) -> tuple[float, float]:
     """Return the band [Hz] in which the excitation of all tests together has power.
 
-    Its edges are where the averaged power density falls below `share` of its usual value (half of the power lies at
-    lines denser than that) or below four times the sensor's noise.
+    At its edges the averaged power density falls below `share` of its typical value (half of the power is at lines with
+    a higher density), or below four times the noise of the sensor.
     """
     lows, highs = [], []
     for test in tests:

@@ -33,10 +33,10 @@ def _decay_row(result: DecayResult) -> dict[str, Any]:
 
 
 def summary(result: FrameIdentification) -> dict[str, Any]:
-    """Return what `mrpipe identify-frame --json` prints, plain numbers in SI.
+    """Return the document that `mrpipe identify-frame --json` prints, as plain numbers in SI.
 
     `mac` is the diagonal of `mac_matrix`: each measured shape against the same mode of the identified frame. Matrices
-    are null where the data determine modes only.
+    are null if the data determine modes only.
     """
     frame, storeys = result.frame, result.tridiagonal
     modes = None if frame is None else natural_modes(frame)
@@ -58,7 +58,7 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
         "second_method_damping_ratios": [float(item.value) for item in result.sweep_damping],
         "second_method_damping_ratio_intervals": [_interval(item) for item in result.sweep_damping],
         "decays": [_decay_row(result.decays[mode]) for mode in sorted(result.decays)],
-        # without a measured excitation its coherence does not exist
+        # without a measured excitation there is no coherence
         "coherence_at_peaks": result.fit.mode_coherence().tolist() if result.fit.spectra else [None] * len(result.mac),
         "coherence_at_peaks_by_floor": result.fit.coherence.tolist() if result.fit.spectra else [],
         "reconstruction_error": [] if result.in_frequency is None else result.in_frequency.error.tolist(),
@@ -90,7 +90,7 @@ def summary(result: FrameIdentification) -> dict[str, Any]:
 
 
 def _over_amplitude(result: FrameIdentification) -> dict[str, Any] | None:
-    """Return the laws of the modes over amplitude, values at the amplitudes seen, and errors on data left out."""
+    """Return the laws of the modes over amplitude, values at the measured amplitudes, and errors on data left out."""
     found = result.amplitude
     if found is None:
         return None
@@ -121,7 +121,7 @@ def _over_amplitude(result: FrameIdentification) -> dict[str, Any] | None:
 
 
 def _plain(values: FloatArray) -> list[Any]:
-    """Return nested lists with None in place of nan, because JSON has no nan."""
+    """Return nested lists with None instead of NaN, because JSON has no NaN."""
     return [[float(item) if np.isfinite(item) else None for item in row] for row in np.atleast_2d(values)]
 
 
@@ -139,7 +139,7 @@ def _clock_row(clock: SensorClock) -> dict[str, Any]:
 
 
 def off_band_share(stiffness: FloatArray) -> float:
-    """Return the largest element of K outside the tri-diagonal band over the largest of all [1]."""
+    """Return the largest element of K outside the tri-diagonal band over the largest element of K [1]."""
     n = stiffness.shape[0]
     outside = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) > 1
     return float(np.abs(stiffness[outside]).max() / np.abs(stiffness).max()) if outside.any() else 0.0

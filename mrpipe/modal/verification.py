@@ -1,4 +1,4 @@
-"""How well the identified frame reproduces the measurements, in time and in frequency (section 3.3.4)."""
+"""Agreement of the identified frame with the measurements, in time and in frequency (section 3.3.4)."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class FrequencyVerification:
     frequency_hz
         Shape (m,).
     measured, synthesised
-        Shape (m, s): leakage taken out, and of M, C, K.
+        Measured without leakage, and from M, C, K, shape (m, s).
     error
         Shape (s,): |measured - synthesised|/|measured| over the band, lines weighted by the excitation.
     floors
@@ -113,9 +113,9 @@ class FrequencyVerification:
 
 
 def verify_in_frequency(frame: Frame, fit: MultiModeFit, band_hz: tuple[float, float]) -> FrequencyVerification:
-    """Compare the measured response of the first test, its transients taken out, with that of M, C and K.
+    """Compare the measured response of the first test, without its transients, with that of M, C and K.
 
-    The frequency response is that to the first input. What further inputs contribute is taken from the model.
+    The frequency response is that to the first input. The contribution of further inputs is computed with the model.
     """
     spectrum = fit.spectra[0]
     inside = (fit.omega[0] >= 2.0 * np.pi * band_hz[0]) & (fit.omega[0] <= 2.0 * np.pi * band_hz[1])

@@ -1,4 +1,4 @@
-"""From prepared tests to a training history: steady cycles joined at the rate of the network (thesis 2.3.1)."""
+"""Training history from prepared tests: steady cycles joined at the rate of the network (thesis 2.3.1)."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from mrpipe.networks.network import CHANNEL_UNITS, FeatureSpec
 from mrpipe.signals.prepared import PreparedTest
 
 CHANNELS = ("displacement", "velocity", "acceleration", "drive", "force")
-"""What a history holds of each test."""
+"""Channels of each test in a history."""
 
 _ATTRIBUTES = ("displacement_m", "velocity_m_s", "acceleration_m_s2", "drive", "force_n")
 
 
 @dataclass(frozen=True)
 class History:
-    """Tests joined end to end, one clock.
+    """Tests joined end to end, all at one sampling rate.
 
     Attributes
     ----------
     names
-        Of the tests, in order.
+        Names of the tests, in order.
     channels
         Channel -> shape (n,), SI.
     starts
-        First sample of each test, and n: shape (tests + 1,). No lag window reaches across a start.
+        Index of the first sample of each test, and n: shape (tests + 1,). No window of past values crosses a start.
     drive_varies
-        Whether the drive changes within the test (half-sine or random) or is constant.
+        Whether the drive varies within each test (half-sine or random), shape (tests,).
     sampling_rate_hz
-        Rate of the network.
+        Sampling rate of the network [Hz].
     drive_unit
         A or V.
     """
@@ -74,10 +74,10 @@ class History:
         )
 
     def largest_jump(self, channel: str) -> float:
-        """Return the largest step at a join over the largest step within a test.
+        """Return the ratio of the largest step at a join to the largest step within a test.
 
-        2 or less for displacement: one sample before its zero crossing in one test, one after it in the next. 0 where
-        the channel moves within no test (a drive that is held): no step within is there to compare with.
+        It is at most 2 for displacement, because one test ends one sample before its zero crossing and the next begins
+        one sample after it. It is 0 if the channel is constant within every test (constant drive).
         """
         values = self.channels[channel]
         steps = np.abs(np.diff(values))
@@ -112,15 +112,15 @@ class Samples:
 
 
 def decimation_factor(native_rate_hz: float, wanted_rate_hz: float) -> int:
-    """Return the whole factor that comes nearest to the wanted rate; 1 where the record is slower than that."""
+    """Return the integer factor with the rate nearest to the requested one; 1 if the record is slower."""
     return max(1, round(native_rate_hz / wanted_rate_hz))
 
 
 def without_aliases(signal: FloatArray, factor: int) -> FloatArray:
     """Low-pass at four fifths of the Nyquist frequency after decimation by `factor`, without delay.
 
-    A symmetric FIR filter of 20 taps a factor; the record is continued by its odd reflection, so that the ends keep
-    their level and slope. Shape (n,) in and out.
+    The filter is a symmetric FIR filter with 20 taps times the factor. The record is extended by odd reflection, so
+    that the ends keep their level and slope. Input and output have shape (n,).
     """
     if factor == 1:
         return np.asarray(signal, dtype=np.float64)
@@ -132,10 +132,10 @@ def without_aliases(signal: FloatArray, factor: int) -> FloatArray:
 
 
 def cut(test: PreparedTest, cycles: int) -> tuple[int, int]:
-    """Return the half-open range of samples that goes into the history.
+    """Return the half-open range of samples that is used for the history.
 
-    The last `cycles` steady cycles, from one upward zero crossing of displacement to another; all there are where a
-    test has fewer, and all of a test whose motion is not periodic.
+    These are the last `cycles` steady cycles, from one upward zero crossing of displacement to another. A test with
+    fewer cycles is used with all of them. A test whose motion is not periodic is used completely.
     """
     if test.excitation != "periodic" or len(test.cycles) < 2:
         return 0, len(test.time_s)
@@ -144,7 +144,7 @@ def cut(test: PreparedTest, cycles: int) -> tuple[int, int]:
 
 
 def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float) -> History:
-    """Join the steady cycles of tests at zero crossings of displacement and bring them to the rate of the network.
+    """Join the steady cycles of tests at zero crossings of the displacement, at the rate of the network.
 
     Each test is low-passed as a whole before it is cut, so that no filter runs across a join. Displacement is
     continuous across joins. Other channels are not (the velocity at another frequency, the force at another current);
@@ -153,11 +153,11 @@ def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float)
     Parameters
     ----------
     tests
-        Of one role, all sampled at one rate.
+        Tests of one role, all with the same sampling rate.
     cycles
-        Steady cycles of each periodic test.
+        Number of steady cycles of each periodic test.
     sampling_rate_hz
-        Rate wanted; the whole factor nearest to it is used, and the native rate where that is lower.
+        Requested rate [Hz]; the nearest rate with an integer factor is used, and the native rate if that is lower.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float)
     """
     rates = {test.sampling_rate_hz for test in tests}
     if len(rates) > 1:
-        raise ValueError(f"tests at {sorted(rates)} Hz cannot be joined; prepare brings them to one rate")
+        raise ValueError(f"tests at {sorted(rates)} Hz cannot be joined; prepare them at one rate")
     native = next(iter(rates)) if rates else sampling_rate_hz
     factor = decimation_factor(native, sampling_rate_hz)
     parts: dict[str, list[FloatArray]] = {name: [np.zeros(0)] for name in CHANNELS}
@@ -190,7 +190,7 @@ def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float)
 
 
 def _which_drives_vary(history: History) -> tuple[bool, ...]:
-    """Return for each test whether its drive moves by more than a twentieth of the campaign's range."""
+    """Return for each test whether its drive varies by more than a twentieth of the range of the campaign."""
     drive = history.channels["drive"]
     span = float(np.ptp(drive)) if len(drive) else 0.0
     records = [history.record(index, "drive") for index in range(len(history.names))]
@@ -200,7 +200,7 @@ def _which_drives_vary(history: History) -> tuple[bool, ...]:
 
 
 def drive_range(history: History) -> float:
-    """Return by how much the drive differs over the whole history (0.5 to 99.5 %), A or V."""
+    """Return the range of the drive over the whole history (0.5 to 99.5 % percentile) [A or V]."""
     drive = history.channels["drive"]
     return float(np.ptp(np.percentile(drive, [0.5, 99.5]))) if len(drive) else 0.0
 
@@ -219,7 +219,7 @@ def window_starts(history: History, past_values: int) -> IntArray:
 
 
 def rows_at(history: History, spec: FeatureSpec, places: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return features (m, R) and targets (m,) of some samples; see :func:`window_starts` for possible samples."""
+    """Return features (m, R) and targets (m,) of the samples `places`, which :func:`window_starts` lists."""
     columns = [history.channels[name][places - lag] for name in spec.channels for lag in range(spec.past_values + 1)]
     if spec.past_target:
         columns += [history.channels[spec.target][places - lag] for lag in range(1, spec.past_values + 1)]
@@ -239,7 +239,7 @@ def write_history(artifact: ArtifactWriter, group: str, history: History) -> Non
 
 
 def read_history(artifact: Artifact, group: str) -> History:
-    """Read what :func:`write_history` wrote."""
+    """Read the history that :func:`write_history` wrote."""
     notes = artifact.attributes(group)
     return History(
         names=tuple(artifact.json(f"{group}/names")),

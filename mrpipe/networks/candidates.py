@@ -1,4 +1,4 @@
-"""What an architecture sweep tries: input states x past values x layers x neurons (thesis Figure 2.13)."""
+"""Architectures of a sweep: input states x past values x layers x neurons (Figure 2.13 of the thesis)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ SHORT = {"displacement": "x", "velocity": "v", "acceleration": "a", "drive": "i"
 
 @dataclass(frozen=True)
 class Candidate:
-    """One architecture.
+    """Architecture of a network.
 
     Attributes
     ----------
     states
         Motion channels among the inputs; the drive is an input of every candidate.
     past_values
-        Past values of each input.
+        Number of past values of each input.
     hidden
         Neurons of each hidden layer.
     biases
@@ -55,7 +55,7 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """Short name: `v,i | 3 past | 8-6-6-1`, with `+b` where biases are trained."""
+        """Short name such as `v,i | 3 past | 8-6-6-1`, with `+b` if biases are trained."""
         inputs = ",".join(SHORT[name] for name in self.channels)
         shape = "-".join(str(count) for count in self.layers)
         return f"{inputs} | {self.past_values} past | {shape}{'+b' if self.biases else ''}"
@@ -63,16 +63,16 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Grid:
-    """The axes of a sweep and the point where they cross.
+    """Axes of a sweep and its reference architecture.
 
     Attributes
     ----------
     states, past_values, layers, neurons
-        What is tried on each axis; all hidden layers of a network have the same number of neurons.
+        Values that are tried on each axis; all hidden layers of a network have the same number of neurons.
     biases
-        Both are tried where it holds both.
+        Whether networks have biases; both values are compared if both are listed.
     centre
-        The thesis' choice: velocity, three past values, two layers of six neurons.
+        Reference architecture, as in the thesis: velocity, three past values, two layers of six neurons.
     """
 
     states: tuple[tuple[str, ...], ...]
@@ -83,7 +83,7 @@ class Grid:
     centre: Candidate
 
     def candidates(self, design: str) -> list[Candidate]:
-        """Return what is tried: `star` varies one axis at a time (layers with neurons), `full` everything."""
+        """Return the candidates: `star` varies one axis at a time (layers with neurons), `full` combines all values."""
         shapes = [(neurons,) * layers for layers, neurons in product(self.layers, self.neurons)]
         if design == "full":
             every: Iterable[Candidate] = (
@@ -102,10 +102,10 @@ class Grid:
         )
 
     def crossings(self, scores: Mapping[Candidate, float]) -> list[Candidate]:
-        """Return what a star leaves out: the best of each axis put together, two axes at a time and more.
+        """Return candidates that a star does not contain: combinations of the best values of two and more axes.
 
-        A star shows which single change helps. The best network usually combines several of them. A further input
-        can help only a network that is large enough to use it, so all inputs are tried with the best layers too.
+        A star shows which single changes reduce the error. The best network usually combines several of them. A further
+        input can help only a network that is large enough to use it, so all inputs are tried with the best layers too.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class Grid:
 
     @property
     def most_crossings(self) -> int:
-        """How many crossings there can be."""
+        """Largest possible number of crossings."""
         at = self.centre
         shapes = [(neurons,) * layers for layers, neurons in product(self.layers, self.neurons)]
         axes = (

@@ -1,4 +1,4 @@
-"""Networks with the conventions of scikit-learn: `fit`, `predict`, `score`, parameters that can be searched."""
+"""Networks with the interface of scikit-learn: `fit`, `predict`, `score`, and parameters that can be searched."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mrpipe.networks.scaling import NORMALISATION, Normalisation, scaling_of
 from mrpipe.networks.training import train_on
 
 _DEFAULTS = InverseTrainingOptions()
-"""Defaults that the estimator shares with `train-inverse`."""
+"""Source of the defaults, so that the estimator and `train-inverse` have the same ones."""
 
 
 class NetworkRegressor(RegressorMixin, BaseEstimator):
@@ -30,9 +30,9 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
     hidden
         Neurons of each hidden layer.
     biases
-        Train biases; without them the estimate of zero features is zero.
+        Whether biases are trained; without biases the estimate for zero features is zero.
     starts, refined_starts, averaged
-        Random starts, how many of them go on with all rows, and how many of these are averaged.
+        Number of random starts, of starts that are trained further with all rows, and of networks that are averaged.
     subsample_rows, subsample_iterations, iterations
         Rows and largest number of iterations of the first phase, and iterations with all rows.
     held_out_share
@@ -101,7 +101,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If X or y are not finite, or do not fit each other or `features`.
+            If X or y are not finite, or their shapes do not agree with each other or with `features`.
         """
         checked = validate_data(self, X, y, dtype=np.float64, ensure_min_samples=2, y_numeric=True)
         rows: FloatArray = checked[0]
@@ -157,7 +157,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
             raise ValueError(f"groups has shape {of_row.shape}, but X has {count} rows")
         names = np.unique(of_row)
         number = round(self.held_out_share * len(names))
-        # too few to hold any out without losing a condition
+        # with so few groups, each held-out group would remove a test condition from the fit
         number = 0 if len(names) < 5 else number
         return np.isin(of_row, rng.permutation(names)[:number])
 

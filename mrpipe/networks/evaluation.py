@@ -1,4 +1,4 @@
-"""Errors of a network: pooled, for each test and for each regime, compared with a linear baseline."""
+"""Errors of a network: pooled, by test and by regime, in comparison with a linear model."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ErrorFigures:
     Attributes
     ----------
     nrmse
-        RMS of the error over RMS of the signal, pooled.
+        Ratio of the RMS error to the RMS of the signal, over all samples.
     fit_percent
         100 (1 - |e| / |signal - mean|).
     r2
@@ -61,9 +61,9 @@ def error_figures(measured: FloatArray, estimated: FloatArray) -> ErrorFigures:
 
 
 def travel_since_reversal(displacement: FloatArray, velocity: FloatArray, starts: IntArray) -> FloatArray:
-    """Return the distance [m] moved since the velocity last changed sign, shape (n,), starting anew at each test.
+    """Return the distance [m] moved since the velocity last changed sign, shape (n,), starting at 0 in each test.
 
-    The first travel of a test is unknown and taken as long (infinite).
+    The travel before the first reversal of a test is unknown and taken as infinite.
     """
     travel = np.empty(len(displacement))
     for first, last in pairwise(starts):
@@ -115,8 +115,8 @@ def yield_time(history: History, yield_travel_m: float) -> float:
 def regimes_of(history: History, yield_travel_m: float) -> IntArray:
     """Return the regime of each sample, a number into :data:`REGIMES`.
 
-    Reversal: the force still acts against the motion that has just turned. Pre-yield: it acts with it, but the travel
-    since the reversal is below `yield_travel_m`. Post-yield: the rest.
+    Reversal: the force still has the direction of the motion before the reversal. Pre-yield: the force has the new
+    direction, but the travel since the reversal is below `yield_travel_m`. Post-yield: all other samples.
     """
     travel = travel_since_reversal(history.channels["displacement"], history.channels["velocity"], history.starts)
     against = history.channels["force"] * history.channels["velocity"] < 0.0
@@ -144,7 +144,7 @@ def by_test(history: History, rows: Samples, estimated: FloatArray) -> list[tupl
 
 
 def linear_baseline(training: Samples, judged: Samples) -> FloatArray:
-    """Return what an affine model of the same features, fitted by least squares, estimates on other rows."""
+    """Return the estimates of an affine model of the same features, which is fitted to `training` by least squares."""
     design = np.column_stack([training.features, np.ones(len(training.target))])
     scale = np.maximum(np.abs(design).max(axis=0), 1e-300)
     coefficients = np.linalg.lstsq(design / scale, training.target, rcond=1e-10)[0] / scale
@@ -152,9 +152,9 @@ def linear_baseline(training: Samples, judged: Samples) -> FloatArray:
 
 
 def free_run(network: Network, history: History) -> FloatArray:
-    """Return the estimate where the network's own past outputs stand for the measured ones, shape (n,).
+    """Return the estimate in a free run, with past outputs of the network instead of measured ones, shape (n,).
 
-    All tests step side by side. The first `past_values` samples of each test are the measured ones.
+    All tests are computed at the same time. The first `past_values` samples of each test are the measured ones.
     """
     spec = network.features
     past = spec.past_values
@@ -183,22 +183,23 @@ def judge_free_run(network: Network, history: History) -> ErrorFigures | None:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A network judged on validation tests.
+    """Assessment of a network on the validation tests.
 
     Attributes
     ----------
     samples, estimated
-        The validation rows and the estimates of their targets, shape (n,).
+        Validation rows, and estimates of their targets, shape (n,).
     training, pooled, linear
-        Error figures on the training tests, on the validation tests, and of a linear model of the same inputs there.
+        Error figures on the training tests, on the validation tests, and on the validation tests for a linear model of
+        the same inputs.
     constant, varying
-        On validation tests of constant and of varying drive.
+        Error figures on the validation tests with constant and with varying drive.
     regimes, varying_regimes
-        By regime, of all validation tests and of those with varying drive.
+        Error figures by regime, of all validation tests and of those with varying drive.
     tests
-        Of each validation test.
+        Error figures of each validation test.
     yield_travel_m
-        Where the pre-yield regime ends, found from the training tests.
+        Travel at the end of the pre-yield regime, computed from the training tests [m].
     negative_share
         Share of estimates below zero (by more than a hundredth of the largest target).
     outside_training_range
@@ -272,7 +273,7 @@ def _row(figures: ErrorFigures, unit: str, span: float | None, *, varies: bool) 
 
 
 def judge(network: Network, training: History, validation: History) -> Judgement:
-    """Judge a network on the validation history; the training history gives the baseline and the yield travel."""
+    """Assess a network on the validation history; the training history gives the linear model and the yield travel."""
     spec = network.features
     fitted, rows = samples(training, spec), samples(validation, spec)
     estimated = network.predict(rows.features)

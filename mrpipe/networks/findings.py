@@ -1,4 +1,4 @@
-"""Results of a sweep: the chosen architecture, and the statements of thesis 2.3.2 with a verdict each."""
+"""Results of a sweep: the chosen architecture, and a verdict on each statement of thesis 2.3.2."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mrpipe.networks.candidates import Candidate
 from mrpipe.networks.sweep import Outcome
 
 WORTHWHILE = 0.10
-"""Relative change of the error below which two architectures count as equal, whatever the spread."""
+"""Relative change of the error up to which two architectures are treated as equal, independent of the spread."""
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,11 @@ class Score:
     Attributes
     ----------
     mean
-        Geometric mean of the held-out NRMSE over starts (a start that failed must not decide).
+        Geometric mean of the held-out NRMSE over the starts, so that a failed start does not dominate.
     standard_error
-        Relative standard error of that mean (of the logarithm).
+        Relative standard error of this mean (standard error of the logarithm).
     best, worst
-        Over starts.
+        Smallest and largest error of the starts.
     """
 
     mean: float
@@ -44,11 +44,11 @@ def score(errors: FloatArray) -> Score:
 
 
 def choose(outcomes: Sequence[Outcome]) -> Outcome:
-    """Return the smallest refined network that is not clearly worse than the best.
+    """Return the smallest refined network that is not significantly worse than the best.
 
-    Not clearly worse: the mean of the logarithmic ratio of the errors, start by start, is at most its standard error
-    and at most that of :data:`WORTHWHILE`. All candidates share the splits of the starts, so how hard a split is drops
-    out of the ratio.
+    A network is not significantly worse if the mean over the starts of the logarithmic ratio of the errors is at most
+    its standard error and at most the logarithm of 1 + :data:`WORTHWHILE`. All candidates have the same splits, so that
+    the difficulty of a split cancels in the ratio.
     """
     refined = [outcome for outcome in outcomes if outcome.is_refined]
     best = min(refined, key=lambda outcome: score(outcome.refined).mean)
@@ -62,21 +62,21 @@ def choose(outcomes: Sequence[Outcome]) -> Outcome:
 
 @dataclass(frozen=True)
 class Finding:
-    """One statement of the thesis and what the sweep says of it.
+    """One statement of the thesis, and the result of the sweep for it.
 
     Attributes
     ----------
     name, statement
-        Short name, and the thesis' words.
+        Short name, and statement of the thesis.
     reference, alternative
-        Labels of the two that were compared.
+        Labels of the two candidates that were compared.
     reference_nrmse, alternative_nrmse
-        Their mean errors over starts.
+        Mean errors of the two candidates over the starts.
     change, uncertainty
         Relative change of the error from reference to alternative (negative: the alternative is better), and two
         standard errors of it.
     level
-        `refined` or `screened`: the fit that both have.
+        `refined` or `screened`: the last fit that both candidates have.
     verdict
         `holds`, `differs` or `not tested`.
     """
@@ -94,10 +94,10 @@ class Finding:
 
 
 def findings(outcomes: Sequence[Outcome], centre: Candidate) -> list[Finding]:
-    """Return the thesis' findings with their verdicts.
+    """Return the statements of the thesis with their verdicts.
 
-    Each compares the thesis' architecture with the best alternative that differs in one respect: the error is smaller
-    where more than a tenth and more than two standard errors separate them.
+    Each statement compares the architecture of the thesis with the best alternative that differs in one property. An
+    error counts as smaller if the difference is more than a tenth and more than two standard errors.
     """
     past, depth = centre.past_values, len(centre.hidden)
     width = centre.hidden[0] if centre.hidden else 0
@@ -118,7 +118,7 @@ def findings(outcomes: Sequence[Outcome], centre: Candidate) -> list[Finding]:
 
 
 def _alternatives(outcomes: Sequence[Outcome], centre: Candidate) -> dict[str, list[Outcome]]:
-    """Return what each finding compares the centre with: outcomes that differ from it in one respect."""
+    """Return the alternatives of each finding: outcomes that differ from the centre in one property."""
     states = [o for o in outcomes if replace(o.candidate, states=centre.states) == centre]
     past = [o for o in outcomes if replace(o.candidate, past_values=centre.past_values) == centre]
     shapes = [o for o in outcomes if replace(o.candidate, hidden=centre.hidden) == centre]

@@ -1,4 +1,4 @@
-"""Rows for fitting and rows for stopping: some of the training records are held out, the rest is fitted."""
+"""Division of the training records into rows for fitting and held-out rows for stopping."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ ALIKE = 1.0 / 12.0
 
 @dataclass(frozen=True)
 class TrainingData:
-    """Normalised rows for fitting, and of the held-out records for stopping.
+    """Normalised rows of the fitted records, and of the held-out records.
 
     Attributes
     ----------
     spec
         Features and target.
     fit_rows, held_rows, every_row
-        Feature rows and targets, SI: to be fitted, held out, and of all records.
+        Feature rows and targets [SI]: of the fitted records, of the held-out records, and of all records.
     scaling
-        Their normalisation, from all training records.
+        Normalisation, computed from all training records.
     held_out
         Names of the held-out records.
     """
@@ -50,18 +50,18 @@ class TrainingData:
         *,
         part: Literal["fit", "held", "every"] = "fit",
     ) -> Problem:
-        """Return the least-squares problem of some of the rows of a part (all where `rows` is None)."""
+        """Return the least-squares problem of the rows `rows` of a part; None: all rows."""
         source = {"fit": self.fit_rows, "held": self.held_rows, "every": self.every_row}[part]
         features = source.features if rows is None else source.features[rows]
         target = source.target if rows is None else source.target[rows]
         return Problem(self.scaling.inputs(features), self.scaling.target(target), layers, biases)
 
     def layers(self, hidden: tuple[int, ...]) -> tuple[int, ...]:
-        """Return all layers of a network of these data."""
+        """Return the neurons of all layers of a network for these data."""
         return (self.spec.width, *hidden, 1)
 
     def relative(self, mean_square: float, *, held: bool = False) -> float:
-        """Turn a mean squared normalised error into RMS error over RMS of the target.
+        """Return the ratio of RMS error to RMS target from a mean squared normalised error.
 
         If the held-out records have no drive, the scale of the target is taken from the fitted ones.
         """
@@ -74,9 +74,10 @@ class TrainingData:
 def hold_out(history: History, share: float, rng: np.random.Generator) -> tuple[History, History]:
     """Split a history by record into one for fitting and one for stopping.
 
-    The records are ranked by RMS force and one is drawn from each group of neighbours, so that the held-out ones span
-    the forces as the others do (14 of 95 drawn blindly misjudged networks by a third). A history of fewer than five
-    records is cut within: the last part of each record is held out, and no window of past values straddles the cut.
+    The records are sorted by RMS force, and one is drawn from each group of neighbours, so that the held-out records
+    cover the same range of forces as the others. (With 14 of 95 records drawn without this rule, the errors of networks
+    were wrong by a third.) With fewer than five records, the last part of each record is held out, and no window of
+    past values crosses the cut.
     """
     count = len(history.names)
     if share <= 0.0:
@@ -95,8 +96,9 @@ def folds(history: History, count: int, rng: np.random.Generator) -> list[tuple[
     Tests with the same motion (frequency and amplitude) stay together, so that a network is judged on motions that it
     was not fitted to. The extreme motions stay in every fit (see :func:`extreme_motions`), because a network is to be
     judged between the motions of its training, not beyond them. The other motions are distributed over the folds by
-    their number of samples. With fewer than three of them, all motions are distributed; with fewer than three motions
-    the records are distributed instead, and fewer than five records are cut within, as by :func:`hold_out`.
+    their number of samples. With fewer than three other motions, all motions are distributed. With fewer than three
+    motions, the records are distributed instead. With fewer than five records, each record is cut as in
+    :func:`hold_out`.
 
     Parameters
     ----------
@@ -105,7 +107,7 @@ def folds(history: History, count: int, rng: np.random.Generator) -> list[tuple[
     count
         Number of splits, at least 1. It is lowered to the number of motions or records.
     rng
-        Decides which split holds which motion.
+        Random generator that assigns the motions to the splits.
     """
     records = len(history.names)
     groups = motions(history)
@@ -130,8 +132,8 @@ def folds(history: History, count: int, rng: np.random.Generator) -> list[tuple[
 def splits(history: History, share: float, count: int, rng: np.random.Generator) -> list[tuple[History, History]]:
     """Split a history `count` times; half of the splits leave out whole motions, the others single tests.
 
-    A network is used at the motions of its training and between them. Splits of the first kind alone reject inputs that
-    need many motions, those of the second kind alone accept networks that fail between the motions.
+    A network is used at the motions of its training and between them. Splits of the first kind alone would reject
+    inputs that need many motions. Splits of the second kind alone would accept networks that fail between the motions.
 
     Parameters
     ----------
@@ -140,9 +142,9 @@ def splits(history: History, share: float, count: int, rng: np.random.Generator)
     share
         Share of the tests left out of each split.
     count
-        Number of splits at most, at least 1.
+        Largest number of splits, at least 1.
     rng
-        Decides which split holds which tests.
+        Random generator that assigns the tests to the splits.
     """
     by_motion = folds(history, max(2, round(1.0 / share)), rng)[: max(1, -(-count // 2))]
     by_test = [hold_out(history, share, rng) for _ in range(count - len(by_motion))]
@@ -151,7 +153,7 @@ def splits(history: History, share: float, count: int, rng: np.random.Generator)
 
 
 def extreme_motions(history: History, groups: Sequence[Sequence[int]]) -> set[int]:
-    """Return the groups of tests at the corners of the range of amplitude and frequency, four at most.
+    """Return the groups of tests at the corners of the range of amplitude and frequency, at most four.
 
     Parameters
     ----------

@@ -24,20 +24,21 @@ Method = Literal["least-squares", "minpack", "mu-identity", "mu-diagonal"]
 
 @dataclass(frozen=True)
 class FitResult:
-    """What a training run gave.
+    """Result of a training run.
 
     Attributes
     ----------
     parameters
-        The best on the held-out rows (the last if there are none).
+        Parameters with the smallest error on the held-out rows; without held-out rows, the last parameters.
     mean_square, held_out_mean_square
-        Mean squared normalised error at `parameters` on the training rows and on the held-out rows (NaN without any).
+        Mean squared normalised error at `parameters` on the training rows and on the held-out rows (NaN without
+        held-out rows).
     iterations
-        Accepted steps.
+        Number of accepted steps.
     reason
-        Why it ended.
+        Reason why the run ended.
     path
-        Mean squared error after each step, the start first.
+        Mean squared error at the start and after each step.
     """
 
     parameters: FloatArray
@@ -49,11 +50,11 @@ class FitResult:
 
 
 class _Stop(Exception):
-    """Ends scipy's loop from within; carries the reason."""
+    """Exception that ends the loop of scipy; it carries the reason."""
 
 
 class _Watch:
-    """Keeps the path and the best parameters and says when to stop."""
+    """Records the path and the best parameters, and applies the stopping rules."""
 
     def __init__(self, held_out: Problem | None, rules: StoppingRules) -> None:
         self.held_out = held_out
@@ -64,7 +65,7 @@ class _Watch:
         self.failures = 0
 
     def accepted(self, parameters: FloatArray, mean_square: float, gradient: FloatArray) -> str:
-        """Note an accepted step; return the reason to stop, or an empty text."""
+        """Record an accepted step; return the reason to stop, or an empty string."""
         self.path.append(mean_square)
         error = self.held_out.mean_square(parameters) if self.held_out is not None else mean_square
         if error < self.best_error or self.best is None:
@@ -81,7 +82,7 @@ class _Watch:
         return "iterations" if len(self.path) > rules.iterations else ""
 
     def result(self, reason: str) -> FitResult:
-        """Return the best of the run."""
+        """Return the best parameters of the run."""
         assert self.best is not None
         parameters, mean_square = self.best
         held_out = self.best_error if self.held_out is not None else float("nan")
@@ -108,9 +109,9 @@ def fit(
         `least-squares` (scipy, trust region, scaled by the Jacobian), `minpack` (scipy's `least_squares` with method
         `lm` on all rows), `mu-identity` (trainlm) or `mu-diagonal`.
     rules
-        When to stop.
+        Stopping rules.
     held_out
-        Rows of other records for early stopping; never those that the model is judged on in the end.
+        Rows of other records for early stopping. These are never the rows on which the final model is assessed.
     """
     watch = _Watch(held_out, rules or StoppingRules())
     if method == "least-squares":

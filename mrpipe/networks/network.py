@@ -7,13 +7,13 @@ past values of k-1, k-2 .. k-p, as in (2.8) and (2.9):
 
     [c1(k), c1(k-1), .. c1(k-p), c2(k), c2(k-1), .. c2(k-p), ...]
 
-of samples `1 / sampling_rate_hz` apart, each made absolute where `FeatureSpec.absolute`. Then
+of samples `1 / sampling_rate_hz` apart, as absolute values if `FeatureSpec.absolute` is true. Then
 
     a = (features - input_shift) / input_scale
     a = tanh(weights[j] @ a + biases[j])               for each hidden layer j
     y = (weights[-1] @ a + biases[-1])[0] * output_scale + output_shift
 
-`weights[j]` has shape (neurons of layer j, neurons of layer j-1). A network without biases has zeros there.
+`weights[j]` has shape (neurons of layer j, neurons of layer j-1). In a network without biases, `biases[j]` are zeros.
 """
 
 from __future__ import annotations
@@ -27,28 +27,27 @@ import numpy as np
 from mrpipe.artifacts import Artifact, ArtifactWriter, FloatArray
 
 CHANNEL_UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
-"""SI unit of each channel that can be input or target; `drive` has the unit of the campaign (A or V)."""
+"""SI unit of each channel that can be input or target. The channel `drive` has the unit of the campaign (A or V)."""
 
 
 @dataclass(frozen=True)
 class FeatureSpec:
-    """What the features of a network are.
+    """Definition of the features of a network.
 
     Attributes
     ----------
     channels
         Input channels in order, such as ("velocity", "drive") of (2.8) or ("velocity", "force") of (2.9).
     past_values
-        How many past values of each channel, in addition to the present one.
+        Number of past values of each channel, in addition to the present one.
     absolute
-        Absolute values of all channels are taken, as in (2.9).
+        Whether the features are absolute values, as in (2.9).
     sampling_rate_hz
-        Rate at which past values lie.
+        Sampling rate of the past values [Hz].
     target
         Channel that the network estimates: `force` (forward) or `drive` (inverse).
     past_target
-        The target itself is an input through its past values k-1 .. k-p only (a model with output feedback);
-        they follow after all channels.
+        Whether the past values k-1 .. k-p of the target are inputs, after all channels (a model with output feedback).
     """
 
     channels: tuple[str, ...]
@@ -80,7 +79,7 @@ def spec_to_json(spec: FeatureSpec) -> dict[str, Any]:
 
 
 def spec_from_json(content: Mapping[str, Any]) -> FeatureSpec:
-    """Return what :func:`spec_to_json` gave back as a specification."""
+    """Return the specification from the result of :func:`spec_to_json`."""
     return FeatureSpec(**{**content, "channels": tuple(content["channels"])})
 
 
@@ -94,11 +93,11 @@ def lagged(channels: Sequence[FloatArray], past_values: int, *, absolute: bool =
     past_values
         Number p of past values.
     absolute
-        Take absolute values.
+        Whether to return absolute values.
 
     Returns
     -------
-    Shape (n - p, channels x (p + 1)); row j belongs to sample j + p. Empty where the record is too short.
+    Shape (n - p, channels x (p + 1)); row j belongs to sample j + p. Empty if the record is too short.
     """
     length = min(len(channel) for channel in channels)
     rows = max(length - past_values, 0)
@@ -113,7 +112,7 @@ def lagged(channels: Sequence[FloatArray], past_values: int, *, absolute: bool =
 
 @dataclass(frozen=True)
 class Network:
-    """A trained network; see the module's text for the layout.
+    """A trained network; the docstring of the module defines the layout.
 
     Attributes
     ----------
@@ -124,9 +123,9 @@ class Network:
     output_scale, output_shift
         In the unit of the target.
     features
-        What the features are.
+        Definition of the features.
     feature_minimum, feature_maximum
-        Range of each feature in the training set, shape (features,); empty where unknown.
+        Range of each feature in the training set, shape (features,); empty if unknown.
     has_biases
         Whether the biases were trained (the thesis has none).
     members
@@ -157,13 +156,13 @@ class Network:
 
     @property
     def architecture(self) -> str:
-        """As the thesis writes it: `8-6-6-1`."""
+        """Architecture in the notation of the thesis, such as `8-6-6-1`."""
         return "-".join(str(count) for count in self.layers)
 
     @property
     def parameters(self) -> int:
         """Number of trained numbers."""
-        # zeros between networks that stand side by side were never trained
+        # zeros between the blocks of averaged networks were not trained
         count = sum(int(np.count_nonzero(matrix)) for matrix in self.weights)
         return count + sum(bias.size for bias in self.biases) if self.has_biases else count
 
@@ -183,7 +182,8 @@ class Network:
         features
             Feature rows as for :meth:`predict`.
         margin
-            How far beyond counts as within, as a share of the range (noise at the edge is not an extrapolation).
+            Share of the range beyond its ends that still counts as within, because noise at the ends is not an
+            extrapolation.
         """
         if not len(self.feature_minimum) or not len(features):
             return 0.0
@@ -192,10 +192,11 @@ class Network:
         return float(np.mean(np.any(outside, axis=1)))
 
     def steady(self) -> Network:
-        """Return this network for inputs that do not change: a network without past values, to 1e-12 the same.
+        """Return this network for constant inputs: a network without past values, equal to a relative error of 1e-12.
 
-        Every past value equals the present one, so that the weights of a channel add up. An inverse asked so gives the
-        drive at which the damper would hold this force at this speed, whatever force was requested before.
+        Every past value equals the present one, so that the weights of a channel add up. An inverse network in this
+        form gives the drive at which the damper would hold this force at this speed, independent of the previous
+        forces.
         """
         spec = self.features
         if spec.past_target:
@@ -218,9 +219,9 @@ class Network:
 
 
 def averaged(networks: Sequence[Network]) -> Network:
-    """Return one network whose output is the mean of several: their layers stand side by side.
+    """Return one network whose output is the mean of several networks, with block-diagonal weights.
 
-    Random errors of single trainings cancel in part; errors that all share remain.
+    Random errors of the single trainings cancel in part; common errors remain.
 
     Parameters
     ----------
@@ -255,7 +256,7 @@ def _stacked(*matrices: FloatArray) -> FloatArray:
 
 
 def write_network(artifact: ArtifactWriter, group: str, network: Network) -> None:
-    """Store a network as arrays under `group`; :func:`read_network` gives it back bit for bit."""
+    """Store a network as arrays under `group`; :func:`read_network` returns it without rounding."""
     for index, (matrix, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         artifact.put(f"{group}/weights_{index}", matrix, unit="1", dims=("neuron", "input"))
         artifact.put(f"{group}/biases_{index}", bias, unit="1", dims=("neuron",))
@@ -274,7 +275,7 @@ def write_network(artifact: ArtifactWriter, group: str, network: Network) -> Non
 
 
 def read_network(artifact: Artifact, group: str) -> Network:
-    """Read what :func:`write_network` wrote."""
+    """Read the network that :func:`write_network` wrote."""
     notes = artifact.attributes(group)
     layers = range(int(notes["layers"]))
     return Network(

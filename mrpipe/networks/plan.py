@@ -1,4 +1,4 @@
-"""What a training stage trains: features and options from the settings, the training set and the sweep."""
+"""Plan of a training stage: features and options from the settings, the training set and the sweep."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mrpipe.networks.training import Trained
 
 @dataclass(frozen=True)
 class TrainingPlan:
-    """All that a training needs.
+    """Data and options of one training.
 
     Attributes
     ----------
@@ -27,9 +27,9 @@ class TrainingPlan:
     spec
         Features and target of the network.
     options
-        How it is trained; the hidden layers are named.
+        Options of the training, with the numbers of neurons of the hidden layers.
     normalisation
-        Of inputs and target, as in the training set.
+        Normalisation of inputs and target, as in the training set.
     """
 
     training: History
@@ -47,13 +47,15 @@ def training_plan(
     Parameters
     ----------
     options
-        Settings of the stage; an architecture `sweep` is replaced by the one that the sweep chose.
+        Settings of the stage; the architecture `sweep` is replaced by the choice of the sweep.
     training_set
         Artifact of `assemble`.
     choice
-        What the sweep chose: `channels`, `past_values`, `hidden`, `biases`. It is read for architecture `sweep` only.
+        Choice of the sweep: `channels`, `past_values`, `hidden`, `biases`. It is read for the architecture `sweep`
+        only.
     kind
-        An inverse network takes over past values, layers and biases of the choice, and keeps its own input channels.
+        Kind of the network. An inverse network uses past values, layers and biases of the choice, but its input
+        channels remain those of the training set.
     """
     spec = spec_from_json(training_set.json(f"{kind}/features"))
     if options.architecture == "sweep":
@@ -71,7 +73,7 @@ def training_plan(
 
 
 def sweep_grid(options: SweepOptions, past_values: int) -> Grid:
-    """Return the axes of a sweep about the reference network, which has `past_values` past values."""
+    """Return the axes of a sweep around the reference network, which has `past_values` past values."""
     centre = Candidate(("velocity",), past_values, THESIS_HIDDEN, options.biases[0])
     return Grid(
         states=tuple(tuple(states) for states in options.states),

@@ -1,9 +1,10 @@
 """The least-squares problem of a network: residuals, analytic Jacobian and its exact compression.
 
-A problem of n rows and P parameters needs no n x P Jacobian. With the Gram matrix of [J e], accumulated over chunks
-of rows, and any square root of it, the last column is a residual and the others a Jacobian of P + 1 rows that have the
-norm, the gradient J'e and the matrix J'J of the full problem: a Gauss-Newton or Levenberg-Marquardt method takes the
-same path. The condition number is squared on the way, which double precision allows for the networks of this program.
+A problem of n rows and P parameters does not need the n x P Jacobian. The Gram matrix of [J e] is accumulated over
+chunks of rows, and a square root of it is computed. The last column of this root is a residual, and the other columns
+are a Jacobian, both with P + 1 rows. They have the norm, the gradient J'e and the matrix J'J of the full problem, so
+that a Gauss-Newton or Levenberg-Marquardt method takes the same steps. The Gram matrix squares the condition number,
+which is acceptable in double precision for the networks of this program.
 """
 
 from __future__ import annotations
@@ -18,11 +19,13 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 
 CHUNK_ROWS = 2048
-"""Rows of the Jacobian held at a time in double precision: fits the second-level cache at a hundred parameters."""
+"""Number of rows of the Jacobian in memory at a time. In double precision and with a hundred parameters, they fit into
+the second-level cache.
+"""
 
 
 def layer_slices(layers: tuple[int, ...], biases: bool) -> list[tuple[slice, slice]]:
-    """Return where weights and biases of each layer lie in the parameter vector (empty slices without biases)."""
+    """Return the slices of weights and biases of each layer in the parameter vector (empty slices without biases)."""
     slices = []
     start = 0
     for inner, outer in pairwise(layers):
@@ -55,7 +58,7 @@ def pack(weights: list[FloatArray], biases: list[FloatArray], has_biases: bool) 
 
 @dataclass(frozen=True)
 class Problem:
-    """Fit a network to rows of normalised data.
+    """Least-squares problem of a network and rows of normalised data.
 
     Attributes
     ----------
@@ -120,7 +123,7 @@ class Problem:
         return self.output(parameters) - self.target
 
     def mean_square(self, parameters: FloatArray) -> float:
-        """Return the mean squared residual, and the penalty if there is one."""
+        """Return the mean squared residual plus the penalty."""
         total = 0.0
         for start in range(0, self.rows, 4 * CHUNK_ROWS):
             part = slice(start, start + 4 * CHUNK_ROWS)
@@ -145,7 +148,7 @@ class Problem:
             part = slice(start, min(start + rows, self.rows))
             stacked = np.empty((self.size + 1, part.stop - part.start), dtype=inputs.dtype)
             self._fill(rounded, inputs[:, part], target[part], stacked)
-            # numpy calls the symmetric product (half the work) where both factors are one array
+            # numpy uses the symmetric product (half the operations) if both factors are the same array
             return stacked @ stacked.T
 
         starts = range(0, self.rows, rows)
@@ -168,7 +171,7 @@ class Problem:
         try:
             root = np.linalg.cholesky(gram).T
         except np.linalg.LinAlgError:
-            # a neuron without effect makes J'J singular: the symmetric square root serves as well
+            # a neuron without effect makes J'J singular; then the symmetric square root is used
             values, vectors = np.linalg.eigh(gram)
             root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
         return np.array(root[:, -1]), np.array(root[:, :-1], order="C")

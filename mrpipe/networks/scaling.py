@@ -1,8 +1,8 @@
 """Normalisation of features and the basis in which a network is trained.
 
-Lagged samples of smooth motion are nearly collinear (eigenvalues over eight decades at 200 Hz), which slows every
-descent. Training therefore runs in a whitened basis; the transform is folded into the first layer afterwards, so the
-network that is stored takes plain normalised features.
+Lagged samples of smooth motion are nearly collinear (eigenvalues over eight decades at 200 Hz), which slows the
+convergence of every method. Training therefore uses a whitened basis. Afterwards the transformation is multiplied into
+the first layer, so that the inputs of the stored network are normalised features.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from mrpipe.networks.network import FeatureSpec
 Normalisation = Literal["maximum", "range", "standard"]
 
 NORMALISATION: Normalisation = "maximum"
-"""The default scaling: zero stays zero."""
+"""Default scaling, which maps zero to zero."""
 
 _SMALLEST_EIGENVALUE = 1e-9
 
 
 @dataclass(frozen=True)
 class Scaling:
-    """How features and target are normalised.
+    """Normalisation of features and target.
 
     Attributes
     ----------
     input_scale, input_shift
-        Shape (R,): normalised = (features - shift) / scale. All past values of a channel share theirs.
+        Shape (R,): normalised = (features - shift) / scale. All past values of a channel have the same scale and shift.
     output_scale, output_shift
         The same for the target.
     basis
@@ -72,13 +72,13 @@ def scaling_of(
     features, target
         Shapes (n, R) and (n,), SI.
     spec
-        What the features are; the values of one channel share a scale.
+        Definition of the features; all values of one channel have the same scale.
     normalisation
         `maximum` divides by the largest magnitude and keeps zero at zero (right for a network without biases, whose
         output at zero input is zero); `range` maps to -1 .. 1 as MATLAB's mapminmax; `standard` to zero mean and unit
         variance.
     whitened
-        Train in the basis in which the features are uncorrelated and of unit size.
+        Whether to train in the basis in which the features are uncorrelated and have unit variance.
     """
     shift = np.zeros(spec.width)
     scale = np.ones(spec.width)
@@ -89,9 +89,9 @@ def scaling_of(
     if whitened:
         normalised = (features - shift) / scale
         values, vectors = np.linalg.eigh(normalised.T @ normalised / len(normalised))
-        # features that are all zero leave no eigenvalue to compare with
+        # features that are all zero have no positive eigenvalue as a reference
         floor = _SMALLEST_EIGENVALUE * (values.max() or 1.0)
-        # the sign of an eigenvector is arbitrary; fixed here, so that the same data give the same network
+        # the sign of an eigenvector is arbitrary; it is fixed here so that the same data give the same network
         vectors = vectors * np.sign(vectors[np.argmax(np.abs(vectors), axis=0), np.arange(spec.width)])
         basis = (vectors / np.sqrt(np.maximum(values, 0.0) + floor)).T
     return Scaling(
@@ -100,7 +100,7 @@ def scaling_of(
 
 
 def channel_blocks(spec: FeatureSpec) -> list[slice]:
-    """Return the columns of each channel, and last those of the past target if there are any."""
+    """Return the columns of each channel, followed by those of the past target if the features contain it."""
     window = spec.past_values + 1
     blocks = [slice(index * window, (index + 1) * window) for index in range(len(spec.channels))]
     if spec.past_target and spec.past_values:
@@ -109,7 +109,7 @@ def channel_blocks(spec: FeatureSpec) -> list[slice]:
 
 
 def scale_safe(scale: FloatArray) -> FloatArray:
-    """Return the scale with ones in place of zeros (a channel that never moves)."""
+    """Return the scale with zeros replaced by ones (constant channels)."""
     return np.where(scale > 0.0, scale, 1.0)
 
 

@@ -1,4 +1,4 @@
-"""When the training of a network ends."""
+"""Stopping rules of the training of a network."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class StoppingRules:
-    """When training ends; the defaults are those of trainlm.
+    """Stopping rules of a training; the defaults are those of trainlm.
 
     Attributes
     ----------
     iterations
-        Accepted steps (epochs).
+        Largest number of accepted steps (epochs).
     held_out_failures
-        Consecutive steps without a new best on the held-out rows; the best parameters are returned.
+        Number of consecutive steps without a new smallest error on the held-out rows after which training ends.
     gradient
         Largest |gradient| of the mean squared normalised error at which training ends.
     improvement
         Relative gain of the last ten steps below which training ends (trainlm has no such rule: 0).
     mu, mu_increase, mu_decrease, mu_maximum
-        Damping of the built-in loop: first value, factors after a failed and a good step, limit.
+        Damping of the built-in loop: first value, factors after a failed and after a successful step, and limit.
     """
 
     iterations: int = 1000

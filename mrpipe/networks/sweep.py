@@ -1,4 +1,7 @@
-"""Runs an architecture sweep: screened on few rows, the better ones refined; resumable, its cost known beforehand."""
+"""Architecture sweep: all candidates are screened on few rows and the better ones are refined.
+
+The cost is predicted before the sweep, and an interrupted sweep can be resumed.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ from mrpipe.networks.stopping import StoppingRules
 from mrpipe.networks.training import in_parallel, initial_parameters
 
 Crossings = Callable[[Mapping[Candidate, float]], list[Candidate]]
-"""Errors of the candidates screened so far -> further candidates."""
+"""Function from the errors of the screened candidates to further candidates."""
 
 _Fits = tuple[FloatArray, FloatArray]
 """Errors (starts,) and parameters (starts, P) of one candidate."""
@@ -34,10 +37,10 @@ _Fits = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Outcome:
-    """RMS error of a candidate over RMS of the held-out force, one number for each start (NaN: not refined).
+    """Ratio of the RMS error of a candidate to the RMS of the held-out force, for each start (NaN: not refined).
 
-    Each start has its split into tests that are fitted and tests that are held out; all candidates have the same ones,
-    so their errors are compared start by start.
+    Each start has a split into fitted and held-out tests. All candidates have the same splits, so that their errors are
+    compared start by start.
     """
 
     candidate: Candidate
@@ -46,7 +49,7 @@ class Outcome:
 
     @property
     def is_refined(self) -> bool:
-        """Whether it went on after the screening."""
+        """Whether the candidate was refined after the screening."""
         return bool(np.isfinite(self.refined).all())
 
 
@@ -95,23 +98,24 @@ def sweep(
     history
         Training tests.
     candidates
-        What to compare.
+        Candidates to compare.
     options
         How.
     seed
-        Of the split and the starts. A candidate's starts depend on the candidate and the seed alone.
+        Seed of the splits and the starts. The starts of a candidate depend on the candidate and the seed only.
     normalisation
         Of inputs and target, see :mod:`mrpipe.networks.scaling`.
     jobs
-        Threads; no result depends on it.
+        Number of threads; the results do not depend on it.
     cache
-        Folder in which each fit is kept as soon as it is done, under a name derived from everything it depends on. A
-        sweep that was interrupted, or is widened, takes them from there.
+        Folder in which each fit is stored when it is complete. The name of the file is derived from all inputs of the
+        fit. A sweep that is resumed or extended reads the fits from this folder.
     crossings
-        Names further candidates once the first are screened (see :meth:`mrpipe.networks.candidates.Grid.crossings`),
-        and how many they can be.
+        Function that returns further candidates after the first screening (see
+        :meth:`mrpipe.networks.candidates.Grid.crossings`), and the largest number of them.
     progress, tell
-        Called with the share done and a text; called with the predicted cost before the sweep starts.
+        `progress` is called with the completed share and a text. `tell` is called with the predicted cost before the
+        sweep.
     """
     began = time.perf_counter()
     data = _splits(history, candidates, options, seed, normalisation)
@@ -159,9 +163,10 @@ def sweep(
 
 
 def _to_refine(means: Sequence[float], planned: int, count: int) -> list[int]:
-    """Return the places of what is refined: the first, the best `count` as planned, and of combinations the best third.
+    """Return the indices of the candidates to refine.
 
-    Combinations do not push out what the findings compare.
+    These are the first candidate, the best `count` of the planned ones, and the best third of the combinations.
+    Combinations do not replace the candidates that the findings compare.
     """
     order = np.argsort(means, kind="stable")
     best = [int(place) for place in order if place < planned][:count]
@@ -170,12 +175,12 @@ def _to_refine(means: Sequence[float], planned: int, count: int) -> list[int]:
 
 
 def _mean(errors: FloatArray) -> float:
-    """Return the logarithm of the geometric mean, so that one start that fails does not decide."""
+    """Return the logarithm of the geometric mean, so that one failed start does not dominate."""
     return float(np.mean(np.log(errors)))
 
 
 def readable(seconds: float) -> str:
-    """Return a time as people say it: 45 s, 12 min, 3.2 h."""
+    """Return a duration in a readable unit, such as 45 s, 12 min or 3.2 h."""
     if seconds < 120.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
@@ -184,7 +189,7 @@ def readable(seconds: float) -> str:
 def _pass(
     work: Callable[[int], _Fits], count: int, jobs: int, progress: Progress, text: str, known: int = 0
 ) -> list[_Fits]:
-    """Do the work for 0 .. count - 1; what is `known` from an earlier run does not count for the remaining time."""
+    """Call `work` for 0 .. count - 1; the prediction of the remaining time excludes fits that are `known`."""
     began = time.perf_counter()
 
     def timed(fraction: float, message: str = "") -> None:
@@ -245,7 +250,10 @@ def _fit_all(
 def _problems(
     data: _Data, candidate: Candidate, options: SweepOptions, *, screening: bool
 ) -> tuple[Problem, Problem, float]:
-    """Return the problem to fit, that to judge, and what turns a normalised RMS error into an NRMSE, of one split."""
+    """Return the problem to fit and the problem for assessment of one split, and a factor.
+
+    The factor converts a normalised RMS error to an NRMSE.
+    """
     spec = candidate.spec(data.fit.sampling_rate_hz)
     features, target = rows_at(data.fit, spec, data.screen if screening else data.refine)
     # the parameters of the screening refer to the basis of its rows, so refining keeps that basis
@@ -253,7 +261,7 @@ def _problems(
     scaling = scaling_of(*basis, spec, data.normalisation, whitened=options.whitened)
     held_features, held_target = rows_at(data.held, spec, data.judged)
     size = float(np.sqrt(np.mean(held_target**2)))
-    # errors of candidates are compared to two digits, so that single precision serves
+    # errors of candidates are compared to two digits, so that single precision is sufficient
     return (
         Problem(scaling.inputs(features), scaling.target(target), candidate.layers, candidate.biases, single=True),
         Problem(scaling.inputs(held_features), scaling.target(held_target), candidate.layers, candidate.biases),
@@ -268,11 +276,11 @@ def predicted_cost(
     further: int = 0,
     kept: Sequence[bool] = (),
 ) -> tuple[float, float]:
-    """Return the seconds on one core that screening and refining will take, `further` candidates unknown as yet.
+    """Return the predicted time of screening and refining on one core [s], including `further` unknown candidates.
 
-    Those `kept` are screened already.
+    Candidates in `kept` have been screened by an earlier run.
 
-    Combinations of the best, and what is refined, are mostly of the larger half.
+    Combinations and refined candidates are mostly in the larger half of the networks.
     """
     screen, refine = predicted_costs(history, candidates, options)
     upper = slice(len(screen) // 2, None)
@@ -285,7 +293,7 @@ def predicted_cost(
 def predicted_costs(
     history: History, candidates: Sequence[Candidate], options: SweepOptions
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the seconds on one core that screening and refining each candidate will take, shapes (candidates,).
+    """Return the predicted times of screening and of refining each candidate on one core [s], shapes (candidates,).
 
     A few iterations of three candidates (the smallest, a middle and the largest) are timed; the others are
     interpolated by their number of parameters.
@@ -295,7 +303,7 @@ def predicted_costs(
     probes = sorted({int(order[place]) for place in (0, len(order) // 2, len(order) - 1)}, key=lambda item: sizes[item])
     rng = np.random.default_rng(0)
     times = np.array([_iteration_seconds(candidates[probe], history.samples, options, rng) for probe in probes])
-    # early stopping leaves out 0 to 60 % of the iterations
+    # early stopping saves 0 to 60 % of the iterations
     effort = options.starts * 0.7
     screen, refine = (np.interp(sizes, sizes[probes], column) * effort for column in times.T)
     return screen * options.screen_iterations, refine * options.refine_iterations
@@ -304,7 +312,7 @@ def predicted_costs(
 def _iteration_seconds(
     candidate: Candidate, available: int, options: SweepOptions, rng: np.random.Generator
 ) -> tuple[float, float]:
-    """Return the seconds of one iteration of screening and of refining, the look at the held-out rows included."""
+    """Return the time of one iteration of screening and of refining [s], including the error of the held-out rows."""
 
     def problem(rows: int) -> Problem:
         inputs = rng.normal(size=(candidate.layers[0], min(rows, available)))
@@ -332,7 +340,7 @@ def _number(key: str) -> int:
 
 
 def _digest_of(data: Sequence[_Data], options: SweepOptions, seed: int) -> str:
-    """Return a digest of all that a fit depends on, without its candidate."""
+    """Return a digest of all inputs of a fit except the candidate."""
     digest = hashlib.sha256()
     fits = options.model_dump(exclude={"refined", "design", "states", "past_values", "layers", "neurons", "biases"})
     digest.update(json.dumps([fits, data[0].normalisation, seed], sort_keys=True).encode())
@@ -346,10 +354,10 @@ def _digest_of(data: Sequence[_Data], options: SweepOptions, seed: int) -> str:
 def _kept(
     cache: Path | None, name: str, candidate: Candidate, work: Callable[[], tuple[FloatArray, FloatArray]]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what an earlier run kept, else do the work and keep it."""
+    """Return the stored fits of an earlier run; without them, compute the fits and store them."""
     found = _kept_file(cache, name, candidate)
     if found is not None:
-        # a damaged file counts as none
+        # a damaged file is treated as missing
         damaged = (OSError, ValueError, KeyError, EOFError, BadZipFile)
         with suppress(*damaged), np.load(found, allow_pickle=False) as stored:
             return stored["errors"], stored["parameters"]
@@ -365,6 +373,6 @@ def _file_name(name: str, candidate: Candidate) -> str:
 
 
 def _kept_file(cache: Path | None, name: str, candidate: Candidate) -> Path | None:
-    """Return the file in which an earlier run kept the fits of a candidate; None if there is none."""
+    """Return the file in which an earlier run stored the fits of a candidate; None if it does not exist."""
     path = None if cache is None else cache / _file_name(name, candidate)
     return path if path is not None and path.is_file() else None

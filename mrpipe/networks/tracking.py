@@ -21,9 +21,10 @@ class Tracking:
     Attributes
     ----------
     sample
-        Index into the history of each entry, shape (n,).
+        Index of each entry in the history, shape (n,).
     desired_n, drive, drive_raw, force_n
-        Shape (n,); the drive within its limits and as the network gave it, A or V.
+        Arrays of shape (n,): desired force [N], drive within its limits and as the network computed it [A or V], and
+        force [N].
     """
 
     sample: IntArray
@@ -34,16 +35,16 @@ class Tracking:
 
 
 def round_trip(inverse: Network, forward: Network, history: History, drive_limit: float) -> Tracking:
-    """Feed measured force and motion to the inverse network and its drive to the forward network.
+    """Compute the drive from force and motion (inverse network), and the force of this drive (forward network).
 
     Parameters
     ----------
     inverse, forward
         Networks of one sampling rate.
     history
-        Where `force` is the desired force; `drive` is not looked at.
+        History whose `force` is the desired force; its `drive` is not used.
     drive_limit
-        Largest drive [A or V]; the estimate is kept within 0 and this.
+        Largest drive [A or V]; the computed drive is limited to the range from 0 to this value.
     """
     rows = samples(history, inverse.features)
     estimate = inverse.predict(rows.features)
@@ -84,22 +85,22 @@ def sinusoidal_motion(
 
 @dataclass(frozen=True)
 class ViscousEmulation:
-    """A viscous damper played by the inverse and the forward network.
+    """Viscous damper emulated by the inverse and the forward network.
 
     Attributes
     ----------
     time_s, displacement_m, velocity_m_s
         Shape (n,).
     tracking
-        Desired and obtained force, drive.
+        Desired force, drive, and obtained force.
     damping_n_s_m, frequency_hz, amplitude_m
-        Requested value.
+        Requested viscous coefficient [N s/m], frequency [Hz], and amplitude [m].
     figures, fast
-        Error of the force, over all and at more than half the peak velocity.
+        Errors of the force: of all samples, and of samples with more than half the peak velocity.
     negative_share
         Share of time in which the inverse network computes a negative drive.
     outside_training_range
-        Share of its inputs beyond the training range.
+        Share of the inputs of the inverse network outside the training range.
     """
 
     time_s: FloatArray
@@ -135,9 +136,10 @@ def emulate_viscous(
     drive_limit
         Largest drive, A or V.
     frequency_hz, amplitude_m
-        Of the motion; the amplitude is by default the 95th percentile of the training displacement.
+        Frequency [Hz] and amplitude [m] of the motion; the default amplitude is the 95th percentile of the training
+        displacement.
     damping_n_s_m
-        By default the coefficient whose peak force is half the 99th percentile of the training force.
+        Viscous coefficient [N s/m]; by default its peak force is half the 99th percentile of the training force.
     """
     amplitude = amplitude_m or float(np.percentile(np.abs(training.channels["displacement"]), 95))
     peak = amplitude * 2.0 * np.pi * frequency_hz
@@ -164,7 +166,7 @@ def emulate_viscous(
 
 @dataclass(frozen=True)
 class TrackingJudgement:
-    """How well an inverse network serves a controller.
+    """Force tracking of a controller with an inverse network.
 
     Attributes
     ----------
@@ -211,7 +213,7 @@ def judge_tracking(
     options: ViscousEmulationOptions,
     yield_travel_m: float,
 ) -> TrackingJudgement:
-    """Judge the round trip on the validation tests and emulate a viscous damper.
+    """Assess the round trip on the validation tests and emulate a viscous damper.
 
     Parameters
     ----------
@@ -222,7 +224,7 @@ def judge_tracking(
     options
         Motion and damping of the emulation.
     yield_travel_m
-        Where the pre-yield regime ends [m].
+        Travel at the end of the pre-yield regime [m].
     """
     limit = float(training.channels["drive"].max())
     trip = round_trip(inverse, forward, validation, limit)

@@ -1,4 +1,7 @@
-"""Training of one architecture from several starts: a subsample first, then all rows; the best on held-out records."""
+"""Training of one architecture from several starts: first on a subsample, then on all rows.
+
+The result is the network with the smallest error on held-out records.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ from mrpipe.networks.scaling import NORMALISATION, Normalisation
 from mrpipe.networks.stopping import StoppingRules
 
 HELD_OUT_ROWS = 10000
-"""Rows of the held-out records on which early stopping looks while a subsample is fitted."""
+"""Number of rows of the held-out records that early stopping uses while a subsample is fitted."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +36,15 @@ class Start:
     Attributes
     ----------
     subsample_nrmse, held_out_nrmse
-        After the first phase: RMS error over RMS of the target, on the training rows and on the held-out records.
+        Ratio of RMS error to RMS target after the first phase, on the training rows and on the held-out records.
     refined_held_out_nrmse
-        On the held-out records after the second phase, NaN where it was not refined.
+        The same ratio on the held-out records after the second phase; NaN without a second phase.
     iterations
-        Of both phases.
+        Number of iterations of both phases.
     reason
-        Why the last phase ended.
+        Reason why the last phase ended.
     seconds
-        Wall time of both phases.
+        Wall time of both phases [s].
     """
 
     subsample_nrmse: float
@@ -59,15 +62,15 @@ class Trained:
     Attributes
     ----------
     network
-        The best on the held-out records, or the average of some.
+        Network with the smallest error on the held-out records, or average of several.
     starts
-        One entry a start.
+        Results of the starts.
     held_out
-        Names of the records that were kept out.
+        Names of the held-out records.
     path
-        Root mean square error over RMS of the target after each iteration of the chosen start.
+        Ratio of RMS error to RMS target after each iteration of the chosen start.
     iterations, seconds
-        Of the chosen start; wall time of all.
+        Number of iterations of the chosen start; wall time of all starts [s].
     """
 
     network: Network
@@ -81,7 +84,7 @@ class Trained:
 def initial_parameters(
     problem: Problem, rng: np.random.Generator, kind: Literal["random", "perceptron"] = "random"
 ) -> FloatArray:
-    """Return a start: uniform within +-0.5, or what scikit-learn's MLPRegressor reaches from another random start."""
+    """Return initial parameters: uniform within +-0.5, or the result of a short fit by scikit-learn's MLPRegressor."""
     if kind == "random":
         return rng.uniform(-0.5, 0.5, problem.size)
     from sklearn.neural_network import MLPRegressor
@@ -103,7 +106,7 @@ def initial_parameters(
 
 
 def to_network(parameters: FloatArray, data: TrainingData, hidden: tuple[int, ...], biases: bool) -> Network:
-    """Return the network of trained parameters, the whitening folded into the first layer."""
+    """Return the network of trained parameters, with the whitening multiplied into the first layer."""
     weights, offsets = unpack(parameters, data.layers(hidden), biases)
     scaling = data.scaling
     return Network(
@@ -125,8 +128,8 @@ def in_parallel(
 ) -> Sequence[object]:
     """Call `work(0) .. work(count - 1)` on some threads, one BLAS thread each, and return the results in order.
 
-    numpy releases the interpreter's lock in the products and hyperbolic tangents that training consists of, so threads
-    do as well as processes and share the data.
+    Training consists of matrix products and hyperbolic tangents, in which numpy releases the lock of the interpreter.
+    Threads are therefore as fast as processes, and they share the data.
     """
     results = []
     with threadpool_limits(1):
@@ -152,19 +155,19 @@ def train(
     Parameters
     ----------
     history
-        Tests of role training; validation tests never come here.
+        Tests of role training; validation tests are not used.
     spec
         What the features are.
     options
-        How to train.
+        Options of the training.
     rng
-        For the split and the starts; the result does not depend on `jobs`.
+        Random generator of the split and the starts; the result does not depend on `jobs`.
     normalisation
         Of inputs and target, see :mod:`mrpipe.networks.scaling`.
     jobs
         Threads.
     progress
-        Called with the share done and a text.
+        Called with the completed share and a text.
     """
     data = training_data(
         history, spec, options.held_out_share, rng, normalisation=normalisation, whitened=options.whitened
@@ -180,7 +183,7 @@ def train_on(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> Trained:
-    """Train a network on rows that are normalised and divided already; arguments as those of :func:`train`."""
+    """Train a network on rows that are already normalised and divided; arguments as in :func:`train`."""
     began = time.perf_counter()
     layers = data.layers(options.hidden)
     rows = np.sort(rng.permutation(len(data.fit_rows.target))[: options.subsample_rows])
@@ -194,9 +197,9 @@ def train_on(
         rules = _limited(options.rules, options.subsample_iterations)
         return fit(small, guess, method=options.method, rules=rules, held_out=monitor), time.perf_counter() - started
 
-    # filters of warnings belong to the process, so they are set here and not in the threads
+    # warning filters are global to the process, so that they are set here and not in the threads
     with warnings.catch_warnings():
-        # a perceptron is meant to stop early, because it is only a start
+        # the perceptron is only a start, so that it need not converge
         warnings.filterwarnings("ignore", message="lbfgs failed to converge")
         early: list[tuple[FitResult, float]] = list(
             in_parallel(first, options.starts, jobs, lambda f, t="": progress(0.6 * f, t), "start")  # type: ignore[arg-type]
@@ -206,7 +209,7 @@ def train_on(
     late: list[tuple[FitResult, float]] = []
     if options.iterations > 0:
         whole, held = _second_phase(data, layers, options, rng)
-        # threads that have no start of their own share the rows of one
+        # threads without a start share the rows of another start
         whole = replace(whole, threads=max(1, jobs // len(chosen)))
 
         def second(place: int) -> tuple[FitResult, float]:
@@ -225,7 +228,7 @@ def train_on(
 def _second_phase(
     data: TrainingData, layers: tuple[int, ...], options: TrainingOptions, rng: np.random.Generator
 ) -> tuple[Problem, Problem | None]:
-    """Return what the second phase fits, and what stops it."""
+    """Return the problem that the second phase fits, and the problem that stops it."""
     learns = options.refine_on == "every"
     available = len((data.every_row if learns else data.fit_rows).target)
     rows = None
@@ -248,7 +251,7 @@ def _monitor(data: TrainingData, layers: tuple[int, ...], biases: bool, rng: np.
 
 
 def _judged(outcome: FitResult) -> float:
-    """Return what starts are compared by: the held-out error, else the training error."""
+    """Return the error that ranks the starts: held-out error, or training error without held-out rows."""
     return outcome.mean_square if np.isnan(outcome.held_out_mean_square) else outcome.held_out_mean_square
 
 

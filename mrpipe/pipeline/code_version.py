@@ -1,6 +1,7 @@
-"""Hashes of everything in the program that the result of a stage depends on.
+"""Hashes of all source files on which the result of a stage depends.
 
-A stage's function imports modules; each of these imports others. Two things are not imports, so modules say them:
+A stage's function imports modules; each of these imports others. Two dependencies are not imports and are declared in
+the modules:
 
 - `LOADS_FROM = ("mrpipe.effects", "mrpipe/exports/controller_template.c")` at the top level of a module names the
   packages that it walks at run time and the files of the program that it reads.
@@ -22,7 +23,9 @@ from mrpipe.artifacts import config_directory
 from mrpipe.source_scan import imported_modules
 
 _NO_RESULT = ("mrpipe.pipeline", "mrpipe.config", "mrpipe.cli", "mrpipe.reporting")
-"""Running, configuring and drawing change no number: an edited figure caption must not make a training stale."""
+"""Packages that run, configure and draw. They change no results, so that an edited caption does not make a training
+stale.
+"""
 _LOADS_FROM = re.compile(r"^LOADS_FROM(?::[^=\n]*)?\s*=\s*\(([^)]*)\)", re.MULTILINE)
 _PARAMETER_SET = re.compile(r"""\bload_parameter_set\(\s*["']([\w-]+)["']\s*,\s*(?:["']([\w-]+)["'])?""")
 
@@ -126,6 +129,6 @@ def _path_of(name: str) -> Path | None:
 
 
 def forget() -> None:
-    """Forget the sources that were read, so that the next call reads them again."""
+    """Clear the cache of sources, so that the next call reads them again."""
     _source.cache_clear()
     _digest.cache_clear()

@@ -1,4 +1,4 @@
-"""Compiles the functions that later stages need in a second process, while the first stages work.
+"""Compilation of the functions of later stages in a second process, while the first stages run.
 
 numba compiles a function when its module is imported for the first time and keeps the result in a cache. In the first
 run on a machine, every stage would wait for the compiler. Results do not depend on it: a function that is not in the
@@ -23,7 +23,7 @@ LIBRARIES = ("matplotlib.figure", "matplotlib.backends.backend_svg", "scipy.stat
 """Libraries of later stages whose first import on a machine takes seconds, because Python compiles them to bytecode."""
 
 NICENESS = 5
-"""Numerical technique: how far the compiler gives way to the stages that work meanwhile."""
+"""Increment of the process priority value (nice) of the compiler, so that the running stages have priority."""
 
 
 def modules_of(stage_modules: Iterable[str]) -> list[str]:
@@ -45,7 +45,7 @@ def modules_of(stage_modules: Iterable[str]) -> list[str]:
 def compiled_ahead(stage_modules: Sequence[str], jobs: int) -> Iterator[Callable[[], bool]]:
     """Compile what stages need in a second process during the block; it ends with the block.
 
-    Yields a function that returns whether the process still works.
+    Yields a function that returns whether the process is still running.
 
     Nothing is started with one process only, or if the same modules were compiled before.
 
@@ -78,7 +78,7 @@ def _started(modules: Sequence[str]) -> subprocess.Popen[bytes] | None:
 
 
 def _mark(modules: Sequence[str]) -> Path | None:
-    """Return the file that says that these modules are in the cache; None without a cache.
+    """Return the file that marks these modules as compiled in the cache; None without a cache.
 
     numba keeps the code of every copy of the sources separately, so the file is named by the place of this copy too.
     """

@@ -1,4 +1,4 @@
-"""Carries out one stage: runs its function, and writes its part of the report and its manifest."""
+"""Execution of one stage: runs its function, and writes its part of the report and its manifest."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Order:
-    """A stage that is to run, although it may have run before.
+    """Order to run a stage.
 
     Attributes
     ----------
     stage
-        Its name.
+        Name of the stage.
     key
-        What its result depends on.
+        Everything on which the result of the stage depends.
     inputs
-        Declared input -> path, of those that are there.
+        Declared input -> path, for the inputs that exist.
     reasons
-        Why it runs.
+        Reasons why the stage runs.
     """
 
     stage: str
@@ -82,17 +82,17 @@ class StageRunner:
     stages
         Name -> stage.
     run_directory
-        Where artifacts, manifests, figures and tables go.
+        Directory of artifacts, manifests, figures and tables.
     logger
-        Takes the log lines.
+        Logger of the run.
     jobs
-        Processes that a stage may use.
+        Largest number of processes of a stage.
     quiet
-        Show no progress.
+        Whether progress is hidden.
     hashes
         Digests of files; those of the outputs are added.
     progress
-        Shows the progress of a stage.
+        Function that shows the progress of a stage.
     """
 
     loaded: LoadedConfig
@@ -166,5 +166,5 @@ def remove_outputs(stage: Stage, run_directory: Path) -> None:
 
 
 def seed_of(seed: int, name: str) -> list[int]:
-    """Return the entropy of a stage's generator: run's seed and stage's name, so that stages do not share draws."""
+    """Return the entropy of the generator of a stage, from seed and stage name, so that stages are independent."""
     return [seed, int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")]

@@ -1,4 +1,4 @@
-"""Content hashes of what a result depends on: files, artifacts and settings.
+"""Content hashes of the inputs of a result: files, artifacts and settings.
 
 The hashes of code are those of :mod:`mrpipe.pipeline.code_version`.
 """
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 MISSING = "missing"
-"""Stands for the digest of a file that is not there."""
+"""Digest of a file that does not exist."""
 # how the artifact was made, not part of its content
 _NOT_CONTENT = {
     "created_utc",
@@ -27,7 +27,7 @@ _NOT_CONTENT = {
 
 
 def digest_of_artifact(path: Path) -> str:
-    """Return the SHA-256 of what an HDF5 artifact says: names, units, dims, shapes, types and values, not its date.
+    """Return the SHA-256 of the content of an HDF5 artifact: names, units, dims, shapes, types, values; not its date.
 
     An artifact that is built again with the same numbers has the same digest, so nothing after it becomes stale.
 
@@ -115,7 +115,7 @@ class FileHashes:
         return digest.hexdigest()
 
     def save(self) -> None:
-        """Write what was learnt to the memory file; a directory that cannot be written only costs time later."""
+        """Write the digests to the memory file; if that is impossible, files are read again later."""
         if self._new:
             from mrpipe.artifacts import atomic_write_text
 
@@ -124,12 +124,12 @@ class FileHashes:
             self._new = {}
 
     def learn(self, entries: Mapping[str, Any]) -> None:
-        """Add what another process learnt, as :meth:`take_new` returned it."""
+        """Add digests of another process, as returned by its :meth:`take_new`."""
         self._known |= entries
         self._new |= entries
 
     def take_new(self) -> dict[str, Any]:
-        """Return what was learnt since the last call or :meth:`save`."""
+        """Return the digests that are new since the last call or :meth:`save`."""
         new, self._new = self._new, {}
         return new
 

@@ -1,4 +1,4 @@
-"""From a run directory to what is compared with another run."""
+"""Reading of a run directory for the comparison with another run."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def read_run(directory: Path) -> KeptRun:
 
 
 def require_two_runs(first: Path, second: Path) -> None:
-    """Refuse a run that would be compared with itself.
+    """Check that two paths are different runs.
 
     Raises
     ------

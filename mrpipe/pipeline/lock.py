@@ -1,4 +1,4 @@
-"""One run at a time in a run directory."""
+"""Lock that permits one run at a time in a run directory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _TEMPORARY = re.compile(r"\..+\.\d+(\.old)?\.tmp")
 
 @contextmanager
 def run_lock(run_directory: Path) -> Iterator[None]:
-    """Hold the run directory; the lock dies with the process, so a killed run leaves none behind.
+    """Lock the run directory; the lock ends with the process, so that a killed run leaves no lock.
 
     Raises
     ------
@@ -48,9 +48,9 @@ def run_lock(run_directory: Path) -> Iterator[None]:
 
 
 def remove_temporaries(run_directory: Path) -> None:
-    """Remove what killed processes left half-written: `.NAME.PID.tmp` and `.NAME.PID.old.tmp`, files and folders.
+    """Remove incomplete files and folders of killed processes: `.NAME.PID.tmp` and `.NAME.PID.old.tmp`.
 
-    Call it with the lock held: nobody else writes here then.
+    Call it only while the lock is held, because then no other process writes here.
     """
     for path in sorted(run_directory.rglob(".*.tmp")):
         if not _TEMPORARY.fullmatch(path.name):

@@ -1,4 +1,4 @@
-"""What is remembered of a stage that ran, and the comparison with what would run now."""
+"""Record of a stage that ran, and its comparison with the present inputs, settings and code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mrpipe.pipeline.fingerprint import FileHashes, flatten
 
 @dataclass(frozen=True)
 class StageKey:
-    """Everything the result of a stage depends on.
+    """Everything on which the result of a stage depends.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class StageKey:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a finished stage left: its key, outputs, summary and warnings.
+    """Record of a finished stage: key, outputs, summary and warnings.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def _adapter() -> Any:
 
 
 def reasons_stale(manifest: Manifest | None, key: StageKey, run_directory: Path, hashes: FileHashes) -> list[str]:
-    """Return why a stage has to run, in plain words; empty where what is there can be used."""
+    """Return the reasons why a stage has to run; empty if the existing result can be used."""
     if manifest is None:
         return ["never built"]
     if manifest.failed and manifest.skipped:

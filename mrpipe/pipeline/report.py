@@ -1,4 +1,4 @@
-"""From a run directory to what the report reads."""
+"""Reading of a run directory for the report."""
 
 from __future__ import annotations
 

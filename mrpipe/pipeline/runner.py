@@ -1,4 +1,4 @@
-"""Runs stages in order, reuses those that are up to date, and reports which are stale and why."""
+"""Execution of the stages in order, with reuse of results that are up to date, and the reasons for stale ones."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ class Pipeline:
     stages
         Name -> stage, in order.
     run_directory
-        Where artifacts, manifests, log, figures, tables and report go.
+        Directory of artifacts, manifests, log, figures, tables and report.
     logger
-        Takes the log lines.
+        Logger of the run.
     jobs
-        Processes to use.
+        Largest number of processes.
     quiet
-        Show no progress.
+        Whether progress is hidden.
     campaign_given
         The user named a campaign on the command line. Data of the virtual laboratory are then used only if a stage
         requires them, or if they exist already.
     keep_going
         A stage that fails does not end the run: stages that need it are skipped, all others are built.
     force
-        Stages that are built even where nothing changed.
+        Stages that are built even if nothing changed.
     outcomes
         Stage -> its result in this call.
     errors
@@ -74,7 +74,7 @@ class Pipeline:
 
     @property
     def runner(self) -> StageRunner:
-        """What runs a single stage."""
+        """Runner of a single stage."""
         return StageRunner(
             self.loaded, self.stages, self.run_directory, self.logger, self.jobs, self.quiet, self.hashes
         )

@@ -1,4 +1,4 @@
-"""What a stage is: declared inputs, outputs and settings, and a function that does the work.
+"""Definition of a stage: declared inputs, outputs and settings, and a function that does the work.
 
 The function gets everything from its :class:`StageContext`, which refuses settings and inputs that were not
 declared; so a stage's cache key depends on everything that it reads.
@@ -41,7 +41,7 @@ class StageContext:
     seed
         Of the run.
     jobs
-        How many processes may be used (does not change results).
+        Number of processes that may be used; it does not change results.
     progress
         Called with the share of the work that is done, and a text.
     report

@@ -1,4 +1,4 @@
-"""Figures of the tracing: where the residual lives, ranking, loops before and after, errors per test."""
+"""Figures of the tracing: location of the residual, ranking, loops before and after, errors per test."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ AFTER = COLOURS[0]
 """Colour of the model with the effects."""
 
 MOST_BARS = 24
-"""Of more tests those with the largest errors are drawn."""
+"""Largest number of bars; of more tests those with the largest errors are drawn."""
 
 _PARTS = {
     "cycle": ("stage of the cycle", {"pre_yield": "pre-yield", "post_yield": "post-yield", "reversal": "reversal"}),
@@ -42,7 +42,7 @@ class ShownTest:
 
 
 def residual_location(location: Mapping[str, Mapping[str, float]]) -> Figure:
-    """Draw which share of the residual's sum of squares lies where: in the cycle, by drive, direction and time."""
+    """Draw the shares of the sum of squares of the residual by part of the cycle, drive, direction and time."""
     groups = [name for name in _PARTS if name in location]
     figure, axes = figure_with_axes(1, 1, height=0.55 * len(groups) + 0.7)
     axis = axes[0, 0]
@@ -182,7 +182,7 @@ def errors_per_test(rows: Sequence[Mapping[str, Any]], noise_floor: float) -> Fi
 
 
 def in_plain_words(summary: Mapping[str, Any]) -> str:
-    """Return a paragraph that says what was found, in plain words."""
+    """Return a paragraph on the result in plain words."""
     before, after = summary["before"]["nrmse"], summary["after"]["nrmse"]
     model, floor = summary["model"], summary["noise_floor_nrmse"]
     start = (

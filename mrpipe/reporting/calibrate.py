@@ -36,7 +36,7 @@ def describe(
     amplitude_m
         Damper amplitude of the loops that are shown.
     map_points
-        Points along each axis of the damping maps.
+        Number of points along each axis of the damping maps.
     """
 
     modes = calibration.modes

@@ -62,10 +62,10 @@ def describe(sink: Sink, result: Traced) -> None:
 
 
 def _identified(sink: Sink, summary: Mapping[str, Any]) -> None:
-    """Say which declared damper that is, and how it differs from the one of `identify-damper`."""
+    """Describe the declared damper, and its difference from the one of `identify-damper`."""
     found = summary["base_form"]["identified"]
     if found is None:
-        sink.text("There is no fit of identify-damper: every base form began at its own starting points.")
+        sink.text("There is no fit of identify-damper: every base form began at the starting points of the library.")
         return
     sink.text(
         f"The damper of identify-damper ({found['form']}) misses the force on the same validation samples by "
@@ -110,7 +110,7 @@ def _where(sink: Sink, traced: Tracing, summary: Mapping[str, Any]) -> None:
     sink.figure(
         "where",
         residual_location(summary["residual"]["location"]),
-        "Where the residual of the baseline lives (training tests).",
+        "Location of the residual of the baseline (training tests).",
     )
     base = traced.selection.base
     used = base.problem.root_weight > 0.0
@@ -128,7 +128,7 @@ def _where(sink: Sink, traced: Tracing, summary: Mapping[str, Any]) -> None:
 
 
 def _drive_map(states: Mapping[str, FloatArray], drive: str, unit: str) -> tuple[str, str, FloatArray, FloatArray]:
-    """Return the drive and its past, or the displacement and the drive where no test's drive has a past."""
+    """Return drive and past drive; or displacement and drive if the drive is constant in every test."""
     past = states["past of drive"]
     if float(np.max(past)) > 0.05 * float(np.max(np.abs(states["drive"]))):
         return drive, f"largest drive so far [{unit}]", states["drive"], past + np.abs(states["drive"])
@@ -143,8 +143,8 @@ def _candidates(sink: Sink, summary: Mapping[str, Any], named_share: float, leas
     sink.figure(
         "ranking",
         candidate_ranking(candidates, named_share, least_share),
-        "What each family of effects recovers when it is added alone and everything is fitted anew; NRMSE on the "
-        "validation tests. A family at a bound of its strength is not named.",
+        "Share that each family of effects recovers if it is added alone and all parameters are fitted again; NRMSE "
+        "on the validation tests. A family whose strength is at a bound is not named.",
     )
     rows = [
         {
@@ -185,8 +185,8 @@ def _before_and_after(sink: Sink, traced: Tracing, summary: Mapping[str, Any]) -
         sink.figure(
             "loops",
             loops_before_and_after(shown),
-            "Validation tests: the one that gains most, one of middling error, and the one of largest error left. The "
-            "models run freely, without the measured force.",
+            "Validation tests: the one with the largest improvement, one with a medium error, and the one with the "
+            "largest error after. The models are simulated without the measured force.",
         )
     more = f"; the {MOST_BARS} with the largest errors of {len(rows)}" if len(rows) > MOST_BARS else ""
     sink.figure(
@@ -199,7 +199,7 @@ def _before_and_after(sink: Sink, traced: Tracing, summary: Mapping[str, Any]) -
 
 
 def _chosen(names: Sequence[str], errors: Mapping[str, Mapping[str, Any]]) -> list[int]:
-    """Return which tests to show: gains most, middling, largest error left."""
+    """Return the tests to show: largest improvement, medium error, largest error after."""
     known = [k for k, name in enumerate(names) if name in errors]
     gains = sorted(known, key=lambda k: errors[names[k]]["nrmse_after"] - errors[names[k]]["nrmse_before"])
     left = sorted(known, key=lambda k: errors[names[k]]["nrmse_after"])
@@ -245,7 +245,7 @@ def _next_steps(sink: Sink, summary: Mapping[str, Any]) -> None:
     wanted = summary["next_tests"]
     if wanted["made_already"]:
         listed = "; ".join(item["decides"] for item in wanted["decides"])
-        sink.text(f"Still open, though the tests for it have been made: {listed}. Longer tests or repeats remain.")
+        sink.text(f"Still open, although the tests for it have been made: {listed}. Longer tests or repeats may help.")
     if not wanted["tests"]:
         return
     for item in wanted["decides"]:
@@ -253,6 +253,6 @@ def _next_steps(sink: Sink, summary: Mapping[str, Any]) -> None:
     sink.table(
         "next-tests",
         pd.DataFrame(wanted["tests"]).drop(columns="later"),
-        f"Tests that would decide what is open, as {wanted['file']} in the run directory lists them; on the virtual "
-        f"rig `mrpipe close-loop --settings {wanted['file']}` makes them and traces again.",
+        f"Tests that would answer the open questions, as listed in {wanted['file']} of the run directory; on the "
+        f"virtual rig `mrpipe close-loop --settings {wanted['file']}` records them and traces again.",
     )

@@ -83,7 +83,3 @@ def response_by_law(found: Mapping[str, Any]) -> Figure:
     handles, names = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper center", ncols=len(shown), fontsize=8, frameon=False)
     return figure
-
-
-def _plain_number(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.3g}"

@@ -11,19 +11,19 @@ WHEN = ("before", "after", "recalibrated")
 """How a law was simulated."""
 
 EQUAL = "; laws whose responses hardly differ count as equal"
-"""Said where two such laws have changed places."""
+"""Text if two such laws have changed places."""
 
 WORTH_SAYING = 0.01
 """Relative change of a law's response below which it is not mentioned."""
 
 
 def in_words(found: Mapping[str, Any]) -> str:
-    """Return what the closed loop says, in plain words."""
+    """Return the result of the closed loop in plain words."""
     return " ".join(in_points(found))
 
 
 def in_points(found: Mapping[str, Any]) -> list[str]:
-    """Return what the closed loop says, a few sentences for each question."""
+    """Return the result of the closed loop, a few sentences for each question."""
     if "laws" not in found:
         return [f"Closed loop {found['status']}."]
     effects = found["plant"]["effects"]
@@ -39,7 +39,7 @@ def in_points(found: Mapping[str, Any]) -> list[str]:
 
 
 def errors_in_words(found: Mapping[str, Any]) -> str:
-    """Return how far the predictions are from what was measured, before and after."""
+    """Return the errors of the predictions against the measurements, before and after."""
 
     def pair(name: str) -> str:
         error = found.get(name) or {}
@@ -58,7 +58,7 @@ def errors_in_words(found: Mapping[str, Any]) -> str:
 
 
 def _doubts(laws: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what to be careful about: responses that grow, and motion beyond what the damper was tested at."""
+    """Return limitations: responses that grow without bound, and motion beyond the tested stroke."""
     grows = list(
         dict.fromkeys(f"{row['law']} ({when})" for row in laws for when in WHEN if "diverged" in row.get(when, {}))
     )
@@ -103,7 +103,7 @@ def ranking_in_words(found: Mapping[str, Any]) -> str:
 
 
 def controller_in_words(found: Mapping[str, Any]) -> str:
-    """Return which changes of the controller were tried, which laws take them, and what that brings."""
+    """Return the changes of the controller that were tried, the laws that adopt them, and their benefit."""
     new = found["controller"]
     gains = ", ".join(
         f"{law} x {value:.2f}" for law, value in new["gain_factors"].items() if abs(value - 1.0) > WORTH_SAYING
@@ -132,7 +132,7 @@ def controller_in_words(found: Mapping[str, Any]) -> str:
 
 
 def _inverse_in_words(inverse: str) -> str:
-    """Return what became of the inverse of the controller."""
+    """Return the outcome for the inverse of the controller."""
     words, _, why = inverse.partition(": ")
     if words != "kept":
         return f"an inverse {inverse}"
@@ -142,7 +142,7 @@ def _inverse_in_words(inverse: str) -> str:
 
 
 def gain_in_words(laws: Sequence[Mapping[str, Any]]) -> str:
-    """Return what the renewed controller changes on the damper with the effect, from the peaks over the band."""
+    """Return the changes by the renewed controller with the effect in the damper, from the peaks over the band."""
     key = "peak_rms_x_top_m"
     changes = {
         row["law"]: row["recalibrated"][key] / row["after"][key] - 1.0

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 WALL_CLOCK = frozenset({"seconds", "predicted_seconds", "real_time_factor"})
-"""Keys of a summary that measure the computer and not the damper; they are not compared."""
+"""Keys of a summary that depend on the computer and are not compared."""
 _NAMING_KEYS = ("name", "law", "form", "test", "id")
 _IDENTITY = ("sha256", "campaign")
 _FILES = "content of files."
@@ -26,7 +26,7 @@ _CAMPAIGN_READERS = {
 
 @dataclass(frozen=True)
 class KeptStage:
-    """What a run keeps of one stage.
+    """Stored results of one stage of a run.
 
     Attributes
     ----------
@@ -37,9 +37,9 @@ class KeptStage:
     code
         Module -> hash of its source.
     summary
-        What the stage printed.
+        Summary that the stage printed.
     not_built
-        Why the stage was skipped or failed; empty where it was built.
+        Why the stage was skipped or failed; empty if it was built.
     """
 
     inputs: Mapping[str, str | None] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Noise, step and useful band of one recorded channel, estimated from the channel alone."""
+"""Noise, quantisation step and useful band of a recorded channel, estimated from this channel only."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def steady_noise(values: FloatArray, rate_hz: float) -> float:
     """Return the standard deviation of the noise of a channel, in its unit.
 
     Corners of a force at reversals, and jumps of a channel that was stuck for a while, reach up to the highest
-    frequencies and look like noise in a spectrum. They are few, so the median of third differences does not see them.
+    frequencies and look like noise in a spectrum. They are few, so that they do not affect the median of third
+    differences.
     """
     spectral = noise_level(values, rate_hz)
     typical = float(np.median(np.abs(np.diff(values, 3)))) / (0.6745 * np.sqrt(20.0))
@@ -54,7 +55,7 @@ def resolution(values: FloatArray) -> float:
 
 
 def displacement_cutoff(displacement: FloatArray, rate_hz: float, motion_hz: float) -> float:
-    """Return the cut-off [Hz] of a displacement: where it sinks into its noise, at most a quarter of the rate.
+    """Return the frequency [Hz] above which a displacement is below its noise, at most a quarter of the rate.
 
     Parameters
     ----------
@@ -68,12 +69,12 @@ def displacement_cutoff(displacement: FloatArray, rate_hz: float, motion_hz: flo
     found = cutoff_by_criterion(displacement, rate_hz, velocity_share=0.9995, margin=CUTOFF_MARGIN)
     # remaining noise is differentiated twice if an effect needs the acceleration
     found = min(found, CUTOFF_MARGIN * signal_end(displacement, rate_hz))
-    # a channel without motion has no frequency, and nothing in it is worth a filter
+    # a channel without motion has no frequency and needs no filter
     least = DISPLACEMENT_HARMONICS * motion_hz or 0.25 * rate_hz
     return float(min(max(found, least), 0.25 * rate_hz, 250.0))
 
 
 def motion_frequency(displacement: FloatArray, velocity: FloatArray) -> float:
-    """Return the frequency of a motion [Hz]: RMS velocity over RMS displacement, over 2 pi; 0 without motion."""
+    """Return the ratio of RMS velocity to RMS displacement over 2 pi as frequency [Hz]; 0 without motion."""
     motion = float(np.std(displacement))
     return float(np.std(velocity)) / (2.0 * np.pi * motion) if motion > 0.0 else 0.0

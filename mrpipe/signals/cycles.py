@@ -1,4 +1,4 @@
-"""Steady cycles: found in the displacement, not assumed."""
+"""Steady cycles, detected in the displacement."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ class SteadyCycles:
 
     @property
     def span(self) -> slice:
-        """Samples from the first steady cycle to the end of the last; everything if there are none."""
+        """Samples from the first steady cycle to the end of the last one; all samples if there are none."""
         return slice(int(self.starts[0]), int(self.starts[-1])) if self.periodic else slice(None)
 
 
 def upward_crossings(values: FloatArray, level: float, hysteresis: float) -> IntArray:
     """Return the first sample at or above `level` after each time that `values` was below `level - hysteresis`.
 
-    The crossing counts once `values` has reached `level + hysteresis`, so that noise near the level does not.
+    A crossing is valid when `values` reaches `level + hysteresis`, so that noise near the level causes no crossings.
     """
     high = values >= level + hysteresis
     low = values < level - hysteresis
@@ -66,7 +66,7 @@ def upward_crossings(values: FloatArray, level: float, hysteresis: float) -> Int
 
 
 def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, fewest: int = 2) -> SteadyCycles:
-    """Find the longest run of cycles that agree in period and amplitude within 5 %, a third of the motion at least.
+    """Return the longest run of cycles that agree in period and amplitude within 5 %, at least a third of the motion.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
     sampling_rate_hz
         Rate.
     fewest
-        Shorter runs do not make a motion periodic; two cycles do only where they are most of the motion.
+        Smallest number of cycles of a periodic motion. Two cycles are sufficient only if they are most of the motion.
     """
     none = SteadyCycles(np.zeros(0, dtype=np.int64))
     low, high = np.percentile(displacement, [2.0, 98.0])
@@ -88,7 +88,7 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
     periods = np.diff(crossings).astype(np.float64)
     heights = np.array([0.5 * np.ptp(displacement[begin:end]) for begin, end in pairwise(crossings)])
     begin, end = _longest_steady_run(periods, heights)
-    # a slow sweep and a random motion have their steady stretches too, but those are not the test
+    # a slow sweep and a random motion have steady parts as well, but these are not periodic tests
     share = SHARE_OF_A_PAIR if end - begin == 2 else STEADY_SHARE
     if end - begin < fewest or np.sum(periods[begin:end]) < share * np.sum(periods):
         return none

@@ -1,4 +1,4 @@
-"""Faults of sensors and time base that are known, taken out of the channels before anything else is done to them."""
+"""Known faults of sensors and time base, which are removed from the channels before all other processing."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from mrpipe.errors import UserError
 
 @dataclass(frozen=True)
 class KnownFaults:
-    """Faults of sensors that are taken out before all else; the fields are those of `prepare.corrections`.
+    """Faults that are removed before all other processing; the fields are those of `prepare.corrections`.
 
     They are subtracted from the recorded channels. The offsets stored with a prepared test do not contain them.
 
     Attributes
     ----------
     force_late_s
-        By how much the force is recorded later than displacement and drive.
+        Delay of the recorded force relative to displacement and drive [s].
     force_offset_n
-        Test -> offset of its load cell in addition to that of the campaign.
+        Test -> offset of the load cell in addition to that of the campaign [N].
     force_per_drive_n, force_per_drive_squared_n
-        Offset for each unit of drive, and of drive squared.
+        Offset per unit of drive, and per unit of squared drive.
     drive_lag_s
-        Lag of the drive in these.
+        First-order lag of the drive in these two offsets [s].
     force_drift_n_s
-        Drift of the load cell in each test.
+        Drift of the load cell in each test [N/s].
     """
 
     force_late_s: float = 0.0
@@ -56,7 +56,7 @@ class KnownFaults:
 
 
 def require_known(faults: KnownFaults, names: Sequence[str]) -> None:
-    """Refuse an offset for a test that the campaign does not have."""
+    """Check that the campaign has every test for which an offset is given."""
     for name in faults.force_offset_n:
         if name not in names:
             where = f"prepare.corrections.force_offset_n.{name}"

@@ -15,16 +15,16 @@ from mrpipe.artifacts import FloatArray
 Phase = Literal["zero", "causal"]
 
 HIGHEST_SHARE_OF_NYQUIST = 0.8
-"""A cut-off above this share of half the sampling rate does nothing useful, and the filter is left out."""
+"""Share of half the sampling rate above which a cut-off has no useful effect, so that the filter is omitted."""
 
 
 def usable_cutoff(cutoff_hz: float, sampling_rate_hz: float) -> float | None:
-    """Return the cut-off, or None where the sampling rate is too low for it to remove anything."""
+    """Return the cut-off, or None if the sampling rate is so low that the filter would remove nothing."""
     return cutoff_hz if 0.0 < cutoff_hz < HIGHEST_SHARE_OF_NYQUIST * sampling_rate_hz / 2.0 else None
 
 
 def samples_needed(cutoff_hz: float, sampling_rate_hz: float) -> int:
-    """Return the fewest samples on which a low-pass with this cut-off says anything: three of its periods."""
+    """Return the least number of samples for a low-pass with this cut-off: three of its periods."""
     return math.ceil(3.0 * sampling_rate_hz / cutoff_hz) + 1
 
 
@@ -42,7 +42,7 @@ def butterworth_lowpass(
     sampling_rate_hz
         Of the values.
     order
-        Of the filter.
+        Order of the filter.
     phase
         `zero` filters forwards and backwards (the design is widened so that half power stays at the cut-off); `causal`
         filters forwards only, and is late (errata D: 11 ms at 20 Hz, 2.2 ms at 100 Hz).
@@ -50,7 +50,7 @@ def butterworth_lowpass(
     Returns
     -------
     FloatArray
-        Shape (n,); unchanged where the cut-off is not usable at this rate.
+        Shape (n,); unchanged if the cut-off is not usable at this rate.
     """
     usable = usable_cutoff(cutoff_hz, sampling_rate_hz)
     if usable is None:
@@ -68,10 +68,10 @@ def butterworth_lowpass(
 
 
 def resample(values: FloatArray, from_hz: float, to_hz: float) -> FloatArray:
-    """Return `values` at another even rate, without aliasing and without delay.
+    """Return `values` at another uniform rate, without aliasing and without delay.
 
     A linear-phase FIR filter (polyphase, Kaiser window) removes what the lower of the two rates cannot carry. The first
-    sample keeps its time. The trend between the ends is carried through, so that the ends do not ring.
+    sample keeps its time. The straight line between the ends is not filtered, so that the ends do not ring.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def decimate(values: FloatArray, factor: int) -> FloatArray:
 
 
 def advance(values: FloatArray, seconds: float, sampling_rate_hz: float) -> FloatArray:
-    """Return `values` as they were `seconds` later (cubic interpolation); what lies beyond an end keeps its value."""
+    """Return `values` at times later by `seconds` (cubic interpolation), with constant values beyond the ends."""
     if seconds == 0.0:
         return values
     place = np.arange(values.size, dtype=np.float64)
@@ -103,7 +103,7 @@ def advance(values: FloatArray, seconds: float, sampling_rate_hz: float) -> Floa
 
 
 def even_clock(time_s: FloatArray, values: FloatArray, sampling_rate_hz: float, even_time_s: FloatArray) -> FloatArray:
-    """Interpolate a channel of an uneven clock (jitter, dropouts) to an even one; a channel on it stays as it is."""
+    """Interpolate a channel from non-uniform times (jitter, dropouts) to uniform ones; others are unchanged."""
     if time_s.size == even_time_s.size and np.max(np.abs(time_s - even_time_s)) <= 1e-3 / sampling_rate_hz:
         return values
     return np.interp(even_time_s, time_s, values)

@@ -8,13 +8,13 @@ Thesis (5.1) to (5.3), with the acceleration as the input that the printed (5.3)
 
 x1 displacement, x2 velocity, b bias of the accelerometer (optional, m = 0 without), y and a measured.
 
-Discretisation. Between two samples y and a are taken as straight lines, which makes the solution exact and adds no
-delay: with A = [[-k, 1, 0], [-l, 0, -1], [m, 0, 0]], B = [[k, 0], [l, 1], [-m, 0]] and u = (y, a),
+Discretisation. Between two samples, y and a are taken as linear in time. The solution is then exact and has no
+additional delay: with A = [[-k, 1, 0], [-l, 0, -1], [m, 0, 0]], B = [[k, 0], [l, 1], [-m, 0]] and u = (y, a),
 
     s(n) = F s(n-1) + G0 u(n-1) + G1 u(n)
 
 F = exp(A dt), and G0, G1 the integrals of exp(A (dt - t)) B against 1 - t/dt and t/dt. :func:`discretise` gives F, G0
-and G1; :func:`kinematic_kalman` runs the recursion, which may as well be run sample by sample in a control loop.
+and G1; :func:`kinematic_kalman` runs the recursion, which can also run sample by sample in a control loop.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def kalman_gains(
     displacement_noise_m, acceleration_noise_m_s2
         Above zero.
     bias_drift_m_s3
-        Rate at which the bias wanders; 0 leaves the bias state out.
+        Drift of the bias [m/s^3]; 0: no bias state.
 
     Raises
     ------
@@ -127,8 +127,8 @@ def kinematic_kalman(
     gains
         See :func:`kalman_gains`.
     start
-        First state (displacement, velocity, bias); by default the first displacement, at rest, no bias. What it is
-        wrong by dies out within about 5/k.
+        First state (displacement, velocity, bias); by default the first displacement, at rest, without bias. An error
+        of this state decays within about 5/k.
 
     Returns
     -------
@@ -153,12 +153,13 @@ def kinematic_kalman(
 def kinematic_smoother(
     displacement: FloatArray, acceleration: FloatArray, dt: float, gains: KalmanGains
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Estimate as :func:`kinematic_kalman` does, forwards and backwards in time, and take the mean: no delay.
+    """Return the mean of the estimates of :func:`kinematic_kalman` forward and backward in time: no delay.
 
-    A constant bias of the accelerometer turns the two velocities by opposite amounts and cancels in the mean.
+    A constant bias of the accelerometer changes the two velocities by opposite amounts and cancels in the mean.
     """
     ahead = kinematic_kalman(displacement, acceleration, dt, gains)
-    # the end state of the run ahead starts the run back, so that only the first few samples lack a good start
+    # the last state of the forward run starts the backward run, so that only the first few samples have an inaccurate
+    # start
     last = np.array([ahead[0][-1], -ahead[1][-1], ahead[2][-1]])
     back = kinematic_kalman(displacement[::-1], acceleration[::-1], dt, gains, start=last)
     settled = min(displacement.size, math.ceil(5.0 / (gains.k * dt)))

@@ -1,4 +1,4 @@
-"""Which tests of a campaign are too short for the filters of the preparation."""
+"""Search for tests that are too short for the filters of the preparation."""
 
 from __future__ import annotations
 

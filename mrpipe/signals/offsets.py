@@ -26,15 +26,16 @@ def balanced_extremes(values: FloatArray, cycles: IntArray) -> float:
 
 
 def mean_over_cycles(values: FloatArray, cycles: IntArray) -> float:
-    """Return the mean over whole cycles: the offset of an acceleration, as knocks spoil the balance of its peaks."""
+    """Return the mean over whole cycles: the offset of an acceleration, whose extremes are distorted by knocks."""
     return float(np.mean(values[cycles[0] : cycles[-1]]))
 
 
 def force_intercept(displacement: FloatArray, velocity: FloatArray, drive: FloatArray, force: FloatArray) -> float:
-    """Return the offset of a force under random motion, where neither mean nor extremes are balanced by chance.
+    """Return the offset of a force under random motion, whose mean and extremes are not symmetric.
 
-    The constant of a least-squares fit of the force by displacement and by functions that are odd in velocity (linear
-    and saturating), each times powers 0, 1, 2 of the drive. The mean alone errs by the correlation of the motion.
+    It is the constant of a least-squares fit of the force by displacement and by odd functions of velocity (linear and
+    saturating), each multiplied by powers 0, 1, 2 of the drive. The mean of the force would contain the mean of these
+    terms.
 
     Parameters
     ----------
@@ -68,9 +69,10 @@ def drive_favours_a_side(drive: FloatArray, cycles: IntArray) -> bool:
 
 
 def acceleration_gain(displacement: FloatArray, acceleration: FloatArray, sampling_rate_hz: float) -> float:
-    """Return measured acceleration over the second derivative of displacement: 1 where sign and unit are right.
+    """Return the ratio of acceleration to second derivative of displacement: 1 if sign and unit are right.
 
-    Taken by cross spectrum about the strongest frequency of the motion, where the displacement's noise does not matter.
+    It is computed from the cross spectrum around the strongest frequency of the motion, where the noise of the
+    displacement is negligible.
 
     Parameters
     ----------
@@ -82,7 +84,7 @@ def acceleration_gain(displacement: FloatArray, acceleration: FloatArray, sampli
     Returns
     -------
     float
-        Gain with sign; 0 where nothing moves.
+        Gain with sign; 0 without motion.
     """
     window = np.hanning(displacement.size)
     frequencies = np.fft.rfftfreq(displacement.size, 1.0 / sampling_rate_hz)

@@ -36,7 +36,7 @@ class SensorCorrections(Section):
         _NO_FAULTS.force_per_drive_squared_n, description="The same for the square of the drive."
     )
     drive_lag_s: float = Field(
-        _NO_FAULTS.drive_lag_s, ge=0.0, le=1.0, description="First-order lag of the drive in these two."
+        _NO_FAULTS.drive_lag_s, ge=0.0, le=1.0, description="First-order lag of the drive in these two offsets."
     )
     force_drift_n_s: float = Field(
         _NO_FAULTS.force_drift_n_s, description="Drift of the load cell from the beginning of each test [N/s]."
@@ -44,13 +44,13 @@ class SensorCorrections(Section):
 
 
 class PreparationOptions(Section):
-    """How measured tests are filtered, freed of offsets and differentiated."""
+    """Options for filtering measured tests, removing offsets, and differentiation."""
 
     working_rate_hz: float = Field(
         0.0,
         ge=0.0,
-        description="Sampling rate to which all tests are brought; 0 takes the lowest of the campaign that is at least "
-        "200 Hz, so that no test is filled up with samples that it does not have.",
+        description="Sampling rate to which all tests are converted; 0: the lowest rate of the campaign that is at "
+        "least 200 Hz, so that no test is interpolated to a higher rate.",
     )
     cutoff_hz: float = Field(
         100.0,
@@ -63,16 +63,17 @@ class PreparationOptions(Section):
     order: int = Field(2, ge=1, le=8, description="Order of the Butterworth filters.")
     phase: Literal["zero", "causal"] = Field(
         "zero",
-        description="zero: forwards and backwards, no channel is late; causal: as on the rig, velocity is 11 ms late.",
+        description="zero: forward and backward filters without delay; causal: as in a real-time controller, with a "
+        "delay of the velocity of 11 ms.",
     )
     cutoff_choice: Literal["by-motion", "fixed", "criterion"] = Field(
         "by-motion",
-        description="fixed: the cut-offs above; criterion: for each test and channel the frequency at which it sinks "
-        "into its noise; by-motion: fixed for sines, criterion for every other motion.",
+        description="fixed: the cut-offs above; criterion: for each test and channel the frequency above which noise "
+        "exceeds the signal; by-motion: fixed for sines, criterion for every other motion.",
     )
     differentiation: Literal["backward", "central", "savitzky-golay", "kalman"] = Field(
         "backward",
-        description="Velocity from displacement: backward difference (2.5; centred where phase is zero), central "
+        description="Velocity from displacement: backward difference (2.5; centred if phase is zero), central "
         "difference, Savitzky-Golay, or the kinematic Kalman filter (5.1 to 5.3), which needs an acceleration.",
     )
     savitzky_golay_window_s: float = Field(0.03, gt=0.0, description="Window of the Savitzky-Golay differentiation.")
@@ -88,23 +89,27 @@ class PreparationOptions(Section):
         description="Noise of the accelerometer (standard deviation) for the Kalman filter; 0 estimates it as above.",
     )
     kalman_bias_drift_m_s3: float = Field(
-        0.0, ge=0.0, description="How fast the accelerometer's bias wanders; 0 leaves the bias state out."
+        0.0, ge=0.0, description="Drift of the bias of the accelerometer for the Kalman filter; 0: no bias state."
     )
     offset: Literal["test", "campaign", "off"] = Field(
         "test",
-        description="Sensor offsets taken out: of each test by itself, one for the whole campaign (median over the "
+        description="Sensor offsets that are removed: one for each test, one for the whole campaign (median over the "
         "tests), or none.",
     )
     displacement_late_s: float = Field(
         0.0,
         ge=-0.1,
         le=0.1,
-        description="Time by which the displacement is recorded later than the other channels (the effect channel-skew "
-        "gives it); taken out.",
+        description="Time by which the displacement is recorded later than the other channels (value of the effect "
+        "channel-skew); it is corrected.",
     )
-    cycles: int = Field(10, ge=0, description="Steady cycles kept of each periodic test; 0 keeps all.")
-    settle_cycles: int = Field(1, ge=0, description="Steady cycles left out at the beginning, if there are enough.")
-    corrections: SensorCorrections = Field(SensorCorrections(), description="Faults of sensors that are known.")
+    cycles: int = Field(10, ge=0, description="Number of steady cycles that are kept of each periodic test; 0: all.")
+    settle_cycles: int = Field(
+        1, ge=0, description="Number of steady cycles that are left out at the beginning, if there are enough."
+    )
+    corrections: SensorCorrections = Field(
+        SensorCorrections(), description="Known faults of sensors, which are corrected."
+    )
 
     @property
     def faults(self) -> KnownFaults:

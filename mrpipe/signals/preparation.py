@@ -1,4 +1,4 @@
-"""From a measured recording to a prepared test: even clock, working rate, filters, offsets, velocity, cycles."""
+"""Preparation of a recording: uniform times, working rate, filters, offsets, velocity, cycles."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ VELOCITY_SHARE = 0.99
 
 
 CONTROLLER_RATE_HZ = 200.0
-"""A mixed campaign is not brought below this rate (thesis 2.3.1: the networks run at it)."""
+"""Lowest working rate of a campaign with several rates [Hz], because the networks run at it (thesis 2.3.1)."""
 
 LENT_OFFSET_SPREAD = 0.05
-"""Largest spread between tests, over the deviation of the channel, at which an offset passes for one of the sensor."""
+"""Ratio of the spread between tests to the deviation of the channel, up to which an offset is one of the sensor."""
 
 
 @dataclass(frozen=True)
 class Preparation:
-    """A prepared test and what was done to it.
+    """Prepared test and the steps of its preparation.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Preparation:
     cutoffs_hz
         Channel -> cut-off used; a channel that was not filtered is missing.
     frequency_hz, amplitude_m
-        Of the steady cycles; 0 where the motion is random.
+        Frequency [Hz] and amplitude [m] of the steady cycles; 0 for a random motion.
     before
         Channels on the working rate before filters and offsets, shape (n,) each, for spectra.
     findings
@@ -72,7 +72,7 @@ class Preparation:
 
 @dataclass(frozen=True)
 class PreparedCampaign:
-    """All prepared tests, and what holds for the campaign as a whole, one line each."""
+    """All prepared tests, and findings on the whole campaign, one line each."""
 
     tests: tuple[Preparation, ...]
     findings: tuple[str, ...] = ()
@@ -104,7 +104,7 @@ def prepare_campaign(
     Raises
     ------
     UserError
-        If the campaign is none of a damper bench, or a test is shorter than the filters need.
+        If the campaign is not one of a damper bench, or a test is too short for the filters.
     """
     source = str(campaign.directory)
     if campaign.rig != "damper-bench":
@@ -139,7 +139,7 @@ def prepare_campaign(
 
 
 def common_rate(rates_hz: Sequence[float]) -> float:
-    """Return the lowest rate that is at least 200 Hz, the controller's; the highest if none is."""
+    """Return the lowest rate that is at least 200 Hz, the rate of the controller; without one, the highest rate."""
     enough = [rate for rate in rates_hz if rate >= CONTROLLER_RATE_HZ]
     return min(enough) if enough else max(rates_hz)
 
@@ -161,7 +161,7 @@ def _on_working_rate(recording: Recording, begin: int, end: int, name: str, rate
 
 
 def _require_rate(options: PreparationOptions) -> None:
-    """Refuse a requested rate that cannot represent the velocity's band (a campaign that is slow by itself may be)."""
+    """Refuse a requested rate that is too low for the band of the velocity; a recorded rate may be too low."""
     asked, cutoff = options.working_rate_hz, options.velocity_cutoff_hz
     if 0.0 < asked < 2.5 * cutoff:
         problem = f"is {asked:g}, too slow for a velocity cut-off of {cutoff:g} Hz"
@@ -169,7 +169,7 @@ def _require_rate(options: PreparationOptions) -> None:
 
 
 def length_needed(options: PreparationOptions, rate: float) -> int:
-    """Return the fewest samples at a working rate [Hz] that the filters of these options need."""
+    """Return the smallest number of samples at a working rate [Hz] for the filters of these options."""
     return max(samples_needed(min(options.cutoff_hz, options.velocity_cutoff_hz), rate), 20)
 
 
@@ -256,9 +256,9 @@ def _measure_offsets(work: _Work) -> None:
 
 
 def _campaign_offset(works: Sequence[_Work], name: str) -> tuple[float, float]:
-    """Return a sensor's offset over the campaign and its spread between the tests that give it well.
+    """Return the offset of a sensor over the campaign, and its spread between the tests that determine it.
 
-    If none does, the mean of all tests weighted by length, and no spread.
+    Without such a test, the offset is the mean of all tests weighted by length, and there is no spread.
     """
     values = np.array([work.offsets[name] for work in works if name in work.trusted])
     if values.size:
@@ -325,7 +325,7 @@ def _finish(work: _Work, options: PreparationOptions, campaign: Campaign) -> Pre
 
 
 def _motion(work: _Work, options: PreparationOptions) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return displacement, velocity and acceleration, offset-free."""
+    """Return displacement, velocity and acceleration without offsets."""
     dt = 1.0 / work.rate
     displacement = work.filtered["displacement"] - work.offsets["displacement"]
     measured = None
@@ -336,7 +336,7 @@ def _motion(work: _Work, options: PreparationOptions) -> tuple[FloatArray, Float
         work.findings.append("no acceleration for the Kalman filter: the velocity is a central difference")
         method = "central"
     if method == "kalman" and measured is not None:
-        # the filter weighs the noise itself, so it is given what was measured
+        # the Kalman filter takes the noise into account, so that its inputs are the unfiltered measurements
         raw = work.channels["displacement"] - work.offsets["displacement"]
         raw_acceleration = work.channels["acceleration"] - work.offsets["acceleration"]
         estimate = kinematic_smoother if options.phase == "zero" else kinematic_kalman
@@ -366,6 +366,6 @@ def _differentiate(values: FloatArray, dt: float, options: PreparationOptions, m
     velocity = backward_difference(values, dt)
     if options.phase == "causal":
         return velocity
-    # (2.5) stands for the middle between two samples: bring it back on the clock of the other channels
+    # (2.5) is the velocity at the middle between two samples: interpolate it to the clock of the other channels
     velocity[0] = velocity[1]
     return np.concatenate((0.5 * (velocity[:-1] + velocity[1:]), velocity[-1:]))

@@ -1,4 +1,4 @@
-"""A prepared test: filtered, offset-free, differentiated, ready for every estimator of the bench."""
+"""Prepared test: filtered, without offsets, differentiated, as input of every estimator of the bench."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mrpipe.signals.channel_noise import displacement_cutoff, motion_frequency, 
 
 @dataclass(frozen=True)
 class PreparedTest:
-    """One test after `prepare`; all channels on one clock, SI, shape (n,).
+    """Test after `prepare`; all channels have the same times, SI, shape (n,).
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class PreparedTest:
     force_n
         Filtered, without offset, shape (n,).
     force_raw_n, displacement_raw_m
-        Offset-free but unfiltered, for estimators that bring their own noise model.
+        Offset-free but unfiltered, for estimators with a separate noise model.
     cycles
         Start indices of the steady cycles at upward zero crossings of displacement, with the end of the last one;
         empty where the motion is not periodic.
@@ -43,9 +43,9 @@ class PreparedTest:
     excitation
         `periodic` or `random`.
     drive_is_set_point
-        The drive is a set point and no record.
+        Whether the drive is a set point instead of a recorded channel.
     displacement_offset_m, force_offset_n
-        What was taken out of the channels as static offset (add it to have the records as measured).
+        Static offsets that were removed from the channels; their sum with the channels is the measured record.
     displacement_noise_m, displacement_noise_band_hz
         Standard deviation and band of the displacement's noise where it was put together from several sensors, so that
         the channel itself does not show; 0 if it does. Not written to the artifact.
@@ -89,7 +89,7 @@ class PreparedTest:
         """Sampling interval [s]."""
         return 1.0 / self.sampling_rate_hz
 
-    # spectra of whole records: an estimator that compares filters or rates reads them again and again
+    # spectra of whole records are cached, because an estimator that compares filters or rates reads them repeatedly
 
     @cached_property
     def force_noise_n(self) -> float:
@@ -168,7 +168,7 @@ def write_prepared(artifact: ArtifactWriter, tests: list[PreparedTest]) -> None:
 
 
 def read_prepared(artifact: Artifact) -> list[PreparedTest]:
-    """Read what :func:`write_prepared` wrote, in the order of writing."""
+    """Read the tests that :func:`write_prepared` wrote, in the order of writing."""
     tests = []
     for name in artifact.members("tests"):
         group = f"tests/{name}"

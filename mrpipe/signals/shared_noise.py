@@ -1,4 +1,4 @@
-"""The noise that a displacement sensor adds to every test, and motion freed of it.
+"""The noise that a displacement sensor adds to every test, and its removal from the motion.
 
 The tests of a campaign share one displacement sensor, but each moves at other frequencies. At each frequency the
 quietest tests therefore show the noise of the sensor alone, whether it is white, coloured or hum. With its density the
@@ -28,7 +28,7 @@ HARMONICS = 4.0
 """Below this multiple of the frequency of the motion every test may hold motion."""
 
 SMOOTHED_BINS = 31
-"""Numerical technique: over so many frequencies the density of the noise is smoothed."""
+"""Numerical technique: number of frequencies over which the density of the noise is smoothed."""
 
 MAINS_HZ = (50.0, 60.0)
 """Frequencies of the mains, at whose multiples all tests may hold hum."""

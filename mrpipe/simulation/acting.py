@@ -1,4 +1,4 @@
-"""What acts on a structure, as the settings describe it: one excitation, and others at the same time."""
+"""Excitation of a structure from the settings: one excitation, and further ones at the same time."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from mrpipe.simulation.settings import ExcitationSettings, SingleExcitationSetti
 from mrpipe.structures import Frame
 
 SWEEP = (0.4, 2.4)
-"""First and last frequency of a sweep over the free frequency, where the settings give none."""
+"""Default first and last frequency of a sweep, relative to the natural frequency without damper force."""
 
 ADJUSTED = ("harmonic", "sweep", "random")
-"""Kinds of motion whose amplitude is found where the settings give none."""
+"""Kinds of motion whose amplitude is computed if the settings do not give it."""
 
 
 def acting_together(settings: ExcitationSettings, frame: Frame, free_rad_s: float, amplitude: float) -> Excitation:
-    """Return everything that acts on a structure at the same time.
+    """Return the sum of all excitations that act on a structure at the same time.
 
     Parameters
     ----------
     settings
-        The excitation, and in `also` what acts in addition.
+        The excitation, and further ones in `also`.
     frame, free_rad_s
         Structure and free frequency of the target mode [rad/s].
     amplitude
-        Of the excitation, as in :func:`excitation_at`; those of `also` give their own.
+        Amplitude of the excitation, as in :func:`excitation_at`; those of `also` have separate ones.
 
     Raises
     ------
@@ -70,9 +70,9 @@ def superposed(first: Excitation, others: Sequence[Excitation]) -> Excitation:
     Parameters
     ----------
     first
-        Gives the duration, the steady part and the details of the run.
+        Excitation that gives the duration, the steady part and the details of the run.
     others
-        What acts in addition; after its end each is zero.
+        Further excitations; each is zero after its end.
     """
     everything = (first, *others)
 
@@ -90,12 +90,12 @@ def superposed(first: Excitation, others: Sequence[Excitation]) -> Excitation:
     details = {**first.details, "also": [item.details for item in others]}
     # without places the inputs are a single history, as everywhere
     single = (lambda times: at(times)[:, 0]) if not places else at
-    # with something else that acts, a harmonic that stops leaves a motion that is still driven
+    # with further excitations the motion is still driven after a harmonic stops
     return replace(first, at=single, places=places, shakes_ground=True, details=details, decay_from_s=math.nan)
 
 
 def known_amplitude(settings: SingleExcitationSettings, where: str = "simulate.excitation") -> float | None:
-    """Return the amplitude of the motion [m/s^2] or force [N] that the settings give; None where it is to be found.
+    """Return the amplitude of motion [m/s^2] or force [N] in the settings; None if it has to be computed.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def known_amplitude(settings: SingleExcitationSettings, where: str = "simulate.e
 def acting(
     excitation: Excitation, settings: SingleExcitationSettings, frame: Frame, where: str = "simulate.excitation"
 ) -> Excitation:
-    """Return the excitation with the places at which its histories act.
+    """Return the excitation with the places where its histories act.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def acting(
         If a place does not exist, or the structure has no second direction.
     """
     if settings.direction_deg:
-        # who reads the response needs the direction, because first floor and top are those that move along it
+        # readers of the response need the direction, because first floor and top are those that move along it
         details = {**excitation.details, "direction_deg": settings.direction_deg}
         excitation = replace(excitation, details=details)
     if settings.kind == "free-decay":
@@ -170,7 +170,7 @@ def excitation_at(
     free_rad_s
         Free frequency of the target mode.
     amplitude_m_s2
-        Of the base acceleration, before `settings.factor`; not used by other kinds of motion.
+        Amplitude of the base acceleration, before `settings.factor`; not used by other kinds of motion.
     where
         Setting that describes it, for messages.
 
@@ -204,7 +204,7 @@ def excitation_at(
 
 
 def _record(settings: SingleExcitationSettings, where: str) -> tuple[FloatArray, FloatArray]:
-    """Return time and histories, (m,) where there is one and (m, k) where there are several."""
+    """Return time [s] and histories, shape (m,) for one history and (m, k) for several."""
     quantity = "force" if settings.force_at else "acceleration"
     time_s, histories = read_histories(
         Path(settings.file),
@@ -218,7 +218,7 @@ def _record(settings: SingleExcitationSettings, where: str) -> tuple[FloatArray,
     if settings.file_y:
         second = f"{where}.file_y"
         other_s, other = read_histories(Path(settings.file_y), settings.file_unit, file_setting=second)
-        # on the clock of the first; a record that ends earlier is at rest after its end
+        # on the clock of the first record; a record that ends earlier is zero after its end
         second_history = np.interp(time_s, other_s - other_s[0] + time_s[0], other[:, 0], right=0.0)
         histories = np.column_stack([histories[:, 0], second_history])
     return time_s, histories[:, 0] if histories.shape[1] == 1 else histories

@@ -1,4 +1,4 @@
-"""The base amplitude at which viscous damping gives a wanted response (thesis 5.5.1)."""
+"""Base amplitude at which viscous damping gives a required response (section 5.5.1 of the thesis)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mrpipe.simulation.loop import LoopOptions, Response, simulate_law
 from mrpipe.structures import Frame
 
 SETTLED = 5e-3
-"""Relative error of the response at which an amplitude counts as found."""
+"""Largest relative error of the response for an amplitude that counts as found."""
 
 
 def adjusted_amplitude(
@@ -33,8 +33,8 @@ def adjusted_amplitude(
 ) -> tuple[float, Response, float]:
     """Return the base amplitude [m/s^2] at which law vd gives a rms top displacement, its response, and the error [1].
 
-    The response grows with the amplitude, but it may jump: a damper that sticks begins to slip. The amplitude is first
-    scaled by what is missing, and bisected once it is bracketed.
+    The response grows with the amplitude, but it may jump when a sticking damper begins to slip. The amplitude is first
+    scaled by the ratio of required to actual response, and bisected once it is bracketed.
 
     Parameters
     ----------
@@ -43,13 +43,13 @@ def adjusted_amplitude(
     viscous
         Controller of law vd with the reference gain.
     excite
-        From an amplitude to the excitation.
+        Function from an amplitude to the excitation.
     rms_top_m
         Wanted.
     rounds
-        Most simulations.
+        Largest number of simulations.
     must
-        Whether an amplitude that misses is an error.
+        Whether it is an error if no amplitude gives the response.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The time steps of a loop: of the plant, of the controller, and of what is recorded."""
+"""Time steps of a loop: of the plant, of the controller, and of the recorded histories."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Clock:
     steps
         Number of steps.
     per_sample
-        Steps of a sample of the controller.
+        Number of steps per sample of the controller.
     every
-        Steps from one recorded value to the next.
+        Number of steps from one recorded value to the next.
     """
 
     dt: float

@@ -1,4 +1,4 @@
-"""What shakes the base: harmonic motion that may stop, a sweep, random motion, or a recorded acceleration."""
+"""Excitations: harmonic motion that may stop, sweep, random motion, or recorded acceleration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mrpipe.structures import Frame, frequency_response
 
 @dataclass(frozen=True)
 class Place:
-    """Where an input acts that is not the base acceleration along the influence vector.
+    """Place of an input other than the base acceleration along the influence vector.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Place:
     shape
         Shape (n,): displacement of each degree of freedom per metre of the ground, or share of the force at each.
     force
-        Whether it is a force [N]; else an acceleration of the ground [m/s^2].
+        Whether the input is a force [N]; else it is an acceleration of the ground [m/s^2].
     """
 
     name: str
@@ -35,25 +35,25 @@ class Place:
 
 @dataclass(frozen=True)
 class Excitation:
-    """What acts on the structure over time: the base acceleration, and what `places` describe.
+    """Excitation of the structure over time: the base acceleration, and the inputs of `places`.
 
     Attributes
     ----------
     duration_s
         Length of the run.
     at
-        From times (m,) [s] to base accelerations (m,) [m/s^2]. With `places`: shape (m, k), a column for the base
-        acceleration if there is one, then one for each place.
+        Function from times (m,) [s] to base accelerations (m,) [m/s^2]. With `places` the result has shape (m, k): a
+        column for the base acceleration, if there is one, then one for each place.
     steady_s
-        From when to when the response is steady and its indices are taken.
+        Start and end [s] of the steady response, over which the indices are computed.
     decay_from_s
-        When a free decay begins; NaN where there is none.
+        Start of a free decay [s]; NaN if there is none.
     frequency_rad_s
-        Of a harmonic, else NaN.
+        Frequency of harmonic motion [rad/s]; else NaN.
     details
-        For tables and JSON.
+        Description for tables and JSON.
     places
-        What acts in addition to, or in place of, the base acceleration.
+        Places of inputs in addition to, or instead of, the base acceleration.
     shakes_ground
         Whether the first column of `at` is the base acceleration along the influence vector.
     """
@@ -82,7 +82,7 @@ def harmonic(
     decay_s: float = 0.0,
     phase_rad: float = 0.0,
 ) -> Excitation:
-    """Return a_g = -A sin(omega t + phase), eased in over `ramp_cycles`, stopped after whole cycles for a free decay.
+    """Return a_g = -A sin(omega t + phase) with a ramp at the start, stopped after whole cycles for a free decay.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def harmonic(
     ramp_cycles
         Length of the raised-cosine start.
     decay_s
-        How long the run goes on at rest of the base.
+        Duration of the free decay after the base has stopped [s].
     phase_rad
         Phase at the start [rad].
     """
@@ -133,7 +133,7 @@ def sweep(amplitude_m_s2: float, first_hz: float, last_hz: float, duration_s: fl
 
 
 RANDOM_RATE = 40.0
-"""Samples of random motion per period of its centre frequency; it is straight between them."""
+"""Samples of random motion per period of its centre frequency, with linear interpolation between them."""
 
 
 def narrow_band(
@@ -197,7 +197,7 @@ def narrow_band(
 
 
 def recorded(time_s: FloatArray, acceleration_m_s2: FloatArray, *, scale: float = 1.0) -> Excitation:
-    """Return a recorded base acceleration, straight between samples.
+    """Return a recorded base acceleration with linear interpolation between samples.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def recorded(time_s: FloatArray, acceleration_m_s2: FloatArray, *, scale: float 
 
 
 def at_rest(duration_s: float) -> Excitation:
-    """Return no excitation: a free decay from an initial state."""
+    """Return zero excitation, for a free decay from an initial state."""
     return Excitation(duration_s, np.zeros_like, (0.0, duration_s), 0.0, details={"kind": "rest"})
 
 

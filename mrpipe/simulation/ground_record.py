@@ -1,4 +1,4 @@
-"""Recorded histories that act on a structure: records as they are downloaded, or text of a clock and columns."""
+"""Recorded histories that act on a structure: downloaded records, or text with time and columns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mrpipe.errors import UserError
 from mrpipe.units import conversion, to_si
 
 HORIZONTAL = 2
-"""Most horizontal channels of a record that are used where none is named."""
+"""Largest number of horizontal channels of a record that are used if none is named."""
 
 UNIFORM_SHARE = 0.9
 """A clock is that of a recorder, and not of straight lines, where so many of its steps are equal."""
@@ -92,13 +92,15 @@ def _from_record(path: Path, channels: Sequence[str | int], channels_setting: st
             raise UserError(path, "", "holds no horizontal channel", remedy)
         if len(chosen) > HORIZONTAL:
             # those of a structure begin anywhere, on the roof too
-            problem = f"holds {len(chosen)} horizontal channels, and which are those of the ground is not said"
+            problem = (
+                f"holds {len(chosen)} horizontal channels, and it is not known which of them are those of the ground"
+            )
             raise UserError(path, "", problem, remedy)
     return common_window(path, chosen)
 
 
 def _place(path: Path, channel: str | int, names: Sequence[str]) -> int:
-    """Return the index of a channel that is named, or numbered as in its name (`3: 90 Deg`) or else from 1."""
+    """Return the index of a channel from its name, the number in its name (`3: 90 Deg`), or its position from 1."""
     text = str(channel).strip()
     numbers = [name.partition(":")[0] for name in names]
     for known in (list(names), numbers):

@@ -1,4 +1,4 @@
-"""What a response comes to: rms, peaks, damping of the decay, tracking, energy, effort (thesis 5.5)."""
+"""Indices of a response: RMS values, peaks, damping of the decay, tracking, energy, effort (section 5.5)."""
 
 from __future__ import annotations
 
@@ -21,14 +21,16 @@ FLOWING = 0.05
 """Share of the drive limit above which current counts as flowing."""
 
 QUICK = 0.55
-"""Where the extrema after the stop show less than this share of the first half period's damping, the decay was over
-within a period: what follows swings about the place where the damper stuck, and the first half period counts."""
+"""If the damping of the extrema after the stop is below this share of that of the first half period, the decay was over
+within one period. The later motion is then a vibration about the position at which the damper sticks, and the damping
+of the first half period is used.
+"""
 
 LEAST_ENERGY = 0.02
-"""Below this share of the energy the motion is not a decay any more."""
+"""Below this share of the energy the motion no longer counts as a decay."""
 
 SMALLEST_FITTED_PEAK = 0.15
-"""Peaks below this share of the first are not part of the controlled decay: residual force or a locked damper."""
+"""Peaks below this share of the first one are not fitted, because residual force or a locked damper determines them."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +68,11 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
     start_s
         When the base stops.
     drive_threshold
-        Drive above which current counts as flowing; where it never does (passive-off) all peaks count.
+        Drive above which current counts as flowing; if it never flows (passive-off), all peaks count.
     """
     t, x, v = response.time_s, response.displacement[:, response.top], response.velocity[:, response.top]
     turns = np.flatnonzero(v[:-1] * v[1:] < 0.0)
-    # the extremum nearest to the stop is where the decay starts from: a quick one has few others
+    # the decay starts from the extremum nearest to the stop, because a quick decay has few others
     if len(turns):
         turns = turns[int(np.argmin(np.abs(t[turns] - start_s))) :]
     drive = response.drive
@@ -106,10 +108,11 @@ def decay_damping(response: Response, start_s: float, drive_threshold: float) ->
 
 
 def energy_damping(response: Response, start_s: float, omega: float) -> float:
-    """Return the damping ratio by which the stored energy fades in the first period after `start_s` [s].
+    """Return the damping ratio from the decrease of the stored energy in the first period after `start_s` [s].
 
-    ln(E0/E1)/(2 omega T) over a whole period, since energy is taken out twice a period and not evenly; over half of it
-    where less than a fiftieth is left by then. For decays that are over before there is a second extremum.
+    ln(E0/E1)/(2 omega T) over a whole period, because energy is dissipated twice per period and not uniformly; over
+    half a period if less than 2 % of the energy remains then. It is used for decays that are over before there is a
+    second extremum.
 
     Parameters
     ----------
@@ -130,7 +133,7 @@ def energy_damping(response: Response, start_s: float, omega: float) -> float:
 
 
 def _damping(response: Response, excitation: Excitation, drive_threshold: float) -> dict[str, Any]:
-    """Return the damping of the decay and within which bounds its readings lie; by energy where there is no other."""
+    """Return the damping ratio of the decay, from the energy if there is no other, and the interval of estimates."""
     decay = decay_damping(response, excitation.decay_from_s, drive_threshold)
     omega = excitation.frequency_rad_s
     energy = energy_damping(response, excitation.decay_from_s, omega) if math.isfinite(omega) else math.nan
@@ -159,14 +162,14 @@ def _peak(values: FloatArray) -> float:
 
 
 def _floors(columns: list[int]) -> dict[str, int]:
-    """Return label -> column of the floors that are listed: the first, the fifth where there is one, and the top."""
+    """Return label -> column of the listed floors: the first, the fifth if there is one, and the top."""
     return {"1": columns[0], **({"5": columns[4]} if len(columns) >= 5 else {}), "_top": columns[-1]}
 
 
 def indices(
     response: Response, excitation: Excitation, *, residual_force_n: float, drive_limit: float
 ) -> dict[str, Any]:
-    """Return the indices of a response, keys with units; None where one has no meaning.
+    """Return the indices of a response, with units in the keys; None if an index is not defined.
 
     Accelerations are relative to the ground unless the key says `absolute`. The fifth floor is left out where there is
     none.
@@ -176,7 +179,7 @@ def indices(
     response, excitation
         Of the run.
     residual_force_n
-        Of the damper's model at no drive, used where the run never shows it.
+        Force of the damper model at zero drive [N], used if the drive is never zero in the run.
     drive_limit
         Of the damper.
     """
@@ -260,7 +263,7 @@ def _energy(response: Response, steady: BoolArray, excitation: Excitation) -> di
 
 
 def places_table(response: Response, names: Sequence[str], excitation: Excitation) -> list[dict[str, Any]]:
-    """Return RMS values and peaks of every degree of freedom, a row each; those of a rotation are in rad and rad/s^2.
+    """Return one row of RMS values and peaks for each degree of freedom; for rotations in rad and rad/s^2.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where an excitation acts on a structure: ground motion in two directions, a shaker, wind."""
+"""Inputs of a structure: ground motion in two directions, shaker forces, wind forces."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def force_shape(frame: Frame, shares: Mapping[str | int, float], where: str) -> 
 
 
 def acting_as_forces(excitation: Excitation, frame: Frame, shares: Mapping[str | int, float], where: str) -> Excitation:
-    """Return the same histories as forces [N] on degrees of freedom in place of a base acceleration.
+    """Return the same histories as forces [N] on degrees of freedom instead of a base acceleration.
 
     Parameters
     ----------
@@ -125,14 +125,14 @@ def in_two_directions(excitation: Excitation, frame: Frame, where: str) -> Excit
 
 
 def ground_amplitude(details: Mapping[str, Any], purpose: str) -> float:
-    """Return the amplitude of the base acceleration [m/s^2] that a response over frequency is measured at.
+    """Return the amplitude of the base acceleration [m/s^2] for a response over frequency.
 
     Parameters
     ----------
     details
         Of the excitation.
     purpose
-        For the message: what needs the amplitude.
+        Purpose of the amplitude, for the message.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """The compiled loop of Figure 5.3: frame, damper, sensors and controller.
 
-One plant step: the frame's linear part is exact for inputs that are linear between the ends of the step
-(`discretise_first_order`), and the force at its end is found together with the motion there, by fixed point and, where
-a law jumps, by bisection. See docs/numerics.md.
+One plant step: the linear part of the frame is exact for inputs that are linear between the ends of the step
+(`discretise_first_order`). The force at the end of the step is solved for together with the motion there, by
+fixed-point iteration and, if a law jumps, by bisection. See docs/numerics.md.
 """
 
 from __future__ import annotations
@@ -121,13 +121,13 @@ def run_loop(
     Parameters
     ----------
     counts, run
-        Integers and numbers of the run, indices I_... and R_...
+        Integers and real numbers of the run, with the indices I_... and R_...
     step_matrix
         Transposed, shape (2n + 3, 2n + 4): from [z, ground before, ground after, force before] to the state after the
         step, followed by displacement, velocity and acceleration of the damper and the momentum-like sum 1'M x; all
         without the force at the end of the step.
     at_end
-        Shape (2n + 4,): what one newton at the end of the step adds to these.
+        Shape (2n + 4,): contribution of 1 N at the end of the step to these values.
     lower, gain
         Transposed lower half of A, shape (2n, n), and accelerations of one newton of damper force, shape (n,).
     M, C, K, w
@@ -135,7 +135,7 @@ def run_loop(
     ground
         Ground acceleration at every plant step, shape (steps + 1,) [m/s^2].
     z
-        Initial state, shape (2n,); holds the final one in the end.
+        Initial state, shape (2n,); it is overwritten by the final state.
     functions, parameters, parameter_offsets, state_offsets, damper
         Chain and its state.
     law, numbers, layout, memory
@@ -160,7 +160,7 @@ def run_loop(
     after = np.zeros(size + 4)
     velocities = after[n:size]
     drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
-    # the plain chain in separate numbers: reading arrays through its function pointers takes longer than its sums
+    # the plain chain in separate variables: reading arrays through function pointers takes longer than the arithmetic
     u, yielding, viscous, zeta, hysteretic = 0.0, 0.0, 0.0, 0.0, 0.0
     rod, rod_end, rod_speed, speed_end = 0.0, 0.0, 0.0, 0.0
     eta_dt, yield_displacement, gamma_share, exponent = 0.0, 1.0, 0.5, 2.0
@@ -186,7 +186,7 @@ def run_loop(
     to_sample, to_output, to_record = 0, 0, 0
     wanted, asked, jumped = 0.0, 0.0, False
     for step in range(counts[I_STEPS] + 1):
-        # counters in place of remainders: integer division costs as much as the rest of the bookkeeping
+        # counters instead of remainders, because integer division takes as long as the rest of the bookkeeping
         if to_sample == 0:
             sample += 1
             to_sample = per_sample
@@ -282,11 +282,11 @@ def run_loop(
                 converged = True
                 break
             if real and abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
-                # so near that the slope of the step before leaves an error far below what matters
+                # so close that a correction with the slope of the step before leaves a negligible error
                 found = guess + difference / (1.0 - slope)
                 converged = True
                 break
-            # the answer grows with the motion and the motion shrinks with the force: the root is bracketed
+            # the force of the damper grows with the motion, and the motion falls with the force: the root is bracketed
             if difference > 0.0:
                 low = max(low, guess)
                 high = min(high, found)
@@ -294,7 +294,7 @@ def run_loop(
                 high = min(high, guess)
                 low = max(low, found)
             if iteration < PLAIN_ITERATIONS:
-                # the slope of the answer hardly changes from step to step: a secant that remembers it
+                # the slope hardly changes from step to step: a secant with the stored slope
                 if iteration > 0 and guess != last_guess:
                     slope = min(max((found - last_found) / (guess - last_guess), -0.9), 0.9)
                 last_guess, last_found = guess, found
@@ -304,7 +304,7 @@ def run_loop(
             else:
                 break
         if not converged:
-            # a jump: within the bracket any force is an answer of the law, and the one found lets the damper stick
+            # a jump: any force within the bracket satisfies the law, and with the one found the damper sticks
             found = guess
         for row_index in range(size + 4):
             after[row_index] += at_end[row_index] * found

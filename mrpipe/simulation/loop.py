@@ -29,7 +29,7 @@ Tracking = Literal["damper", "ideal", "continuous", "unclipped"]
 
 
 RECORD_RATE_HZ = 1000.0
-"""Rate of the histories if the settings give none. With a perfect damper, whose force jumps, it is the plant's rate."""
+"""Default rate of the histories [Hz]. With a perfect damper, whose force jumps, it is the rate of the plant."""
 
 _SETTINGS = SimulateSettings()
 """The defaults that the options share with the settings."""
@@ -37,12 +37,12 @@ _SETTINGS = SimulateSettings()
 
 @dataclass(frozen=True)
 class LoopOptions:
-    """How the loop is run.
+    """Options of the simulation of the loop.
 
     Attributes
     ----------
     plant_rate_hz
-        Steps of the plant a second; raised to the next multiple of the controller's rate.
+        Steps of the plant per second; raised to the next multiple of the rate of the controller.
     tracking
         `damper`: the chain gives the force. `ideal`: the damper gives the clipped desired force of the controller and
         holds it from sample to sample. `continuous`: the law acts on the true motion at every instant, and its force
@@ -97,7 +97,7 @@ class Response:
     command_time_s
         Clock of the controller.
     seconds
-        Wall time of the compiled loop.
+        Wall time of the compiled loop [s].
     floors
         Columns of the degrees of freedom that move with the ground: the first floor to the top. Empty: all columns.
     """
@@ -156,7 +156,7 @@ def base_shear(frame: Frame, absolute_acceleration: FloatArray) -> FloatArray:
     absolute_acceleration
         Of the degrees of freedom [m/s^2], shape (m, n).
     """
-    # not by BLAS, whose second thread continues to run after a product of this length
+    # BLAS is not used, because its second thread continues to run after a product of this length
     return np.einsum("tf,f->t", absolute_acceleration, frame.ground_masses)
 
 
@@ -168,7 +168,8 @@ def no_damper() -> Chain:
 def is_plain(chain: Chain) -> bool:
     """Return whether a chain is the plain one of (2.1) to (2.4), whose parameters the compiled loop reads directly.
 
-    The names do not decide it, because a driver with different rates for rising and falling drive has the same name.
+    The step names are not sufficient, because a lag with different rates for rising and falling drive has the same
+    name.
     """
     return chain.names == parts.BOUC_WEN and chain.functions[:4] == (
         lag_step, polynomial_step, hysteresis_step, sum_step
@@ -199,7 +200,7 @@ def simulate_law(
     excitation
         Base acceleration; its duration is that of the run.
     options
-        How the loop is run.
+        Options of the simulation of the loop.
     position
         Connectivity vector w, shape (n,); floor 1 to ground if left out.
     rng
@@ -251,7 +252,7 @@ def simulate_law(
 
 
 def _plant(frame: Frame, w: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return step matrix, what the force at the end adds, lower half of A and gain of the force for the kernel."""
+    """Return step matrix, contribution of the force at the end, lower half of A, and gain of the force."""
     n = frame.floors
     space = state_space(frame, -w)
     Ad, B0, B1 = discretise_first_order(space.A, space.B, dt)
@@ -337,7 +338,7 @@ def _response(
         velocity=record[:, n : 2 * n],
         acceleration=absolute - np.outer(ground, frame.ground_influence),
         absolute_acceleration=absolute,
-        # not by BLAS, whose second thread spins on after a product of this length
+        # BLAS is not used, because its second thread continues to run after a product of this length
         damper_displacement=np.einsum("tf,f->t", record[:, :n], w),
         damper_velocity=np.einsum("tf,f->t", record[:, n : 2 * n], w),
         force=tail[:, parts.T_FORCE],

@@ -22,7 +22,7 @@ TRACK_BOUC_WEN = 3  # as TRACK_DAMPER, for the plain chain of (2.1) to (2.4) wit
 
 # --- numbers of the run ---
 R_DT = 0
-R_LAG = 1  # share of the way to the command that the driver goes in a step, 1 without lag
+R_LAG = 1  # share of the difference to the command by which the driver moves in a step; 1 without lag
 R_C = 2
 R_K = 3
 R_CLIPPED = 4  # 1: the force of a perfect damper is never active; 0: it follows the linear law
@@ -34,7 +34,7 @@ I_PER_SAMPLE = 1
 I_DELAY = 2
 I_TRACK = 3
 I_RECORD = 4  # plant steps between records
-I_COMMAND = 5  # where the damper's state keeps the command of the step before; -1: nowhere
+I_COMMAND = 5  # index in the state of the damper of the last command; -1: none
 I_SIZE = 6
 
 # --- columns of the record after the 2n of the state and the n absolute accelerations ---
@@ -97,7 +97,7 @@ def sense(
 ) -> None:  # fmt: skip
     """Fill the readings of the sensors; `lower` is the transposed lower half of A, `gain` the accelerations of 1 N.
 
-    In the noise, infinity marks a reading that repeats the one before, minus infinity one that is 0.
+    In the noise, plus infinity marks a reading that repeats the last one, and minus infinity a reading of 0.
     """
     before = measured.copy()
     n = w.shape[0]

@@ -1,7 +1,8 @@
-"""The closed loop once more, in plain numpy and readable: what the compiled kernel is tested against.
+"""A second, readable version of the closed loop in plain numpy, as reference for tests of the compiled kernel.
 
-Bouc-Wen dampers only. Every part is written anew: the hysteresis is integrated from (2.2) with small Runge-Kutta steps,
-the controller works on arrays and lists, the step solves motion and force by plain repetition.
+It supports Bouc-Wen dampers only. Every part is programmed independently: the hysteresis is integrated from (2.2) with
+small Runge-Kutta steps, the controller works on arrays and lists, and the step solves for motion and force by simple
+iteration.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ class ReferenceDamper:
     speed: float = 0.0
 
     def moved(self, increment: float, velocity: float, command: float, dt: float) -> tuple[float, ReferenceDamper]:
-        """Return the force after a step, and the damper then."""
+        """Return the force [N] after a step, and the damper in its new state."""
         numbers = self.model.parameters
         turn = _turning_point(increment, self.speed, velocity, dt)
         zeta = self.zeta
@@ -183,7 +184,7 @@ def reference_loop(
     ground
         Base acceleration at every plant step, shape (steps + 1,) [m/s^2].
     per_sample
-        Plant steps a controller sample.
+        Plant steps per controller sample.
 
     Returns
     -------

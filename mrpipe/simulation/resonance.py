@@ -22,14 +22,18 @@ from mrpipe.simulation.settings import ResonanceSettings
 from mrpipe.simulation.steady_state import CurveOptions, Run
 
 BAND = (0.75, 1.2)
-"""Default band: lowest frequency over the free one of the target mode, highest over that with a locked damper. The
-resonance of any loop with a passive damper force lies between these two frequencies."""
+"""Default band: lowest frequency relative to the natural frequency of the target mode without damper force, and highest
+one relative to that with a locked damper. The resonance of any loop with a passive damper force lies between these two
+natural frequencies.
+"""
 
 WARNED = 1.1
 """A standard error is reported if it exceeds the demanded one by this factor."""
 
 REFINEMENTS, FLATNESS = 12, 0.01
-"""Most frequencies that refine one maximum, and by how much its neighbours may be lower in the end [1]."""
+"""Largest number of frequencies that refine one maximum, and largest relative difference to its neighbours at the end
+[1].
+"""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ class Curves:
     curves
         One per amplitude.
     warnings
-        What to know about them.
+        Messages for the user.
     """
 
     factors: tuple[float, ...]
@@ -74,7 +78,7 @@ def default_band(calibration: Artifact) -> tuple[float, float]:
 
 
 def curve_options(settings: ResonanceSettings, *, absolute: bool) -> CurveOptions:
-    """Return how the curves are measured."""
+    """Return the options of the response curves."""
     return CurveOptions(
         points=settings.points,
         tolerance=settings.tolerance,
@@ -117,7 +121,7 @@ def measure_resonance(
     rig, law
         The loop.
     excitation
-        Gives the nominal amplitude of the base acceleration.
+        Excitation that gives the nominal amplitude of the base acceleration.
     band_rad_s
         Lowest and highest frequency [rad/s].
     settings
@@ -149,7 +153,7 @@ def measure_resonance(
     curves = []
     for number, factor in enumerate(settings.amplitude_factors):
         progress(number / len(settings.amplitude_factors), f"response over frequency at {factor:g} times the amplitude")
-        # the linear algebra of a run is so small that a second thread only takes time from other programs
+        # the linear algebra of a run is so small that a second thread would only slow down other programs
         with threadpool_limits(1):
             curves.append(response_curve(run, factor * amplitude, band_rad_s, options, jobs=jobs))
     warnings = _warnings(curves, band_rad_s, settings.standard_error)

@@ -1,9 +1,9 @@
 """Steady response of the closed loop over the excitation frequency, and its resonance.
 
-A loop with a friction-like damper is not linear: its resonance depends on the law, on the gains and on the amplitude.
-A comparison of laws at one frequency therefore favours the law that happens to be detuned there. This module measures
-the steady RMS response at many frequencies, at constant amplitude of the base acceleration, and refines the frequency
-of the largest response.
+A loop with a friction-like damper is not linear: its resonance depends on the law, on the gains and on the amplitude. A
+comparison of laws at one frequency therefore favours a law that moves the resonance away from this frequency. This
+module measures the steady RMS response at many frequencies, at constant amplitude of the base acceleration, and refines
+the frequency of the largest response.
 
 The values of an irregular response have a standard error, and the largest of several such values is on average too
 large. With `CurveOptions.standard_error` all values that may be the largest are therefore measured again, over further
@@ -23,19 +23,22 @@ from mrpipe.simulation.steady_state import CurveOptions, Run, Steady, SteadyResp
 from mrpipe.simulation.windows import DISPLAYED, QUANTITIES
 
 NARROW, INTO = 10.0, 0.3
-"""A maximum is found once its interval is narrower than so many frequency tolerances; share of the wider side of the
-interval that a search enters where the parabola repeats the maximum."""
+"""A maximum is found once its interval is narrower than this number of frequency tolerances; and share of the wider
+side of the interval at which the search continues if the parabola repeats the maximum.
+"""
 
 SEARCHING = (8.0, 4.0, 2.0)
-"""Errors with which two values are compared in a search, over the standard error with which the maximum is measured:
-one after the other until the difference is larger than its error."""
+"""Errors with which two values are compared in a search, relative to the standard error of the maximum. They are used
+one after the other until the difference exceeds its error.
+"""
 
 RIVAL = 2.0
-"""A value may be the largest if it is smaller than the largest one by less than so many standard errors of their
-difference."""
+"""A value may be the largest if it is smaller than the largest one by less than this number of standard errors of their
+difference.
+"""
 
 SEARCHING_CYCLES = 0.25
-"""Most cycles over which a value of the search is averaged, over the most for a largest value."""
+"""Largest number of cycles over which a value of the search is averaged, relative to that of a largest value."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class ResponseCurve:
     frequency_rad_s
         Ascending, shape (m,) [rad/s]: the grid and the refined frequencies.
     values
-        Of QUANTITIES, shape (m, len(QUANTITIES)), SI units.
+        Values of QUANTITIES, shape (m, len(QUANTITIES)), SI.
     errors
         Standard errors of the values, shape (m, len(QUANTITIES)).
     steady
@@ -111,15 +114,15 @@ def response_curve(
     Parameters
     ----------
     run
-        Runs the loop under an excitation, from rest.
+        Function that runs the loop under an excitation, from rest.
     amplitude_m_s2
         Amplitude of the base acceleration [m/s^2].
     band_rad_s
         Lowest and highest frequency [rad/s].
     options
-        How it is measured.
+        Options of the measurement.
     known
-        Frequency [rad/s] -> response that was measured under the same conditions; the new ones are put in.
+        Frequency [rad/s] -> response that was measured under the same conditions; new responses are added.
     jobs
         Threads for the further runs of an irregular response; the result does not depend on their number.
     """
@@ -147,7 +150,7 @@ def response_curve(
 
 
 def _accurate(measured: SteadyResponses, omega: float, column: int, times: float = SEARCHING[0]) -> float:
-    """Return a value with an error of so many times the demanded one, as far as a search averages."""
+    """Return a value whose error is at most `times` the required one, within the limit of cycles of a search."""
     options = measured.options
     most = round(SEARCHING_CYCLES * options.most_averaged_cycles)
     return measured.accurate(omega, column, times * options.standard_error, most)
@@ -217,7 +220,7 @@ def _relative_error(measured: SteadyResponses, omega: float, column: int) -> flo
 
 
 def _maxima(values: FloatArray, share: float) -> list[int]:
-    """Return the places of local maxima above a share of the largest value; infinite values are not refined."""
+    """Return the indices of local maxima above a share of the largest value; infinite values are not refined."""
     if not np.all(np.isfinite(values)):
         return []
     padded = np.concatenate([[-math.inf], values, [-math.inf]])
@@ -261,7 +264,7 @@ def _refine(measured: SteadyResponses, column: int, grid: Sequence[float], place
 
 
 def _vertex(x: tuple[float, float, float], y: tuple[float, float, float]) -> float:
-    """Return where the parabola through three points has its maximum; the middle point where it has none."""
+    """Return the abscissa of the maximum of the parabola through three points; the middle point if there is none."""
     left, right = (x[1] - x[0]) * (y[1] - y[2]), (x[1] - x[2]) * (y[1] - y[0])
     bottom = left - right
     if bottom == 0.0:

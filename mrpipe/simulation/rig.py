@@ -1,4 +1,4 @@
-"""The loop as the settings describe it: structure, damper, options of the run, and what shakes the base."""
+"""The closed loop from the settings: structure, damper, options of the run, and excitation."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from mrpipe.structures import Frame, frame_from_parameter_set, natural_modes
 from mrpipe.structures.over_amplitude import read_frame_at
 
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
-"""Dampers of a run by name, and the stage whose artifact holds each."""
+"""Name of a damper of a run -> stage whose artifact contains it."""
 
 LARGEST_PLAUSIBLE_M_S2 = 9.81
 """Amplitude of the base acceleration above which a computed one is reported: strong-motion records seldom have a peak
@@ -69,7 +69,7 @@ class Rig:
 
     @property
     def perfect(self) -> bool:
-        """Whether the damper gives any force that is desired, and the sensors are perfect."""
+        """Whether the damper gives every desired force, and the sensors are perfect."""
         return self.options.tracking == "ideal"
 
     def reason_to_skip(self, law: str) -> str:
@@ -78,7 +78,7 @@ class Rig:
         if law in skipped:
             return f"law {law} could not be calibrated: {skipped[law]}"
         if self.options.tracking != "damper" and law_named(law).output == "drive":
-            return f"law {law} commands the drive, so that a perfect damper (simulate.tracking) has no force"
+            return f"law {law} commands the drive, so that a perfect damper (simulate.tracking) has no desired force"
         return ""
 
     def controller(self, law: str | Law, gains: Gains | None = None) -> Controller:
@@ -94,7 +94,7 @@ class Rig:
         rng: np.random.Generator | None = None,
         initial_state: FloatArray | None = None,
     ) -> Response:
-        """Run the loop under a controller; `chain` in place of the damper's own.
+        """Run the loop under a controller; `chain` replaces the chain of the damper.
 
         Raises
         ------
@@ -145,7 +145,7 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact], ga
     damper = damper_named(settings.damper, dampers)
     controllers = ControllerFactory(
         frame,
-        # the controller knows the damper that it was designed for, not what the tracing has found since
+        # the controller contains the damper that it was designed for, without effects that the tracing has found since
         damper_named("identified", dampers) if settings.damper == "traced" else damper,
         read_calibrated_with(artifact, gains),
         settings.controller,
@@ -156,7 +156,7 @@ def read_rig(settings: SimulateSettings, artifact: Callable[[str], Artifact], ga
 
 
 def loop_options(settings: SimulateSettings) -> LoopOptions:
-    """Return how the loop is run."""
+    """Return the options of the loop."""
     sensors = settings.sensors
     perfect = settings.tracking != "damper"
     noise = SensorNoise(sensors.displacement_noise_m, sensors.acceleration_noise_m_s2, sensors.acceleration_bias_m_s2)
@@ -186,7 +186,7 @@ def excitation_of(
     Parameters
     ----------
     rig, settings
-        What is shaken, and how.
+        Rig, and settings of the excitation.
     warn
         Called with a message if the adjustment does not reach a response that the settings do not demand.
 
@@ -208,7 +208,7 @@ def expected_top(rig: Rig) -> float:
     known = rig.controllers.calibrated
     if rig.frame.influence_y is None:
         return known.amplitude_m * abs(known.top_0 / known.u_0)
-    # the calibration does not know in which direction the ground moves, and so which degree of freedom is the top
+    # the calibration does not know the direction of the ground motion, and therefore not the top degree of freedom
     modes = natural_modes(rig.frame)
     shape = modes.mode_shapes[:, int(np.argmin(np.abs(modes.angular_frequencies - known.omega_0)))]
     return known.amplitude_m * abs(float(shape[rig.frame.top] / (rig.position @ shape)))
@@ -249,7 +249,7 @@ def _adjusted(
 
 
 def amplitude_warning(amplitude_m_s2: float) -> str:
-    """Return what the user should know where a base amplitude that was computed [m/s^2] is implausible; else ""."""
+    """Return a warning if a computed base amplitude [m/s^2] is implausible; else an empty text."""
     if amplitude_m_s2 <= LARGEST_PLAUSIBLE_M_S2:
         return ""
     return (

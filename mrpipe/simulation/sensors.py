@@ -23,16 +23,16 @@ _FAULT = SensorFaultSettings()
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """RMS noise of a sample of each sensor; the accelerometers' constant bias.
+    """RMS noise of a sample of each sensor, and constant bias of the accelerometers.
 
     Attributes
     ----------
     displacement_m
-        Of the laser at the damper.
+        Noise of the displacement sensor at the damper [m].
     acceleration_m_s2
-        Of each accelerometer.
+        Noise of each accelerometer [m/s^2].
     acceleration_bias_m_s2
-        Of the difference of the two accelerometers that give the damper's acceleration.
+        Bias of the difference of the two accelerometers that give the acceleration of the damper [m/s^2].
     """
 
     displacement_m: float = 0.0
@@ -67,7 +67,7 @@ class SensorFault:
 
 
 def sensor_noise(noise: SensorNoise, samples: int, floors: int, rng: np.random.Generator | None) -> FloatArray:
-    """Return sensor noise, shape (samples, 5 + n); the damper's acceleration is a difference of two sensors."""
+    """Return sensor noise, shape (samples, 5 + n); the acceleration of the damper is the difference of two sensors."""
     result = np.zeros((samples, MEASURED_FLOORS + floors))
     if noise.displacement_m > 0.0 or noise.acceleration_m_s2 > 0.0:
         if rng is None:

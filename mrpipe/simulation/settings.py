@@ -1,4 +1,4 @@
-"""Settings of the closed loop: a section of the configuration, and the options of :mod:`mrpipe.simulation.rig`."""
+"""Settings of the closed loop: sections of the configuration, and options of :mod:`mrpipe.simulation.rig`."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ class SingleExcitationSettings(Section):
 
     kind: Literal["harmonic", "sweep", "random", "recorded", "free-decay"] = Field(
         "harmonic",
-        description="Harmonic with a free decay after its stop, sweep, narrow-band random motion, recorded motion, or "
-        "release from a shape.",
+        description="Kind of excitation: harmonic motion with a free decay after its stop, sweep, narrow-band random "
+        "motion, recorded motion, or free decay from an initial displacement.",
     )
     frequency_rad_s: float | None = Field(
         None,
         gt=0.0,
-        description="Of the harmonic, and centre of random motion; null: the free frequency of the calibrated mode.",
+        description="Frequency of harmonic motion, and centre frequency of random motion; null: natural frequency of "
+        "the calibrated mode without damper force.",
     )
     base_amplitude_m_s2: float | None = Field(
         None,
         gt=0.0,
-        description="Of harmonic or sweep; random motion has the RMS of this harmonic. null: adjusted so that vd gives "
-        "`reference_rms_top_m` under the harmonic.",
+        description="Amplitude of harmonic motion or sweep; random motion has the RMS value of this harmonic. null: "
+        "adjusted so that vd gives `reference_rms_top_m` under harmonic motion.",
     )
     adjust_with: Literal["damper", "ideal"] = Field(
         "damper", description="Whether the amplitude is adjusted with the damper in the loop or with perfect tracking."
@@ -35,45 +36,49 @@ class SingleExcitationSettings(Section):
     reference_rms_top_m: float | None = Field(
         None,
         gt=0.0,
-        description="RMS top displacement of vd in the adjustment; null: that at which the damper would move with the "
-        "expected amplitude of the calibration in the free mode.",
+        description="RMS top displacement of vd in the adjustment; null: the one at which the damper would move with "
+        "the expected amplitude of the calibration in the mode without damper force.",
     )
     reference_c_n_s_m: float | None = Field(
         None, gt=0.0, description="Viscous gain of vd in the adjustment; null: as calibrated."
     )
-    factor: float = Field(1.0, gt=0.0, description="Factor on the base acceleration, whatever its kind.")
-    cycles: int = Field(40, ge=2, description="Cycles of the harmonic.")
-    settling_cycles: int = Field(20, ge=1, description="Cycles left out of the indices.")
-    ramp_cycles: float = Field(2.0, ge=0.0, description="Cycles over which the harmonic is eased in.")
-    decay_s: float = Field(8.0, ge=0.0, description="Free decay after the harmonic stops.")
+    factor: float = Field(1.0, gt=0.0, description="Factor on the base acceleration of every kind.")
+    cycles: int = Field(40, ge=2, description="Number of cycles of harmonic motion.")
+    settling_cycles: int = Field(20, ge=1, description="Number of first cycles that are left out of the indices.")
+    ramp_cycles: float = Field(2.0, ge=0.0, description="Number of cycles of the ramp at the start of harmonic motion.")
+    decay_s: float = Field(8.0, ge=0.0, description="Duration of the free decay after harmonic motion stops.")
     release_top_m: float | None = Field(
         None,
         gt=0.0,
-        description="Top displacement from which kind free-decay is released; null: the damper starts at the expected "
-        "amplitude of the calibration.",
+        description="Initial top displacement of kind free-decay; null: the damper starts at the expected amplitude "
+        "of the calibration.",
     )
     sweep_first_hz: float | None = Field(
-        None, gt=0.0, description="First frequency of the sweep; null: 0.4 of the free frequency."
+        None,
+        gt=0.0,
+        description="First frequency of the sweep; null: 0.4 times the natural frequency without damper force.",
     )
     sweep_last_hz: float | None = Field(
-        None, gt=0.0, description="Last frequency of the sweep; null: 2.4 times the free frequency."
+        None,
+        gt=0.0,
+        description="Last frequency of the sweep; null: 2.4 times the natural frequency without damper force.",
     )
-    sweep_s: float = Field(60.0, gt=0.0, description="Length of the sweep.")
-    random_s: float = Field(240.0, gt=0.0, description="Length of random motion.")
+    sweep_s: float = Field(60.0, gt=0.0, description="Duration of the sweep.")
+    random_s: float = Field(240.0, gt=0.0, description="Duration of random motion.")
     random_bandwidth: float = Field(
         0.1,
         gt=0.0,
         le=2.0,
         description="Width of the spectrum of random motion at half its height, over the centre frequency.",
     )
-    random_seed: int = Field(1, ge=0, description="Seed of random motion; all laws meet the same motion.")
+    random_seed: int = Field(1, ge=0, description="Seed of random motion, which is the same for all laws.")
     file: str = Field(
         "",
         description="Recorded motion: PEER AT2, COSMOS or CSMIP V2 (also V1 and RAW), SMC, GeoNet V2A, a zip of them, "
         "or text of time [s] and one column for each history. Two components act in the two directions of the "
         "structure (`structure.influence_y`).",
     )
-    file_y: str = Field("", description="Record of the second direction, where each direction has its own file.")
+    file_y: str = Field("", description="Record of the second direction, if each direction has a separate file.")
     file_unit: str = Field(
         "m/s^2", description="Unit of the histories in a text file, such as g, cm/s^2 or, for forces, kN."
     )
@@ -85,15 +90,17 @@ class SingleExcitationSettings(Section):
     direction_deg: float = Field(
         0.0,
         description="Direction of the ground motion, from the first direction of the structure towards the second one; "
-        "a record of two components is turned as a whole.",
+        "the two components of a record are rotated together.",
     )
     force_at: dict[str | int, float] = Field(
         {},
-        description="Degrees of freedom on which a force acts in place of ground motion (shaker, wind), each with a "
+        description="Degrees of freedom on which a force acts instead of ground motion (shaker, wind), each with a "
         "factor. The histories of a file belong to them in this order; one history acts on all.",
     )
     force_amplitude_n: float | None = Field(
-        None, gt=0.0, description="With `force_at`: amplitude of a harmonic force or sweep; random forces have its RMS."
+        None,
+        gt=0.0,
+        description="With `force_at`: amplitude of a harmonic force or sweep; random forces have the same RMS value.",
     )
 
 
@@ -102,8 +109,9 @@ class ExcitationSettings(SingleExcitationSettings):
 
     also: tuple[SingleExcitationSettings, ...] = Field(
         (),
-        description="What acts at the same time, each like `simulate.excitation` with its own amplitude, such as wind "
-        "(`force_at`) during motion of the ground. The duration is that of `simulate.excitation`.",
+        description="Further excitations that act at the same time, each with the settings of `simulate.excitation` "
+        "and a separate amplitude, such as wind (`force_at`) during ground motion. The duration is that of "
+        "`simulate.excitation`.",
     )
 
 
@@ -113,13 +121,13 @@ class SensorFaultSettings(Section):
     kind: Literal["none", "missing", "zero", "stuck"] = Field(
         "none",
         description="`missing`: the reading is not a number; `zero`: it is 0; `stuck`: the last reading is repeated, "
-        "as with samples that come late.",
+        "like late samples.",
     )
     sensor: Literal["displacement", "accelerometers", "velocity", "force", "all"] = Field(
-        "all", description="Which sensor."
+        "all", description="Sensor with the fault."
     )
-    share: float = Field(0.01, ge=0.0, le=1.0, description="Share of the samples that begin a fault.")
-    samples: int = Field(1, ge=1, description="Length of a fault in samples of the controller.")
+    share: float = Field(0.01, ge=0.0, le=1.0, description="Share of the samples at which a fault begins.")
+    samples: int = Field(1, ge=1, description="Duration of a fault in samples of the controller.")
 
 
 class SensorSettings(Section):
@@ -127,19 +135,21 @@ class SensorSettings(Section):
 
     displacement_noise_m: float = Field(20e-6, ge=0.0, description="RMS noise of the damper displacement.")
     acceleration_noise_m_s2: float = Field(0.1, ge=0.0, description="RMS noise of each acceleration.")
-    acceleration_bias_m_s2: float = Field(0.0, description="Constant bias of the damper's acceleration.")
+    acceleration_bias_m_s2: float = Field(0.0, description="Constant bias of the acceleration of the damper.")
     fault: SensorFaultSettings = Field(SensorFaultSettings(), description="Faulty readings.")
 
 
 class SimulateSettings(Section):
     """The closed loop."""
 
-    frame: str = Field("identified", description="Frame: `identified`, or a set of configs/frames or its YAML file.")
+    frame: str = Field(
+        "identified", description="Frame: `identified`, or a parameter set of configs/frames or its YAML file."
+    )
     frame_amplitude_m: float = Field(
         0.0,
         ge=0.0,
-        description="Where identify-frame found modes that depend on amplitude: amplitude of the motion [m] at which "
-        "the identified frame is taken (equivalent linear frame). 0 takes M, C and K of constant modes.",
+        description="Amplitude of the motion [m] at which the identified frame is taken (equivalent linear frame), if "
+        "identify-frame found modes that depend on the amplitude. 0: M, C and K of constant modes.",
     )
     damper: str = Field(
         "identified",
@@ -149,11 +159,12 @@ class SimulateSettings(Section):
     )
     tracking: Literal["damper", "ideal", "continuous", "unclipped"] = Field(
         "damper",
-        description="The damper gives the force; `ideal`: the controller has perfect sensors and its clipped force is "
-        "held from sample to sample; `continuous`: vd, vdps, vdns act at every instant and are never active; "
-        "`unclipped`: the same, but the force may be active, so that the loop is linear.",
+        description="How the desired force becomes the actual one. `damper`: the damper model gives the force. "
+        "`ideal`: the sensors are perfect, and the clipped force of the controller is held from sample to sample. "
+        "`continuous`: vd, vdps and vdns act at every instant, with clipping, so that they never feed energy into the "
+        "structure. `unclipped`: the same without clipping, so that the loop is linear.",
     )
-    plant_rate_hz: float = Field(2000.0, ge=100.0, description="Steps of the plant a second.")
+    plant_rate_hz: float = Field(2000.0, ge=100.0, description="Steps of the plant per second.")
     record_rate_hz: float | None = Field(
         None, gt=0.0, description="Rate of the histories; null: 1000 Hz, and every plant step with a perfect damper."
     )
@@ -164,12 +175,12 @@ class SimulateSettings(Section):
         "the calibrated one, because there is no yielding that would round it.",
     )
     driver_time_constant_s: float = Field(
-        0.0, ge=0.0, description="Lag of the current driver in addition to the damper's own."
+        0.0, ge=0.0, description="Time constant of the current driver in addition to the lag of the damper."
     )
     accelerations: Literal["relative", "absolute"] = Field(
-        "relative", description="Which accelerations `simulate --resonance` and `design` judge."
+        "relative", description="Accelerations that `simulate --resonance` and `design` judge."
     )
-    excitation: ExcitationSettings = Field(ExcitationSettings(), description="What shakes the base.")
+    excitation: ExcitationSettings = Field(ExcitationSettings(), description="Excitation of the structure.")
     controller: ControllerSettings = Field(ControllerSettings(), description="The real-time controller.")
     sensors: SensorSettings = Field(SensorSettings(), description="Noise of the sensors.")
 
@@ -179,28 +190,35 @@ class ResonanceSettings(Section):
 
     band_rad_s: tuple[float, float] | None = Field(
         None,
-        description="Lowest and highest frequency; null: from 0.75 times the free frequency of the calibrated mode to "
-        "1.2 times its frequency with a locked damper.",
+        description="Lowest and highest frequency; null: from 0.75 times the natural frequency of the calibrated mode "
+        "without damper force to 1.2 times that with a locked damper.",
     )
-    points: int = Field(19, ge=5, description="Frequencies of the grid; the resonances are refined in addition.")
+    points: int = Field(19, ge=5, description="Number of frequencies of the grid; resonances are refined in addition.")
     amplitude_factors: tuple[float, ...] = Field(
         (1.0,),
         min_length=1,
         description="Amplitudes of the base acceleration in multiples of that of `simulate.excitation`.",
     )
     tolerance: float = Field(
-        2e-3, gt=0.0, description="Relative change of the RMS values from window to window that counts as steady."
+        2e-3,
+        gt=0.0,
+        description="Largest relative change of the RMS values from window to window of a steady response.",
     )
-    window_cycles: int = Field(6, ge=2, description="Cycles over which an RMS value is taken.")
+    window_cycles: int = Field(6, ge=2, description="Number of cycles over which an RMS value is computed.")
     most_cycles: int = Field(
-        160, ge=20, description="Longest run at one frequency; only the largest values are averaged over more."
+        160,
+        ge=20,
+        description="Largest number of cycles of a run at one frequency; only the largest values are averaged over "
+        "more.",
     )
     standard_error: float = Field(
         1.5e-3,
         gt=0.0,
         description="Relative standard error of the largest values. A response that does not become periodic is "
-        "averaged over further runs until the largest values are known so accurately.",
+        "averaged over further runs until its largest values have this accuracy.",
     )
     most_averaged_cycles: int = Field(
-        200_000, ge=0, description="Most cycles over which one of the largest values is averaged; 0: no further runs."
+        200_000,
+        ge=0,
+        description="Largest number of cycles over which one of the largest values is averaged; 0: no further runs.",
     )

@@ -1,8 +1,9 @@
-"""The compiled loop of a structure with several dampers, each with its own controller and perhaps behind a brace.
+"""The compiled loop of a structure with several dampers, each with a separate controller and possibly a brace.
 
 The structure's linear part is exact for inputs that are linear between the ends of a step. The forces at the end of a
 step are found together with the motion there: damper by damper, repeated until no force changes. A brace has no mass;
-the rate of its deformation is the backward difference of second order, which damps what the step cannot resolve.
+the rate of its deformation is the backward difference of second order, which damps motions that the step cannot
+resolve.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ TRACK_DAMPER, TRACK_LAW, TRACK_SAMPLED = 0, 1, 2
 SWEEPS, ITERATIONS = 40, 60
 TOLERANCE_N, CORRECTED_N = 1e-5, 2e-3
 SETTLED, SETTLED_LAW = 1e-6, 1e-10
-"""Relative change of the forces from sweep to sweep that ends a step, with dampers and with linear laws."""
+"""Relative change of the forces between iterations at which a step ends, with dampers and with linear laws."""
 
 # --- integers of the run ---
 I_STEPS, I_PER_SAMPLE, I_DELAY, I_TRACK, I_RECORD, I_SIZE = 0, 1, 2, 3, 4, 5
@@ -124,7 +125,7 @@ def _sense(
 ) -> None:  # fmt: skip
     """Fill the readings of one damper's sensors; `moved` is the acceleration of each place by the ground alone.
 
-    In the noise, infinity marks a reading that repeats the one before, minus infinity one that is 0.
+    In the noise, plus infinity marks a reading that repeats the last one, and minus infinity a reading of 0.
     """
     before = measured.copy()
     relative = rod

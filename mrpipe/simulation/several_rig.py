@@ -1,4 +1,4 @@
-"""The loop with several dampers as the settings describe it."""
+"""The closed loop with several dampers from the settings."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class RigDamper:
     Attributes
     ----------
     known
-        Its place, law and calibration.
+        Place, law and calibration of the damper.
     model
-        The damper; its controller knows the same model.
+        Model of the damper, which its controller uses too.
     controller
         Settings of its controller, with the sensors that it has.
     measured
@@ -232,7 +232,7 @@ def controller_of(entry: DamperSettings, settings: ControllerSettings) -> Contro
 
 
 def dampers_excitation(rig: DampersRig, settings: ExcitationSettings) -> Excitation:
-    """Return what shakes the base.
+    """Return the excitation of the structure.
 
     Without `base_amplitude_m_s2`, the amplitude of harmonic motion and sweeps is the largest at which no damper moves
     more than its expected amplitude, by the linear equivalents at the frequency of the motion.
@@ -286,7 +286,7 @@ def dampers_release(rig: DampersRig, settings: ExcitationSettings) -> FloatArray
 
 
 def dampers_band(rig: DampersRig) -> tuple[float, float]:
-    """Return the band of frequencies of a design where the settings give none [rad/s].
+    """Return the default band of frequencies of a design [rad/s].
 
     It runs from below the lowest free frequency of the target modes to above the highest one with a locked damper.
     """

@@ -1,8 +1,8 @@
 """The steady response of the closed loop at one frequency of harmonic base motion.
 
 Most loops become periodic, and a few windows of whole cycles give their values. A loop that switches its damper can
-move irregularly for ever. Its values are means over a run, and are only as accurate as the run is long. Where a value
-must be known to a demanded accuracy, :class:`SteadyResponses` averages over further runs until its standard error
+have a permanently irregular response. Its values are means over a run, whose accuracy depends on the length of the run.
+If a value is needed with a given accuracy, :class:`SteadyResponses` averages over further runs until its standard error
 is small enough.
 """
 
@@ -31,8 +31,9 @@ FURTHER_RUN = (4, 54)
 """Fewest and most windows of a further run; the histories of a longer one would need too much memory."""
 
 FEWEST_RUNS = 8
-"""Fewest further runs of an irregular response. It can stay near one motion for hundreds of cycles before it changes to
-another, so that the scatter within a run can be small while the means of several runs differ."""
+"""Fewest further runs of an irregular response. Such a response can stay near one motion for hundreds of cycles before
+it changes to another, so that the scatter within a run can be small although the means of several runs differ.
+"""
 
 PHASE_STEP = 2.0 * math.pi * (0.5 * math.sqrt(5.0) - 0.5)
 """Each further run begins at another phase of the base motion, this angle later than the run before, so that irregular
@@ -41,12 +42,12 @@ motions are independent. The golden section spreads any number of phases evenly.
 
 @dataclass(frozen=True)
 class CurveOptions:
-    """How a response curve is measured.
+    """Options of the measurement of a response curve.
 
     Attributes
     ----------
     points
-        Frequencies of the grid, spaced in equal ratios.
+        Number of frequencies of the grid, which have equal ratios.
     settling_cycles
         Cycles before the first comparison of windows.
     window_cycles
@@ -58,7 +59,7 @@ class CurveOptions:
     frequency_tolerance
         Relative accuracy of the refined resonance frequencies.
     refinements
-        Most frequencies that refine one maximum.
+        Largest number of frequencies that refine one maximum.
     flatness
         A maximum is refined until its neighbours are lower by no more than this share, because a maximum can be a kink.
     refined
@@ -70,7 +71,7 @@ class CurveOptions:
     standard_error
         Relative standard error to which the largest values are measured; infinite: every value comes from one run.
     most_averaged_cycles
-        Most cycles over which one value is averaged for it.
+        Largest number of cycles over which one value is averaged.
     """
 
     points: int = _SETTINGS.points
@@ -97,7 +98,7 @@ class Steady:
     values
         In the order of QUANTITIES.
     errors
-        Their standard errors. Two windows that agree give half their difference.
+        Standard errors of the values. For two windows that agree it is half of their difference.
     steady
         Whether the values became steady within the longest run.
     cycles
@@ -105,7 +106,7 @@ class Steady:
     scatter
         Relative standard deviation from window to window, shape (q,); None where two windows agreed.
     further
-        Values of each window of the further runs, shape (k, q) each; where there are some, their mean is the value.
+        Values of each window of the further runs, shape (k, q) each; if there are any, their mean is the value.
     """
 
     values: FloatArray
@@ -151,7 +152,7 @@ def steady_values(
         windows = values_between(response, edges, options.absolute)
         length = settled(windows, options.tolerance)
         if length:
-            # the shortest run whose windows would have been enough
+            # the shortest run with a sufficient number of windows
             enough = next(k for k in range(2, count + 1) if settled(windows[:k], options.tolerance))
             return _steady(windows, length, True, cycles - window * (count - enough))
         if cycles >= options.most_cycles:
@@ -226,8 +227,8 @@ class SteadyResponses:
     def accurate(self, omega: float, column: int, error: float, most_cycles: int) -> float:
         """Return the value of one quantity, averaged over further runs until its standard error is small enough.
 
-        The first run does not enter the mean of the further ones. It decided that the value is worth the effort, and a
-        value that was selected because it is large is on average too large.
+        The first run does not enter the mean of the further ones. It was used to select the value, and a value that was
+        selected because it is large is on average too large.
 
         Parameters
         ----------

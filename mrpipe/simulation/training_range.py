@@ -1,7 +1,8 @@
-"""Whether networks and damper model of a closed loop were asked only for what training and bench tests have shown them.
+"""Check whether networks and damper model of a closed loop were used within the range of their training and tests.
 
-A network answers to anything, and outside the range of its training rows with no meaning. What the controller asked is
-found from what it noted at each of its samples, in the form in which its kernel asks.
+A network gives an output for every input, but outside the range of its training rows the output has no meaning. The
+inputs are reconstructed from the signals that the controller recorded at each of its samples, in the same form as in
+its kernel.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ from mrpipe.simulation.loop import Response
 from mrpipe.simulation.rig import Rig
 
 MARGIN = 0.02
-"""How far beyond the range counts as within, as a share of the range: noise at the edge is not an extrapolation."""
+"""Share of the range beyond its ends that still counts as within, because noise at the ends is not an extrapolation."""
 
 WORTH_A_WARNING = 1e-3
-"""Share of time outside above which it is warned of: six hundredths of a second in a minute, one strong peak."""
+"""Share of time outside the range above which a warning is given: 0.06 s in a minute, one strong peak."""
 
 _SUFFIX = {"displacement": "m", "velocity": "m_s", "acceleration": "m_s2", "force": "n"}
 _SHOWN = {
@@ -36,7 +37,7 @@ _SHOWN = {
 
 @dataclass(frozen=True)
 class InputRange:
-    """One input of a network or model: what it was asked and what it knows.
+    """One input of a network or model: the range in the loop and the known range.
 
     Attributes
     ----------
@@ -51,7 +52,7 @@ class InputRange:
     known: tuple[float, float]
 
     def words(self, name: str) -> str:
-        """Return such as `velocity up to 0.21 m/s, trained up to 0.14, 3.2 % of the time`."""
+        """Return a text such as `velocity up to 0.21 m/s (known to 0.14) 3.2 % of the time`."""
         factor, unit = _SHOWN[name]
         low, high = (factor * value for value in self.asked)
         known_low, known_high = (factor * value for value in self.known)
@@ -64,7 +65,7 @@ class InputRange:
 
 @dataclass(frozen=True)
 class RangeCheck:
-    """How one network or model was asked.
+    """Inputs of one network or model compared with their known ranges.
 
     Attributes
     ----------
@@ -73,7 +74,7 @@ class RangeCheck:
     outside_share
         Share of time with any input outside [1].
     inputs
-        By channel.
+        Channel -> range.
     """
 
     what: str
@@ -82,14 +83,14 @@ class RangeCheck:
 
     @property
     def warning(self) -> str:
-        """What to warn of; empty where it stayed within."""
+        """Warning; empty if all inputs stayed within their ranges."""
         if self.outside_share < WORTH_A_WARNING:
             return ""
         left = [item.words(name) for name, item in self.inputs.items() if item.outside_share >= WORTH_A_WARNING / 10.0]
         return f"the {self.what} extrapolates {100.0 * self.outside_share:.2g} % of the time: " + "; ".join(left)
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as plain values, SI, keys with units."""
+        """Return the check as plain values in SI, with units in the keys."""
         inputs = {
             name: {
                 "outside_share": item.outside_share,
@@ -105,12 +106,12 @@ class RangeCheck:
 
 @dataclass(frozen=True)
 class Requests:
-    """What the controller knew at each of its samples: channel -> shape (samples,), SI."""
+    """Inputs of the controller at each of its samples: channel -> shape (samples,), SI."""
 
     channels: Mapping[str, FloatArray]
 
     def rows(self, network: Network, rate_hz: float) -> FloatArray:
-        """Return the feature rows with which the kernel asks a network, shape (samples, R).
+        """Return the feature rows that the kernel passes to a network, shape (samples, R).
 
         Past values between samples are interpolated; before the first sample the memory is filled with it.
         """
@@ -126,7 +127,7 @@ class Requests:
 
 
 def requests(response: Response, acceleration: FloatArray) -> Requests:
-    """Return what the controller knew, from what it noted; `acceleration` of the damper at its samples [m/s^2]."""
+    """Return the inputs of the controller from its recorded signals; `acceleration` [m/s^2] is that of the damper."""
     commands = response.commands
     return Requests(
         {
@@ -165,7 +166,7 @@ def ranges_as_json(checks: Sequence[RangeCheck]) -> dict[str, Any]:
 def check_networks(
     controller: Controller, response: Response, acceleration: FloatArray, *, drive_counts: bool = True
 ) -> list[RangeCheck]:
-    """Compare what the controller asked its networks with what they were trained on.
+    """Compare the inputs of the networks of a controller with the range of their training.
 
     Parameters
     ----------
@@ -183,7 +184,7 @@ def check_networks(
             continue
         counts = np.ones(len(response.commands), dtype=bool)
         if role == "inverse":
-            # below the switch its answer is thrown away
+            # below the switch force the output of the network is not used
             counts = response.commands[:, COMMAND_SWITCHED] < 0.5
         what = "inverse network" if role == "inverse" else f"network of law {controller.law}"
         checks.append(_check(what, network, asked.rows(network, controller.options.rate_hz), counts))

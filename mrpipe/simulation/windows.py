@@ -1,4 +1,4 @@
-"""Values of a steady response over successive windows of whole cycles, their mean, and how accurate the mean is."""
+"""Values of a steady response over successive windows of whole cycles, their mean, and the error of the mean."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.simulation.loop import Response
 
 DISPLAYED = ("rms_x_top_m", "rms_x1_m", "rms_a1_m_s2", "rms_a_top_m_s2", "rms_stroke_m")
-"""RMS values that decide whether a response is steady, and that every response curve shows."""
+"""RMS values that decide whether a response is steady, and that every response curve contains."""
 
 QUANTITIES = (
     *DISPLAYED,
@@ -27,10 +27,10 @@ the sum of the floors' masses times absolute accelerations. The drive is in the 
 """
 
 SMALLEST_GROUP = 3
-"""Fewest windows whose scatter says how far sensor noise reaches."""
+"""Least number of windows from whose scatter the effect of sensor noise is estimated."""
 
 FEWEST_BLOCKS = 8
-"""Fewest blocks whose scatter gives a standard error."""
+"""Least number of blocks from whose scatter a standard error is computed."""
 
 _IS_RMS = np.array([name.startswith("rms_") for name in QUANTITIES])
 
@@ -78,7 +78,7 @@ def values_between(response: Response, edges_s: FloatArray, absolute: bool) -> F
 
 
 def settled(windows: FloatArray, tolerance: float) -> int:
-    """Return how many of the last windows are steady; 0 while the values still change.
+    """Return the number of last windows that are steady; 0 while the values still change.
 
     The first columns, those of :data:`DISPLAYED`, decide; the others follow them. Two successive windows that agree
     within the tolerance are steady, and the last one counts. Sensor noise makes the windows scatter; then the values

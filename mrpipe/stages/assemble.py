@@ -1,4 +1,4 @@
-"""`assemble`: prepared tests to the training set."""
+"""`assemble`: builds the training set from prepared tests."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         rates = sorted({test.sampling_rate_hz for test in chosen})
         if len(rates) > 1:
             raise UserError(
-                context.inputs["prepare"], "tests", f"rates of {rates} Hz", "let prepare bring them to one rate"
+                context.inputs["prepare"],
+                "tests",
+                f"rates of {rates} Hz",
+                "prepare them at one rate (prepare.working_rate_hz)",
             )
         histories[role] = join(chosen, cycles=settings.cycles, sampling_rate_hz=settings.sampling_rate_hz)
         context.progress(0.4 if role == "training" else 0.6, f"{role}: {histories[role].samples} samples")

@@ -17,11 +17,13 @@ if TYPE_CHECKING:
 
 
 FREQUENCIES = (0.625, 1.6)
-"""Lowest and highest frequency that nnc learns, over that of the free mode, which lies in their middle: a network that
-cannot tell a slow large motion from a quick small one answers for the middle."""
+"""Ratios of the lowest and the highest training frequency of nnc to the frequency of the free mode. This frequency is
+in the middle of the range, because a network that cannot distinguish a slow large motion from a fast small one gives
+the force for the middle.
+"""
 
 INPUT_NOISE = (0.002, 0.04)
-"""Noise on displacement and velocity in the training of nnc, over the expected amplitude of each."""
+"""Ratio of the noise on displacement and velocity in the training of nnc to the expected amplitude of each."""
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
@@ -90,7 +92,7 @@ def _options(settings: CalibrateSettings, weights: Weights) -> CalibrationOption
     from mrpipe.control.laws import law_names
 
     overrides = {law: settings.given(law) for law in law_names()}
-    # nnc imitates fdns, so that it takes over its gains
+    # nnc imitates fdns and therefore has the gains of fdns
     overrides["nnc"] = overrides["nnc"] or overrides["fdns"]
     return CalibrationOptions(
         mode=settings.target_mode,

@@ -1,6 +1,6 @@
 """`calibrate` for a structure with several dampers: each has its own place, brace, law and gains.
 
-Takes the place of the stage for one damper where the configuration has `structure.dampers`.
+This stage replaces the stage for one damper if the configuration has `structure.dampers`.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 
 def _identified(context: StageContext) -> tuple[DamperModel | None, Known]:
-    """Return the damper that `identify-damper` chose and all base forms that it fitted; nothing where it has none."""
+    """Return the damper that `identify-damper` chose and all base forms that it fitted; both empty without a result."""
     from mrpipe.dampers.model import read_damper
     from mrpipe.fitting.known import read_known
 
@@ -86,7 +86,7 @@ def _declared(context: StageContext) -> str:
 
 
 def _closed_loop(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
-    """Return the part on the closed loop; where it fails, the tracing stands and the reason is kept."""
+    """Return the part on the closed loop; if it fails, the tracing remains valid and the reason is stored."""
     try:
         return closed_loop(context, traced, tests)
     except Exception as error:
@@ -158,7 +158,7 @@ def _laws(context: StageContext, available: list[str]) -> list[str]:
 
 
 def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
-    """Write what `prepare` should take out of the channels, as settings to be laid over the configuration."""
+    """Write the corrections that `prepare` should apply to the channels, as settings for the configuration."""
     from mrpipe.tracing.bench.corrections import Corrections, corrections_of
 
     prepare = context.settings.prepare
@@ -178,7 +178,7 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
 
 
 def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Effect]) -> dict[str, Any]:
-    """Write the tests that would decide what is open, as settings for `record`; those of before stay in the list."""
+    """Write the tests that would decide open questions, as settings for `record`; earlier tests stay in the list."""
     from mrpipe.tracing.bench.extra_tests import wanted_tests
 
     extra = wanted_tests(traced.summary, library, traced.training)
@@ -246,7 +246,7 @@ def _write(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
 
 
 def _check(settings: Any) -> None:
-    """Look for effects and base forms that are not known, and for files of the user that do not work."""
+    """Check that effects and base forms are known, and that files of the user can be read."""
     from mrpipe.dampers.library import forms_named
     from mrpipe.effects.library import effects_named
     from mrpipe.tracing.bench.baseline import form_name

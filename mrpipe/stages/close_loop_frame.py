@@ -1,6 +1,7 @@
 """`close-loop` on a structure: the residual of a linear frame, and of its closed loop, traced to an effect.
 
-Takes the place of the stage on a bench campaign where the user gives a campaign of a shear frame, or has no bench.
+This stage replaces the stage on a bench campaign if the user gives a campaign of a shear frame, or has no bench
+campaign.
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ def _stage(*inputs: str) -> Stage:
 
 
 def variant(configuration: RunSettings, given: str = "") -> Stage | None:
-    """Return the stage on a structure's campaign where there is one to trace, None where the bench is meant.
+    """Return the stage on the campaign of a structure; None if the tracing is that of the bench.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from mrpipe.pipeline.loop_inputs import LOOP_INPUTS
 from mrpipe.pipeline.stage import Stage, StageContext
 
 KEPT = "design-kept"
-"""Folder with the results of the laws that are done, until the design is complete."""
+"""Folder with the results of completed laws, until the design is complete."""
 
 if TYPE_CHECKING:
     from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
@@ -31,7 +31,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     began = time.perf_counter()
     settings, simulate = context.settings.design, context.settings.simulate
     rig = read_rig(simulate, context.artifact)
-    # what would be designed without the tracing, to say what the tracing is worth
+    # the design without the tracing, to show the benefit of the tracing
     identified = (
         read_rig(simulate.changed(damper="identified"), context.artifact) if simulate.damper == "traced" else None
     )

@@ -1,6 +1,6 @@
 """`design` for a structure with several dampers: the gains of all dampers are searched together.
 
-Takes the place of the stage for one damper where the configuration has `structure.dampers`.
+This stage replaces the stage for one damper if the configuration has `structure.dampers`.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 FOLDER = "controller"
 DAMPERS = {"identified": "identify-damper", "traced": "close-loop"}
-"""Dampers of this run by name, and the stage whose artifact holds each."""
+"""Dampers of this run by name, and the stage whose artifact contains each."""
 
 
 FILES = ("controller.json", "controller.c", "controller.h", "self_test.c", "vectors.csv", "README.md")
@@ -54,7 +54,7 @@ def _run(context: StageContext, law: str, place: str) -> Mapping[str, Any]:
     from mrpipe.structures.over_amplitude import read_frame_at
 
     settings = context.settings.export
-    # the observer of a law knows the frame that was simulated
+    # the observer of a law contains the frame that was simulated
     frame = read_frame_at(context.artifact("identify-frame"), context.settings.simulate.frame_amplitude_m)
     damper = damper_named(
         context.settings.simulate.damper,

@@ -1,6 +1,6 @@
 """`identify-frame` for a structure that the configuration gives: nothing is identified, the matrices are checked.
 
-Takes the place of the stage on a campaign where the section `structure` describes a structure.
+This stage replaces the stage on a campaign if the section `structure` describes a structure.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ VARIANTS = (
 
 
 def variant(configuration: RunSettings, given: str = "") -> Stage | None:
-    """Return the stage where the configuration gives a structure, None where a campaign is to be identified.
+    """Return the stage if the configuration gives a structure; None if a campaign is to be identified.
 
     Parameters
     ----------

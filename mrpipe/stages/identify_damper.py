@@ -1,4 +1,4 @@
-"""`identify-damper`: a parametric damper from bench tests, its rivals, and how well each does on unseen tests."""
+"""`identify-damper`: parametric damper models from bench tests, and their errors on validation tests."""
 
 from __future__ import annotations
 

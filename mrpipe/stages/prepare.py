@@ -1,4 +1,4 @@
-"""`prepare`: measured recordings to filtered, offset-free, differentiated tests with their steady cycles."""
+"""`prepare`: filters and differentiates recordings, removes offsets, and finds steady cycles."""
 
 from __future__ import annotations
 

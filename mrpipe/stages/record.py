@@ -27,7 +27,7 @@ _DAMPER = (
 
 
 def _true_damper(context: StageContext) -> TrueDamper:
-    """Return the damper of the settings: one rig has one damper, whatever stage records it."""
+    """Return the damper of the settings, which is the same for all stages that record a rig."""
     import numpy as np
 
     from mrpipe.laboratory.damper import damper_from_set, draw_damper

@@ -1,7 +1,7 @@
 """All stages by name, in the order of the pipeline.
 
 A stage registers itself: every module of this folder that defines `STAGE` (or `STAGES`) belongs to the pipeline. The
-order follows from what each stage reads and from its `after`.
+order follows from the inputs of each stage and from its `after`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ RECORDERS = {
     "campaign:frame": "record-frame",
     "campaign:closed-loop": "record-closed-loop",
 }
-"""Stage that makes a campaign where the virtual laboratory records it."""
+"""Input -> stage with which the virtual laboratory records this campaign."""
 
 
 @cache
@@ -44,7 +44,7 @@ def all_stages() -> dict[str, Stage]:
 
 
 def forget() -> None:
-    """Forget what was found, so that the next call looks into the folder again."""
+    """Clear the list of stages, so that the next call searches the folder again."""
     _modules.cache_clear()
     all_stages.cache_clear()
 
@@ -92,8 +92,8 @@ def all_variants() -> tuple[Stage, ...]:
 def stages_for(configuration: RunSettings, given: str = "") -> dict[str, Stage]:
     """Return the stages that suit a configuration.
 
-    A module may define `variant(configuration, given)`. It returns a stage that takes the place of the one of its
-    name, or None.
+    A module may define `variant(configuration, given)`. It returns a stage that replaces the stage of the same name, or
+    None.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def stage_named(name: str) -> Stage:
     Raises
     ------
     UserError
-        If there is no such stage; the nearest name is given.
+        If no such stage exists; the message names the most similar one.
     """
     from mrpipe.artifacts.yaml_source import nearest
 

@@ -24,7 +24,7 @@ READ = (
     "close-loop",
     *(f"simulate-{law}" for law in LAWS),
 )
-"""What the ledger reads of a run."""
+"""Stages of a run that the ledger reads."""
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:

@@ -1,4 +1,4 @@
-"""`sweep`: which inputs, past values, layers and neurons the forward network needs."""
+"""`sweep`: inputs, past values, layers and neurons of the forward network, by comparison."""
 
 from __future__ import annotations
 

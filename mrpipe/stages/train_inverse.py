@@ -75,7 +75,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
 
 
 def _signed(context: StageContext, plan: TrainingPlan) -> dict[str, Judgement]:
-    """Return the errors of two short trainings on the subsample that differ in the absolute values alone."""
+    """Return the errors of two short trainings on the subsample that differ in the absolute values only."""
     from dataclasses import replace
 
     from mrpipe.networks.evaluation import judge
@@ -94,7 +94,7 @@ def _signed(context: StageContext, plan: TrainingPlan) -> dict[str, Judgement]:
 
 
 def _compared(signed: Mapping[str, Judgement]) -> dict[str, dict[str, float]]:
-    """Return what is kept of the two short trainings."""
+    """Return the stored results of the two short trainings."""
     return {
         "nrmse": {name: item.pooled.nrmse for name, item in signed.items()},
         "negative_share": {name: item.negative_share for name, item in signed.items()},

@@ -16,14 +16,15 @@ ComplexArray = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class NaturalModes:
-    """Undamped modes in rising order.
+    """Undamped modes in ascending order of frequency.
 
     Attributes
     ----------
     angular_frequencies
-        Shape (n,) [rad/s]; a negative squared frequency (unstable) shows as NaN.
+        Shape (n,) [rad/s]; NaN for a negative squared frequency (unstable mode).
     mode_shapes
-        Shape (n, n), a row a floor, a column a mode, U'MU = I [1/sqrt(kg)], top floor positive in the first mode.
+        Shape (n, n), one row per floor and one column per mode, U'MU = I [1/sqrt(kg)]; the top floor is positive in the
+        first mode.
     """
 
     angular_frequencies: FloatArray
@@ -37,7 +38,7 @@ class NaturalModes:
 
 @dataclass(frozen=True)
 class ComplexModes:
-    """Damped modes, one of each conjugate pair, in rising order of |s|; overdamped (real) ones come last.
+    """Damped modes, one of each conjugate pair, in ascending order of |s|; overdamped (real) modes are last.
 
     Attributes
     ----------
@@ -57,13 +58,13 @@ class ComplexModes:
 
     @property
     def damping_ratios(self) -> FloatArray:
-        """-Re s/|s| [1]; negative where the mode grows."""
+        """Damping ratios -Re s/|s| [1]; negative if the mode grows."""
         return np.asarray(-self.poles.real / np.maximum(np.abs(self.poles), 1e-300))
 
 
 @dataclass(frozen=True)
 class StateSpace:
-    """z' = A z + B u with z = [x, v] relative to the ground; u = [ground acceleration, force 1, ...].
+    """State space z' = A z + B u with z = [x, v] relative to the ground, u = [ground acceleration, force 1, ...].
 
     Attributes
     ----------
@@ -82,7 +83,7 @@ class StateSpace:
     def absolute_acceleration(self) -> tuple[FloatArray, FloatArray]:
         """Return C (n, 2n) and D (n, 1 + k) of the absolute accelerations x'' + x_g'' = C z + D u.
 
-        The ground's part cancels: M (x'' + r x_g'') = f - C x' - K x.
+        The ground acceleration cancels, because M (x'' + r x_g'') = f - C x' - K x.
         """
         n = self.floors
         D = self.B[n:].copy()
@@ -93,7 +94,7 @@ class StateSpace:
 def natural_modes(frame: Frame) -> NaturalModes:
     """Return the undamped modes of (K - omega2 M) u = 0 (4.4), unit modal mass.
 
-    A stiffness that is not symmetric to rounding is symmetrised (the route (3.16) leaves rounding).
+    A stiffness matrix with rounding errors in its symmetry, such as that of (3.16), is symmetrised.
     """
     squared, shapes = eigh(0.5 * (frame.stiffness + frame.stiffness.T), frame.mass)
     signs = np.where(shapes[-1] < 0.0, -1.0, 1.0)
@@ -132,7 +133,7 @@ def state_space(frame: Frame, force_positions: ArrayLike | None = None) -> State
     frame
         The structure.
     force_positions
-        Shape (n, k), a column a force acting on the floors [1]; none if left out. A damper force f that resists
+        Shape (n, k), one column per force that acts on the floors [1]; None: no forces. A resisting damper force f
         (4.1) has the column -w.
     """
     n = frame.floors
@@ -151,16 +152,16 @@ def state_space(frame: Frame, force_positions: ArrayLike | None = None) -> State
 def complex_modes(
     frame: Frame, *, position: ArrayLike | None = None, stiffness: float = 0.0, damping: float = 0.0
 ) -> ComplexModes:
-    """Return the damped modes, with a linear device f = damping v + stiffness x at `position` where one is given.
+    """Return the damped modes, optionally with a linear device f = damping v + stiffness x at `position`.
 
     Parameters
     ----------
     frame
         The structure.
     position
-        Connectivity vector w, shape (n,); floor 1 to ground if left out.
+        Connectivity vector w, shape (n,); None: floor 1 to ground.
     stiffness, damping
-        Of the device [N/m], [N s/m].
+        Stiffness [N/m] and viscosity [N s/m] of the device.
     """
     w = floor_position(frame.floors) if position is None else np.asarray(position, dtype=np.float64)
     device = np.outer(w, w)
@@ -210,9 +211,10 @@ def frequency_response(
     omega
         Shape (m,) [rad/s].
     shaker_floor
-        0: the input is the ground acceleration; else a force on that floor.
+        0: the input is the ground acceleration; otherwise a force on the floor with this number.
     absolute_acceleration
-        Absolute acceleration to input ([1] or [1/kg]); else displacement relative to the ground ([s2] or [m/N]).
+        Whether the output is the absolute acceleration ([1] or [1/kg]); otherwise the output is the displacement
+        relative to the ground ([s^2] or [m/N]).
     """
     w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
     n = frame.floors

@@ -1,4 +1,4 @@
-"""A linear structure: what identification finds, or a file gives, and the closed loop shakes."""
+"""Linear structure: result of the identification or of a file, and part of the closed loop."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mrpipe.errors import UserError
 
 @dataclass(frozen=True)
 class Frame:
-    """M x'' + C x' + K x = -w f - M r x_g'' (4.1), with the displacements x relative to the ground.
+    """Linear structure M x'' + C x' + K x = -w f - M r x_g'' (4.1); x is relative to the ground.
 
     For a shear frame the degrees of freedom are the floors, floor 1 first, and r is a column of ones.
 
@@ -21,13 +21,13 @@ class Frame:
     mass, damping, stiffness
         Shape (n, n); kg, N s/m, N/m for displacements. Rotations have kg m^2 and so on.
     name
-        For tables.
+        Name of the structure in tables.
     influence
         Displacement of each degree of freedom when the ground moves by 1 m, r, shape (n,) [1]; None: ones.
     degrees_of_freedom
         Names of the degrees of freedom, length n; empty: `floor 1` and so on.
     modal_coordinates
-        How many of the last coordinates are amplitudes of modes, as after a Craig-Bampton reduction.
+        Number of last coordinates that are amplitudes of modes, as after a Craig-Bampton reduction.
     influence_y
         The same for ground motion in the second direction; None: the structure has one direction.
     """
@@ -52,12 +52,12 @@ class Frame:
         return np.ones(self.floors) if self.influence is None else self.influence
 
     def turned(self, degrees: float) -> Frame:
-        """Return the same structure with the directions of the ground motion turned from x towards y.
+        """Return the same structure with the directions of the ground motion rotated from x towards y.
 
         Parameters
         ----------
         degrees
-            Angle of the first direction against x.
+            Angle of the first direction from x [degrees].
 
         Raises
         ------
@@ -137,7 +137,7 @@ _MATRICES = {"mass": "kg", "damping": "N*s/m", "stiffness": "N/m"}
 
 
 def write_frame(artifact: ArtifactWriter, frame: Frame, group: str = "frame") -> None:
-    """Write the matrices of a frame, and influence vector and names where it has its own."""
+    """Write the matrices of a frame, and its influence vector and names if they differ from the defaults."""
     for name, unit in _MATRICES.items():
         artifact.put(f"{group}/{name}", getattr(frame, name), unit=unit, dims=("floor", "floor_of_cause"))
     if frame.influence is not None:
@@ -152,7 +152,7 @@ def write_frame(artifact: ArtifactWriter, frame: Frame, group: str = "frame") ->
 
 
 def read_frame(artifact: Artifact, group: str = "frame") -> Frame:
-    """Read what :func:`write_frame` wrote.
+    """Read the frame that :func:`write_frame` wrote.
 
     Raises
     ------

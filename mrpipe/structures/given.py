@@ -26,7 +26,7 @@ from mrpipe.structures.shear_frames import frame_from_modes, frame_from_paramete
 from mrpipe.units import conversion, same_unit_dimension
 
 Reader = Callable[[Path, str], Any]
-"""From a file and the name of a variable in it (empty: the only table) to its content."""
+"""Function from a file and the name of a variable (empty: the only table) to the content of the variable."""
 
 _GROUND = ("ground", "0")
 
@@ -47,16 +47,17 @@ def structure_from_settings(
     settings
         Exactly one of matrices, storey table and modes.
     read
-        Reads a variable of a data file.
+        Function that reads a variable of a data file.
     name
-        Of the structure.
+        Name of the structure.
     warn
-        Called with what the user should know.
+        Function that is called with warnings.
 
     Raises
     ------
     UserError
-        If several descriptions are given, sizes disagree, or a matrix is not symmetric and positive as required.
+        If several descriptions are given, sizes disagree, or a matrix is not symmetric and positive definite as
+        required.
     """
     ways = {
         "frame": bool(settings.frame),
@@ -270,15 +271,15 @@ def _as_many(key: str, values: Sequence[Any], count: int) -> Sequence[Any]:
 def without_massless(frame: Frame, warn: Callable[[str], None] | None = None) -> Frame:
     """Return the structure without its degrees of freedom that have no mass.
 
-    Their static condensation is exact, because nothing but springs acts on them. Dashpots on them must be proportional
-    to the springs, as with damping proportional to the stiffness.
+    Their static condensation is exact, because only springs act on them. Dashpots on them must be proportional to the
+    springs, as with damping proportional to the stiffness.
 
     Parameters
     ----------
     frame
         The structure.
     warn
-        Called with the names of what was removed.
+        Function that is called with the names of the removed degrees of freedom.
 
     Raises
     ------
@@ -347,7 +348,7 @@ def degree_of_freedom(frame: Frame, name: str | int, where: str = "structure") -
     Raises
     ------
     UserError
-        If there is none.
+        If no such degree of freedom exists.
     """
     names = frame.names
     if str(name) in names:
@@ -365,7 +366,7 @@ def device_position(
 ) -> FloatArray:
     """Return the connectivity vector w, shape (n,), of a device between two degrees of freedom, or one and ground.
 
-    The device's displacement is w'x = x_first - x_second; the ground may be named first or second.
+    The displacement of the device is w'x = x_first - x_second; the first or the second may be the ground.
     """
     if str(first) in _GROUND:
         first, second = second, first

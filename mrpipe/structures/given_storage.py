@@ -62,7 +62,7 @@ def _fetched(found: DataFile, name: str) -> Any:
 
 
 def given_summary(full: Frame, reduced: Reduced, heights_m: list[float] | None = None) -> dict[str, Any]:
-    """Return what `mrpipe identify-frame --json` prints for a given structure, plain numbers in SI.
+    """Return the summary of a given structure for `mrpipe identify-frame --json`, as plain numbers in SI.
 
     Intervals have zero width, because a given structure has no measurement error. `mac` compares each mode of the
     reduced structure with the same mode of the full one. `heights_m` is the height of each degree of freedom.
@@ -106,7 +106,7 @@ def given_summary(full: Frame, reduced: Reduced, heights_m: list[float] | None =
 
 
 def write_given(artifact: ArtifactWriter, reduced: Reduced, summary: dict[str, Any]) -> None:
-    """Write matrices and modes in the groups that an identified frame has."""
+    """Write matrices and modes to the same groups as for an identified frame."""
     write_frame(artifact, reduced.frame)
     artifact.put("modes/shapes", summary["mode_shapes"], unit="1", dims=("floor", "mode"))
     artifact.put("modes/mac", summary["mac_matrix"], unit="1", dims=("reduced_mode", "full_mode"))

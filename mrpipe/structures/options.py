@@ -17,16 +17,18 @@ class Storey(Section):
     mass_kg: float = Field(..., gt=0.0, description="Mass of the floor above the storey.")
     stiffness_n_m: float = Field(..., gt=0.0, description="Lateral stiffness of the storey.")
     height_m: float | None = Field(
-        None, gt=0.0, description="Height of the storey; where all have one, the report draws the mode shapes over it."
+        None,
+        gt=0.0,
+        description="Height of the storey; if all storeys have one, the report draws the mode shapes over the height.",
     )
-    repeat: int = Field(1, ge=1, description="How many storeys in a row are like this one.")
+    repeat: int = Field(1, ge=1, description="Number of successive storeys with these properties.")
 
 
 class StoreyColumn(Section):
     """One quantity of a storey table, with its unit."""
 
     name: str = Field("", description="Column in `storey_table.file`.")
-    values: tuple[float, ...] = Field((), description="The values themselves, lowest storey first, without a file.")
+    values: tuple[float, ...] = Field((), description="Values, lowest storey first, if there is no file.")
     unit: str = Field("", description="Unit, such as t, kip*s^2/in, kN/mm, ft; empty: SI.")
 
 
@@ -71,7 +73,7 @@ class DamperSettings(Section):
     law: str = Field(
         "vd",
         description="Control law. All dampers with `lqg` share one regulator and one observer; every other law reads "
-        "the sensors of its own damper.",
+        "the sensors of its damper only.",
     )
     gains: dict[str, float] = Field(
         {}, description="Gains of the law by name, such as {c_n_s_m: 250}; gains that are left out are calibrated."
@@ -101,7 +103,9 @@ class ReductionSettings(Section):
     )
     keep: tuple[str | int, ...] = Field((), description="Degrees of freedom that stay, by name or number from 1.")
     modes: int = Field(
-        10, ge=1, description="Modes that stay (craig-bampton: fixed-interface modes; balanced: all coordinates)."
+        10,
+        ge=1,
+        description="Number of modes that are kept (craig-bampton: fixed-interface modes; balanced: all coordinates).",
     )
     band_high_hz: float | None = Field(
         None,
@@ -114,7 +118,7 @@ class ReductionSettings(Section):
 class StructureSettings(Section):
     """A linear structure from a file, a parameter set, a storey table or modes; else `identify-frame` identifies it."""
 
-    frame: str = Field("", description="Set of configs/frames, such as `thesis`, or its YAML file.")
+    frame: str = Field("", description="Parameter set of configs/frames, such as `thesis`, or its YAML file.")
     file: str = Field(
         "",
         description="File of the matrices (.mat, .csv, .h5, .json), or an openseespy script (.py), which is run.",
@@ -125,7 +129,7 @@ class StructureSettings(Section):
         MatrixEntry(), description="Damping matrix; without a name and a file: modal damping by `damping_ratio`."
     )
     damping_ratio: tuple[float, ...] = Field(
-        (0.01,), min_length=1, description="Damping ratio of the modes; the last one holds for all further modes."
+        (0.01,), min_length=1, description="Damping ratio of the modes; the last one is valid for all further modes."
     )
     storeys: tuple[Storey, ...] = Field((), description="Storey table of a shear frame, lowest storey first.")
     storey_table: StoreyTable = Field(StoreyTable(), description="Storey table with units, or from a file.")
@@ -134,7 +138,9 @@ class StructureSettings(Section):
         (), description="A row per degree of freedom, a column per mode; as many modes as degrees of freedom."
     )
     masses_kg: tuple[float, ...] = Field((), description="Masses of the degrees of freedom, with `mode_shapes`.")
-    degrees_of_freedom: tuple[str, ...] = Field((), description="Their names; empty: floor 1, floor 2, ...")
+    degrees_of_freedom: tuple[str, ...] = Field(
+        (), description="Names of the degrees of freedom; empty: floor 1, floor 2, ..."
+    )
     influence: tuple[float, ...] = Field(
         (),
         description="Displacement of each degree of freedom when the ground moves by 1 m; empty: 1 for all. A rotation "
@@ -146,7 +152,7 @@ class StructureSettings(Section):
     reduction: ReductionSettings = Field(ReductionSettings(), description="Reduction of a large structure.")
     dampers: tuple[DamperSettings, ...] = Field(
         (),
-        description="Dampers of the structure, each with its own law. Without any, the structure has the one damper of "
+        description="Dampers of the structure, each with a separate law. Empty: the structure has the one damper of "
         "the section `calibrate`.",
     )
     accelerometers: tuple[str | int, ...] = Field(

@@ -30,7 +30,7 @@ def modes_at_amplitude(
     softening, damping_growth
         Exponents a and b, shape (r,) [1].
     relative_amplitude
-        Amplitude over reference amplitude A/A_0, shape (r,) [1].
+        Ratio of amplitude to reference amplitude A/A_0, shape (r,) [1].
     """
     level = np.log1p(relative_amplitude)
     omega = angular_frequencies * np.exp(-softening * level)
@@ -45,7 +45,7 @@ def frame_with_modes(frame: Frame, angular_frequencies: FloatArray, damping_rati
     Parameters
     ----------
     frame
-        n floors.
+        Frame with n floors.
     angular_frequencies, damping_ratios
         Shape (n,) [rad/s], [1].
     """
@@ -84,7 +84,7 @@ def read_frame_at(artifact: Artifact, amplitude_m: float) -> Frame:
 def frame_at_amplitude(artifact: Artifact, frame: Frame, amplitude_m: float) -> Frame:
     """Return the linear frame that is equivalent to the identified one at an amplitude of the motion.
 
-    The modes share the motion in proportion to their largest amplitudes in the identification.
+    The motion is divided among the modes in proportion to their largest amplitudes in the identification.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Ground-motion records: PEER AT2, CSMIP and COSMOS V2 (also zipped), text, csv and MATLAB; g, cm/s^2 or m/s^2.
 
-A record is checked before it is used: finite samples, a uniform clock that agrees with what the file says, the number
-of points it promises, and peaks that a ground motion can have in the unit it claims.
+Every record is checked: finite samples, uniform times that agree with the header, the number of points of the header,
+and peaks that are plausible for a ground motion in the stated unit.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ GRAVITY = 9.80665
 SMALLEST_PEAK, LARGEST_PEAK = 0.05 * GRAVITY, 1.5 * GRAVITY
 """Peaks [m/s^2] from which the unit of a record is inferred if the record does not state it."""
 IMPOSSIBLE_PEAK = 3.0 * GRAVITY
-"""No ground motion on record is stronger [m/s^2]."""
+"""Peak above which a record is refused [m/s^2]; no recorded ground motion exceeds it."""
 
 _UNITS = (
     (re.compile(r"units?\s+of\s+g\b|\(g\)|\[g\]|\bin\s+g\b|,\s*g\s*$|^\s*g\s*$", re.IGNORECASE | re.MULTILINE), "g"),
@@ -39,7 +39,7 @@ _UNITS = (
     (re.compile(r"(?<![a-z])m[/_]s(ec)?\s*(/s(ec)?|\^?2|2|\*\*2)", re.IGNORECASE), "m/s^2"),
 )
 _UNIT_COLUMN = re.compile(r"[\[(]\s*([^\[\]()]*/\s*s(?:ec)?(?![a-z])[^\[\]()]*)[\])]", re.IGNORECASE)
-"""A bracketed unit per second or per second squared: of a column that is not time."""
+"""Pattern of a unit in brackets per second or per second squared, which marks a column that is not time."""
 _OTHER_QUANTITY = re.compile(r"\b(velocity|displacement)\b[^\n]*\bunits?\s+of\b", re.IGNORECASE)
 _FOREIGN = (".json", ".xlsx", ".xls", ".h5", ".hdf5", ".pdf", ".png", ".jpg", ".npz", ".npy")
 _CLOCK_NAME = re.compile(r"^\W*(t|time|zeit)\b", re.IGNORECASE)
@@ -50,12 +50,12 @@ _INTERVAL = re.compile(r"\bDT\s*[=:]\s*([0-9.]+(?:E[-+]?\d+)?)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class GroundMotion:
-    """A record in SI.
+    """Ground-motion record in SI units.
 
     Attributes
     ----------
     name
-        Of the file, or of the synthesis.
+        Name of the file, or of the synthesis.
     acceleration_m_s2
         Shape (n, components).
     interval_s
@@ -63,9 +63,9 @@ class GroundMotion:
     unit
         Unit in the file.
     unit_from
-        How the unit was found: `given`, `header` or `peak`.
+        Source of the unit: `given`, `header` or `peak`.
     notes
-        What was assumed, for tables.
+        Assumptions, for tables.
     """
 
     name: str
@@ -91,7 +91,7 @@ class GroundMotion:
         return np.asarray(np.abs(self.acceleration_m_s2).max(axis=0))
 
     def in_components(self, count: int) -> GroundMotion:
-        """Return the record with `count` components: the first ones, or zeros where it has fewer."""
+        """Return the record with `count` components: the first ones, and zeros for missing ones."""
         values = self.acceleration_m_s2
         if self.components >= count:
             return replace(self, acceleration_m_s2=values[:, :count])
@@ -100,7 +100,7 @@ class GroundMotion:
         return replace(self, acceleration_m_s2=np.hstack([values, missing]), notes=(*self.notes, note))
 
     def with_second(self, other: GroundMotion) -> GroundMotion:
-        """Return a record of this one's first component and that of `other`, which must have the same clock."""
+        """Return a record of the first components of this record and of `other`, which must have the same times."""
         if not np.isclose(self.interval_s, other.interval_s, rtol=1e-6):
             raise UserError(
                 other.name,
@@ -113,9 +113,10 @@ class GroundMotion:
         return replace(self, name=f"{self.name} + {other.name}", acceleration_m_s2=both)
 
     def resampled(self, interval_s: float) -> GroundMotion:
-        """Return the record at another interval: a polyphase filter keeps what the new rate cannot hold out of it.
+        """Return the record at another interval, by a polyphase filter without aliases.
 
-        The mean of the ends is taken out before and put back after, so that a constant stays constant.
+        The mean of the two ends is subtracted before filtering and added afterwards, so that a constant remains
+        constant.
         """
         ratio = Fraction(self.interval_s / interval_s).limit_denominator(1000)
         if ratio == 1:
@@ -146,16 +147,17 @@ def read_motion(
         `.at2`; `.mat` (a variable with rows or columns of time and acceleration); anything else is text: one column (or
         AT2-like rows), time and acceleration, two components, or time and two components.
     unit
-        Unit of the samples; by default that of the header, else the only unit with a plausible peak.
+        Unit of the samples; by default that of the header or, without one, the only unit with a plausible peak.
     interval_s
-        Sampling interval; must agree with the file if the file states it.
+        Sampling interval [s]; it must agree with the file if the file states one.
     fallback_interval_s
-        Interval if neither the file nor `interval_s` gives one.
+        Sampling interval if neither the file nor `interval_s` gives one [s].
 
     Raises
     ------
     UserError
-        If the file is missing, empty, holds NaN, breaks its promises (NPTS, DT), mixes units or does not say enough.
+        If the file is missing or empty, contains NaN, contradicts its header (NPTS, DT), mixes units, or does not
+        determine the unit.
     """
     path = Path(path)
     if not path.is_file():
@@ -182,7 +184,7 @@ def read_motion(
 
 
 def _text(path: Path) -> str:
-    """Return a text file, whatever its encoding, its superscripts written out."""
+    """Return the text of a file, read as Latin-1, with `^2` instead of the superscript 2."""
     return path.read_text(encoding="latin-1").replace("\u00c2\u00b2", "^2").replace("\u00b2", "^2")
 
 
@@ -259,7 +261,7 @@ def _read_text(path: Path) -> _Raw:
 
 
 def _split_clock(path: Path, values: FloatArray, header: str) -> _Raw:
-    """Separate a clock in the first column: the header names it, or it rises (or falls) nearly always."""
+    """Separate a time column: the first column, if the header names it or it is nearly monotonic."""
     points = _POINTS.search(header)
     if points and int(points.group(1)) != len(values):
         raise UserError(
@@ -333,7 +335,9 @@ def _unit(path: Path, raw: _Raw, given: str | None) -> tuple[str, str]:
         to_si(np.zeros(1), text, where=f"{path}: header", quantity="acceleration")
     said = {name for pattern, name in _UNITS if pattern.search(raw.header)} | further
     if len(said) > 1:
-        raise UserError(path, "header", f"names the units {', '.join(sorted(said))}", f"bring all to one; {_ADVICE}")
+        raise UserError(
+            path, "header", f"names the units {', '.join(sorted(said))}", f"convert all to the same unit; {_ADVICE}"
+        )
     if said:
         return said.pop(), "header"
     peak = float(np.abs(raw.values).max())

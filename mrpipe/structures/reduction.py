@@ -1,8 +1,8 @@
 """Reduction of a large structure: static condensation, Craig-Bampton, modal and balanced truncation.
 
 All methods except :func:`balanced`, which truncates a state space, return a structure with M, C, K and an influence
-vector. The error of a reduction is the largest deviation of the frequency response to ground motion, at the degrees of
-freedom that stay, over the largest response.
+vector. The error of a reduction is the largest deviation of the frequency response to ground motion, at the retained
+degrees of freedom, relative to the largest response.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ BEYOND_FIRST = 1.5
 
 @dataclass(frozen=True)
 class Reduced:
-    """A smaller structure.
+    """Reduced structure and the error of the reduction.
 
     Attributes
     ----------
     frame
         The reduced structure, coordinates q.
     basis
-        From reduced to full coordinates, x = T q, shape (n, m).
+        Transformation T from reduced to full coordinates, x = T q, shape (n, m).
     kept
-        Indices of the physical degrees of freedom that stay, in the order of the first coordinates; empty: none.
+        Indices of the retained physical degrees of freedom, in the order of the first coordinates; empty: none.
     error
         Largest relative error of the frequency response over the band [1].
     band_high_hz
-        Highest frequency of the band.
+        Highest frequency of the band [Hz].
     """
 
     frame: Frame
@@ -98,7 +98,7 @@ def craig_bampton(frame: Frame, kept: Sequence[int], modes: int, band_high_hz: f
 
 
 def modal(frame: Frame, modes: int, kept: Sequence[int] = (), band_high_hz: float | None = None) -> Reduced:
-    """Keep the lowest modes; with as many `kept` degrees of freedom as modes, in physical coordinates.
+    """Retain the lowest modes; with as many `kept` degrees of freedom as modes, in physical coordinates.
 
     Parameters
     ----------
@@ -133,12 +133,12 @@ def modal(frame: Frame, modes: int, kept: Sequence[int] = (), band_high_hz: floa
 def balanced_structure(
     frame: Frame, kept: Sequence[int], coordinates: int, band_high_hz: float | None = None
 ) -> Reduced:
-    """Keep the shapes that ground motion and forces on `kept` excite most: balanced truncation that leaves M, C and K.
+    """Retain the shapes that ground motion and forces on `kept` excite most: balanced truncation of M, C and K.
 
     For symmetric M, C and K and outputs at the places of the forces, the position part of the controllability Gramian
     and the velocity part of the observability Gramian are equal in the inner product of the mass. Both are diagonal in
     the eigenvectors of the former, and the truncation is a projection that keeps the structure symmetric and stable
-    (position-velocity balancing: Meyer and Srinivasan 1996; Reis and Stykel 2008). The basis is turned so that its
+    (position-velocity balancing: Meyer and Srinivasan 1996; Reis and Stykel 2008). The basis is rotated so that its
     first coordinates are the displacements of `kept`.
 
     Parameters
@@ -146,7 +146,7 @@ def balanced_structure(
     frame
         Structure; all modes need damping.
     kept
-        Indices of the degrees of freedom whose forces and displacements count, from 0.
+        Indices of the degrees of freedom whose forces and displacements are inputs and outputs, from 0.
     coordinates
         Number of coordinates of the reduced structure, at least as many as `kept`.
     band_high_hz
@@ -165,7 +165,8 @@ def balanced_structure(
     forces = np.eye(frame.floors)[:, kept]
     motions = [frame.mass @ vector for vector in (frame.ground_influence, frame.influence_y) if vector is not None]
     loads = np.column_stack([*motions, forces])
-    # each input alone would store the same energy at rest, so that none counts more by its unit
+    # the inputs are scaled such that each alone stores the same static energy, so that the result does not depend on
+    # their units
     loads /= np.sqrt(np.einsum("ni,ni->i", loads, np.linalg.solve(frame.stiffness, loads)))
     space = state_space(frame, loads)
     _require_stable(space)
@@ -182,7 +183,7 @@ def balanced_structure(
 
 
 def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
-    """Reduce a structure as the settings say; without a reduction its coordinates and its response stay the same.
+    """Reduce a structure with the settings; without a reduction coordinates and response are unchanged.
 
     Raises
     ------
@@ -221,12 +222,12 @@ def balanced(space: StateSpace, outputs: FloatArray, order: int) -> tuple[FloatA
     outputs
         C, shape (p, 2n).
     order
-        States that stay.
+        Number of retained states.
 
     Returns
     -------
-    A, B, C of the reduced system, and the bound of the error: twice the sum of the Hankel singular values left out,
-    over the largest one.
+    A, B, C of the reduced system, and the bound of the error: twice the sum of the truncated Hankel singular values,
+    divided by the largest value.
 
     Raises
     ------
@@ -258,7 +259,7 @@ def _require_stable(space: StateSpace) -> None:
 
 
 def frequency_error(frame: Frame, reduced: Frame, basis: FloatArray, places: Sequence[int], high_hz: float) -> float:
-    """Return the largest error of the response to ground motion over the largest response, from 0 to `high_hz`.
+    """Return the largest error of the response to ground motion from 0 to `high_hz`, relative to the largest response.
 
     Of two directions of the ground the worse one counts. Where the ground moves nothing, the response is that to a
     force on all places. The lines lie at the natural frequencies and between them, because a resonance is narrow.
@@ -323,7 +324,7 @@ def _projected(frame: Frame, basis: FloatArray, kept: Sequence[int], band_high_h
 
 
 def _root(gramian: FloatArray) -> FloatArray:
-    """Return L with L L' = gramian, also where rounding makes the gramian slightly indefinite."""
+    """Return L with L L' = gramian, even if rounding makes the gramian slightly indefinite."""
     symmetric = 0.5 * (gramian + gramian.T)
     try:
         return np.asarray(cholesky(symmetric, lower=True))

@@ -14,12 +14,12 @@ from mrpipe.structures.frame import Frame
 
 @dataclass(frozen=True)
 class LinearResponse:
-    """Histories, shape (m, n).
+    """Response histories, shape (m, n).
 
     Attributes
     ----------
     displacement, velocity
-        Relative to the ground [m], [m/s].
+        Displacement and velocity relative to the ground [m], [m/s].
     absolute_acceleration
         [m/s2].
     """
@@ -38,7 +38,7 @@ def linear_response(
     force_position: FloatArray | None = None,
     initial_state: FloatArray | None = None,
 ) -> LinearResponse:
-    """Return the response to an excitation that is linear between samples (exact to rounding for such a one).
+    """Return the response to an excitation that is linear between samples, exact to rounding.
 
     Parameters
     ----------
@@ -49,11 +49,11 @@ def linear_response(
     dt
         Sampling interval [s].
     shaker_floor
-        0 for the ground.
+        Number of the floor on which the force acts, from 1; 0: ground motion.
     force_position
-        Shape (n,): what a unit force gives to each degree of freedom, in place of `shaker_floor`.
+        Shape (n,): share of a unit force on each degree of freedom, instead of `shaker_floor`.
     initial_state
-        [x, v] at the first sample, shape (2n,); at rest if left out.
+        State [x, v] at the first sample, shape (2n,); None: at rest.
     """
     n = frame.floors
     if force_position is None and shaker_floor:

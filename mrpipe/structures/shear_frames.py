@@ -48,7 +48,7 @@ def frame_from_modes(
     Parameters
     ----------
     mode_shapes
-        Shape (n, n), a row a floor, a column a mode, any scaling [1].
+        Shape (n, n), one row per floor and one column per mode, with any scaling [1].
     angular_frequencies
         Shape (n,) [rad/s].
     damping_ratios
@@ -121,9 +121,9 @@ def shear_frame(
     damping_ratios
         Shape (n,) or one number for all modes [1].
     name
-        Of the frame.
+        Name of the frame.
     source
-        What messages name.
+        Source of the numbers, for error messages.
 
     Raises
     ------
@@ -151,9 +151,10 @@ def clamped_column_stiffness(
 
 
 def p_delta_stiffness(floor_masses: ArrayLike, storey_height: float, gravity: float = 9.81) -> FloatArray:
-    """Return the stiffness [N/m] of shape (n,) that gravity takes from each storey.
+    """Return the reduction of the stiffness of each storey by gravity [N/m], shape (n,).
 
-    A clamped column of length L under the axial force N loses 6 N/(5 L) (its consistent geometric stiffness).
+    The stiffness of a clamped column of length L under the axial force N is reduced by 6 N/(5 L) (consistent geometric
+    stiffness).
     """
     masses = np.asarray(floor_masses, dtype=np.float64)
     carried = np.cumsum(masses[::-1])[::-1] * gravity
@@ -161,7 +162,7 @@ def p_delta_stiffness(floor_masses: ArrayLike, storey_height: float, gravity: fl
 
 
 def frame_from_dimensions(values: ParameterSet) -> Frame:
-    """Return the shear frame that plates and columns give, gravity's P-delta included (errata row 3)."""
+    """Return the shear frame of plates and columns, including the P-delta effect of gravity (errata row 3)."""
     number = {key: values.scalar(key) for key in values.values if key != "damping_ratios"}
     floors, columns = int(number["floors"]), int(number["columns"])
     plate = number["plate_length"] * number["plate_width"] * number["plate_thickness"]
@@ -183,7 +184,7 @@ def frame_from_parameter_set(parameters: ParameterSet | str | Path) -> Frame:
     Raises
     ------
     UserError
-        If the set is not there, its model is unknown or a value is missing or impossible.
+        If the set does not exist, its model is unknown, or a value is missing or impossible.
     """
     values = parameters if isinstance(parameters, ParameterSet) else load_parameter_set("frames", parameters)
     entry = values.values

@@ -1,4 +1,4 @@
-"""All claims of the chapters that are wanted."""
+"""All claims of the requested chapters."""
 
 from __future__ import annotations
 
@@ -106,5 +106,5 @@ def build_ledger(
     if unknown := sorted(set(outcomes) - known):
         raise ValueError(f"no entry is named {', '.join(unknown)}")
     if lacking := [entry.id for entry in entries if entry.id not in outcomes]:
-        raise ValueError(f"nothing says what becomes of {', '.join(lacking)}")
+        raise ValueError(f"no module computes {', '.join(lacking)}")
     return Ledger(tuple(judge(entry, outcomes[entry.id]) for entry in entries), cases)

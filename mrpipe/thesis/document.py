@@ -28,6 +28,7 @@ amplitude of the excitation, has no verdict, because a recomputed value could no
 
 The places are sections and tables of the thesis; the text at hand has no page numbers. Of the figures, only the numbers
 that the thesis states in words are compared, because the recorded curves are not published.
+
 """
 
 _TITLES: dict[Kind, str] = {

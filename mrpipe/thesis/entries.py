@@ -1,4 +1,4 @@
-"""What the ledger compares: every entry of `printed_values`, one YAML file for each table and each chapter.
+"""Entries of the ledger: those of `printed_values`, one YAML file for each table and each chapter.
 
 The files hold what the thesis prints and how close a recomputed value must come. They hold no recomputed value.
 """

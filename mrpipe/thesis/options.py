@@ -10,12 +10,13 @@ from mrpipe.options import Section
 
 
 class ReproduceSettings(Section):
-    """Which results of the thesis are recomputed, and what with."""
+    """Results of the thesis that are recomputed, and the data that are used."""
 
     source: Literal["run", "sets"] = Field(
         "run",
         description="`run`: the frame, damper, networks and responses of this run; what is missing is built first. "
-        "`sets`: the printed frame, damper set C and its exact inverse, without a run; less can be recomputed then.",
+        "`sets`: the printed frame, damper set C and its exact inverse, without a run; fewer results can be "
+        "recomputed then.",
     )
     chapters: tuple[Literal[2, 3, 4, 5, 6], ...] = Field(
         (2, 3, 4, 5, 6), min_length=1, description="Chapters of the thesis whose results are recomputed."

@@ -21,7 +21,7 @@ def test_a_file_that_ends_within_a_row(tmp_path: Path, capsys: pytest.CaptureFix
     (folder / "one.csv").write_text(text[: text.rstrip().rindex(",")])
     assert run(["show", str(folder)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "test one, force, row 4001: is missing in the last row, as where a recording was cut off" in line
+    assert "test one, force, row 4001: is missing in the last row, as if the recording was interrupted" in line
     assert "delete this row" in line
 
 

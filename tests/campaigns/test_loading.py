@@ -108,7 +108,7 @@ def test_several_segments_keep_what_lies_between_them_out(tmp_path: Path) -> Non
         ({"channels": {"displacement": CHANNELS["displacement"]}}, "channels: no channel force; write force: {column"),
         ({"sampling_rate_hz": 500}, "the clock runs at 1000 Hz, but sampling_rate_hz says 500"),
         ({"sampling_rate_hz": -1}, "sampling_rate_hz: is -1"),
-        ({"tests": []}, "tests: is empty; list one test"),
+        ({"tests": []}, "tests: is empty; list at least one test"),
         ({"directory": "elsewhere"}, "directory: 'elsewhere' is not a directory"),
     ],
 )
@@ -176,7 +176,7 @@ def test_two_channels_of_one_column_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("role", ["training", "validation"])
 def test_a_missing_role_is_told(tmp_path: Path, role: str) -> None:
     tests = [test | {"role": "repeat" if test["role"] == role else test["role"]} for test in content()["tests"]]
-    assert f"tests: no {role} test; give one test" in told(campaign(tmp_path, tests=tests))
+    assert f"tests: no {role} test; give at least one test" in told(campaign(tmp_path, tests=tests))
 
 
 @pytest.mark.golden
@@ -292,7 +292,7 @@ def test_channels_that_freeze_or_fall_out_are_reported(tmp_path: Path) -> None:
     columns["x"][2000:2030] = columns["x"][2000]
     columns["F"][3300:3303] = 0.0
     findings = load_campaign(campaign(tmp_path, columns)).findings
-    assert "test one: displacement stands still for 30 samples at 2 s and then jumps" in findings
+    assert "test one: displacement repeats one value for 30 samples at 2 s and then jumps" in findings
     assert "test one: force falls to exactly 0 in 3 samples, the first at 3.3 s" in findings
     assert len(findings) == 2
 

@@ -100,7 +100,7 @@ FAULTS = {
     "names": (replace(GOOD, forms=(FORM, FORM)), "used twice: plain"),
     "unit": (_searched(unit="furlonk"), "'furlonk' is not a unit"),
     "scale": (_searched(scale="size"), "'size' is not a product of"),
-    "order": (_searched(low=3.0, high=2.0), "are not in order"),
+    "order": (_searched(low=3.0, high=2.0), "is not below the upper bound"),
     "start": (_searched(start=20.0), "starts outside the bounds"),
     "logarithm": (_searched(low=-1.0), "must be above 0"),
     "strength": (
@@ -108,7 +108,7 @@ FAULTS = {
         "0 must lie within its bounds",
     ),
     "amplitude": (_with(amplitude_steps={}), "amplitude_steps names []"),
-    "place": (_with(amplitude_steps={"number": 3}), "none of the 1 steps"),
+    "place": (_with(amplitude_steps={"number": 3}), "one of the 1 steps"),
     "not compiled": (_with(steps=_one(driving)), "is not compiled"),
     "no list": (_with(steps=lambda values: None), "list of Step"),
     "too many": (_with(steps=lambda values: 20 * _one(linear)(values)), "too many for a chain"),
@@ -119,7 +119,7 @@ FAULTS = {
     "dividing by 0": (_with(steps=_one(dividing)), "ZeroDivisionError"),
     "without effect": (_with(steps=_one(linear, 0.0)), "the force stays the same"),
     "left over": (_with(steps=_one(shifted)), "the force changes by 1 N"),
-    "not linear": (_with(steps=_one(squared)), "misses twice the force"),
+    "not linear": (_with(steps=_one(squared)), "differs from twice the force"),
     "feeding": (_with(steps=_one(linear, -1.0)), "feeds"),
 }  # fmt: skip
 

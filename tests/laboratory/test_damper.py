@@ -74,7 +74,7 @@ def test_strength_is_scaled_to_its_share(damper: TrueDamper, form: Any) -> None:
 
 @pytest.mark.planted
 def test_a_share_out_of_reach_is_told(damper: TrueDamper) -> None:
-    with pytest.raises(UserError, match=r"out of reach"):
+    with pytest.raises(UserError, match=r"cannot be reached"):
         calibrate_strength(damper.with_effects([Planted(find_form("delay"), {}, 0.05)]), 0, [motion_of()])
 
 

@@ -1,4 +1,4 @@
-"""How well the force of one test agrees with what the other tests predict, and how sure that prediction is."""
+"""Agreement of the force of one test with the prediction of the other tests, and the error of this prediction."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def fit(part: Normal, coefficients: FloatArray) -> tuple[float, float]:
 
 
 def delay(test: Slow, expected: FloatArray) -> float:
-    """Return by how much the force of a test comes later than expected [s], from the highest cross-correlation.
+    """Return the delay [s] of the force of a test relative to the prediction, from the highest cross-correlation.
 
     Lags up to a quarter of a second are searched; a parabola interpolates between samples.
     """

@@ -22,8 +22,8 @@ def is_dead(values: FloatArray) -> bool:
 def find_spikes(values: FloatArray, share: float = SPIKE_SHARE) -> IntArray:
     """Return the indices of spikes: one or two samples far from the samples before and after them.
 
-    `share` is the smallest deviation over the range that 99 % of the samples cover. Steps and corners of a signal stay
-    where they are under a median of five samples, so only isolated samples deviate.
+    `share` is the smallest deviation over the range that 99 % of the samples cover. A median of five samples preserves
+    steps and corners of a signal, so only isolated samples deviate.
     """
     if values.size < 20:
         return np.zeros(0, dtype=np.int64)

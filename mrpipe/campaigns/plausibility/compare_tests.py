@@ -16,7 +16,7 @@ from mrpipe.campaigns.plausibility.whole_campaign import find_exchanged_columns,
 
 
 def compare_tests(tests: Sequence[TestArrays]) -> tuple[Finding, ...]:
-    """Return everything by which a test contradicts the others or cannot be a sound recording.
+    """Return all findings by which a test contradicts the others or is faulty itself.
 
     The findings are named `dead-channel`, `stuck-channel`, `spikes`, `same-record`, `sign-reversed`, `unit-decades`,
     `at-rest`, `channels-exchanged`, `force-unrelated`, `gain-differs` and `delay-differs`. Tests with a dead
@@ -85,7 +85,7 @@ def _stuck(test: TestArrays) -> list[Finding]:
                 channel=name,
                 sentence=f"repeats one value for {stuck.samples} samples ({duration:.3g} s) from {begin:.4g} s on "
                 "while the rig moves",
-                remedy="cut the stretch off with segments_s, or leave the test out",
+                remedy="exclude these samples with segments_s, or leave the test out",
                 numbers={"begin_s": begin, "duration_s": duration, "stretches": float(stuck.count)},
             )
         )
@@ -126,7 +126,7 @@ def same_records(tests: Sequence[TestArrays]) -> list[Finding]:
         consequence = (
             "the validation error would be that of samples the model was fitted to"
             if leak
-            else "they count as independent tests, and the noise is underestimated"
+            else "they would count as independent tests, and the noise would be underestimated"
         )
         findings.append(
             Finding(

@@ -1,4 +1,4 @@
-"""Tests whose stroke, force or drive is decades away from that of the others, because a unit is wrong."""
+"""Tests whose stroke, force or drive differs by orders of magnitude from the others, because a unit is wrong."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ LARGE_DRIVE = 20.0
 
 
 def find_decades(tests: Sequence[Slow]) -> list[Finding]:
-    """Return tests whose stroke, force or drive lies decades away from that of most others.
+    """Return tests whose stroke, force or drive differs by orders of magnitude from most others.
 
-    The tests are parted at the widest gap between their sizes. If it spans decades, the smaller group is named; of
-    groups of equal size the larger values are named, because which of them are wrong cannot be known. A drive can be
-    zero in a test, so only a drive that is far larger than all others is suspected.
+    The tests are divided at the widest gap between their values. If it spans orders of magnitude, the smaller group is
+    named. Of groups of equal size the one with larger values is named, because the data do not show which group is
+    wrong. A drive can be zero in a test, so only a drive that is far larger than all others is suspected.
     """
     findings = []
     for channel, decades in (("displacement", 3.0 * DECADES), ("force", DECADES), ("drive", DECADES)):

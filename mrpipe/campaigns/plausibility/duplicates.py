@@ -1,4 +1,4 @@
-"""Stretches of samples that occur in two tests: the same file twice, a copy in another format, overlapping segments."""
+"""Sequences of samples that occur in two tests: the same file twice, copies in other formats, overlapping segments."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Overlap:
 
 
 def find_overlaps(tests: Sequence[tuple[str, Mapping[str, FloatArray]]]) -> list[Overlap]:
-    """Return pairs of tests that hold the same stretches of samples.
+    """Return pairs of tests that contain the same sequences of samples.
 
-    Windows of :data:`WINDOW` samples of all common channels are reduced to one number each and compared, wherever in
-    the two tests they lie. Windows in which the rig rests are left out, because rests look alike.
+    Windows of :data:`WINDOW` samples of all common channels are reduced to one number each and compared, at any
+    position in the two tests. Windows in which the rig rests are left out, because all rests look the same.
 
     Parameters
     ----------

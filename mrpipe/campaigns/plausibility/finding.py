@@ -23,7 +23,7 @@ class Finding:
     name
         Name of the check, such as `sign-reversed`.
     severity
-        `error` where results would be wrong with near certainty, `warning` where the user should look.
+        `error` if results would almost certainly be wrong, `warning` if the user should check the data.
     sentence
         What was found, with its numbers, in plain English.
     remedy

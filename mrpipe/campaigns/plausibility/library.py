@@ -1,4 +1,4 @@
-"""All plausibility checks, found by walking the package `checks`, and their verdict on a campaign."""
+"""All plausibility checks, one per module of the package `checks`, and their findings on a campaign."""
 
 from __future__ import annotations
 

@@ -233,7 +233,7 @@ def with_outrigger(tower: Tower, floor: int, arm_m: float) -> Tower:
     floor
         The outrigger's floor, 2 to 75.
     arm_m
-        From the core to the damper [m].
+        Distance from the core to the damper [m].
     """
     if not 2 <= floor <= FLOORS - 1:
         raise UserError("benchmark.wind.outrigger_floor", str(floor), "is not a floor for an outrigger", "2 to 75")
@@ -253,7 +253,7 @@ def with_tuned_mass(tower: Tower, mass_kg: float, frequency_ratio: float) -> Tow
     mass_kg
         Of the tuned mass; 500 t in the original benchmark.
     frequency_ratio
-        Its frequency over the tower's first.
+        Frequency of the tuned mass over the first one of the tower.
     """
     model = tower.model
     lowest = eigh(model.stiffness, model.mass, eigvals_only=True, subset_by_index=(0, 0))[0]

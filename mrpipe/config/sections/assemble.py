@@ -14,27 +14,36 @@ InverseInput = Literal["displacement", "velocity", "acceleration", "force"]
 
 
 class AssembleSettings(Section):
-    """What goes into the training set and what the networks see of it."""
+    """Content of the training set, and the features of the networks."""
 
     cycles: int = Field(
-        10, ge=1, description="Steady cycles of each periodic test, joined at zero crossings of displacement."
+        10,
+        ge=1,
+        description="Number of steady cycles of each periodic test, joined at zero crossings of the displacement.",
     )
     sampling_rate_hz: float = Field(
         200.0,
         gt=0.0,
-        description="Rate of the networks; the record is decimated by the nearest whole factor, or kept where slower.",
+        description="Sampling rate of the networks; records are decimated by the nearest integer factor, and slower "
+        "records are not changed.",
     )
-    past_values: int = Field(3, ge=0, le=50, description="Past values of each input, in addition to the present one.")
+    past_values: int = Field(
+        3, ge=0, le=50, description="Number of past values of each input, in addition to the present one."
+    )
     forward_inputs: tuple[ForwardInput, ...] = Field(
         ("velocity", "drive"), min_length=1, description="Input channels of the forward network, in order (2.8)."
     )
     forward_past_force: bool = Field(
-        False, description="Past values of the force are inputs of the forward network too; then it can run freely."
+        False,
+        description="Whether past values of the force are inputs of the forward network too; it can then run without "
+        "measured forces.",
     )
     inverse_inputs: tuple[InverseInput, ...] = Field(
         ("velocity", "force"), min_length=1, description="Input channels of the inverse network, in order (2.9)."
     )
-    inverse_absolute: bool = Field(True, description="The inverse network sees absolute values, as in (2.9).")
+    inverse_absolute: bool = Field(
+        True, description="Whether the inputs of the inverse network are absolute values, as in (2.9)."
+    )
     normalisation: Normalisation = Field(
         NORMALISATION,
         description="Normalisation of inputs and target: `maximum` keeps zero at zero, `range` maps to -1 .. 1 "

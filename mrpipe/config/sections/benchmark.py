@@ -16,20 +16,20 @@ class MotionSettings(Section):
     file: str = Field(
         "synthetic",
         description="Record: `synthetic` (spectrum-compatible, seeded), a path (AT2, text, csv, mat), or the name of a "
-        "public record where the public data are there: elcentro, erzikan, jiji, kobe, newhall, rinaldi, sylmar, "
+        "public record if the public data are present: elcentro, erzikan, jiji, kobe, newhall, rinaldi, sylmar, "
         "elcentro-ns.",
     )
     second_file: str | None = Field(
-        None, description="Record of the second horizontal component, where each component has its own file (AT2)."
+        None, description="Record of the second horizontal component, if each component has a separate file (AT2)."
     )
     unit: str | None = Field(
-        None, description="Unit of the samples (g, cm/s^2, m/s^2); null: as the header says or the peak shows."
+        None, description="Unit of the samples (g, cm/s^2, m/s^2); null: from the header, or from the size of the peak."
     )
     interval_s: float | None = Field(
-        None, gt=0.0, description="Sampling interval [s] of a record with neither clock nor DT; null: the file's."
+        None, gt=0.0, description="Sampling interval [s] of a record with neither clock nor DT; null: that of the file."
     )
     resampled_interval_s: float | None = Field(
-        None, gt=0.0, description="Bring the record to this interval [s] without aliasing; null: leave it."
+        None, gt=0.0, description="Interval to which the record is resampled without aliasing [s]; null: not resampled."
     )
     peak_ground_g: float = Field(
         0.3, gt=0.0, description="Design ground acceleration on rock of the synthetic motion [g]."
@@ -54,13 +54,13 @@ class TenStoreySettings(Section):
     )
     damper: str = Field(
         "p4-1000kn",
-        description="Parameter set in configs/dampers that stands for the damper, or a damper artifact (.h5).",
+        description="Parameter set in configs/dampers for the damper, or a damper artifact (.h5).",
     )
     inverse: str = Field("bingham-1000kn", description="Bingham parameter set in configs/dampers that is inverted.")
     filter_rate_1_s: float = Field(31.4, ge=0.0, description="Rate lambda of the voltage filter (24) [1/s]; 0: none.")
     time_step_s: float = Field(0.0005, gt=0.0, le=0.005, description="Longest time step [s].")
     dampers: tuple[float, ...] = Field(
-        (0.25, 0.5, 1.0, 2.0, 4.0), description="Numbers of dampers side by side at which the sensitivity is computed."
+        (0.25, 0.5, 1.0, 2.0, 4.0), description="Numbers of parallel dampers for which the sensitivity is computed."
     )
 
 
@@ -74,10 +74,14 @@ class BaseIsolatedSettings(Section):
     surrogate: str = Field(
         "base-isolated-surrogate", description="Parameter set in configs/structures (or YAML file) of the surrogate."
     )
-    bearing_stiffness_n_m: float = Field(919.422e3, gt=0.0, description="Of each bearing, published model [N/m].")
-    bearing_viscosity_n_s_m: float = Field(27.717e3, ge=0.0, description="Of each bearing, published model [N s/m].")
+    bearing_stiffness_n_m: float = Field(
+        919.422e3, gt=0.0, description="Stiffness of each bearing of the published model [N/m]."
+    )
+    bearing_viscosity_n_s_m: float = Field(
+        27.717e3, ge=0.0, description="Viscosity of each bearing of the published model [N s/m]."
+    )
     motion: MotionSettings = Field(MotionSettings(), description="Ground motion of two components.")
-    all_motions: bool = Field(False, description="Also run all seven public motions (--all).")
+    all_motions: bool = Field(False, description="Whether all seven public motions are run (--all).")
     laws: tuple[str, ...] = Field(
         ("vd", "vdns", "fdns", "lqg", "lqg-clipped", "passive-off", "passive-on"),
         min_length=1,
@@ -86,19 +90,22 @@ class BaseIsolatedSettings(Section):
     )
     damper: str = Field("bingham-1000kn", description="Bingham parameter set in configs/dampers.")
     neural_inverse: bool = Field(
-        True, description="Voltage from a neural inverse of the damper, as the thesis; false: from the formula."
+        True,
+        description="Whether the voltage comes from a neural inverse of the damper, as in the thesis; otherwise from "
+        "the formula.",
     )
     hidden_neurons: int = Field(6, ge=2, le=20, description="Neurons of both hidden layers of the neural inverse.")
     damping_ratio: float = Field(
         0.1, gt=0.0, lt=0.6, description="Damping ratio of the isolation modes to which vd, vdns and fdns are set."
     )
     stiffness_share: float = Field(
-        0.2, ge=0.0, lt=0.9, description="Share of the isolation's stiffness that vdns takes away."
+        0.2, ge=0.0, lt=0.9, description="Share of the stiffness of the isolation that vdns compensates."
     )
     lqg: LqgWeights = Field(LqgWeights(), description="Weights of LQG.")
     time_step_s: float = Field(0.001, gt=0.0, le=0.005, description="Longest time step [s].")
     dampers: tuple[float, ...] = Field(
-        (1.0, 2.0, 5.0, 10.0, 20.0), description="Dampers at each of the two positions, for the sensitivity."
+        (1.0, 2.0, 5.0, 10.0, 20.0),
+        description="Numbers of dampers at each of the two positions for which the sensitivity is computed.",
     )
 
 
@@ -108,7 +115,7 @@ class WindLoadSettings(WindClimate):
     file: str = Field(
         "synthetic",
         description="`synthetic` (spectral representation, seeded) or a file of forces on the 76 floors (text, csv, "
-        "mat, npy; a row a sample, a clock may come first).",
+        "mat, npy; one row per sample, the first column may be the time).",
     )
     unit: str = Field("kN", description="Unit of the forces in a file.")
     interval_s: float | None = Field(None, gt=0.0, description="Sampling interval of a file without a clock [s].")
@@ -136,26 +143,32 @@ class WindSettings(Section):
     )
     position: Literal["ground", "outrigger", "tuned-mass"] = Field(
         "ground",
-        description="Where the damper works: `ground` (between ground and floor 1, as the thesis), `outrigger`, or "
+        description="Position of the damper: `ground` (between ground and floor 1, as the thesis), `outrigger`, or "
         "`tuned-mass` (between the top floor and a tuned mass, as the original benchmark).",
     )
     dampers: float | None = Field(
-        None, gt=0.0, description="1000 kN dampers side by side; null: 1 (ground), 8 (outrigger), 0.1 (tuned mass)."
+        None,
+        gt=0.0,
+        description="Number of parallel 1000 kN dampers; null: 1 (ground), 8 (outrigger), 0.1 (tuned mass).",
     )
     outrigger_floor: int = Field(40, ge=2, le=75, description="Floor of the outrigger.")
-    outrigger_arm_m: float = Field(21.0, gt=0.0, description="From the core to the damper [m].")
+    outrigger_arm_m: float = Field(21.0, gt=0.0, description="Distance from the core to the damper [m].")
     tuned_mass_kg: float = Field(500e3, gt=0.0, description="Tuned mass on the top floor [kg].")
-    tuned_frequency_ratio: float = Field(0.99, gt=0.5, lt=1.5, description="Its frequency over the tower's first.")
+    tuned_frequency_ratio: float = Field(
+        0.99, gt=0.5, lt=1.5, description="Frequency of the tuned mass over the first one of the tower."
+    )
     damper: str = Field("bingham-1000kn", description="Bingham parameter set in configs/dampers.")
     neural_inverse: bool = Field(
-        True, description="Voltage from a neural inverse of the damper, as the thesis; false: from the formula."
+        True,
+        description="Whether the voltage comes from a neural inverse of the damper, as in the thesis; otherwise from "
+        "the formula.",
     )
     hidden_neurons: int = Field(6, ge=2, le=20, description="Neurons of both hidden layers of the neural inverse.")
     filter_rate_1_s: float = Field(
-        31.4, ge=0.0, description="Rate of the voltage filter, (24) of P4 [1/s]; 0: none, and voltages then jump."
+        31.4, ge=0.0, description="Rate of the voltage filter, (24) of P4 [1/s]; 0: no filter, so that voltages jump."
     )
     stiffness_share: float = Field(
-        0.5, ge=0.0, lt=0.95, description="Share of the static stiffness at the damper that vdns takes away."
+        0.5, ge=0.0, lt=0.95, description="Share of the static stiffness at the damper that vdns compensates."
     )
     lqg: LqgWeights = Field(
         LqgWeights(displacement=1000.0, acceleration=10.0, force_n=1e6, interval_s=0.001),

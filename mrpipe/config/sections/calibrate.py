@@ -13,7 +13,7 @@ __all__ = ["CalibrateSettings", "CalibrationSettings", "NeuralReferenceSettings"
 
 
 class _Fixed(CalibrationSettings):
-    """For which mode and damper the laws are calibrated, and the gains they run with."""
+    """Mode and damper for which the laws are calibrated, and the gains that are used."""
 
     damper: str = Field(
         "identified",
@@ -22,26 +22,27 @@ class _Fixed(CalibrationSettings):
     )
     damper_floor: int = Field(1, ge=1, description="Floor that the damper acts on.")
     damper_across_storey: bool = Field(
-        False, description="The damper spans the storey below its floor; else it sits between floor and ground."
+        False,
+        description="Whether the damper spans the storey below its floor; otherwise it is between floor and ground.",
     )
     expected_amplitude_m: float | None = Field(
         None,
         gt=0.0,
-        description="Damper amplitude at which forces are judged and around which nnc learns; null: half the largest "
-        "displacement of the bench tests.",
+        description="Damper amplitude at which forces are judged and around which nnc is trained; null: half the "
+        "largest displacement of the bench tests.",
     )
     friction_rounding_share: float = Field(
         1.0 / 6.0,
         ge=0.0,
-        description="Speed over which the friction of fdns and nnc changes its sign, over the damper's peak speed at "
-        "the expected amplitude; 0: the jump of (4.18).",
+        description="Speed over which the friction of fdns and nnc changes its sign, relative to the peak speed of "
+        "the damper at the expected amplitude; 0: the jump of (4.18).",
     )
     together: bool = Field(
         True,
-        description="With `structure.dampers`: search the gains of all dampers together for the largest damping of the "
-        "target modes; else each damper has the gains that it would have alone.",
+        description="With `structure.dampers`: whether the gains of all dampers are searched together for the largest "
+        "damping of the target modes; otherwise each damper has the gains that it would have alone.",
     )
-    map_points: int = Field(25, ge=5, le=200, description="Points along each axis of the damping maps.")
+    map_points: int = Field(25, ge=5, le=200, description="Number of points along each axis of the damping maps.")
     neural: NeuralReferenceSettings = Field(NeuralReferenceSettings(), description="The neural reference controller.")
     regulator: RegulatorSettings = Field(RegulatorSettings(), description="Clipped LQG.")
 
@@ -53,7 +54,7 @@ class _Fixed(CalibrationSettings):
 if TYPE_CHECKING:
 
     class CalibrateSettings(_Fixed):
-        """For which mode and damper the laws are calibrated, and the gains they run with."""
+        """Mode and damper for which the laws are calibrated, and the gains that are used."""
 
 else:
     CalibrateSettings = create_model(

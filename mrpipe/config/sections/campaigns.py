@@ -1,4 +1,4 @@
-"""Where the measurements come from."""
+"""Sources of the measurements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class CampaignsSettings(Section):
     bench: str | None = Field(
         LABORATORY,
         description="Damper bench campaign: path of a directory with campaign.yaml or of a campaign file (relative to "
-        "the configuration), `laboratory` to record it on the virtual rig, null where there is none.",
+        "the configuration), `laboratory` to record it on the virtual rig, or null if there is none.",
     )
     frame: str | None = Field(
         LABORATORY, description="Frame campaign (sweeps, free decays): path, `laboratory` or null, as for bench."

@@ -1,4 +1,4 @@
-"""How the program runs; nothing here changes a result."""
+"""Execution of the program; these settings change no result."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class ExecutionSettings(Section):
     jobs: int = Field(
         0,
         ge=0,
-        description="Processes that a stage uses at most; 0 means one for each core. With more than one, `mrpipe run` "
-        "runs two stages at a time where neither needs the other.",
+        description="Largest number of processes of a stage; 0: one per core. With more than one process, `mrpipe "
+        "run` runs two stages at a time if neither needs the other.",
     )
     log_level: Literal["debug", "info", "warning"] = Field(
-        "info", description="How much the log file and standard error say: debug, info or warning."
+        "info", description="Level of messages in the log file and on standard error: debug, info or warning."
     )

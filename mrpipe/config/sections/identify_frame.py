@@ -9,12 +9,12 @@ from mrpipe.options import Section
 
 
 class IdentifyFrameSettings(Section, IdentificationOptions):
-    """How the frame is identified from its forced, ambient and decay tests."""
+    """Identification of the frame from its forced, ambient and decay tests."""
 
     mode_matrix: str = Field(
         "",
-        description="Mode shapes to use in place of the measured ones: a set in configs/frames or a YAML file; "
-        "empty for the measured ones.",
+        description="Mode shapes to use instead of the measured ones: a parameter set in configs/frames or a YAML "
+        "file; empty: the measured ones.",
     )
     segment_s: float = Field(
         16.0, gt=0.0, description="Length of a segment of the averaged frequency responses that the report shows."

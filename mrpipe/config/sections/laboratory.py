@@ -14,13 +14,20 @@ from mrpipe.options import Section
 class PlantedEffect(Section):
     """An effect of the true damper."""
 
-    name: str = Field(description="Name of the effect, as in docs/effects.md; `unfamiliar` for shapes of no family.")
-    form: str = Field("", description="Which functional form; empty for the first one.")
+    name: str = Field(
+        description="Name of the effect, as in docs/effects.md; `unfamiliar` for shapes that belong to no effect of "
+        "the library."
+    )
+    form: str = Field("", description="Form of the effect; empty: the first one.")
     strength_share: float | None = Field(
-        None, gt=0.0, lt=2.0, description="RMS of the effect over RMS of the force; scales the form's first number."
+        None,
+        gt=0.0,
+        lt=2.0,
+        description="RMS of the effect over RMS of the force; it scales the first parameter of the form.",
     )
     parameters: dict[str, float] = Field(
-        default_factory=dict, description="Numbers of the form in SI; those left out take the form's own."
+        default_factory=dict,
+        description="Parameters of the form in SI; parameters that are left out have the values of the form.",
     )
 
 
@@ -43,13 +50,19 @@ class FrameSettings(FrameRig):
 
     structure: str = Field("thesis", description="Parameter set of the true frame (configs/frames, or a YAML file).")
     random_floors: int = Field(
-        0, ge=0, le=12, description="Draw a shear frame of so many floors from the seed instead; 0 takes the set."
+        0,
+        ge=0,
+        le=12,
+        description="Number of floors of a shear frame that is drawn at random from the seed; 0: the parameter set is "
+        "used.",
     )
     declared_effects: tuple[PlantedEffect, ...] = Field(
         (), description="Effects of the true structure that campaign.yaml names."
     )
     hidden_effects: tuple[PlantedEffect, ...] = Field(
-        (), description="Effects of the true structure (joint-friction, cubic-stiffness, ...) that it keeps back."
+        (),
+        description="Effects of the true structure (joint-friction, cubic-stiffness, ...) that campaign.yaml does not "
+        "declare.",
     )
 
 
@@ -57,7 +70,9 @@ class ClosedLoopSettings(LoopRig):
     """The closed-loop campaign on the shaking table."""
 
     laws: tuple[str, ...] = Field(
-        ("vd", "vdps", "vdns", "fdns", "passive-off", "passive-on"), min_length=1, description="Control laws recorded."
+        ("vd", "vdps", "vdns", "fdns", "passive-off", "passive-on"),
+        min_length=1,
+        description="Control laws that are recorded.",
     )
 
     @field_validator("laws")
@@ -86,10 +101,17 @@ class LaboratorySettings(Section):
         "file that no estimator reads.",
     )
     draw_hidden_share: float | None = Field(
-        None, gt=0.0, lt=1.0, description="Draw one more hidden effect from the seed, of this share of the force RMS."
+        None,
+        gt=0.0,
+        lt=1.0,
+        description="Share of the RMS force of one more hidden effect, which is drawn at random from the seed; 0: "
+        "none.",
     )
     vary_damper: float = Field(
-        0.0, ge=0.0, le=0.5, description="Log-normal spread by which the damper departs from its set (0: as printed)."
+        0.0,
+        ge=0.0,
+        le=0.5,
+        description="Log-normal spread of the parameters of the damper around its parameter set (0: no spread).",
     )
     bench: BenchSettings = Field(BenchSettings(), description="The bench campaign.")
     frame: FrameSettings = Field(FrameSettings(), description="The frame campaign.")

@@ -6,4 +6,4 @@ from mrpipe.signals.options import PreparationOptions
 
 
 class PrepareSettings(PreparationOptions):
-    """How measured tests are filtered, freed of offsets and differentiated."""
+    """Filtering of measured tests, removal of offsets, and differentiation."""

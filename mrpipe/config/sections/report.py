@@ -10,7 +10,7 @@ from mrpipe.options import Section
 
 
 class ReportSettings(Section):
-    """What the report shows."""
+    """Content of the report."""
 
     title: str = Field("", description="Title of the report; empty: the name of the configuration.")
     formats: tuple[Literal["html", "markdown"], ...] = Field(

@@ -6,4 +6,4 @@ from mrpipe.networks.options import SweepOptions
 
 
 class SweepSettings(SweepOptions):
-    """Which architectures of the forward network are compared, and how long each is trained."""
+    """Architectures of the forward network that are compared, and their training."""

@@ -6,4 +6,4 @@ from mrpipe.networks.options import TrainingOptions
 
 
 class TrainForwardSettings(TrainingOptions):
-    """How the forward network (motion and drive to force) is trained."""
+    """Training of the forward network (motion and drive to force)."""

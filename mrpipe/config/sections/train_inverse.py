@@ -6,4 +6,4 @@ from mrpipe.networks.options import InverseTrainingOptions
 
 
 class TrainInverseSettings(InverseTrainingOptions):
-    """How the inverse network (motion and force to drive) is trained."""
+    """Training of the inverse network (motion and force to drive)."""

@@ -1,4 +1,4 @@
-"""The control laws: one file per law, found by looking into this folder.
+"""Control laws: one file per law. Every file of this folder is a law.
 
 A file `my_law.py` defines `LAW`, a :class:`~mrpipe.control.law.Law`, whose name is `my-law`. Nothing else has to be
 changed: command line, settings, calibration, simulation, export, recalibration and report read this list. Further
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 LOADS_FROM = ("mrpipe.control.laws",)
 
 _FIRST = ("vd", "vdps", "vdns", "fdns", "nnc", "lqg", "passive-off", "passive-on")
-"""Laws that tables show first, in this order; the others follow by name."""
+"""Laws that tables show first, in this order; the others follow in alphabetical order."""
 
 
 def law_names() -> tuple[str, ...]:
     """Return the names of all laws in the order of tables, without importing them."""
     modules = (item.name for item in pkgutil.iter_modules(__path__))
-    # a leading underscore marks what several laws share
+    # a leading underscore marks a module that several laws share
     found = {name.replace("_", "-") for name in modules if not name.startswith("_")}
     return (*(name for name in _FIRST if name in found), *sorted(found.difference(_FIRST)))
 
@@ -58,7 +58,7 @@ def law_named(name: str) -> Law:
 
 
 def is_linear(name: str) -> bool:
-    """Return whether this is the name of a law that is linear in the motion of the damper where it is not clipped."""
+    """Return whether a law with this name exists and is linear in the motion of the damper, apart from clipping."""
     return name in law_names() and law_named(name).linear
 
 

@@ -1,4 +1,4 @@
-"""What the laws of friction with negative stiffness share: f = sign(v) alpha X - alpha x (4.18), (4.20)."""
+"""Functions that the laws of friction with negative stiffness share: f = sign(v) alpha X - alpha x (4.18), (4.20)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FRICTION = GainRange(
 @njit(LAW_SIGNATURE, cache=True)
 def friction_force(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
     """Return f = alpha (sign(v) X - x) (4.18), where X is the last extremum of the displacement."""
-    # the pending extremum counts where it already exceeds the last one, so that a growing motion stays dissipative
+    # the pending extremum is used if it already exceeds the last one, so that the force dissipates in a growing motion
     amplitude = max(state[S_AMPLITUDE], abs(state[S_X]))
     side = state[S_DIRECTION]
     if numbers[ROUNDING] > 0.0:

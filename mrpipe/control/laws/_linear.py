@@ -1,4 +1,4 @@
-"""What the linear laws share: f = c v + k x (4.14), clipped where it would put energy in (P2 (22))."""
+"""Functions that the linear laws share: f = c v + k x (4.14), clipped where it would add energy (P2 (22))."""
 
 from __future__ import annotations
 

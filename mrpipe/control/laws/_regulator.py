@@ -1,4 +1,4 @@
-"""What the laws with a state observer share: z+ = F z + g f + H y, u = -k z."""
+"""Functions that the laws with a state observer share: z+ = F z + g f + H y, u = -k z."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def observe(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: 
 
 @njit(LAW_SIGNATURE, cache=True)
 def regulator_force(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Return -k z, where the damper is assumed to have given the force that was desired at the last sample."""
+    """Return -k z, assuming that the force of the damper was the desired force of the last sample."""
     return observe(numbers, layout, state, measured, state[S_FORCE])
 
 
@@ -84,7 +84,7 @@ C_BODY = "    return observe(state, measured, state[S_FORCE]);\n"
 
 
 def regulator_assessment(plant: Plant, gain: FloatArray) -> Assessment:
-    """Follow the target's pole while the unclipped regulator u = -k z, shape (2n,), is faded in."""
+    """Follow the pole of the target mode while the unclipped u = -k z, shape (2n,), increases from zero."""
     answers = []
     for item in (plant.bare, plant.frame):
         space = state_space(item, plant.position)

@@ -1,4 +1,4 @@
-"""What the laws share that switch the largest drive on and off by the measured damper force.
+"""Functions that the laws share which switch the largest drive on and off by the measured damper force.
 
 Signs: the damper force f is positive where it resists, so the force on the structure along w is -f. Jansen and Dyke
 (2000) write the same laws for the force on the structure.
@@ -17,7 +17,7 @@ from mrpipe.control.kernel import AT_LAW, FLOORS, MEASURED_FLOORS, STATE_LAW
 from mrpipe.control.law import GainRange
 
 CORNER_SHARE = 0.1
-"""Corner of the integration of accelerations over the free frequency of the target mode."""
+"""Ratio of the corner frequency of the integration of accelerations to the free frequency of the target mode."""
 
 CORNER = GainRange(
     "corner_rad_s",
@@ -30,8 +30,8 @@ CORNER = GainRange(
 def absolute_velocity(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
     """Return the absolute velocity along the damper [m/s], integrated from the accelerometers of the floors.
 
-    The integral forgets what is slower than the corner frequency, because an accelerometer has a bias. The numbers of
-    the law are the sample time, the decay over it, and the connectivity vector w.
+    The integral decays below the corner frequency, because an accelerometer has a bias. The numbers of the law are the
+    sample time, the decay factor per sample, and the connectivity vector w.
     """
     at, memory = layout[AT_LAW], layout[STATE_LAW]
     total = 0.0
@@ -56,6 +56,6 @@ static double absolute_velocity(double *state, const double *measured)
 
 
 def integration_numbers(gains: Gains, position: FloatArray | None, dt: float) -> FloatArray:
-    """Return sample time, decay over it, and connectivity vector, shape (2 + n,)."""
+    """Return the sample time, the decay factor per sample, and the connectivity vector, shape (2 + n,)."""
     w = np.zeros(0) if position is None else np.asarray(position, dtype=np.float64)
     return np.concatenate([[dt, math.exp(-dt * gains.get("corner_rad_s", 0.0))], w])

@@ -19,7 +19,7 @@ from mrpipe.control.laws._switching import (
 
 @njit(LAW_SIGNATURE, cache=True)
 def bang_bang(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Command the largest drive where the damper takes energy out of the absolute motion of its floor."""
+    """Command the largest drive while the damper takes energy from the absolute motion of its floor."""
     velocity = absolute_velocity(numbers, layout, state, measured)
     state[S_REQUEST] = numbers[DRIVE_LIMIT] if velocity * measured[MEASURED_FORCE] > 0.0 else 0.0
     return 0.0

@@ -13,7 +13,7 @@ from mrpipe.control.lqg import lqg_observer, regulator_gain
 
 @njit(LAW_SIGNATURE, cache=True)
 def clipped_optimal(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Command the largest drive where the regulator's force has the sign of the damper's and is larger."""
+    """Command the largest drive while the force of the regulator has the sign of the damper force and is larger."""
     force = measured[MEASURED_FORCE]
     wanted = observe(numbers, layout, state, measured, force)
     state[S_REQUEST] = numbers[DRIVE_LIMIT] if (wanted - force) * force > 0.0 else 0.0

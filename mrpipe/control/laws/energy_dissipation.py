@@ -11,7 +11,7 @@ from mrpipe.control.law import Law
 
 @njit(LAW_SIGNATURE, cache=True)
 def energy_dissipation(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Command the largest drive where the damper takes energy out of the relative motion: v f > 0."""
+    """Command the largest drive while the damper takes energy from the relative motion: v f > 0."""
     state[S_REQUEST] = numbers[DRIVE_LIMIT] if state[S_V] * measured[MEASURED_FORCE] > 0.0 else 0.0
     return 0.0
 

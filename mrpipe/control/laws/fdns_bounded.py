@@ -1,8 +1,8 @@
 """Friction with negative stiffness that accounts for the residual and the largest force of the damper.
 
-The damper gives no less than its residual force F0 and no more than its largest force F1. Over a half cycle the force
-alpha (X - x) is then replaced by the one between these bounds, and the dissipated energy differs from the 2 alpha X^2
-of the law. This law scales alpha so that the bounded force dissipates just that.
+The force of the damper lies between its residual force F0 and its largest force F1. Over a half cycle these bounds
+limit the force alpha (X - x), so that the dissipated energy differs from the 2 alpha X^2 of the law. This law scales
+alpha such that the bounded force dissipates 2 alpha X^2.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from mrpipe.control.law import Law
 from mrpipe.control.laws._friction import FRICTION, friction_assessment, friction_candidates
 
 STEEPEST = 64.0
-"""Largest factor on alpha."""
+"""Largest factor by which alpha is scaled."""
 
 
 @njit(float64(float64, float64, float64, float64), cache=True)
 def bounded_energy(slope: float, amplitude: float, lowest: float, highest: float) -> float:
-    """Return the integral of slope u, held between two forces, over u from 0 to twice the amplitude [J]."""
+    """Return the integral of slope u, limited to between two forces, for u from 0 to twice the amplitude [J]."""
     way = 2.0 * amplitude
     first = min(lowest / slope, way)
     last = min(highest / slope, way)
@@ -41,7 +41,7 @@ def bounded_energy(slope: float, amplitude: float, lowest: float, highest: float
 
 @njit(float64(float64, float64, float64, float64), cache=True)
 def bounded_slope(alpha: float, amplitude: float, lowest: float, highest: float) -> float:
-    """Return the slope whose bounded force dissipates 2 alpha X^2 in a half cycle; 0 where the residual force does."""
+    """Return the slope whose bounded force dissipates 2 alpha X^2 in a half cycle; 0 if the residual force suffices."""
     wanted = 2.0 * alpha * amplitude * amplitude
     if wanted <= 2.0 * lowest * amplitude or alpha <= 0.0:
         return 0.0

@@ -15,7 +15,7 @@ from mrpipe.control.law import Assessment, GainRange, Law, Plant
 from mrpipe.control.limits import damping_estimate
 
 LOSS = 4.0 / math.pi
-"""Loss of a friction force of amplitude g X in harmonic motion of amplitude X, over g."""
+"""Loss of a friction force g X in harmonic motion of amplitude X, divided by g."""
 
 
 @njit(LAW_SIGNATURE, cache=True)
@@ -27,7 +27,7 @@ def homogeneous_friction(numbers: FloatArray, layout: IntArray, state: FloatArra
 
 
 def _candidates(plant: Plant) -> Mapping[str, Gains]:
-    """Return g for which the equivalent loss is the best one: 1/nu by closed form, and by complex eigenvalue."""
+    """Return g with the optimal equivalent loss: by closed form, where the loss is 1/nu, and by complex eigenvalue."""
 
     def ratio(g: float) -> float:
         answer = exact.exact_equivalent(plant.bare, plant.position, plant.modes, complex(0.0, LOSS * g))

@@ -21,7 +21,7 @@ from mrpipe.structures import Frame, state_space
 
 @njit(LAW_SIGNATURE, cache=True)
 def lyapunov_drive(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Command the largest drive where the damper force makes V = z'P z/2 fall: z'P B f > 0."""
+    """Command the largest drive while the damper force decreases V = z'P z/2: z'P B f > 0."""
     force = measured[MEASURED_FORCE]
     direction = observe(numbers, layout, state, measured, force)
     state[S_REQUEST] = numbers[DRIVE_LIMIT] if direction * force > 0.0 else 0.0
@@ -50,7 +50,7 @@ def _check_damped(frame: Frame) -> None:
 
 
 def _candidates(plant: Plant) -> Mapping[str, Gains]:
-    """Return no gains, because the law has none, after a look at what it needs."""
+    """Check that the structure is damped; return no gains, because the law has none."""
     _check_damped(plant.frame)
     return {}
 

@@ -1,4 +1,4 @@
-"""Passive-off: the damper without current."""
+"""Passive-off: the damper without drive."""
 
 from __future__ import annotations
 

@@ -22,12 +22,12 @@ from mrpipe.control.laws._switching import (
 
 @njit(LAW_SIGNATURE, cache=True)
 def sky_hook(numbers: FloatArray, layout: IntArray, state: FloatArray, measured: FloatArray) -> float:
-    """Return f = c v_absolute; the clipping leaves it out where it would put energy into the relative motion."""
+    """Return f = c v_absolute; clipping sets it to zero where it would add energy to the relative motion."""
     return numbers[GAIN_C] * absolute_velocity(numbers, layout, state, measured)
 
 
 def _candidates(plant: Plant) -> Mapping[str, Gains]:
-    """Return c as for viscous damping, with the corner of the integration."""
+    """Return c of viscous damping and the corner frequency of the integration."""
     corner = CORNER_SHARE * plant.modes.omega_0
     found = linear_candidates(plant, 0.0)
     return {source: found[source].changed(corner_rad_s=corner) for source in ("closed-form", "exact")}

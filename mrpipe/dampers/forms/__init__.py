@@ -1,4 +1,4 @@
-"""Base forms of a damper, one file each; :mod:`mrpipe.dampers.library` finds them by walking this package."""
+"""Base forms of a damper, one file each; :mod:`mrpipe.dampers.library` loads the modules of this package."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ LOADS_FROM: tuple[str, ...] = ()  # only names are read here; mrpipe.dampers.lib
 
 
 def form_names() -> tuple[str, ...]:
-    """Return the names of all forms without loading them: a file `bouc_wen.py` holds the form `bouc-wen`."""
+    """Return the names of all forms without loading them: a file `bouc_wen.py` defines the form `bouc-wen`."""
     return tuple(item.name.replace("_", "-") for item in pkgutil.iter_modules(__path__))

@@ -1,4 +1,4 @@
-"""Algebraic model: a root of free sharpness in place of a hyperbolic tangent, shifted with the displacement."""
+"""Algebraic model: a root function with free sharpness instead of a hyperbolic tangent, shifted with displacement."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -16,10 +16,10 @@ from mrpipe.dampers.plant import DISPLACEMENT, HYSTERESIS, STEP_SIGNATURE, VELOC
 
 @njit(STEP_SIGNATURE, cache=True)
 def algebraic_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: velocity scale [m/s], frequency [1/s] that weighs the displacement, sharpness of the knee."""
+    """Parameters: velocity scale [m/s], frequency [1/s] that weights the displacement, sharpness of the knee."""
     ratio = (wire[VELOCITY] + parameters[1] * wire[DISPLACEMENT]) / parameters[0]
     size, sharpness = abs(ratio), parameters[2]
-    # both branches are the same function; each keeps its power from overflowing
+    # both branches are the same function; each avoids an overflow of the power
     if size <= 1.0:
         wire[HYSTERESIS] = ratio / (1.0 + size**sharpness) ** (1.0 / sharpness)
     else:

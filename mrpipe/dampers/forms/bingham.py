@@ -25,7 +25,15 @@ FORM = BaseForm(
     summary="Bingham (6.1): F_y tanh(v/v_t) parallel to a dashpot; a jump for v_t = 0",
     source="Stanway, Sproston, Stevens 1985; Papanastasiou 1987, J. Rheol. 31, 385-404 (regularisation)",
     parameters=(
-        shape("transition_velocity", "m/s", "speed over which the sign is rounded", "speed", 1e-4, 1.0, (0.01, 0.1)),
+        shape(
+            "transition_velocity",
+            "m/s",
+            "speed over which the sign of the velocity is rounded",
+            "speed",
+            1e-4,
+            1.0,
+            (0.01, 0.1),
+        ),
     ),
     steps=_steps,
     post_yield=_post_yield,

@@ -30,8 +30,8 @@ from mrpipe.dampers.viscoplastic import outer_velocity
 def advance_spring(deformation: float, speed: float, dt: float, yield_deformation: float, relaxation: float) -> float:
     """Return the deformation of the spring [m] after `dt` [s] at a constant speed [m/s]; exact.
 
-    Below the yield deformation all of the motion goes into the spring. Beyond it the Bingham element moves by
-    (e - e_y)/relaxation, which is a linear equation.
+    Below the yield deformation the spring takes the whole motion. Beyond it the Bingham element moves by (e -
+    e_y)/relaxation, which is a linear equation.
     """
     e, left = deformation, dt
     for _ in range(6):
@@ -58,7 +58,7 @@ def advance_spring(deformation: float, speed: float, dt: float, yield_deformatio
             break
         final = edge + speed * relaxation
         if (final - edge) * sign < 0.0 and abs(e) > yield_deformation:
-            # the motion has turned: the element creeps until the force is below its yield force again
+            # the motion has reversed: the element creeps until the force is below its yield force again
             needed = relaxation * math.log((e - final) / (edge - final))
             if needed < left:
                 e, left = edge, left - needed
@@ -75,8 +75,8 @@ def bingham_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     """Parameters: stiffness of the spring [N/m]. State: last displacement [m], deformation of the spring [m], last
     velocity [m/s], last yield force [N], last viscosity [N s/m].
 
-    The velocity of the Bingham element takes the place of the rod's. A long interval is divided, because the yield
-    force can change while the spring is strained.
+    The velocity of the Bingham element replaces that of the rod. A long interval is divided, because the yield force
+    can change while the spring is strained.
     """
     x, v = wire[DISPLACEMENT], wire[VELOCITY]
     wire[OUTER_VELOCITY] = v
@@ -96,7 +96,7 @@ def bingham_spring_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
         end = (part + 1.0) / count
         limit = (state[3] + end * (strength - state[3])) / stiffness
         relaxation = (state[4] + end * (viscosity - state[4])) / stiffness
-        # at most two pieces: up to the turning point of the motion, and behind it
+        # at most two pieces: before and after the turning point of the motion
         for _ in range(2):
             until = turn if begin < turn < end else end
             after = displacement_between(until, state[0], state[2], x, v, dt)

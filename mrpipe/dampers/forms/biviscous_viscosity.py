@@ -1,4 +1,4 @@
-"""Biviscous model whose viscosity before yield is constant: the velocity at which it yields grows with the force."""
+"""Biviscous model with a constant viscosity before yield: the yield velocity grows with the yield force."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -14,7 +14,7 @@ from mrpipe.dampers.plant import HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FOR
 
 @njit(STEP_SIGNATURE, cache=True)
 def biviscous_viscosity_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: viscosity before yield less that after it [N*s/m]."""
+    """Parameters: viscosity before yield minus viscosity after yield [N*s/m]."""
     # a damper without yield force has no force before yield either
     wire[HYSTERESIS] = min(max(parameters[0] * wire[VELOCITY] / max(wire[YIELD_FORCE], 1e-12), -1.0), 1.0)
 
@@ -37,7 +37,7 @@ FORM = BaseForm(
         shape(
             "preyield_viscosity",
             "N*s/m",
-            "viscosity before yield less that after it",
+            "viscosity before yield minus that after yield",
             "force/speed",
             0.8,
             2000.0,

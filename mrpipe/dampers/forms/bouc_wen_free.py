@@ -22,9 +22,15 @@ FORM = BaseForm(
         GAMMA_SHARE,
         EXPONENT,
         Parameter(
-            "growth", "1", "power of the yield force that the yield displacement grows with", "one", -0.5, 2.0, (0.5,)
+            "growth",
+            "1",
+            "exponent with which the yield displacement grows with the yield force",
+            "one",
+            -0.5,
+            2.0,
+            (0.5,),
         ),
-        constant("reference_force", "N", "yield force at which the yield displacement is given", "force"),
+        constant("reference_force", "N", "yield force for which the yield displacement is given", "force"),
     ),
     steps=_steps,
     coupled=True,

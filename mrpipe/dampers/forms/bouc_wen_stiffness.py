@@ -1,4 +1,4 @@
-"""Bouc-Wen model whose initial stiffness is constant: its yield displacement grows with the yield force."""
+"""Bouc-Wen model with constant initial stiffness: the yield displacement is proportional to the yield force."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _steps(values: Values) -> list[Step]:
 FORM = BaseForm(
     name="bouc-wen-stiffness",
     summary="Bouc-Wen hysteresis with exponent 2 and a constant initial stiffness k: x_y = F_y(u)/k",
-    source="Spencer, Dyke, Sain, Carlson 1997, J. Eng. Mech. 123, 230-238 (A and z alike for all voltages)",
+    source="Spencer, Dyke, Sain, Carlson 1997, J. Eng. Mech. 123, 230-238 (A and z the same for all voltages)",
     parameters=(
         shape("initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)),
         GAMMA_SHARE,

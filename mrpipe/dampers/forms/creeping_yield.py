@@ -61,7 +61,7 @@ def creeping_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
 
 
 def creeping(spring_rate: float, creep_speed: float, exponent: float, gamma_share: float) -> Step:
-    """Return the hysteresis that creeps: spring rate [1/m], creep under the full force [m/s], power, gamma share."""
+    """Return the creeping hysteresis: spring rate [1/m], creep speed at the full force [m/s], exponent, gamma share."""
     numbers = np.array([spring_rate, creep_speed, exponent, gamma_share], dtype=np.float64)
     return Step("creeping", Phase.HYSTERESIS, creeping_step, numbers, 2)
 
@@ -71,7 +71,7 @@ def _steps(values: Values) -> list[Step]:
 
 
 def _post_yield(values: Values, at: Strength) -> FloatArray:
-    # z at rest of its equation, v (1 - z^2) = v_c z^m: a monotone equation, solved by bisection
+    # steady state of z: v (1 - z^2) = v_c z^m, a monotone equation, solved by bisection
     speed, creep, power = at.speed, values["creep_speed"], values["creep_exponent"]
     low, high = np.zeros_like(speed), np.ones_like(speed)
     for _ in range(40):
@@ -88,7 +88,7 @@ FORM = BaseForm(
     parameters=(
         shape("elastic_rate", "1/m", "stiffness over the yield force", "one/stroke", 2.0, 500.0, (10.0, 40.0)),
         shape("creep_speed", "m/s", "creep under the full force", "speed", 2e-3, 2.0, (0.03, 0.2)),
-        shape("creep_exponent", "1", "power of the force that drives it", "one", 1.0, 20.0, (3.0,)),
+        shape("creep_exponent", "1", "exponent of the force in the creep law", "one", 1.0, 20.0, (3.0,)),
         Parameter("gamma_share", "1", "gamma over gamma plus beta", "one", 0.0, 1.0, (0.5,)),
     ),
     steps=_steps,

@@ -17,7 +17,7 @@ SUB_STEP = 0.05
 """Longest sub-step of the integration, in yield displacements."""
 
 YIELDED = 1e-7
-"""The rest of the way to the yield force, as a share of it, at which the damper counts as yielded."""
+"""The damper counts as yielded if its force is within this share of the yield force."""
 
 
 @njit(float64(float64, float64, float64, float64), cache=True)
@@ -27,7 +27,7 @@ def _slope(y: float, power: float, tilt: float, curvature: float) -> float:
 
 @njit(float64(float64, float64, float64[::1]), cache=True)
 def _advanced(zeta: float, increment: float, parameters: FloatArray) -> float:
-    """Return the normalised force after the rod moved by `increment` [m] without turning (Runge-Kutta, order 4)."""
+    """Return the normalised force after a motion by `increment` [m] without reversal (Runge-Kutta, order 4)."""
     if increment == 0.0:
         return zeta
     sign = 1.0 if increment > 0.0 else -1.0
@@ -73,12 +73,12 @@ def _steps(values: Values) -> list[Step]:
 
 FORM = BaseForm(
     name="duhem",
-    summary="dy/d(|x|/x_y) = (1 - y)^p exp(a y + b y^2), y = z sign v: Bouc-Wen and Dahl loops and those between",
+    summary="dy/d(|x|/x_y) = (1 - y)^p exp(a y + b y^2), y = z sign v: Bouc-Wen loops, Dahl loops and loops in between",
     source="Visintin 1994, Differential Models of Hysteresis, chapter V (Duhem); Dahl 1976, AIAA J. 14, 1675-1682 "
     "(p free, a = b = 0)",
     parameters=(
         YIELD_DISPLACEMENT,
-        shape("power", "1", "p: above 1 the force approaches its limit slowly", "one", 0.3, 4.0, (1.2,)),
+        shape("power", "1", "p: above 1 the force approaches its limit more slowly", "one", 0.3, 4.0, (1.2,)),
         Parameter(
             "tilt",
             "1",

@@ -1,4 +1,4 @@
-"""Elastic-plastic friction with a constant stiffness, whose force stays when the yield force changes."""
+"""Elastic-plastic friction with a constant stiffness; its force does not jump when the yield force changes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def elastic_plastic_step(wire: FloatArray, state: FloatArray, parameters: FloatA
     divided, because the yield force can change while the element is strained.
     """
     x, v = wire[DISPLACEMENT], wire[VELOCITY]
-    # a lower limit keeps the share of the yield force defined where the damper has no yield force
+    # a lower limit keeps the ratio to the yield force defined if the damper has no yield force
     limit = max(wire[YIELD_FORCE], 1e-9)
     if wire[FIRST] > 0.5:
         state[0] = x

@@ -40,7 +40,7 @@ def _stage_force(slope: float, right: float, creep: float, yield_force: float) -
 def _advance(
     state: FloatArray, first: float, last: float, strength: float, viscosity: float, dt: float, solid: FloatArray
 ) -> None:
-    """Advance Kelvin deformation and force/k2 [m] while the rod's velocity goes from `first` to `last` [m/s].
+    """Advance Kelvin deformation and force/k2 [m] while the rod velocity changes from `first` to `last` [m/s].
 
     Two-stage diagonally implicit Runge-Kutta (L-stable, second order). Each stage is one piecewise linear equation in
     the force.
@@ -72,7 +72,7 @@ def gamota_filisko_step(wire: FloatArray, state: FloatArray, parameters: FloatAr
     last yield force, last viscosity.
 
     The damper yields within a few milliseconds after a reversal, so that a longer interval is divided. The velocity of
-    the Bingham element takes the place of the rod's.
+    the Bingham element replaces that of the rod.
     """
     v = wire[VELOCITY]
     wire[OUTER_VELOCITY] = v

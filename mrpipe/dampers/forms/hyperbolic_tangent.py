@@ -41,8 +41,16 @@ FORM = BaseForm(
     source="Kwok, Ha, Nguyen, Li, Samali 2006, Sens. Actuators A 132, 441-451",
     parameters=(
         shape("velocity_scale", "m/s", "speed over which the force reverses", "speed", 3e-3, 2.0, (0.1, 0.3, 0.03)),
-        Parameter("shift", "1", "delta: width of the loop over the velocity", "one", 0.0, 6.0, (0.5, 0.0)),
-        shape("displacement_scale", "m", "over which the shift changes its sign", "stroke", 1e-4, 1.0, (0.03,)),
+        Parameter("shift", "1", "delta: width of the loop over velocity", "one", 0.0, 6.0, (0.5, 0.0)),
+        shape(
+            "displacement_scale",
+            "m",
+            "displacement over which the shift changes its sign",
+            "stroke",
+            1e-4,
+            1.0,
+            (0.03,),
+        ),
         amplitude("stiffness", "N/m", "spring parallel to the damper", "force/stroke", 0.0, 10.0),
     ),
     steps=_steps,

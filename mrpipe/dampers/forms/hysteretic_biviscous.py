@@ -45,7 +45,15 @@ FORM = BaseForm(
     parameters=(
         shape("yield_velocity", "m/s", "speed at which it yields", "speed", 1e-3, 1.0, (0.05, 0.2)),
         Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
-        shape("acceleration_scale", "m/s^2", "over which the branches change", "acceleration", 1e-4, 1.0, (0.02,)),
+        shape(
+            "acceleration_scale",
+            "m/s^2",
+            "acceleration over which the branches change",
+            "acceleration",
+            1e-4,
+            1.0,
+            (0.02,),
+        ),
         REST,
         BEND,
         LARGEST_DRIVE,

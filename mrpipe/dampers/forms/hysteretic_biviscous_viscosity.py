@@ -26,7 +26,7 @@ NUMBERS = ("preyield_viscosity", "hysteresis_velocity", "acceleration_scale")
 
 @njit(STEP_SIGNATURE, cache=True)
 def hysteretic_viscosity_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: viscosity before yield less that after it [N*s/m], hysteresis velocity [m/s], acceleration scale
+    """Parameters: viscosity before yield minus that after yield [N*s/m], hysteresis velocity [m/s], acceleration scale
     [m/s^2].
     """
     shift = parameters[1] * rounded_sign(wire[ACCELERATION], parameters[2])
@@ -57,14 +57,22 @@ FORM = BaseForm(
         shape(
             "preyield_viscosity",
             "N*s/m",
-            "viscosity before yield less that after it",
+            "viscosity before yield minus that after yield",
             "force/speed",
             0.8,
             2000.0,
             (20.0, 5.0),
         ),
         Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
-        shape("acceleration_scale", "m/s^2", "over which the branches change", "acceleration", 1e-4, 1.0, (0.02,)),
+        shape(
+            "acceleration_scale",
+            "m/s^2",
+            "acceleration over which the branches change",
+            "acceleration",
+            1e-4,
+            1.0,
+            (0.02,),
+        ),
     ),
     steps=_steps,
     post_yield=_post_yield,

@@ -40,7 +40,15 @@ FORM = BaseForm(
     parameters=(
         shape("velocity_scale", "m/s", "speed over which the force reverses", "speed", 3e-3, 2.0, (0.1, 0.3, 0.03)),
         Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
-        shape("acceleration_scale", "m/s^2", "over which the branches change", "acceleration", 1e-4, 1.0, (0.02,)),
+        shape(
+            "acceleration_scale",
+            "m/s^2",
+            "acceleration over which the branches change",
+            "acceleration",
+            1e-4,
+            1.0,
+            (0.02,),
+        ),
     ),
     steps=_steps,
     post_yield=_post_yield,

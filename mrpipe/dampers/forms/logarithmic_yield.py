@@ -38,7 +38,7 @@ FORM = BaseForm(
     parameters=(
         YIELD_DISPLACEMENT,
         GAMMA_SHARE,
-        shape("gain", "1", "rise for each e-fold of speed", "one", 1e-3, 1e3, (0.1, 10.0)),
+        shape("gain", "1", "relative rise per factor e of the speed", "one", 1e-3, 1e3, (0.1, 10.0)),
         shape("velocity_scale", "m/s", "speed at which the rise begins", "speed", 1e-3, 0.5, (0.02, 0.1)),
     ),
     steps=_steps,

@@ -15,7 +15,7 @@ from mrpipe.dampers.plant import CURRENT, FORCE, HYSTERESIS, STEP_SIGNATURE, VEL
 
 @njit(STEP_SIGNATURE, cache=True)
 def bristle_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: damping of the bristles [N s/m], whether it is for each unit of the drive."""
+    """Parameters: damping of the bristles [N s/m], and whether it is per unit of the drive."""
     speed = wire[VELOCITY]
     damping = parameters[0] * wire[CURRENT] if parameters[1] > 0.0 else parameters[0]
     wire[FORCE] += damping * (speed - abs(speed) * wire[HYSTERESIS])
@@ -35,12 +35,14 @@ def _steps(values: Values) -> list[Step]:
 
 FORM = BaseForm(
     name="lugre",
-    summary="bristles z' = v - |v| z/x_y with their own damping: F_y z/x_y + (sigma_1 + sigma_1u u) z' + c0 v",
+    summary="bristles z' = v - |v| z/x_y with internal damping: F_y z/x_y + (sigma_1 + sigma_1u u) z' + c0 v",
     source="Jimenez and Alvarez-Icaza 2005, Struct. Control Health Monit. 12, 91-116; Canudas de Wit et al. 1995",
     parameters=(
         YIELD_DISPLACEMENT,
         amplitude("sigma_1", "N*s/m", "damping of the bristles", "force/speed", 0.0, 50.0),
-        amplitude("sigma_1_rate", "N*s/m/drive", "its rise with the drive", "force/speed/drive", 0.0, 50.0),
+        amplitude(
+            "sigma_1_rate", "N*s/m/drive", "change of the damping with the drive", "force/speed/drive", 0.0, 50.0
+        ),
     ),
     steps=_steps,
     amplitude_steps={"sigma_1": 1, "sigma_1_rate": 2},

@@ -23,8 +23,8 @@ def _steps(values: Values) -> list[Step]:
 
 
 def _post_yield(values: Values, at: Strength) -> FloatArray:
-    # the springs are left out, for they need the displacement. Below the speed at which the series dashpot carries the
-    # yield force it alone moves
+    # the springs are left out, because they need the displacement. Below the speed at which the series dashpot carries
+    # the yield force, only this dashpot moves
     series = values["c1_a"] + values.get("c1_b", 0.0) * at.drive
     total = at.yield_force + at.viscosity * at.speed
     return np.asarray(np.minimum(series * at.speed, series * total / (at.viscosity + series)), dtype=np.float64)
@@ -38,7 +38,9 @@ FORM = BaseForm(
         YIELD_DISPLACEMENT,
         GAMMA_SHARE,
         shape("c1_a", "N*s/m", "dashpot in series without drive", "force/speed", 0.1, 3e4, (30.0, 3.0)),
-        Parameter("c1_b", "N*s/m/drive", "its rise with the drive", "force/speed/drive", 0.0, 3e4, (10.0,)),
+        Parameter(
+            "c1_b", "N*s/m/drive", "change of the dashpot with the drive", "force/speed/drive", 0.0, 3e4, (10.0,)
+        ),
         shape("k0", "N/m", "spring across the inner element", "force/stroke", 1e-6, 1.0, (0.02,)),
         amplitude("k1", "N/m", "spring across the damper", "force/stroke", 0.0, 10.0),
     ),

@@ -27,7 +27,7 @@ FORM = BaseForm(
         YIELD_DISPLACEMENT,
         GAMMA_SHARE,
         Parameter("velocity_exponent", "1", "power of the speed", "one", 1e-3, 1.2, (0.15, 0.4)),
-        constant("reference_velocity", "m/s", "speed at which the yield force is given", "speed"),
+        constant("reference_velocity", "m/s", "speed for which the yield force is given", "speed"),
     ),
     steps=_steps,
     post_yield=_post_yield,

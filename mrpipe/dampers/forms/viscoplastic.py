@@ -17,7 +17,7 @@ LEAST = 1e-6
 
 @njit(float64(float64, float64, float64, float64[::1]), cache=True)
 def overstress_rate(z: float, v: float, limit: float, parameters: FloatArray) -> float:
-    """Return z' [1/s] where the damper flows beyond `limit`; parameters as in :func:`viscoplastic_step`."""
+    """Return z' [1/s] while the damper flows beyond `limit`; parameters as in :func:`viscoplastic_step`."""
     over = abs(z) / limit - 1.0
     if over <= 0.0:
         return parameters[0] * v
@@ -29,9 +29,9 @@ def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
     """Parameters: spring rate [1/m], speed of flow at twice the yield force [m/s], exponent. State: z, last velocity,
     last limit.
 
-    z is the force over the yield force at this drive, without effects. What effects take from the yield force lowers
-    the limit of z beyond which the damper flows: the spring keeps its force while the yield force changes. Integrated
-    by the Rosenbrock method of second order of :mod:`mrpipe.dampers.rosenbrock`.
+    z is the force over the yield force at this drive, without effects. A reduction of the yield force by effects lowers
+    the limit of z beyond which the damper flows, so that the spring keeps its force while the yield force changes.
+    Integrated by the Rosenbrock method of second order of :mod:`mrpipe.dampers.rosenbrock`.
     """
     limit = max(1.0 - wire[YIELD_LOSS], LEAST)
     if wire[FIRST] > 0.5:
@@ -73,12 +73,13 @@ def _post_yield(values: Values, at: Strength) -> FloatArray:
 
 FORM = BaseForm(
     name="viscoplastic",
-    summary="z' = q (v - v_f <|z| - 1>^n sign z): a spring in series with flow that the force beyond yield drives",
+    summary="z' = q (v - v_f <|z| - 1>^n sign z): a spring in series with flow at a rate that depends on the force "
+    "beyond yield",
     source="Perzyna 1966, Fundamental problems in viscoplasticity, Adv. Appl. Mech. 9, 243-377",
     parameters=(
         shape("elastic_rate", "1/m", "stiffness over the yield force", "one/stroke", 2.0, 500.0, (20.0, 60.0)),
         shape("flow_speed", "m/s", "speed of flow at twice the yield force", "speed", 0.02, 50.0, (3.0, 0.5)),
-        shape("exponent", "1", "power of the force beyond yield", "one", 1.0, 6.0, (1.5,)),
+        shape("exponent", "1", "exponent of the force beyond yield", "one", 1.0, 6.0, (1.5,)),
     ),
     steps=_steps,
     post_yield=_post_yield,

@@ -36,7 +36,7 @@ FORM = BaseForm(
     summary="Bouc-Wen hysteresis parallel to F_p(u) p, p' = q (v - v0 atanh p)",
     source="Eyring 1936 (saturating dashpot); plug that slips parallel to a layer that shears, as in Phillips 1969",
     parameters=(
-        # which of the two parts takes the elastic path of a reversal makes two optima far apart
+        # either part can represent the elastic path after a reversal, so that there are two distant optima
         replace(YIELD_DISPLACEMENT, starts=(0.05, 0.003)),
         GAMMA_SHARE,
         shape("spring_rate", "1/m", "stiffness over the part's force", "one/stroke", 2.0, 1500.0, (40.0, 200.0, 900.0)),

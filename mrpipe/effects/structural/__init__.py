@@ -1,1 +1,1 @@
-"""Effects of a structure that a linear frame lacks: one file an effect, found by itself."""
+"""Effects of a structure that a linear frame lacks, one file each."""

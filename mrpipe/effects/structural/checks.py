@@ -1,4 +1,4 @@
-"""What is demanded of every effect of a structure: of those that come with the program and of a user's own alike."""
+"""Demands on every effect of a structure, of the program and of users."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SCALES = (
     EffectScales(stroke=0.004, speed=0.15, acceleration=5.0, drive=1.0, force=50.0, time=20.0),
     EffectScales(stroke=0.05, speed=0.3, acceleration=2.0, drive=1.0, force=2e6, time=60.0),
 )
-"""A storey of a laboratory frame, and one of a building."""
+"""Scales of a storey of a laboratory frame, and of a building."""
 COMPILED = ("storey", "floor")
 
 
 def checks_of(effect: StructuralEffect, known: Sequence[str]) -> list[Check]:
-    """Return every demand on an effect of a structure, met or not.
+    """Return the result of every demand on an effect of a structure.
 
     Parameters
     ----------
@@ -40,11 +40,13 @@ def checks_of(effect: StructuralEffect, known: Sequence[str]) -> list[Check]:
         failure = _parameters(form)
         checks.append(Check(form.name, "Units, scales, bounds and starts of the parameters are sound", failure))
         if not failure and effect.acts_on in COMPILED:
-            demand = "The step is compiled, keeps to its memory, and depends on state and motion alone"
+            demand = "The step is compiled, writes only to its memory, and depends on state and motion alone"
             checks.append(Check(form.name, demand, _each(form)))
         elif not failure and effect.acts_on == "base":
             checks.append(
-                Check(form.name, "Columns of the base's turn fit the amplitudes and are finite", _columns(form))
+                Check(
+                    form.name, "Columns of the rotation of the base match the amplitudes and are finite", _columns(form)
+                )
             )
     return checks
 
@@ -61,7 +63,7 @@ def _each(form: StructuralForm) -> str:
             failure = _step(form, scales)
         except IndexError:
             failure = f"reads or writes beyond its memory (state_size {form.state_size}) or its parameters"
-        except Exception as error:  # a user's own file may do anything
+        except Exception as error:  # the file of a user may raise any error
             failure = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
         if failure:
             return failure
@@ -69,7 +71,7 @@ def _each(form: StructuralForm) -> str:
 
 
 def _step(form: StructuralForm, scales: EffectScales) -> str:
-    """Run the step uncompiled, where an index beyond its memory is an error; do every third step twice."""
+    """Run the step uncompiled, so that an index beyond its memory is an error; do every third step twice."""
     plain = getattr(form.step, "py_func", None)
     if plain is None:
         return "the function is not compiled: decorate it with @njit(STEP_SIGNATURE, cache=True)"
@@ -91,14 +93,12 @@ def _step(form: StructuralForm, scales: EffectScales) -> str:
             state[:] = before
             plain(position, rate, state, numbers, 5.0 / RATE_HZ, again)
             if not (np.array_equal(again, out) and np.array_equal(state, after)):
-                return (
-                    "the same step from the same state gives another force: something is remembered outside the state"
-                )
+                return "the same step from the same state gives another force: something is stored outside the state"
         if not np.isfinite(out).all():
             return "the unit forces are not finite, or one of them is not written"
         forces.append(out)
     if not np.array_equal(numbers, before_all):
-        return "writes into its parameters: what it remembers belongs into its state"
+        return "writes into its parameters: numbers that it stores belong into its state"
     return "" if all(np.any(column) for column in np.array(forces).T) else "a unit force is always 0"
 
 
@@ -111,7 +111,7 @@ def _columns(form: StructuralForm) -> str:
         turn: FloatArray = scales.stroke * np.sin(2.0 * np.pi * scales.speed / scales.stroke * time)
         try:
             columns = form.columns(turn, 1.0 / RATE_HZ, values)
-        except Exception as error:  # a user's own file may do anything
+        except Exception as error:  # the file of a user may raise any error
             return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
         if np.shape(columns) != (len(turn), len(form.amplitudes)):
             return f"columns have the shape {np.shape(columns)}, expected {(len(turn), len(form.amplitudes))}"

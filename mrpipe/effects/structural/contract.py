@@ -1,11 +1,12 @@
-"""What an effect of a structure is: the one narrow contract that every file of this package (and a user's own) keeps.
+"""Definition of an effect of a structure: the contract that every file of this package (and of a user) fulfils.
 
-A file defines `EFFECT = StructuralEffect(...)` and nothing else knows of it. Where it acts decides what its forms
-bring:
+A file defines `EFFECT = StructuralEffect(...)`; no other module has to be changed. Its forms contain, depending on the
+place where it acts:
 
-- `storey`, `floor`: a *step*, a small compiled function that turns the history of a drift (or of a floor's displacement
-  relative to the ground) into unit forces; the forces are proportional to amplitudes, which are solved for exactly.
-- `base`: the turn of the base, as columns of motion of unit storey height.
+- `storey`, `floor`: a *step*, a small compiled function that computes unit forces from the history of a drift (or of
+  the displacement of a floor relative to the ground); the forces are proportional to amplitudes, which are solved for
+  exactly.
+- `base`: the rotation of the base, as columns of motion per unit storey height.
 - `damper-rod`, `command`: declared here with its parameters, found in the closed loop by
   :mod:`mrpipe.tracing.structure.damper` and :mod:`mrpipe.tracing.structure.delay`.
 """
@@ -34,20 +35,20 @@ class StructuralForm:
     Attributes
     ----------
     name, summary
-        Key within the effect; the law in a line.
+        Key within the effect; the law in one line.
     searched
-        Parameters that a fit searches, in the order in which the step reads them. Scales are those of the place:
-        stroke and speed of drift or floor, RMS of the storey's shear force.
+        Parameters that a fit searches, in the order in which the step reads them. Scales are those of the place: stroke
+        and speed of drift or floor, RMS shear force of the storey.
     amplitudes
-        What the unit forces are multiplied by: solved for, within their sign (a lower bound of 0 allows none below).
+        Factors of the unit forces, which the fit solves for; a lower bound of 0 excludes negative values.
     step
         Compiled with :data:`STEP_SIGNATURE`; None for `base`, `damper-rod` and `command`.
     state_size
-        Length of the step's memory, zeros at first.
+        Length of the memory of the step, which is 0 at the start.
     columns
-        `base` only: (reference turn (m,), dt, values) -> columns (m, k) of the base's turn.
+        `base` only: (reference rotation (m,), dt, values) -> columns (m, k) of the rotation of the base.
     constants
-        Numbers that the step reads after the searched ones (which side, which kind).
+        Numbers that the step reads after the searched ones, such as side or kind.
     """
 
     name: str
@@ -71,7 +72,7 @@ class StructuralEffect(Described):
     forms
         One or several functional shapes.
     places
-        `all`: every storey with its own amplitude; `one`: the place is searched for.
+        `all`: every storey has a separate amplitude; `one`: one place is searched.
     separated_by
         Other effect -> test that separates the two.
     """

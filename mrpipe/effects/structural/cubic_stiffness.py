@@ -28,9 +28,10 @@ _POWER = shape("power", "1", "power of the drift", "one", 1.6, 5.0, (2.4, 3.6))
 EFFECT = StructuralEffect(
     name="cubic-stiffness",
     summary="the stiffness of a storey changes with the square of its drift",
-    physics="Columns clamped at both ends are stretched by large drift and stiffen; soft clamps and gravity soften.",
-    remedy="Keep to smaller drift, or declare the cubic coefficient of the storeys named.",
-    residual="Over the drift of one storey a cubic curve; the natural frequency moves with amplitude.",
+    physics="A large drift stretches columns that are clamped at both ends, which stiffens them; soft clamps and "
+    "gravity soften.",
+    remedy="Use smaller drifts, or declare the cubic coefficient of the named storeys.",
+    residual="A cubic curve over the drift of one storey; the natural frequency changes with the amplitude.",
     source="Duffing (1918)",
     acts_on="storey",
     forms=(
@@ -43,10 +44,10 @@ EFFECT = StructuralEffect(
     ),
     separated_by={
         "impact": Separation(
-            "the same motion at half the amplitude: a bumper is not reached, a cubic force falls to an eighth"
+            "the same motion at half the amplitude: a bumper is not reached, while a cubic force falls to an eighth"
         ),
         "joint-friction": Separation(
-            "free decay from two amplitudes: stiffness shifts its frequency, friction ends it"
+            "free decay from two amplitudes: a cubic stiffness shifts the frequency, friction ends the decay"
         ),
     },
 )

@@ -16,7 +16,7 @@ def contact_step(
 ) -> None:
     """Contact of stiffness and damping beyond a gap; parameters: gap [m], kind (0 linear, 1 Hertz), side (0, 1, -1).
 
-    Unit forces: spring, and a dashpot that works only while it is pressed.
+    Unit forces: spring, and a dashpot that acts only during compression.
     """
     out[0] = 0.0
     out[1] = 0.0
@@ -37,7 +37,9 @@ _GAP = shape(
 )
 _STIFFNESS = amplitude("stiffness", "N/m", "stiffness of the contact", "force/stroke", 0.0, 1e6)
 _HERTZ = amplitude("stiffness", "N/m", "secant stiffness of the contact at 1 mm", "force/stroke", 0.0, 1e6)
-_DAMPING = amplitude("damping", "N*s/m", "damping of the contact pressed in by the gap", "force/speed", 0.0, 1e6)
+_DAMPING = amplitude(
+    "damping", "N*s/m", "damping of the contact at an indentation equal to the gap", "force/speed", 0.0, 1e6
+)
 
 
 def _form(name: str, summary: str, kind: float, side: float) -> StructuralForm:
@@ -47,10 +49,10 @@ def _form(name: str, summary: str, kind: float, side: float) -> StructuralForm:
 
 EFFECT = StructuralEffect(
     name="impact",
-    summary="a force that sets in where a floor has used up a gap",
+    summary="a force that begins when a floor has moved through a gap",
     physics="A floor strikes a bumper, a stop of the table or a neighbour once its displacement exceeds the free gap.",
-    remedy="Widen the gap at the floor named or shake less; declare gap and contact stiffness.",
-    residual="Zero up to a displacement of one floor, a steep rise beyond it, with high-frequency bursts in its "
+    remedy="Widen the gap at the named floor or reduce the excitation; declare gap and contact stiffness.",
+    residual="Zero up to some displacement of one floor, a steep rise beyond it, and high-frequency bursts in its "
     "acceleration.",
     source="Hunt and Crossley (1975), Jankowski (2005)",
     acts_on="floor",

@@ -1,4 +1,4 @@
-"""Joint friction: bolts and column feet slip and hold, and take energy at any amplitude."""
+"""Joint friction: bolts and column feet slip and stick, and dissipate energy at any amplitude."""
 
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
@@ -18,8 +18,8 @@ def slipping_step(
 ) -> None:
     """Springs in parallel that slip at their limits (Iwan); parameters: slip displacement [m], number of springs.
 
-    Limits of several springs are 1/2, 1, 2, 4 of it, so that slip sets in gradually. `state` is the drift of the step
-    before and the deflection of each spring.
+    The limits of several springs are 1/2, 1, 2 and 4 times the slip displacement, so that slip begins gradually.
+    `state` is the drift of the step before and the deflection of each spring.
     """
     moved = position - state[0]
     state[0] = position
@@ -46,11 +46,11 @@ _FORCE = amplitude("force", "N", "friction force of a storey", "force", 0.0, 10.
 
 EFFECT = StructuralEffect(
     name="joint-friction",
-    summary="a force of constant size against the drift's rate",
+    summary="a force of constant size that opposes the rate of the drift",
     physics="Bolted joints and column feet slip: a storey resists with a friction force at any amplitude.",
-    remedy="Tighten or weld the joints of the storeys named; declare friction force and slip displacement.",
-    residual="A step over the drift rate of a storey, independent of amplitude: the damping ratio falls as the "
-    "amplitude rises.",
+    remedy="Tighten or weld the joints of the named storeys; declare friction force and slip displacement.",
+    residual="A step over the drift rate of a storey, independent of the amplitude; the damping ratio falls with "
+    "rising amplitude.",
     source="Jenkins (1962), Iwan (1966); Coulomb friction",
     acts_on="storey",
     forms=(
@@ -70,7 +70,7 @@ EFFECT = StructuralEffect(
         StructuralForm(
             "gradual-slip",
             "four slipping springs with limits of 1/2 to 4 x_s",
-            (shape("slip_displacement", "m", "drift about which slip begins", "stroke", 0.001, 0.3, (0.01, 0.05)),),
+            (shape("slip_displacement", "m", "drift around which slip begins", "stroke", 0.001, 0.3, (0.01, 0.05)),),
             (_FORCE,),
             slipping_step,
             5,
@@ -79,15 +79,25 @@ EFFECT = StructuralEffect(
         StructuralForm(
             "coulomb",
             "F 2/pi atan(rate/v0)",
-            (shape("rounding_speed", "m/s", "speed over which the force reverses", "speed", 1e-4, 0.2, (0.005, 0.04)),),
+            (
+                shape(
+                    "rounding_speed",
+                    "m/s",
+                    "drift rate over which the force reverses",
+                    "speed",
+                    1e-4,
+                    0.2,
+                    (0.005, 0.04),
+                ),
+            ),
             (_FORCE,),
             coulomb_step,
         ),
     ),
     separated_by={
         "cubic-stiffness": Separation(
-            "free decay from two amplitudes: friction ends it, stiffness shifts its frequency"
+            "free decay from two amplitudes: friction ends the decay, a cubic stiffness shifts the frequency"
         ),
-        "base-rocking": Separation("free decay to rest: friction stops it at once"),
+        "base-rocking": Separation("free decay to rest: friction stops the motion abruptly"),
     },
 )

@@ -1,4 +1,4 @@
-"""All effects of a structure, found by walking the package; a user's own from files that the configuration names."""
+"""All effects of a structure: those of the modules of the package, and those of files that the configuration names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 
 LOADS_FROM = ("mrpipe.effects.structural",)
-"""Packages that are walked at run time: their modules belong to the code version of a stage."""
+"""Packages whose modules are found at run time; they are part of the code version of a stage."""
 
 
 @cache
@@ -24,7 +24,7 @@ def all_structural_effects() -> dict[str, StructuralEffect]:
 
 
 def load_structural_file(path: Path) -> StructuralEffect | None:
-    """Return the EFFECT of a user's own file where it is one of a structure, None where it is one of a damper.
+    """Return the EFFECT of a file of a user if it is one of a structure; None if it is one of a damper.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def load_structural_file(path: Path) -> StructuralEffect | None:
 
 
 def structural_effects(names: Sequence[str] = (), files: Sequence[Path] = ()) -> dict[str, StructuralEffect]:
-    """Return the effects of these names (all where none of them is one of a structure), with those of the files."""
+    """Return the effects of these names (all if none of them is one of a structure), and those of the files."""
     known = all_structural_effects()
     chosen = {name: known[name] for name in names if name in known} or dict(known)
     own = [item for item in map(load_structural_file, files) if item is not None]

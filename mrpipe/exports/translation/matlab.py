@@ -59,7 +59,7 @@ def safe(name: str) -> str:
 
 
 def outputs_of(routine: Routine, given: dict[str, str]) -> list[str]:
-    """Return where the changed arrays of a call go; `given` maps arguments to what is passed."""
+    """Return the targets of the arrays that a call changes; `given` maps parameters to arguments."""
     return [given[name] for name in routine.arguments if name in routine.written]
 
 

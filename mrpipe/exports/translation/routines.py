@@ -1,4 +1,4 @@
-"""Which functions a chain calls, and what a translator must know of each: types, constants, changed arrays."""
+"""Functions that a chain calls, and their properties for a translator: types, constants, changed arrays."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Routine:
     name
         Unique name in the target.
     tree
-        Its definition, without the docstring.
+        Definition of the function without the docstring.
     arguments
         Name -> type.
     constants
@@ -40,7 +40,7 @@ class Routine:
     calls
         Names of other routines in its text -> routine.
     python
-        The function itself.
+        Compiled function.
     written
         Arrays among the arguments that it (or what it calls) changes.
     measured
@@ -48,7 +48,7 @@ class Routine:
     types
         Local variable -> type.
     result
-        Type of what it returns; None where it returns nothing.
+        Type of the returned value; None if the function returns nothing.
     """
 
     name: str
@@ -216,7 +216,7 @@ def _unique(python: Any, names: set[str]) -> str:
 
 
 def _argument_types(function: Any, tree: ast.FunctionDef) -> dict[str, Kind]:
-    """Return the types of the compiled signature, or what the text shows where a function is compiled at its call."""
+    """Return the types of the compiled signature; without a signature, those in the source text."""
     names = [item.arg for item in tree.args.args]
     if function.nopython_signatures:
         from numba import types

@@ -1,4 +1,4 @@
-"""What the translations of compiled steps into other languages share: indented lines, assignments, bounds of loops."""
+"""Parts that the translations of compiled steps share: indented lines, assignments, bounds of loops."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Writer(ABC):
     Parameters
     ----------
     routine
-        What is translated.
+        Function that is translated.
     """
 
     def __init__(self, routine: Routine) -> None:

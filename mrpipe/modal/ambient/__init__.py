@@ -1,1 +1,1 @@
-"""Modes from responses alone."""
+"""Modes from responses without a measured excitation (ambient tests)."""

@@ -1,4 +1,4 @@
-"""The band of ambient responses in which modes can be seen."""
+"""Frequency band of ambient responses that contains modes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mrpipe.modal.records import FrameTest
 from mrpipe.modal.spectra import ComplexArray
 
 USABLE_BAND = 0.45
-"""Part of the sampling rate below which a filter against aliasing leaves the responses unchanged."""
+"""Share of the sampling rate below which an anti-alias filter does not change the responses."""
 _SEGMENT_PERIODS = 40.0
 _LEAST_COMMON = 0.25
 _MARGIN = 1.15
@@ -39,7 +39,7 @@ def coherency(segments: ComplexArray) -> ComplexArray:
 
 
 def common_motion_ends_hz(test: FrameTest, first_hz: float) -> float:
-    """Return the frequency above which the sensors have no motion in common [Hz].
+    """Return the frequency [Hz] above which the motions of the sensors are not coherent.
 
     At a resonance all sensors move together, so that the largest eigenvalue of their coherence matrix is near the
     number of sensors; noise of the sensors and local forces leave it near 1.

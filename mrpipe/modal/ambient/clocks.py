@@ -3,8 +3,8 @@
 A proportionally damped structure has real mode shapes, so that the cross-spectrum of two sensors is real at each
 resonance. Where the clock of sensor j is late by tau_j, its phase is -omega (tau_j - tau_l). One delay for each sensor
 therefore makes all cross-spectra real at once. A delay, constant or changing linearly with time, counts only if it
-predicts the phases in parts of the band that were left out of its estimate. A delay that all sensors share cannot be
-seen and changes nothing; delays are stated against the median of the sensors.
+predicts the phases in parts of the band that were left out of its estimate. A delay that all sensors share has no
+effect and cannot be determined; delays are therefore relative to the median of the sensors.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from mrpipe.modal.records import FrameTest
 from mrpipe.modal.spectra import ComplexArray
 
 _CHUNKS = 8
-"""Parts of the record, by which a drift is seen."""
+"""Number of parts of the record, from which a drift is estimated."""
 _SEGMENTS = 8
-"""Segments of a part, by which coherency is seen."""
+"""Number of segments of a part, from which the coherency is estimated."""
 _BANDS = 10
-"""Parts of the band of equal coherency; each is left out once."""
+"""Number of parts of the band with equal coherency; each is left out once."""
 _LEVEL = 0.01
-"""Probability of a delay where there is none."""
+"""Probability that a delay is found where there is none."""
 _GRID_PHASE = 0.5
 """Step of the scan over delays: phase of the highest frequency [rad]."""
 _LARGEST_DRIFT = 1e-4
-"""Quartz clocks differ by less than 100 parts per million."""
+"""Largest drift [1]: quartz clocks differ by less than 100 parts per million."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class _Coherency:
     def real_part(self, offset: FloatArray, drift: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the real part at given delays of the sensors, summed over pairs, shape (chunks, m), and its slope.
 
-        The slope is that by the delay of the first sensor of each pair, shape (chunks, pairs).
+        The slope is the derivative with respect to the delay of the first sensor of each pair, shape (chunks, pairs).
         """
         delay = offset[None, :] + self.time[:, None] * drift
         apart = delay[:, self.first] - delay[:, self.second]
@@ -112,7 +112,7 @@ def _pair_delays(found: _Coherency, reach: float, drift_reach: float) -> tuple[F
 
 
 def _start(found: _Coherency, sensors: int, reach: float, drift_reach: float) -> tuple[FloatArray, FloatArray]:
-    """Return offsets and drifts of the sensors from the pairs that are most certain (spanning tree)."""
+    """Return offsets and drifts of the sensors from the most certain pairs (a spanning tree)."""
     offsets, drifts, certain = _pair_delays(found, reach, drift_reach)
     offset, drift = np.zeros(sensors), np.zeros(sensors)
     known = {int(found.first[int(np.argmax(certain))])}
@@ -131,7 +131,7 @@ def _start(found: _Coherency, sensors: int, reach: float, drift_reach: float) ->
 def _polished(
     found: _Coherency, offset: FloatArray, drift: FloatArray, *, drifts: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the offsets and drifts at the nearest maximum; without `drifts` the drifts stay."""
+    """Return the offsets and drifts at the nearest maximum; without `drifts` the drifts are not changed."""
     sensors, unit = offset.size, 1.0 / float(found.omega[-1])
     half_time = float(found.time[-1])
 
@@ -152,7 +152,7 @@ def _polished(
 
 
 def _bands(found: _Coherency) -> list[np.ndarray]:
-    """Return the lines of parts of the band with equal sums of coherency, beyond what noise has by chance."""
+    """Return the lines of parts of the band with equal sums of coherency, beyond that of noise by chance."""
     by_chance = 1.0 / _SEGMENTS  # expectation of the squared coherency of independent noise
     weight = np.cumsum(np.maximum(np.abs(found.squared).mean(axis=(0, 1)) - by_chance, 0.0))
     edges = np.searchsorted(weight, weight[-1] * np.arange(1, _BANDS) / _BANDS)
@@ -162,7 +162,7 @@ def _bands(found: _Coherency) -> list[np.ndarray]:
 def _gain(
     found: _Coherency, band: np.ndarray, one: tuple[FloatArray, FloatArray], other: tuple[FloatArray, FloatArray]
 ) -> float:
-    """Return by how much one set of delays makes a band more real than another one."""
+    """Return the increase of the real part in a band from one set of delays to another one."""
     return float((found.real_part(*one)[0] - found.real_part(*other)[0])[:, band].sum())
 
 
@@ -180,14 +180,14 @@ def _left_out(found: _Coherency, band: np.ndarray) -> _Coherency:
 
 
 def ambient_clocks(test: FrameTest, low_hz: float, high_hz: float = 0.0) -> list[SensorClock]:
-    """Return the delays of the sensors of an ambient test that its responses prove.
+    """Return the delays of the sensors of an ambient test, as far as its responses confirm them.
 
     Parameters
     ----------
     test
         An ambient test.
     low_hz, high_hz
-        Band; 0 for `high_hz` takes the band in which the sensors move together.
+        Band [Hz]; 0 for `high_hz`: the band in which the motions of the sensors are coherent.
     """
     sensors = len(test.sensors)
     if sensors < 2:
@@ -205,7 +205,7 @@ def ambient_clocks(test: FrameTest, low_hz: float, high_hz: float = 0.0) -> list
     def estimate(data: _Coherency, drifts: bool) -> tuple[FloatArray, FloatArray]:
         return _polished(data, *_start(data, sensors, reach, _LARGEST_DRIFT if drifts else 0.0), drifts=drifts)
 
-    # the search over all delays is repeated without each band, because its result would otherwise have seen the band
+    # the search over all delays is repeated without each band, so that its result does not depend on that band
     parts = [_left_out(found, band) for band in bands]
     none = (still, still)
 
@@ -229,7 +229,7 @@ def _stated(
     half_time: float,
     unit: float,
 ) -> list[SensorClock]:
-    """Return the delays against the median of the sensors; those below the smallest phase are left."""
+    """Return the delays relative to the median of the sensors; delays below the smallest phase are left out."""
     offset, drift = best[0] - np.median(best[0]), best[1] - np.median(best[1])
     scatter = np.array([item[0] - np.median(item[0]) for item in left_out])
     count = len(left_out)
@@ -245,7 +245,7 @@ def _stated(
 def synchronised(
     tests: Sequence[FrameTest], band_hz: tuple[float, float], options: IdentificationOptions
 ) -> tuple[tuple[FrameTest, ...], tuple[SensorClock, ...]]:
-    """Return ambient tests with the clocks of their sensors corrected, and the delays that were taken out.
+    """Return ambient tests with corrected clocks of their sensors, and the delays that were corrected.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Modes from responses alone: ambient vibration, or earthquakes without a ground channel.
+"""Modes from responses without a measured excitation: ambient vibration, or earthquakes without a ground channel.
 
 pyOMA2 estimates the poles at many model orders (stochastic subspace identification or pLSCF). Poles
 that keep frequency and shape over the orders form clusters, and the choice among these is that of the forced tests.
@@ -48,7 +48,7 @@ _SCALINGS = 2
 
 @dataclass(frozen=True)
 class _Cluster:
-    """Poles of several orders that are one: medians, shape turned to real, and how many orders have it."""
+    """Poles of several orders that represent the same mode: medians, shape rotated to real, number of orders."""
 
     angular_frequency: float
     damping_ratio: float
@@ -58,7 +58,7 @@ class _Cluster:
 
 
 def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> Records:
-    """Filter, decimate and cut the responses; a record spans the modes that a chain of floors can have."""
+    """Filter, decimate and cut the responses; the band contains all modes that a chain of floors can have."""
     rate = tests[0].sampling_rate_hz
     first = lowest_peak_hz(tests, low_hz)
     # the highest mode of a uniform chain lies (4 n + 2)/pi above the lowest; real ones spread more
@@ -103,7 +103,7 @@ def _assurance(first: ComplexArray, second: ComplexArray) -> float:
 
 
 def _distance(pole: Pole, group: Sequence[Pole]) -> float:
-    """Return how far a pole is from a cluster, relative to the frequency; infinite where it cannot belong to it."""
+    """Return the distance of a pole from a cluster, relative to the frequency; infinite if it cannot belong to it."""
     omega = float(np.median([item.angular_frequency for item in group]))
     zeta = float(np.median([item.damping_ratio for item in group]))
     assurance = _assurance(pole.shape, group[0].shape)
@@ -116,8 +116,8 @@ def _distance(pole: Pole, group: Sequence[Pole]) -> float:
 def _clusters(poles: Sequence[Pole]) -> list[_Cluster]:
     """Group poles of neighbouring frequency and equal shape, at most one of each order in a group.
 
-    Of each order the pole nearest to a group is taken first. High orders split a mode into a pole that stays and one
-    that wanders; in another sequence the second could take the place of the first.
+    Of each order the pole nearest to a group is taken first. High orders split a mode into a stable pole and one that
+    changes with the order; in another sequence the second pole could replace the first.
     """
     groups: list[list[Pole]] = []
     for order in sorted({pole.order for pole in poles}, reverse=True):
@@ -155,8 +155,8 @@ def _without_copies(clusters: Sequence[_Cluster]) -> tuple[list[_Cluster], list[
     """Return the clusters without those that repeat the shape of a more stable one: high orders split a pole.
 
     A pole repeats another one where their half-power bands overlap. Farther away, up to a tenth of the frequency, it
-    may also be a mode that the sensors see alike. The second result says of which poles this holds. Both rise with
-    frequency.
+    may also be another mode with a similar shape at the sensors. The second result marks these poles. Both results are
+    sorted by frequency.
     """
     kept: list[_Cluster] = []
     doubtful: list[bool] = []
@@ -210,7 +210,7 @@ def _jackknife(
 def _as_fit(
     test: FrameTest, firm: Sequence[_Cluster], covariance: FloatArray, errors: FloatArray, density: FloatArray
 ) -> MultiModeFit:
-    """Return clusters of rising frequency as a fit; shapes are scaled by the response at their frequency."""
+    """Return clusters, sorted by frequency, as a fit; shapes are scaled by the response at their frequency."""
     zeta = np.array([item.damping_ratio for item in firm])
     residues = np.column_stack([item.shape for item in firm]) * density * 2.0 * zeta
     empty: tuple[ComplexArray, ...] = ()
@@ -240,7 +240,7 @@ def find_ambient_modes(
     source: Path,
     method: str = "ssi",
 ) -> ModeSearch:
-    """Return the modes that the responses of ambient tests show.
+    """Return the modes that are identified from ambient tests.
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def find_ambient_modes(
     layout
         Floors and masses.
     low_hz, high_hz
-        Band; 0 for `high_hz` takes a band that follows from the lowest peak and the number of floors.
+        Band [Hz]; 0 for `high_hz`: a band that follows from the lowest peak and the number of floors.
     source
         campaign.yaml, for messages.
     method
@@ -271,7 +271,7 @@ def find_ambient_modes(
     parts = tuple(tuple(group) for group in groups.values())
     found = _search(parts, layout, (low_hz, high_hz), source, ESTIMATORS[method])
     if len(found.numbers) < layout.floors and not high_hz:
-        # a soft storey or a light top spreads the modes over more than a chain of like floors does
+        # with a soft storey or a light top the modes have a wider band than those of a uniform chain
         wide = max(common_motion_ends_hz(group[0], lowest_peak_hz(group, low_hz)) for group in parts)
         wide = min(wide, USABLE_BAND * min(group[0].sampling_rate_hz for group in parts))
         if wide > found.band_hz[1]:
@@ -301,7 +301,7 @@ def _search(
     numbered = _numbered(fit, layout)
     notes: tuple[str, ...] = ()
     if merged is not None:
-        for _ in range(_SCALINGS):  # a mode that is found by it scales the others
+        for _ in range(_SCALINGS):  # a mode that is found in this way scales the others
             merged = replace(merged, fit=scaled_by_orthogonality(merged, list(numbered), layout))
             numbered = max(_numbered(merged.fit, layout), numbered, key=len)
         notes = scaling_notes(fit, merged.fit, list(numbered))
@@ -319,7 +319,7 @@ def _search(
 
 
 def _numbered(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
-    """Return pole -> mode number (from 1): a complete set where there is one, else the largest."""
+    """Return pole -> mode number (from 1): a complete set if there is one, else the largest one."""
     chosen = complete_set(fit, layout)
     return dict(zip(chosen, range(1, len(chosen) + 1), strict=True)) if chosen else largest_set(fit, layout)
 

@@ -1,4 +1,4 @@
-"""Poles of responses alone at many model orders, by the estimators of pyOMA2.
+"""Poles of responses without a measured excitation at many model orders, by the estimators of pyOMA2.
 
 An estimator first condenses a block of the responses into a statistic. Statistics of several blocks can be averaged, so
 that the scatter of the blocks gives errors. The poles of one or of several model orders then follow from the mean.
@@ -25,7 +25,7 @@ from mrpipe.modal.search.selection import LARGEST_DAMPING
 from mrpipe.modal.spectra import ComplexArray
 
 _SEGMENT_ROWS = 12
-"""Length of a spectral segment over that of the correlation functions of SSI."""
+"""Length of a spectral segment, relative to that of the correlation functions of SSI."""
 _LEAST_SEGMENT = 256
 
 
@@ -51,7 +51,7 @@ class Records:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the progress bars and log lines of pyOMA2 out of the program's own output."""
+    """Keep the progress bars and log lines of pyOMA2 out of the output of mrpipe."""
     logger = logging.getLogger("pyoma2")
     level = logger.level
     logger.setLevel(logging.ERROR)
@@ -63,13 +63,13 @@ def _quiet() -> Iterator[None]:
 
 
 class Estimator(Protocol):
-    """How poles follow from responses."""
+    """An estimator of poles from responses."""
 
     def orders(self, floors: int, sensors: int) -> range:
         """Return the model orders to try."""
 
     def statistic(self, block: FloatArray, records: Records) -> ComplexArray | FloatArray:
-        """Return what the poles need of one block, shape (s, m), of the responses."""
+        """Return the statistic of one block of the responses, shape (s, m), from which poles are computed."""
 
     def poles(self, statistic: ComplexArray | FloatArray, records: Records, orders: Sequence[int]) -> list[Pole]:
         """Return the physical poles of all model orders."""

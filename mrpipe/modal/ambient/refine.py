@@ -1,9 +1,9 @@
 """Frequency and damping of modes from the spectra of ambient responses, by maximum likelihood (Whittle).
 
 Subspace identification gives good shapes, but at high model orders it may split a mode into two poles of wrong damping.
-The shapes turn the responses into modal coordinates, each of which has one peak and small remains of the others. The
-periodogram of a stationary response is exponentially distributed about its spectral density, independently from line to
-line, so that frequency and damping of the peak follow from maximum likelihood.
+The shapes convert the responses to modal coordinates, each of which has one peak and small contributions of the other
+modes. The lines of the periodogram of a stationary response are independent and exponentially distributed, with the
+spectral density as mean. Frequency and damping of the peak therefore follow from maximum likelihood.
 
 Sources: Whittle (1953), Estimation and information in stationary time series, Arkiv foer Matematik 2; Au (2011), Fast
 Bayesian FFT method for ambient modal identification with separated modes, Journal of Engineering Mechanics 137.
@@ -24,7 +24,8 @@ from mrpipe.modal.records import FrameTest
 _ROUNDS = 2
 _LEAST_HALF_WIDTH = 0.08
 _LARGEST_HALF_WIDTH = 0.4
-"""Part of the frequency of a mode up to which the density of the force is taken as one power of the frequency."""
+"""Share of the frequency of a mode, as half bandwidth, in which the density of the force is one power of the frequency.
+"""
 _WIDTHS = 8.0
 _USUAL_DAMPING = 0.01
 _LINES_PER_WIDTH = 12.0
@@ -32,9 +33,9 @@ _REACH_FREQUENCY = 0.03
 _DAMPING_RANGE = (5e-4, 0.15)
 _LEAST_LINES = 24
 _RANGE_OF_LEVELS = 20.0
-"""Logarithm by which noise and neighbours may differ from the lowest power in the band."""
+"""Bound on the logarithm of noise and neighbours over the lowest power in the band."""
 _EXPONENT_SPREAD = 2.0
-"""Standard deviation of the power of the frequency before the data are seen: forces of wind fall by up to f^-4."""
+"""Prior standard deviation of the exponent of the frequency: forces of wind fall with up to f^-4."""
 
 
 @dataclass(frozen=True)
@@ -91,10 +92,11 @@ def _resonance(omega: FloatArray, pole: float, zeta: float) -> tuple[FloatArray,
 
 
 class _Peak:
-    """Negative log likelihood of one modal coordinate: its own peak, remains of the neighbours, and white noise.
+    """Negative log likelihood of one modal coordinate: its peak, contributions of neighbouring modes, and white noise.
 
-    The spectrum of wind or traffic falls with frequency. A flat force would attribute this slope to the mode and move
-    its frequency. The density of the force on the mode is therefore a power of the frequency near the peak.
+    The spectrum of wind or traffic falls with frequency. A model with a flat force would attribute this slope to the
+    mode and shift its frequency. The density of the force on the mode is therefore a power of the frequency near the
+    peak.
 
     Parameters: logarithms of frequency, damping, own density and noise, the power of the frequency, logarithms of the
     densities of the neighbours.
@@ -153,7 +155,7 @@ def _refined(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, 
 
 
 def _half_width(mode: int, modes: Sequence[tuple[float, float]]) -> float:
-    """Return half the width of the band about a mode in which its spectrum is fitted [rad/s].
+    """Return half the width of the band around a mode in which its spectrum is fitted [rad/s].
 
     The flanks of a peak separate its damping from noise and from the level of the force. The band therefore reaches
     half way to the next mode, as far as a power of the frequency can describe the force.

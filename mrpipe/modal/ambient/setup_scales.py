@@ -1,15 +1,15 @@
-"""Scale of set-ups by the orthogonality of the modes, where the reference sensors stand at a node.
+"""Scale of set-ups from the orthogonality of the modes, if the reference sensors are at a node.
 
-The sensors that two set-ups share give the ratio of their shapes. At a node of a mode they do not show it. The rows
-that each set-up shows then have a separate factor d_s. The modes of one structure are orthogonal to the mass, so
-that the factors of a mode obey
+The sensors that two set-ups share give the ratio of their shapes. Sensors at a node of a mode do not show this ratio.
+The rows of each set-up then have an unknown factor d_s. The modes of one structure are orthogonal to the mass, so that
+the factors of a mode obey
 
     sum_s d_s (phi_q' M a_s) = 0    for each other mode q,
 
-with the rows a_s of set-up s. What the shared sensors say, d_s a_s(i) = d_t a_t(i), is one more equation for each of
-them. All equations are weighted by their errors. The vector of factors is the right singular vector of the smallest
-singular value, because only the common factor of all parts stays free. The misfit of the equations beyond the
-unknowns widens the errors (Birge 1932, Physical Review 40, 207).
+with the rows a_s of set-up s. Each shared sensor gives a further equation, d_s a_s(i) = d_t a_t(i). All equations are
+weighted by their errors. The vector of factors is the right singular vector of the smallest singular value, because
+only the common factor of all parts is free. The misfit of the redundant equations increases the errors (Birge 1932,
+Physical Review 40, 207).
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from mrpipe.modal.search.selection import Layout, all_floors_measured, floor_sha
 
 _ROUNDS = 4
 _OPEN = 0.2
-"""Error of a shape over its norm from which the signs of its parts stay open: twice as much is a part of the shape."""
+"""Error of a shape over its norm from which on the signs of its parts are not determined."""
 _CONTRADICTION = 9.0
-"""Squared misfit over its degrees of freedom from which the parts contradict the other modes."""
+"""Squared misfit over its degrees of freedom from which on the parts contradict the other modes."""
 
 
 def scaled_by_orthogonality(merged: Merged, modes: Sequence[int], layout: Layout) -> MultiModeFit:
-    """Return the merged fit with shapes whose set-ups the orthogonality scales better than the shared sensors do.
+    """Return the merged fit; set-ups are scaled by orthogonality where this is better than the shared sensors.
 
-    Nothing changes where masses are unknown, or a floor has no sensor in any set-up.
+    The fit is unchanged if masses are unknown, or if a floor has no sensor in any set-up.
 
     Parameters
     ----------
@@ -65,19 +65,19 @@ def scaled_by_orthogonality(merged: Merged, modes: Sequence[int], layout: Layout
 
 
 def scaling_notes(before: MultiModeFit, after: MultiModeFit, modes: Sequence[int]) -> tuple[str, ...]:
-    """Return a line that names the modes (their places from 0) whose shape the shared sensors alone leave open."""
+    """Return a line that names the modes (indices from 0) whose shape the shared sensors alone do not determine."""
     open_before = np.flatnonzero(shape_errors(before) >= _OPEN)
     names = [str(place) for place, mode in enumerate(modes, start=1) if mode in open_before]
     if not names or after is before:
         return ()
     return (
-        f"set-ups: the shared sensors stand near a node of mode {', '.join(names)}; the scale of its parts follows "
+        f"set-ups: the shared sensors are near a node of mode {', '.join(names)}; the scale of its parts follows "
         "from the orthogonality of the modes to the given floor masses",
     )
 
 
 def _parts(merged: Merged, mode: int) -> list[Part]:
-    """Return what each set-up shows of a mode."""
+    """Return the part of a mode that each set-up shows."""
     parts = []
     for index, set_up in enumerate(merged.set_ups):
         values, errors = part_of(set_up, merged.places[index][mode], float(merged.fit.angular_frequencies[mode]))
@@ -92,9 +92,9 @@ class Part:
     Attributes
     ----------
     rows
-        Degree of freedom (from 0) of each value.
+        Degree of freedom (from 0) of each value, shape (s,).
     values, errors
-        Shape (s,): any scale, and standard errors.
+        Values with arbitrary scale, and standard errors, shape (s,).
     """
 
     rows: tuple[int, ...]
@@ -105,7 +105,7 @@ class Part:
 def joined_parts(
     parts: Sequence[Part], shapes: FloatArray, errors: FloatArray, masses: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return a mode whose parts have unknown scales, shape (n,), and its errors; None where they stay unknown.
+    """Return a mode from parts with unknown scales, shape (n,), and its errors; None if scales remain unknown.
 
     Parameters
     ----------

@@ -1,10 +1,9 @@
-"""Merging of ambient set-ups: sensors that move from test to test, and reference sensors that stay.
+"""Merging of ambient set-ups with sensors that are moved between tests and reference sensors that are not.
 
-Ambient shapes have no scale. Each set-up therefore gives shapes with an unknown factor for every mode, and the
-sensors that two set-ups share (reference sensors) determine the ratio of these factors. Modes of different set-ups
-belong together where frequencies are near and the shapes at the shared sensors are alike. A set-up that does not show a
-mode as a stable pole gives its shape by the strongest singular vector of the spectral densities at the frequency of the
-mode.
+Ambient shapes have no scale. Each set-up therefore gives shapes with an unknown factor for every mode, and the sensors
+that two set-ups share (reference sensors) determine the ratio of these factors. Modes of different set-ups are the same
+if their frequencies are close and their shapes at the shared sensors are similar. If a set-up has no stable pole of a
+mode, the strongest singular vector of the spectral densities at its frequency gives the shape.
 
 Source: Au (2011), Assembling mode shapes by least squares, Mechanical Systems and Signal Processing 25.
 """
@@ -23,12 +22,12 @@ from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest, Sensor
 
 _NEAR = 0.03
-"""Relative difference up to which frequencies of two set-ups may belong to one mode."""
+"""Largest relative difference of frequencies of two set-ups that may be the same mode."""
 _ALIKE = 0.7
-"""Modal assurance at the shared sensors from which two shapes may belong to one mode."""
+"""Least modal assurance at the shared sensors for shapes that may be the same mode."""
 
 PICKED_UP = 0.01
-"""Least error of a sensor over the mean motion of the mode: sensors pick up other floors, and gains differ."""
+"""Least error of a sensor over the mean motion of the mode, because of cross-talk and gain errors."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class SetUp:
     tests, fit
         The tests, and their poles.
     doubtful
-        Which poles may repeat another pole of the same set-up, because the sensors see both alike; empty: none.
+        Whether each pole may be a copy of another pole of the set-up with the same shape at the sensors; empty: none.
     """
 
     tests: tuple[FrameTest, ...]
@@ -50,14 +49,14 @@ class SetUp:
 
 @dataclass(frozen=True)
 class Merged:
-    """Modes of several set-ups in one fit; `places` holds for each set-up the index of each mode, -1 without one."""
+    """Modes of several set-ups in one fit; `places` gives for each set-up the index of each mode, or -1."""
 
     fit: MultiModeFit
     set_ups: tuple[SetUp, ...]
     places: tuple[tuple[int, ...], ...]
 
     def parts(self, modes: Sequence[int]) -> list[tuple[SetUp, list[int], list[int]]]:
-        """Return for each set-up the positions within `modes` that it shows, and their indices in its own fit."""
+        """Return for each set-up the positions within `modes` that it shows, and their indices in its fit."""
         found = []
         for item, own in zip(self.set_ups, self.places, strict=True):
             positions = [i for i, mode in enumerate(modes) if own[mode] >= 0]
@@ -109,9 +108,9 @@ def merge_set_ups(set_ups: Sequence[SetUp], source: Path) -> Merged:
 def confirmed(set_ups: Sequence[SetUp]) -> list[SetUp]:
     """Return set-ups without the doubtful poles that no other set-up shows.
 
-    A mode of the structure has the same frequency in all set-ups. A pole that an estimator splits from a mode appears
-    at another place in each. Poles of two set-ups are paired one to one, so that the copy of a mode does not count as
-    confirmed by the mode itself.
+    A mode of the structure has the same frequency in all set-ups. A pole that an estimator splits from a mode has
+    another frequency in each of them. Poles of two set-ups are paired one to one, so that the mode itself does not
+    confirm its copy.
     """
     kept = []
     for index, own in enumerate(set_ups):
@@ -161,7 +160,7 @@ def _add(shape: _Shape, index: int, own: SetUp, shared: Sequence[Sensor]) -> Non
     alike = [(_assurance(fit.residues[rows, mode].real, reference), int(mode)) for mode in near]
     alike = [item for item in alike if item[0] > _ALIKE]
     if alike:
-        # one shared sensor makes all shapes alike: then the nearest frequency decides
+        # with one shared sensor all shapes are equal there, so the nearest frequency decides
         gaps = np.abs(fit.angular_frequencies - shape.omega)
         best = max(alike, key=lambda item: (round(item[0], 2), -float(gaps[item[1]])))[1]
         shape.places[index] = best
@@ -182,14 +181,14 @@ def _add(shape: _Shape, index: int, own: SetUp, shared: Sequence[Sensor]) -> Non
 
 
 def part_of(set_up: SetUp, pole: int, omega: float) -> tuple[FloatArray, FloatArray]:
-    """Return a mode at the sensors of one set-up, any scale, and its errors, shape (s,) each.
+    """Return a mode at the sensors of one set-up with arbitrary scale, and its errors, shape (s,) each.
 
     Parameters
     ----------
     set_up
         Tests and poles.
     pole
-        Index of the mode among its poles; -1: no stable pole, so that the spectral densities count.
+        Index of the mode among its poles; -1: no stable pole, so that the spectral densities are used.
     omega
         Angular frequency of the mode [rad/s].
     """
@@ -245,8 +244,8 @@ def pooled_poles(fit: MultiModeFit, parts: Sequence[tuple[Sequence[int], MultiMo
     fit
         Modes with merged shapes.
     parts
-        For each set-up: the modes that it shows, and its own fit of these. Where set-ups differ by more than their
-        errors (temperature), the error of the mean grows with the scatter.
+        For each set-up: the modes that it shows, and its fit of these. If set-ups differ by more than their errors, for
+        example due to temperature, the error of the mean follows from the scatter.
     """
     modes = fit.angular_frequencies.size
     logs = [np.log(fit.angular_frequencies), np.log(fit.damping_ratios)]

@@ -1,4 +1,4 @@
-"""Fit of modes over amplitude to forced tests, and the proof on tests that were left out.
+"""Fit of amplitude-dependent modes to forced tests, and their validation on tests left out.
 
 Laws of frequency and damping are fitted to the records in the time domain by least squares inside the band; shapes and
 the contribution of higher modes are the linear part. Each record has the same weight. Laws are used only where they
@@ -29,8 +29,9 @@ from mrpipe.modal.spectra import ComplexArray
 
 _LEAST_GAIN = 0.05
 _SUFFICIENT = 0.03
-"""RMS error over RMS response below which constant modes serve. A natural frequency
-that is wrong by a fiftieth of the half-power bandwidth leaves about as much."""
+"""RMS error over RMS response below which constant modes are sufficient. An error of a natural frequency of a fiftieth
+of the half-power bandwidth has about this effect.
+"""
 _LEAST_ENERGY = 0.05
 """Share of the energy of a mode below the smallest amplitude at which its law is reported."""
 _EVALUATIONS = 25
@@ -41,16 +42,17 @@ _START_DAMPING = 0.3
 
 @dataclass(frozen=True)
 class AmplitudeDependence:
-    """Result of the cross-validation and the model fitted to all records.
+    """Result of the cross-validation, and the model fitted to all records.
 
     Attributes
     ----------
     model
         Model with the best law.
     left_out
-        Name of what was left out of each fit: a test, or a part of the only test.
+        Name of the part left out of each fit: a test, or a part of the only test.
     constant_error, error
-        Squared error over squared response of what was left out, one value a fit: constant modes and the best law.
+        Squared error over squared response of the part left out, for each fit, with constant modes and with the best
+        law.
     """
 
     model: AmplitudeModel
@@ -60,7 +62,7 @@ class AmplitudeDependence:
 
 
 class _Record:
-    """A test as the fit needs it: spectra inside the band of that part of its time that counts."""
+    """A test in the form that the fit needs: spectra inside the band, for the part of the time that counts."""
 
     def __init__(self, test: FrameTest, model: _Common, name: str, counts: FloatArray) -> None:
         self.name = name
@@ -85,7 +87,7 @@ class _Record:
 
 @dataclass(frozen=True)
 class _Common:
-    """What all fits share."""
+    """Data that all fits share."""
 
     sensors: tuple[Sensor, ...]
     inputs: tuple[Place, ...]
@@ -107,7 +109,7 @@ def _common(fit: MultiModeFit) -> _Common:
 
 
 class _Problem:
-    """Errors of the records for given laws; shapes and direct terms by linear least squares, a sensor at a time."""
+    """Errors of the records for given laws; shapes and direct terms by linear least squares for each sensor."""
 
     def __init__(self, common: _Common, records: Sequence[_Record], measure: Measure) -> None:
         self.common = common
@@ -278,7 +280,7 @@ def _begin(problem: _Problem, constant: FloatArray) -> FloatArray | None:
 
 
 def _reach(modes: int) -> FloatArray:
-    """Return how far a fit may go from its start: frequency, damping, and their two exponents of each mode."""
+    """Return the largest change of the parameters in a fit: frequency, damping, and two exponents of each mode."""
     return np.repeat([0.06, 1.8, 0.15, 1.5], modes)
 
 
@@ -298,7 +300,7 @@ def _folds(tests: Sequence[FrameTest], common: _Common) -> tuple[list[_Record], 
 
 
 def find_amplitude_dependence(fit: MultiModeFit, tests: Sequence[FrameTest]) -> AmplitudeDependence | None:
-    """Return modes over amplitude if they predict records left out of the fit better than constant modes.
+    """Return amplitude-dependent modes if they predict records left out of the fit better than constant modes.
 
     Parameters
     ----------
@@ -363,7 +365,7 @@ def _model(problem: _Problem, theta: FloatArray) -> AmplitudeModel:
 def _seen(problem: _Problem, laws: AmplitudeLaws) -> tuple[FloatArray, FloatArray]:
     """Return the smallest and the largest amplitude that counts for each mode over all records, shape (r,) each [m].
 
-    The smallest is the amplitude below which the records hold 5 % of the energy of the mode: what is seen below it is
+    The smallest is the amplitude below which the records contain 5 % of the energy of the mode; below it the signal is
     mostly noise.
     """
     motions = [_simulated_record(laws, record) for record in problem.records]
@@ -384,7 +386,7 @@ def _simulated_record(laws: AmplitudeLaws, record: _Record) -> Motion:
 
 
 def amplitude_finding(result: AmplitudeDependence) -> str:
-    """Return one line for the user: how far the modes change over the amplitudes seen, and what the laws gain."""
+    """Return one line for the user: the change of the modes over the measured amplitudes, and the gain of the laws."""
     model = result.model
     low, high = model.laws.at(model.smallest_m), model.laws.at(model.largest_m)
     mode = int(np.argmax(np.abs(high[0] / low[0] - 1.0)))

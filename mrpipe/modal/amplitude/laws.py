@@ -1,7 +1,8 @@
 """Modes whose frequency and damping depend on the amplitude of the motion.
 
-Joints slip and materials yield a little, so that natural frequencies of real structures fall and damping ratios grow
-with amplitude. One linear model then fits no large record well. Here each mode keeps its shape, and follows
+Slip in joints and slight yielding of materials cause natural frequencies of real structures to fall and damping ratios
+to grow with amplitude. No single linear model then fits a record with large amplitudes well. Here each mode keeps its
+shape, and follows
 
     omega(A) = omega_0 (1 + A/A_0)^(-a),    zeta(A) = zeta_0 (1 + A/A_0)^b,
 
@@ -34,7 +35,7 @@ class AmplitudeLaws:
     Attributes
     ----------
     measure
-        Amplitude that counts: that of the `mode` itself, that of the whole `motion`, or none (`constant`).
+        Amplitude in the laws: that of the `mode` itself, that of the whole `motion`, or none (`constant`).
     angular_frequencies, damping_ratios
         Shape (r,): values at zero amplitude [rad/s], [1].
     softening, damping_growth
@@ -67,7 +68,7 @@ class AmplitudeLaws:
         )
 
     def rows(self) -> FloatArray:
-        """Return the laws as the simulation takes them, shape (r, 5)."""
+        """Return the laws in the layout of the simulation, shape (r, 5)."""
         columns = (
             self.angular_frequencies,
             self.damping_ratios,
@@ -80,7 +81,7 @@ class AmplitudeLaws:
 
 @dataclass(frozen=True)
 class AmplitudeModel:
-    """Modes over amplitude, with the shapes that belong to them.
+    """Amplitude-dependent modes with their shapes.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""Clocks of sensors: delays, drifts and steps, and their proof."""
+"""Clocks of sensors: delays, drifts and steps, and their validation."""

@@ -1,10 +1,10 @@
-"""Clocks of sensors: offset and drift of each sensor against the excitation, estimated from a fit and corrected.
+"""Clocks of sensors: delay of each sensor relative to the excitation, estimated from a fit and corrected.
 
-A proportionally damped structure has real mode shapes: at a resonance all floors move in phase or in opposite phase. A
-sensor whose clock is late by tau turns its residue at frequency omega by exp(-i omega tau), so one delay explains the
-phases of all its modes. The response of each sensor is therefore fitted with real residues and a delay that is
-constant, changes linearly with time, or steps once. The poles are those of a fit without this restriction. A delay
-counts only if it predicts the phases of modes that were left out of its estimate.
+A proportionally damped structure has real mode shapes: at a resonance all floors move in phase or in opposite phase. If
+the clock of a sensor is late by tau, its residue at the frequency omega has the factor exp(-i omega tau), so one delay
+explains the phases of all modes at this sensor. The response of each sensor is therefore fitted with real residues and
+a delay that is constant, changes linearly with time, or steps once. The poles are those of a fit without this
+restriction. A delay counts only if it predicts the phases of modes that were left out of its estimate.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _STEP_ITERATIONS = 1
 _STEP_PLACES = 15
 _SMOOTHED_LINES = 41
 LEAST_PHASE = 0.02
-"""Delays below this phase [rad] at the highest mode are left: filters and damping cause as much."""
+"""Delays below this phase [rad] at the highest mode are not corrected, because filters and damping cause the same."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class SensorClock:
     drift
         Change of the delay per second [1].
     step_s, step_at_s
-        Sudden change of the delay [s] and its time [s].
+        Step of the delay [s], and its time [s].
     """
 
     test: str
@@ -96,13 +96,13 @@ class _SensorFit:
         self.spectrum = spectrum.responses[:, column]
 
     def scanned(self, delays: FloatArray) -> FloatArray:
-        """Return the cost of each constant delay, shape (delays,), by a turn of the spectrum (fast, approximate)."""
+        """Return the cost of each constant delay, shape (delays,), from a phase rotation (fast, approximate)."""
         turned = stack(self.spectrum[:, None] * np.exp(1j * np.outer(self.omega, delays))) * self.weight
         along = self.q.T @ turned
         return np.asarray(np.sum(turned**2, axis=0) - np.sum(along**2, axis=0))
 
     def linearised(self, delay: FloatArray, changes: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-        """Return the residual at a delay, shape (2 lines,), and its derivative by each change of the delay."""
+        """Return the residual at a delay, shape (2 lines,), and its derivative for each change of the delay."""
         moved = np.clip(self.time + delay, self.time[0], self.time[-1])
         slope = self.spline(moved, 1)
         histories = [self.spline(moved), *(slope * change for change in changes)]
@@ -161,10 +161,10 @@ def _constant_delay(fit: _SensorFit, highest: float) -> tuple[FloatArray, float,
 
 
 def _supported(fit: _SensorFit, better: float, worse: float, parameters: int) -> bool:
-    """Return whether the Bayesian information criterion takes a delay with so many more parameters.
+    """Return whether the Bayesian information criterion supports a delay with this number of additional parameters.
 
-    A delay that only fits noise can predict the lines that were left out by chance, and several places of a step are
-    tried for each sensor. The proof by such lines is therefore not enough by itself.
+    By chance a delay that only fits noise can predict the lines that were left out, and several positions of a step are
+    tried for each sensor. The validation by left-out lines is therefore not sufficient.
     """
     rows = fit.q.shape[0] - fit.q.shape[1]
     return bool(rows * np.log(worse / max(better, 1e-300)) > parameters * np.log(rows))
@@ -173,7 +173,7 @@ def _supported(fit: _SensorFit, better: float, worse: float, parameters: int) ->
 def _sensor_clock(fit: _SensorFit, name: str, sensor: Sensor, steps: bool, highest: float) -> SensorClock:
     """Return the delay of a sensor: none, constant, drifting or with a step.
 
-    Each form must be proven against the simpler ones by modes that were left out, and supported by all lines.
+    Each form must be better than the simpler ones on modes that were left out, and all lines must support it.
     """
     ones, time = np.ones(fit.time.size), fit.time
     offset, cost, spread = _constant_delay(fit, highest)
@@ -216,7 +216,7 @@ def _step(fit: _SensorFit, offset: FloatArray) -> tuple[FloatArray, FloatArray, 
 def _step_forms(
     fit: _SensorFit, offset: FloatArray
 ) -> list[tuple[list[FloatArray], FloatArray, FloatArray, float, float]]:
-    """Return for each place of a step: changes of the delay, their coefficients and errors, cost, and the place [s]."""
+    """Return for each position of a step: changes of the delay, coefficients, errors, cost, and position [s]."""
     forms = []
     for at in np.linspace(fit.time[0], fit.time[-1], _STEP_PLACES + 2)[1:-1]:
         changes = [np.ones(fit.time.size), (fit.time >= at).astype(np.float64)]
@@ -226,22 +226,22 @@ def _step_forms(
 
 
 def estimate_clocks(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool = True) -> list[SensorClock]:
-    """Return the delay of each sensor in each test against the excitations of that test.
+    """Return the delay of each sensor in each test, relative to the excitations of that test.
 
     Parameters
     ----------
     fit
         A fit of these tests.
     tests
-        In the order of the fit.
+        Tests in the order of the fit.
     steps
-        Whether a delay may step.
+        Whether a delay may have a step.
     """
     found = []
     modes = list(zip(fit.angular_frequencies, fit.damping_ratios, strict=True))
     for test, spectrum, measured, steady in zip(tests, fit.spectra, fit.measured, fit.steady, strict=True):
         variance = uniform_filter1d(np.abs(measured - steady) ** 2, _SMOOTHED_LINES, axis=0, mode="nearest")
-        # lines that hardly any residual was left at must not rule the fit
+        # lines with a very small residual must not dominate the fit
         variance = np.maximum(variance, 0.1 * np.median(variance, axis=0))
         for is_displacement in sorted(set(test.is_displacement)):
             problem = Problem([spectrum], len(modes), is_displacement)
@@ -259,7 +259,7 @@ def estimate_clocks(fit: MultiModeFit, tests: Sequence[FrameTest], steps: bool =
 
 
 def corrected(test: FrameTest, clocks: Sequence[SensorClock]) -> FrameTest:
-    """Return a test with the delays of its sensors taken out by interpolation."""
+    """Return a test in which interpolation has removed the delays of its sensors."""
     time = np.arange(test.responses.shape[0]) / test.sampling_rate_hz
     responses = test.responses.copy()
     for clock in clocks:
@@ -296,7 +296,7 @@ def expected_clocks(
 ) -> list[SensorClock]:
     """Return the delays that sensors had in all tests of the fit, for tests that were not fitted.
 
-    A delay counts where each test of the fit shows it for the same sensor, and its scatter is below a fifth of it.
+    A delay counts if each test of the fit has it for the same sensor, with a scatter below a fifth of its value.
 
     Parameters
     ----------

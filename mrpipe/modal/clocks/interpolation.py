@@ -1,9 +1,9 @@
 """Values of a record between its samples.
 
-A cubic spline through the samples is wrong where a mode has few samples a period: half a sample away it loses 5 % of a
-motion of 0.3 and 24 % of one of 0.4 of the sampling rate. A clock that drifts would then change the amplitude of the
-highest modes. The record is therefore first sampled more finely by a low-pass filter, which is exact up to nearly half
-the sampling rate, and the spline goes through the fine samples.
+A cubic spline through the samples is inaccurate for a mode with few samples per period: half a sample away it loses 5 %
+of a motion at 0.3 times the sampling rate, and 24 % at 0.4 times. A clock that drifts would then change the amplitude
+of the highest modes. The record is therefore first sampled more finely by a low-pass filter, which is exact up to
+nearly half the sampling rate, and the spline goes through the fine samples.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mrpipe.artifacts import FloatArray
 
 _FINER = 4
 _REACH = 64
-"""Samples to each side that a value depends on."""
+"""Number of samples on each side on which a value depends."""
 _SHAPE = 6.0
 """Shape of the Kaiser window: errors are about 1e-4."""
 

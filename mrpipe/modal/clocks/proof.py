@@ -1,6 +1,6 @@
-"""Proof of a clock error by frequencies that were left out of its estimate.
+"""Validation of a clock error by frequencies that were left out of its estimate.
 
-One delay turns the phases of all modes of a sensor in proportion to their frequency. A delay that is estimated without
+One delay shifts the phases of all modes of a sensor in proportion to their frequency. A delay that is estimated without
 the lines around one mode must therefore improve the fit of that mode. An error of the model, such as a mode that was
 not found, disturbs the phase of one mode alone and predicts nothing about the others.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray, IntArray
 
 _ROWS_PER_COLUMN = 2
-"""Rows of a part over columns of the basis, below which the part is joined with its neighbour."""
+"""Ratio of rows of a part to columns of the basis below which the part is joined with its neighbour."""
 _LEAST_EIGENVALUE = 1e-9
 
 
@@ -58,7 +58,7 @@ class LeftOut:
         self.outside = [_inverse(np.eye(basis.shape[1]) - gram) for gram in grams]
 
     def costs(self, trials: Sequence[FloatArray]) -> FloatArray:
-        """Return the cost of each part, its delay estimated from the others, shape (parts,).
+        """Return the cost of each part, with the delay estimated from the other parts, shape (parts,).
 
         Parameters
         ----------
@@ -82,7 +82,7 @@ class LeftOut:
         return found
 
     def proves(self, better: FloatArray, worse: FloatArray) -> bool:
-        """Return whether one delay predicts the parts better than another, also without the part that gains most."""
+        """Return whether one delay predicts the parts better than another, also without the part of largest gain."""
         sizes = np.array([rows.size for rows in self.rows])
         gains = sizes * np.log(np.maximum(worse, 1e-300) / np.maximum(better, 1e-300))
         return bool(gains.sum() > 0.0 and gains.sum() - gains.max(initial=0.0) > 0.0)

@@ -1,4 +1,4 @@
-"""Damping ratio of each mode from free decays and from the multi-mode fit."""
+"""Choice of the damping ratio of each mode, from free decays or from the multi-mode fit."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from mrpipe.modal.records import FrameTest, FrameTests, Place
 _NORMAL_95 = 1.959964
 _WIDEST_DECAY_INTERVAL = 0.02
 _WIDE_INTERVAL = 0.1
-"""Half width of the 95 % interval over the damping ratio above which a finding states it."""
+"""Half width of the 95 % interval, relative to the damping ratio, above which a finding reports it."""
 
 
 def decays_of_modes(tests: FrameTests, fit: MultiModeFit) -> tuple[dict[int, DecayResult], list[str]]:
-    """Return the most certain free decay of each mode, by mode number from 1, and messages for the user."""
+    """Return mode number (from 1) -> most certain free decay, and messages for the user."""
     results: dict[int, DecayResult] = {}
     findings = []
     for test in tests.decays:
@@ -71,7 +71,7 @@ def choose_damping(
     Parameters
     ----------
     sweep
-        Damping ratios of the multi-mode fit, one a mode.
+        Damping ratios of the multi-mode fit, one for each mode.
     decays
         Free decays by mode number from 1.
     damping_from
@@ -79,7 +79,7 @@ def choose_damping(
     other
         Name of the tests of the fit, for the source and for messages.
     method
-        How the damping ratio is read from a decay.
+        Method by which the damping ratio is computed from a decay.
 
     Returns
     -------
@@ -98,14 +98,14 @@ def choose_damping(
             chosen.append(first)
             sources.append("decay")
         else:
-            # neither is sure: the mean of two independent methods, each by its certainty
+            # both are uncertain: the mean of two independent estimates, weighted by their certainty
             chosen.append(pooled(first, second))
             sources.append(f"decay and {other}")
         if chosen[-1].half_width > _WIDE_INTERVAL * chosen[-1].value:
             percent = 100.0 * chosen[-1].half_width / chosen[-1].value
             findings.append(
-                f"mode {mode}: the records determine the damping ratio only to +-{percent:.0f} % (95 % interval); "
-                "longer records, or more force on this mode, determine it better"
+                f"mode {mode}: the records determine the damping ratio only within +-{percent:.0f} % (95 % interval); "
+                "longer records, or more force on this mode, would reduce this interval"
             )
         if first is not None:
             apart = abs(first.value - second.value)

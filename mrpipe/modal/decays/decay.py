@@ -15,9 +15,9 @@ from mrpipe.modal.records import FrameTest
 HALF_BAND_RAD_S = np.pi
 FILTER_ORDER = 5
 _DRIVEN = 0.5
-"""Amplitude over the largest one from which a mode is still driven when its excitation stops."""
+"""A mode is still driven when the excitation stops if its amplitude is above this share of the largest one."""
 LARGEST_FILTERED_DAMPING = 0.02
-"""Above it the band-pass rings longer than the mode."""
+"""Largest damping ratio with the band-pass; beyond it the band-pass rings longer than the mode."""
 _NORMAL_95 = 1.959964
 
 
@@ -36,9 +36,10 @@ class Estimate:
 
     @staticmethod
     def of_logarithm(value: float, standard_error: float, freedom: float = np.inf) -> Estimate:
-        """Return the interval of a positive value whose logarithm has a standard error of so many degrees of freedom.
+        """Return the interval of a positive value from the standard error of its logarithm.
 
-        The quantile is that of Student's t, because a standard error from a few groups is itself uncertain.
+        The quantile is that of Student's t with `freedom` degrees of freedom, because a standard error from a few
+        groups is itself uncertain.
         """
         factor = float(np.exp(stats.t.ppf(0.975, freedom) * standard_error))
         return Estimate(value, value / factor, value * factor)
@@ -54,12 +55,12 @@ class Estimate:
 
 
 DecayMethod = Literal["exponential-fit", "logarithmic-decrement", "point-to-point", "linear-fit"]
-"""How the damping ratio is read from a decay."""
+"""Methods to compute the damping ratio from a decay."""
 
 
 @dataclass(frozen=True)
 class DecayResult:
-    """What one decay test says of its mode.
+    """Result of one decay test for its mode.
 
     Attributes
     ----------
@@ -112,11 +113,11 @@ class Envelope:
     Attributes
     ----------
     damping_ratio
-        By the decay rate of the curve at its start [1].
+        Damping ratio from the decay rate of the curve at its start [1].
     standard_error
-        Of the damping ratio, by the scatter of the peaks about the curve.
+        Standard error of the damping ratio, from the scatter of the peaks around the curve.
     rms_error
-        Of the peaks, in their unit.
+        RMS error of the peaks, in their unit.
     """
 
     damping_ratio: float
@@ -133,7 +134,7 @@ def linear_envelope(peak_time_s: FloatArray, peak: FloatArray) -> Envelope:
     """Fit a straight line to the peaks of a decay (section 3.2.2).
 
     The damping ratio follows from the slope of the line over its value at the first peak, which is the decay rate of
-    the exponential that touches it there.
+    the exponential that is tangent there.
 
     Parameters
     ----------
@@ -170,7 +171,7 @@ def damping_from_decrement(decrement: float) -> float:
 def modal_coordinates(test: FrameTest, mode_shapes: FloatArray, angular_frequencies: FloatArray) -> FloatArray:
     """Return the relative accelerations of the modes, shape (m, r): the inverse of the mode matrix separates them.
 
-    A floor that has only a displacement enters with -omega2 of the mode in question.
+    For a floor with only a displacement the acceleration is -omega^2 times the displacement, with omega of the mode.
     """
     responses = test.responses - test.responses.mean(axis=0)
     inverse = np.linalg.pinv(mode_shapes)
@@ -186,16 +187,16 @@ def modal_coordinates(test: FrameTest, mode_shapes: FloatArray, angular_frequenc
 
 
 def decay_start(test: FrameTest, coordinate: FloatArray, omega: float) -> int:
-    """Return the sample at which the free decay begins; 0 where the record begins with the release.
+    """Return the sample at which the free decay begins; 0 if the record begins with the release.
 
-    The excitation near the mode shows where it stops. At a resonance a small excitation is enough and may stay below
-    the noise of its sensor, and a decay never begins before the largest amplitude, so that counts as well. An
-    excitation that goes on while the amplitude has already fallen does not drive the mode: it is noise of the sensor.
+    The decay begins where the excitation near the frequency of the mode stops. At a resonance a small excitation below
+    the noise of its sensor may be sufficient to drive the mode. A decay never begins before the largest amplitude, so
+    this is used as well. An excitation that continues while the amplitude has fallen is noise of the sensor.
     """
     rate = test.sampling_rate_hz
     envelope = np.abs(signal.hilbert(_band_pass(coordinate, omega, rate)))
     largest = int(np.argmax(envelope))
-    # a decay that begins with the record is largest at its beginning, except for the ringing of the filter
+    # the amplitude of a decay that begins with the record is largest at its beginning, except for filter ringing
     largest = 0 if largest < _edge_s(2.0 * np.pi / omega, coordinate.size / rate, True) * rate else largest
     if test.excitation is None:
         return largest
@@ -250,11 +251,11 @@ def _useful(peak: FloatArray, noise: float) -> int:
 
 
 def _decrement(time: FloatArray, peak: FloatArray) -> tuple[Estimate, Estimate, FloatArray]:
-    """Return damping by the decrement over all peaks, the mean from peak to peak, and the series."""
+    """Return the damping ratio from the decrement over all peaks, the mean from peak to peak, and the series."""
     logs = np.log(peak)
     slope, intercept = np.polyfit(time, logs, 1, w=peak)
     scatter = logs - (slope * time + intercept)
-    # neighbouring peaks of a filtered signal carry nearly the same noise: one of four counts
+    # neighbouring peaks of a filtered signal have nearly the same noise: one of four counts
     spread = float(np.sqrt(np.average(scatter**2, weights=peak**2)) * 2.0)
     cycles = 0.5 * (peak.size - 1)
     count = max(1, peak.size // 8)
@@ -278,7 +279,7 @@ def _waves(time: FloatArray, poles: list[complex]) -> FloatArray:
 
 
 def damped_sinusoids(time: FloatArray, angular_frequencies: FloatArray, damping_ratios: FloatArray) -> FloatArray:
-    """Return a constant and, a mode, the real and imaginary part of its decaying wave: shape (m, 1 + 2r)."""
+    """Return a constant, and for each mode the real and imaginary part of its decaying wave, shape (m, 1 + 2r)."""
     zetas, omegas = damping_ratios, angular_frequencies
     poles = -zetas * omegas + 1j * omegas * np.sqrt(1.0 - zetas**2)
     return _waves(time, [complex(pole) for pole in poles])
@@ -339,7 +340,7 @@ def analyse_decay(
         return None
     own = coordinates[:, mode] - tail[:, mode].mean()
     high = own[start:] - signal.savgol_filter(own[start:], 2 * max(2, int(0.05 * period * rate)) + 1, 3)
-    # a short decay fades while the band-pass still rings from the release: then its peaks are taken unfiltered
+    # a short decay ends while the band-pass still rings from the release: its peaks are then taken without filter
     for filtered in (True, False) if zeta <= LARGEST_FILTERED_DAMPING else (False,):
         shown = _band_pass(own, omega, rate) if filtered else own
         edge = int(_edge_s(period, tail.shape[0] / rate, filtered) * rate)

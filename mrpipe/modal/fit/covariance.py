@@ -11,8 +11,8 @@ from mrpipe.modal.fit.projected import ProjectedFit
 def pole_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
     """Covariance of theta that allows for noise of the excitation, which reaches all outputs through H.
 
-    A lightly damped peak has too few lines to estimate their scatter. The variance predicted from the noise of the
-    whole band is taken where it is the larger one.
+    A lightly damped peak has too few lines to estimate their scatter. The larger one of this scatter and the variance
+    predicted from the noise of the whole band is taken.
     """
     jacobian, residual = fit.jacobian(theta), fit.residual(theta)
     inverse = np.linalg.pinv(jacobian.T @ jacobian)
@@ -40,16 +40,16 @@ def pole_covariance(fit: ProjectedFit, theta: FloatArray) -> FloatArray:
 
 
 def clustered_covariance(fit: ProjectedFit, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Covariance of theta that also allows for what a sensor has wrong in one test over all lines of a peak.
+    """Covariance of theta that allows for errors of a sensor which are the same at all lines of a peak in one test.
 
-    An error of a sensor's clock or cross-talk is alike from line to line, and noise of single lines does not show it.
-    Each sensor in each test is therefore one cluster of the robust covariance (Liang and Zeger 1986). The larger
-    variance of this and of :func:`pole_covariance` counts.
+    Errors of the clock of a sensor, or cross-talk, are the same from line to line, and the scatter of single lines does
+    not show them. Each sensor in each test is therefore one cluster of the robust covariance (Liang and Zeger 1986).
+    The larger variance of this and of :func:`pole_covariance` counts.
 
     Returns
     -------
-    Covariance, shape (2r, 2r), and the degrees of freedom of each standard error, shape (2r,): the clusters less one
-    where the clusters count (Cameron and Miller 2015), else infinite.
+    Covariance, shape (2r, 2r), and the degrees of freedom of each standard error, shape (2r,): number of clusters minus
+    one if the clusters determine the error (Cameron and Miller 2015), else infinite.
     """
     covariance = pole_covariance(fit, theta)
     freedom = np.full(theta.size, np.inf)

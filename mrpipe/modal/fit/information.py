@@ -1,4 +1,4 @@
-"""The information criterion of a fit, and which poles that are not modes it supports."""
+"""The information criterion of a fit, and the poles that are not modes but are supported by it."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def weighted(spectra: Sequence[RecordSpectrum], theta: FloatArray, separate: boo
 def poles_of_fit(fit: MultiModeFit, spectra: Sequence[RecordSpectrum]) -> FloatArray:
     """Return theta = (ln omega, ln zeta) of the modes, then of those other poles that the spectra support.
 
-    The response of a pole that is not a mode of the structure, such as that of its support, has the band in common
-    with the modes. A fit of the modes alone attributes it to them. The other poles of `fit` therefore take part where
-    they lie in the band and the Bayesian information criterion supports each of them.
+    The response of a pole that is not a mode of the structure, such as that of its support, overlaps with the modes. A
+    fit of the modes alone would attribute it to them. The other poles of `fit` are therefore included if they lie in
+    the band and the Bayesian information criterion supports each of them.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from mrpipe.modal.spectra import ComplexArray, RecordSpectrum, all_inputs, all_s
 
 @dataclass(frozen=True)
 class PoleCandidate:
-    """A pole that keeps its place as the model order grows.
+    """A pole that is stable over the model orders.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class PoleCandidate:
     damping_ratio
         [1].
     occurrences
-        In how many model orders it was found.
+        Number of model orders in which it was found.
     """
 
     angular_frequency: float
@@ -62,7 +62,7 @@ def _triangle(
 
 
 def _reduced(triangle: FloatArray, highest: int, order: int) -> FloatArray:
-    """Return the part that the denominator of a lower order alone must explain.
+    """Return the part that the denominator alone must explain for a lower order.
 
     A lower order uses a subset of the columns of the highest order. The R factor of a subset of columns follows from
     the R factor of all columns, so the data are factored once for all orders.
@@ -86,7 +86,7 @@ def lscf_poles(
     orders
         Orders of the denominator in z = exp(-i omega step).
     high_rad_s
-        Upper end of the band; it is put at 0.95 pi of the unit circle.
+        Upper end of the band [rad/s]; it corresponds to 0.95 pi on the unit circle.
     """
     step = 0.95 * np.pi / high_rad_s
     highest = max(orders)
@@ -120,7 +120,7 @@ def stable_poles(
     band_rad_s
         Poles outside are dropped.
     largest_damping_ratio, frequency_tolerance
-        What counts as physical, and as the same pole.
+        Largest damping ratio of a physical pole, and relative tolerance of the frequency of the same pole.
     """
     found: list[tuple[float, float, int]] = []
     for order, poles in zip(orders, lscf_poles(spectra, orders, band_rad_s[1]), strict=True):

@@ -1,8 +1,9 @@
 """Multi-mode fit of whole-record spectra with leakage modelled: poles by variable projection, the rest linear.
 
-In a record of finite length the spectrum of a response is exactly Y = H U + T, where T holds what the modes carried
-over the record's beginning and end and has the poles of H. Frames damped by a tenth of a per cent ring for longer than
-a test lasts, so T is as large as H U at the peaks; averaging with windows would smear both into too much damping.
+In a record of finite length the spectrum of a response is exactly Y = H U + T, where the transient T is due to the
+state of the modes at the beginning and the end of the record, and has the poles of H. Frames with damping ratios of 0.1
+% vibrate for longer than a test lasts, so that T is as large as H U at the peaks. Averaging with windows would broaden
+both and give too large damping ratios.
 """
 
 from __future__ import annotations
@@ -59,11 +60,12 @@ def fit_modes(
     angular_frequencies, damping_ratios
         First guess, shape (r,).
     passes
-        Fits with weights renewed from the residuals of the one before.
+        Number of fits; each has weights from the residuals of the fit before.
     evaluations
-        Bound on the evaluations of a pass.
+        Largest number of evaluations of a pass.
     near
-        The first pass has weights from the residuals of the guess; else strong peaks outweigh a mode without a peak.
+        Whether the first pass has weights from the residuals of the guess, so that strong peaks do not dominate a mode
+        without a peak.
     """
     order = np.argsort(angular_frequencies)
     guess = np.concatenate([np.log(angular_frequencies[order]), np.log(np.clip(damping_ratios[order], 1e-5, 0.3))])
@@ -96,7 +98,7 @@ def fitted_poles(fit: ProjectedFit, guess: FloatArray, passes: int, evaluations:
 
 
 def rising(theta: FloatArray) -> IntArray:
-    """Return the places in theta = (ln omega, ln zeta) of the poles in rising order of frequency, shape (r,)."""
+    """Return the indices of the poles in theta = (ln omega, ln zeta) in rising order of frequency, shape (r,)."""
     return np.argsort(theta[: theta.size // 2])
 
 

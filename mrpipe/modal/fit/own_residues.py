@@ -1,8 +1,8 @@
-"""Poles fitted with residues of each test, where tests contradict shared residues.
+"""Poles fitted with separate residues of each test, if tests contradict common residues.
 
-Cross-talk, cables and mounts differ between tests. Residues that two tests are made to share then leave a part of every
-strong mode in the residual. That part is not noise. It moves a hidden mode next to a strong one by more than the
-intervals say. With residues of each test the contradiction disappears from the poles.
+Cross-talk, cables and mounts differ between tests. A fit with common residues then leaves a part of every strong mode
+in the residual. This part is not noise. It shifts a hidden mode next to a strong one by more than its interval. With
+residues of each test the contradiction disappears from the poles.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from mrpipe.modal.fit.result import MultiModeFit
 _PASSES = 2
 _EVALUATIONS = 10
 _SAME = 0.005
-"""Relative change of a frequency up to which a fit has found the same mode again."""
+"""Largest relative change of a frequency for the same mode in another fit."""
 
 
 def with_own_residues(fit: MultiModeFit) -> MultiModeFit:
     """Return the fit with poles that give each test separate residues, and the errors of all poles by clusters.
 
-    Residues of each test are taken by the Bayesian information criterion. The shapes remain those that the tests share
-    at these poles. Without several tests, or without evidence, the poles stay as they are. Poles that are not modes
-    take part, because their response would otherwise be attributed to the modes (:func:`poles_of_fit`).
+    Separate residues are used if the Bayesian information criterion supports them. The shapes remain those of common
+    residues at these poles. With one test, or without support, the poles are unchanged. Poles that are not modes are
+    included, because their response would otherwise be attributed to the modes (:func:`poles_of_fit`).
 
     Parameters
     ----------

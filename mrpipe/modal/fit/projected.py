@@ -15,7 +15,7 @@ from mrpipe.modal.spectra import ComplexArray, RecordSpectrum, all_sensors
 
 @dataclass
 class _Group:
-    """Sensors of one kind that the same tests have: they share one linear basis."""
+    """Sensors of one kind that occur in the same tests, so that they have the same linear basis."""
 
     problem: Problem
     sensors: list[Sensor]
@@ -47,7 +47,7 @@ def _groups(spectra: Sequence[RecordSpectrum], modes: int, separate: bool) -> li
 class ProjectedFit:
     """Variable projection over all groups of sensors, with weights renewed from the residuals.
 
-    With `separate`, each test has separate residues; else tests share the residues of their common sensors.
+    With `separate`, each test has separate residues; else the residues of a sensor are common to all tests.
     """
 
     def __init__(self, spectra: Sequence[RecordSpectrum], modes: int, separate: bool = False) -> None:

@@ -16,11 +16,11 @@ _TRANSIENT_POWERS = 5
 DIRECT_POWERS = 4
 _STEP = 1e-6
 _LEAST_INDEPENDENCE = 1e-5
-"""Part of a unit column that the columns before it do not explain, below which normal equations are too coarse."""
+"""Least part of a unit column that the columns before it do not explain; below it normal equations are inaccurate."""
 
 
 def stack(matrix: ComplexArray) -> FloatArray:
-    """Return real and imaginary parts after one another, shape (2 m, n)."""
+    """Return real and imaginary parts, concatenated, shape (2 m, n)."""
     return np.concatenate([matrix.real, matrix.imag], axis=0)
 
 
@@ -46,7 +46,7 @@ class Problem:
         self.turns = [np.exp(-1j * item.omega * item.dt) for item in spectra]
 
     def mode_columns(self, omega_r: float, zeta: float) -> ComplexArray:
-        """Columns of one mode, shape (rows, 2 inputs + 2 tests): two of H U an input, a complex transient a test."""
+        """Columns of one mode, shape (rows, 2 inputs + 2 tests): two of H U per input, a complex transient per test."""
         columns = np.zeros((self.total, self.width), dtype=np.complex128)
         start = 0
         count = 2 * len(self.inputs)
@@ -97,10 +97,10 @@ class State:
 
 
 def _projection(basis: FloatArray, target: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-    """Return the least-squares coefficients of the target, and what takes the basis out of other columns.
+    """Return the least-squares coefficients of the target, and a function that projects other columns off the basis.
 
-    Normal equations with one refinement cost a fifth of an orthogonal basis; where columns are too much alike for them,
-    the orthogonal basis it is.
+    Normal equations with one refinement take a fifth of the time of an orthogonal basis. If columns are too similar for
+    them, an orthogonal basis is used.
     """
     gram = basis.T @ basis
     try:

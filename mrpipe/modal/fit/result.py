@@ -32,12 +32,12 @@ class MultiModeFit:
     coherence
         Shape (n, r): share of the response near the peak that the excitation and the ends of the record explain.
     steady, measured
-        One entry a test, shape (m, s): H U of the fit, and the measured response without its transient part. Columns
+        One entry per test, shape (m, s): H U of the fit, and the measured response without its transient part. Columns
         are the sensors of the test.
     omega
-        One entry a test, shape (m,) [rad/s].
+        One entry per test, shape (m,) [rad/s].
     excitation
-        One entry a test, shape (m,): the first input of the test.
+        One entry per test, shape (m,): the first input of the test.
     noise_variance
         Shape (n,): variance of a spectral line far from the peaks.
     sensors
@@ -45,15 +45,16 @@ class MultiModeFit:
     inputs
         Places of the inputs.
     participations
-        Shape (k, r) complex: what an input contributes to a mode, relative to the input of `residues`.
+        Shape (k, r) complex: participation of a mode in an input, relative to the input of `residues`.
     input_residues
         Shape (n, k, r) complex: the residues of each input; nan if no test has this sensor and this input.
     spectra
         The spectra that were fitted.
     transients
-        One entry a test, shape (m, s): contribution of the ends of the record.
+        One entry per test, shape (m, s): contribution of the ends of the record.
     freedom
-        Shape (2r,): degrees of freedom of the standard errors in `covariance`; empty where all come from many lines.
+        Shape (2r,): degrees of freedom of the standard errors in `covariance`; empty if all of them come from many
+        lines.
     other_poles
         Shape (2, q): angular frequencies [rad/s] and damping ratios of fitted poles that are not modes.
     """

@@ -27,7 +27,7 @@ from mrpipe.modal.search.selection import shape_errors
 
 _LEAST_ASSURANCE = 0.5
 _LARGEST_ERROR = 0.35
-"""Relative error of a scale from which it counts as unknown: the mass hardly moves this mode."""
+"""Relative error from which on a scale counts as unknown, because the mass hardly shifts this mode."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class ModalScale:
 
 @dataclass(frozen=True)
 class _Equations:
-    """Rows of the linear system for the scales, and the relative error of the scale that each modified mode gives."""
+    """Rows of the linear system for the scales, and the relative error of the scale from each modified mode."""
 
     matrix: FloatArray
     target: FloatArray
@@ -82,7 +82,7 @@ def _equations(base: MultiModeFit, changed: MultiModeFit, added: dict[int, float
         if likeness[near] < _LEAST_ASSURANCE or shift[near] <= 0.0:
             continue
         errors[near] = min(errors[near], error)
-        # a mode that hardly moves gives a doubtful equation; its weight follows from the error of its shift
+        # the equation of a mode with a small shift is uncertain; its weight follows from the error of the shift
         weight = 1.0 / max(error, 1e-4)
         rows.append(weight * x * (square * (mass * y) @ x / shift))
         target.append(weight * y)

@@ -1,4 +1,4 @@
-"""From modes to M, C and K: by all modes where they are complete, else by updating a storey model."""
+"""From modes to M, C and K: from all modes if they are complete, else by updating a storey model."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mrpipe.structures import Frame, frame_from_modes, modal_damping_matrix, nat
 _MODEL_ERROR = 0.02
 """Relative frequency error of the storey model above which the user is warned."""
 _OPEN_TURN = 0.1
-"""Standard error [rad] of the rotation of rows without a sensor, from which their shapes count as not determined."""
+"""Standard error [rad] of the rotation of rows without a sensor above which their shapes are not determined."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class PartialModes:
     scale_errors
         Shape (r,): relative standard errors of `scaled_residues`; None: the usual error.
     scaled_by
-        What gives the scale, for messages.
+        Source of the scale, for messages.
     """
 
     angular_frequencies: FloatArray
@@ -65,17 +65,17 @@ class Assembly:
     frame
         None where masses and scale are unknown.
     shapes
-        Shape (n, r), expanded to floors without a sensor; nan there where nothing determines them.
+        Shape (n, r), expanded to floors without a sensor; NaN at floors at which they are not determined.
     numbers
         Mode number (from 1) of each column.
     storeys
-        Storey model; None where the masses are unknown.
+        Storey model; None if the masses are unknown.
     masses
         Shape (n,) [kg]; nan where unknown.
     mass_intervals
         Shape (n, 2) [kg].
     findings
-        What is not determined, one line each.
+        Quantities that are not determined, one line each.
     """
 
     frame: Frame | None
@@ -88,7 +88,7 @@ class Assembly:
 
 
 def can_scale(masses: FloatArray, modes: PartialModes) -> bool:
-    """Return whether a known mass or a measured force sets the scale of the mass matrix."""
+    """Return whether a known mass or a measured force determines the scale of the mass matrix."""
     scaled = modes.driven >= 0 and modes.scaled_residues is not None and bool(np.isfinite(modes.scaled_residues).any())
     return bool(np.isfinite(masses).any()) or scaled
 
@@ -97,10 +97,10 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
     """Build a frame from modes that are incomplete, have floors without a sensor, or whose masses are unknown.
 
     A storey model with the known masses is fitted to the modes. It gives the mode numbers and the shapes at floors
-    without a sensor. Where all modes were found, the matrices follow from the expanded shapes made orthogonal to the
-    mass; else they are those of the storey model, with the mean damping ratio for modes that were not found. Shapes
-    that are orthogonal to known masses do not depend on the storey model: a storey that it leaves open leaves no row
-    of them open.
+    without a sensor. If all modes were found, the matrices follow from the expanded shapes after orthogonalisation with
+    respect to the mass; else they are those of the storey model, with the mean damping ratio for modes that were not
+    found. Shapes that are orthogonal to known masses do not depend on the storey model, so that a storey which is not
+    determined does not affect them.
     """
     unknown_rows = [row for row in range(layout.floors) if row not in modes.measured]
     if not layout.is_chain or not can_scale(masses, modes):
@@ -129,7 +129,7 @@ def assemble_partial(modes: PartialModes, masses: FloatArray, layout: Layout, so
         frame = frame_from_modes(
             whole, modes.angular_frequencies, zeta, updated.masses, name="identified", source=source
         )
-        # orthogonality to masses that are estimates would change measured shapes, which are better known
+        # orthogonality to estimated masses would change measured shapes, which are more accurate
         shapes = whole if orthogonal else shapes
         open_rows = unknown_rows if orthogonal and completed.turn_error > _OPEN_TURN else open_rows
     else:
@@ -167,7 +167,7 @@ def _modes_only(modes: PartialModes, masses: FloatArray, layout: Layout, unknown
 def _is_open(updated: UpdatedModel, row: int) -> bool:
     """Return whether the mass of a floor (from 0), or the storey below or above it, is not determined.
 
-    The shape of a floor without a sensor then follows from them alone, so that it would be a guess.
+    The shape at a floor without a sensor depends on these quantities alone, so that it would be unreliable.
     """
     return not {f"mass {row + 1}", f"storey {row + 1}", f"storey {row + 2}"}.isdisjoint(updated.undetermined)
 
@@ -192,7 +192,8 @@ def _findings(
     if open_rows:
         floors = ", ".join(str(row + 1) for row in open_rows)
         findings.append(
-            f"floors without a sensor ({floors}): their mode shapes are not determined, because the data leave open "
+            f"floors without a sensor ({floors}): their mode shapes are not determined, because the data do not "
+            "determine "
             + (
                 "how their motion is divided among them"
                 if orthogonal
@@ -212,7 +213,8 @@ def _findings(
         mode = updated.numbers[int(np.argmax(np.abs(updated.frequency_error)))]
         instead = "K follows from the modes instead" if not missing else "K is therefore uncertain"
         findings.append(
-            f"springs between neighbouring floors alone miss the frequency of mode {mode} by {100.0 * worst:.1f} %; "
+            f"with springs between neighbouring floors alone the frequency of mode {mode} differs by "
+            f"{100.0 * worst:.1f} %; "
             f"{instead}"
         )
     if modes.driven >= 0 and np.any(updated.mass_high > updated.mass_low):
@@ -221,7 +223,7 @@ def _findings(
 
 
 def _expanded(modes: PartialModes, model: FloatArray, index: FloatArray) -> FloatArray:
-    """Return shapes at all floors: measured where a sensor is, else the model's mode scaled to the measured floors."""
+    """Return shapes at all floors: measured ones, or the mode of the model scaled to the measured floors."""
     shapes = modes.shapes.copy()
     rows = list(modes.measured)
     unknown = [row for row in range(shapes.shape[0]) if row not in modes.measured]

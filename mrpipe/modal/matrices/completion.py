@@ -1,4 +1,4 @@
-"""Mode shapes at all floors, orthogonal to the mass, from those at floors with a sensor."""
+"""Mode shapes at all floors, orthogonal with respect to the mass, from those at floors with a sensor."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from scipy.optimize import brentq, lsq_linear, minimize
 from mrpipe.artifacts import FloatArray
 
 _LEAST_ERROR = 1e-6
-"""Error of a shape element over the norm of the shape, below which it only costs condition."""
+"""Least error of a shape element over the norm of the shape; a smaller one only worsens the conditioning."""
 _TURNS = 50
 _SECOND_STEP = 1e-3
 """Step of the second differences by an angle [rad]."""
 _OTHER = 0.3
 """Rows of unit norm that differ by more than this are another solution."""
 _AMBIGUOUS = 4.0
-"""Two reflections whose squared misfits over their variance differ by less than this are both possible."""
+"""Two reflections are both possible if their squared misfits over the variance differ by less than this."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Completion:
     shapes
         Shape (n, n), normalised to the mass.
     turn_error
-        Standard error [rad] of the rotation of the rows of floors without a sensor; zero with one such floor at most,
-        infinite where another sign of a row is as likely.
+        Standard error [rad] of the rotation of the rows of floors without a sensor; zero with at most one such floor,
+        infinite if another sign of a row is equally likely.
     """
 
     shapes: FloatArray
@@ -46,13 +46,13 @@ def completed_shapes(
     masses: FloatArray,
     angular_frequencies: FloatArray,
 ) -> Completion:
-    """Return the shapes orthogonal to the mass; the rows of floors with a sensor decide, each by its certainty.
+    """Return the shapes orthogonal to the mass that fit the rows of floors with a sensor, weighted by certainty.
 
     With L = M^(1/2) the mass-normalised shapes form an orthogonal matrix. Its measured rows A are known up to a scale
     d_r of each mode, and A diag(d^2) A' = 1 gives these scales. The other rows span the complement of the measured
-    ones. Of all rotations of the complement the one is taken that leaves the smallest stiffness between floors that
-    are not neighbours, because the measurements cannot show it. The elements of K that this leaves beyond neighbours
-    are taken as errors of that assumption. They give the standard error of the rotation.
+    ones. The measurements do not determine the rotation of the complement. The rotation with the smallest stiffness
+    between floors that are not neighbours is taken. The remaining elements of K between such floors are taken as errors
+    of this assumption, and give the standard error of the rotation.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def completed_shapes(
 def _by_certainty(start: FloatArray, seen: FloatArray, errors: FloatArray, rows: Sequence[int]) -> FloatArray:
     """Return the orthogonal matrix whose rows fit the measured ones best, each element weighted by its variance.
 
-    Without weights a mode whose shape is hardly known turns the shapes of the others. What all modes have wrong alike
-    (cross-talk, gains, masses) is a second variance. It is chosen so that the squared misfit equals its degrees of
+    Without weights a mode with an uncertain shape would rotate the shapes of the others. Errors that all modes share
+    (cross-talk, gains, masses) are a second variance. It is chosen such that the squared misfit equals its degrees of
     freedom (the random-effects estimate of Paule and Mandel 1982).
 
     Parameters
@@ -122,7 +122,7 @@ def _by_certainty(start: FloatArray, seen: FloatArray, errors: FloatArray, rows:
 
 
 def _turned(start: FloatArray, seen: FloatArray, weight: FloatArray, rows: Sequence[int]) -> tuple[FloatArray, float]:
-    """Turn an orthogonal matrix until its rows fit `seen` best; return it and the squared misfit (Gauss-Newton).
+    """Rotate an orthogonal matrix until its rows fit `seen` best; return it and the squared misfit (Gauss-Newton).
 
     The scale of each mode is free, so that the misfit is the part of the weighted column across the measured one.
     """
@@ -216,7 +216,7 @@ def _rotated(
 
 
 def _turn_error(cost: Callable[[FloatArray], float], angles: FloatArray, variance: float) -> float:
-    """Return the largest standard error of the angles at the least cost, a sum of squares of so much variance each."""
+    """Return the largest standard error of the angles at the minimum of a sum of squares with a given variance."""
     if not angles.size:
         return 0.0
     steps = _SECOND_STEP * np.eye(angles.size)

@@ -26,7 +26,7 @@ class FloorMasses:
 def masses_by_orthogonality(
     shapes: FloatArray, relative_errors: FloatArray, masses: FloatArray, scales: FloatArray, scale_errors: FloatArray
 ) -> FloorMasses | None:
-    """Return the masses for which the shapes are orthogonal; None where the data do not determine all of them.
+    """Return the masses for which the shapes are orthogonal; None if the data do not determine all of them.
 
     For two modes sum_i m_i x_ir x_is = 0, and for a mode of known scale sum_i m_i x_ir^2 = 1 / a_r. No model of the
     stiffness is needed.

@@ -1,7 +1,7 @@
-"""Floors that move as rigid plates: two translations and a rotation, from sensors at known places.
+"""Floors that move as rigid plates: two translations and a rotation, from sensors at known positions.
 
 A sensor along x at the place (px, py) measures u_x - py * rotation, a sensor along y measures u_y + px * rotation. With
-three sensors of which two are apart, the three motions of the floor follow by least squares.
+three sensors, of which two are parallel at a distance, the three motions of the floor follow by least squares.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ def _row(direction: str, place: tuple[float, float]) -> tuple[float, float, floa
 def measured_rows(
     places: Sequence[tuple[int, str]], positions: Mapping[str, tuple[float, float]], floors: int
 ) -> FloatArray:
-    """Return what sensors measure of the motions of rigid floors, shape (places, 3 n).
+    """Return the matrix from the motions of rigid floors to the measured motions, shape (places, 3 n).
 
-    The same row distributes the force of a shaker at this place over the degrees of freedom, because the power of the
-    force is that at its place.
+    The same row distributes the force of a shaker at this position over the degrees of freedom (principle of virtual
+    work).
 
     Parameters
     ----------

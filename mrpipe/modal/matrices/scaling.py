@@ -1,4 +1,4 @@
-"""What gives the scale of the modes: the force of a shaker, or tests with known added masses."""
+"""Scale of the modes, from the force of a shaker or from tests with known added masses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _USUAL_FORCE_ERROR = 0.02
 
 @dataclass(frozen=True)
 class Scale:
-    """Scale of the modes, where one is known.
+    """Scale of the modes, if it is known.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Scale:
     floor
         Floor, from 1; 0 without a scale.
     source
-        What gives the scale, for messages.
+        Source of the scale, for messages.
     """
 
     residues: FloatArray | None = None
@@ -47,7 +47,7 @@ def find_scale(
 ) -> tuple[Scale, list[str]]:
     """Return the scale of the modes: from the force of a shaker, else from added masses.
 
-    Where the floor masses are known, tests with added masses are a check of them, and the finding says the result.
+    If the floor masses are known, tests with added masses are a check of them, and a finding reports the result.
     """
     scale = _of_force(fit)
     if not tests.with_added_masses or not layout.is_chain:
@@ -57,10 +57,14 @@ def find_scale(
     if added.residues is not None:
         unknown = int(np.count_nonzero(~np.isfinite(added.residues)))
         if unknown:
-            findings.append(f"the added mass is too small, or sits at a node, to scale {unknown} of the modes")
+            findings.append(
+                f"the added mass is too small, or is at a node, so that {unknown} of the modes have no scale"
+            )
         findings += _compared(fit, layout, added)
     else:
-        findings.append("the added mass moves no mode by more than its error: the modes have no scale from it")
+        findings.append(
+            "the added mass shifts no mode by more than its error, so it does not determine the scale of the modes"
+        )
     return (scale if scale.residues is not None else added), findings
 
 
@@ -70,7 +74,7 @@ def _of_force(fit: MultiModeFit) -> Scale:
         rows = [i for i, sensor in enumerate(fit.sensors) if sensor[:2] == place[:2] and place.floor > 0]
         if rows:
             values = fit.input_residues[rows[0], column].real
-            # the sign of a recorded force is a matter of convention: the driving point always follows the force
+            # the sign of a recorded force is a convention: the driving point always moves in the direction of the force
             values = np.asarray(values * np.sign(np.nansum(values)))
             return Scale(values, None, place.floor, "the measured force")
     return Scale()
@@ -84,7 +88,7 @@ def _of_added_masses(fit: MultiModeFit, tests: FrameTests, layout: Layout, optio
     found = modal_scale(fit, changed)
     if not np.isfinite(found.values).any():
         return Scale()
-    # the floor at which the least moving mode moves most has the smallest errors
+    # the floor at which the smallest modal motion is largest has the smallest errors
     shapes = floor_shapes(fit, layout)[0]
     unit = np.abs(shapes / np.linalg.norm(shapes, axis=0))
     floor = int(np.argmax(unit.min(axis=1)))

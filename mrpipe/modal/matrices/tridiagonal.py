@@ -18,7 +18,7 @@ _MOST_ASSIGNMENTS = 80
 
 @dataclass(frozen=True)
 class TridiagonalFit:
-    """Storeys of the shear frame nearest to measured modes.
+    """Storey stiffnesses of the shear frame nearest to measured modes.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class TridiagonalFit:
     frequency_error
         Model over measured, minus one, shape (r,) [1].
     at_bound
-        Storeys (from 1) that ended at a bound: the shear frame does not suit them.
+        Storeys (from 1) that ended at a bound, because a shear frame does not represent them.
     undetermined
         Storeys (from 1) whose interval is wider than half of their value.
     """
@@ -122,7 +122,7 @@ def fit_partial(
 ) -> UpdatedModel:
     """Fit the storeys to fewer modes than floors, or to modes that are not measured at all floors.
 
-    Where the mode numbers are left open, each assignment that the possible numbers allow is fitted and the best taken.
+    If the mode numbers are not given, every possible assignment is fitted, and the best one is taken.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def fit_partial(
         raise ValueError("no assignment of mode numbers is possible")
     if known.size == masses.size:
         return best
-    # unknown masses take up what the storeys cannot describe
+    # unknown masses represent what the storeys cannot describe
     return with_jackknife(model, masses, modes, best)
 
 

@@ -4,10 +4,10 @@ K(p) = K0 + p_1 K_1 + p_2 K_2 + ... with positive parameters p: storeys, connect
 gives. The modes may be fewer than the degrees of freedom, and some degrees of freedom may have no sensor. Masses that
 are not known are parameters as well where the modes are scaled, that is, where a measured force excited them.
 
-The intervals of a least-squares fit hold where the model is right and the errors are independent. A structure has
-stiffness that the model lacks, and sensors pick up other directions: such errors are alike in all rows of a mode. The
-fits without one mode each (jackknife; Efron and Tibshirani 1993, An Introduction to the Bootstrap, chapter 11) show
-what they cause.
+The intervals of a least-squares fit are valid if the model is correct and the errors are independent. A structure has
+stiffness that the model lacks, and sensors also measure other directions. Such errors are correlated over the rows of a
+mode. Fits that leave out one mode each (jackknife; Efron and Tibshirani 1993, An Introduction to the Bootstrap, chapter
+11) show their effect.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from mrpipe.artifacts import FloatArray
 
 _NORMAL_95 = 1.959964
 _UNDETERMINED = 0.5
-"""Half width of an interval, in logarithms, from which a parameter counts as not determined by the data."""
+"""Half width of an interval, in logarithms, above which the data do not determine a parameter."""
 _RANGE = 8.0
 """Parameters may differ from their start by this factor in logarithms."""
 _FEWEST_MODES = 3
-"""Fewer modes do not determine a model without one of them."""
+"""Least number of modes for the jackknife, because one of them is left out in each fit."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class MeasuredModes:
     rows
         Degree of freedom (from 0) of each row of `shapes`.
     numbers
-        Number (from 1) of each mode among those of the model; empty where it is left to the fit.
+        Number (from 1) of each mode among those of the model; empty: the fit determines it.
     scaled_residues
         Shape (r,) [1/kg]: acceleration over force at the degree of freedom `driven`, nan where unknown.
     driven
@@ -129,7 +129,7 @@ class UpdatedModel:
     frequency_error
         Model over measured, minus one, shape (r,).
     undetermined
-        Names of the parameters that the data leave open by more than half of their value.
+        Names of the parameters whose interval is wider than half of their value.
     cost
         Sum of squares of the weighted residual.
     """
@@ -172,7 +172,8 @@ class _Problem:
     def residual(self, theta: FloatArray) -> FloatArray:
         modes = self.modes
         omega, shapes = self.model_modes(theta)
-        # known masses weigh the floors of a shape; unknown ones must not, or the weights would follow the parameters
+        # known masses weight the floors of a shape; unknown ones must not, because the weights would depend on the
+        # parameters
         weight = np.ones(len(self.rows)) if self.unknown.size else np.sqrt(self.masses[self.rows])
         model = weight[:, None] * shapes[self.rows]
         model = model / np.maximum(np.linalg.norm(model, axis=0), 1e-300)
@@ -229,14 +230,15 @@ def update_model(
 def with_jackknife(
     model: StiffnessModel, masses: FloatArray, modes: MeasuredModes, found: UpdatedModel
 ) -> UpdatedModel:
-    """Return an updated model whose intervals hold the errors that its modes have in common with no other mode.
+    """Return an updated model with intervals that include errors which are correlated within a mode (jackknife).
 
     Parameters
     ----------
     model, masses, modes
         As for :func:`update_model`.
     found
-        Its result; its intervals are kept where they are wider. Fewer than three modes leave it as it is.
+        Result of :func:`update_model`; its intervals are kept where they are wider. With fewer than three modes it is
+        returned unchanged.
     """
     count = modes.angular_frequencies.size
     if count < _FEWEST_MODES:

@@ -1,4 +1,4 @@
-"""Checks of a mode matrix: orthogonality with respect to the mass, and signs that break it."""
+"""Checks of a mode matrix: orthogonality with respect to the mass, and wrong signs."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ def _off_diagonal(coupling: FloatArray) -> float:
 
 
 def sign_changes(mode_shape: ArrayLike, negligible: float = 0.03) -> int:
-    """Return how often a shape of shape (n,) changes sign from the ground up; elements near zero are passed over."""
+    """Return the number of sign changes of a mode shape, shape (n,), from the ground up, without elements near zero."""
     shape = np.asarray(mode_shape, dtype=np.float64)
     signs = np.sign(shape[np.abs(shape) > negligible * np.abs(shape).max()])
     return int(np.count_nonzero(signs[1:] != signs[:-1]))
 
 
 def wrong_signs(mode_shapes: ArrayLike, mass: ArrayLike) -> tuple[tuple[int, int], ...]:
-    """Return the fewest elements (floor, mode), from 1, whose sign must turn to make the columns orthogonal.
+    """Return the fewest elements (floor, mode), from 1, whose sign must change to make the columns orthogonal.
 
     All sets of up to three elements are tried; empty if none reduces the off-diagonal coupling to less than a quarter.
     """
@@ -76,7 +76,7 @@ def wrong_signs(mode_shapes: ArrayLike, mass: ArrayLike) -> tuple[tuple[int, int
             break
         for chosen in combinations(places, number):
             turned = _turned_cost(scaled, gram, chosen)
-            # another element must be worth its place
+            # another element must reduce the cost enough
             if turned < best[0] * (0.5 if number > len(best[1]) else 1.0):
                 best = (turned, chosen)
     if best[0] > 0.25 * before:
@@ -100,12 +100,12 @@ def _turned_cost(scaled: FloatArray, gram: FloatArray, chosen: tuple[tuple[int, 
 def check_mode_matrix(
     mode_shapes: ArrayLike, mass: ArrayLike, *, largest_coupling: float = LARGEST_COUPLING
 ) -> list[ModeMatrixFinding]:
-    """Return what is wrong with a mode matrix (empty where nothing is).
+    """Return what is wrong with a mode matrix; empty if nothing is.
 
     Parameters
     ----------
     mode_shapes
-        Shape (n, r), a row a floor, a column a mode.
+        Shape (n, r): one row per floor, one column per mode.
     mass
         Shape (n, n), diagonal [kg].
     largest_coupling
@@ -133,7 +133,7 @@ def check_mode_matrix(
         for floor, mode in elements:
             corrected[floor - 1, mode - 1] *= -1.0
         left = np.abs(np.triu(modal_coupling(corrected, mass), 1)).max()
-        message = f"the sign of {names} is wrong: turned, the largest coupling is {left:.3f}"
+        message = f"the sign of {names} is wrong: with the other sign the largest coupling is {left:.3f}"
         findings.append(ModeMatrixFinding("wrong-sign", message, elements))
     return findings
 
@@ -141,7 +141,7 @@ def check_mode_matrix(
 def possible_sign_changes(mode_shape: ArrayLike, error: ArrayLike) -> tuple[int, int]:
     """Return the fewest and the most sign changes that a shape (n,) can have, given standard errors (n,).
 
-    The sign of an element smaller than twice its error is open.
+    The sign of an element smaller than twice its error is not determined.
     """
     shape = np.asarray(mode_shape, dtype=np.float64)
     known = np.abs(shape) > np.maximum(2.0 * np.asarray(error, dtype=np.float64), 1e-12)
@@ -159,10 +159,10 @@ def possible_sign_changes(mode_shape: ArrayLike, error: ArrayLike) -> tuple[int,
 
 
 def orthogonal_shapes(mode_shapes: ArrayLike, mass: ArrayLike, relative_errors: ArrayLike) -> FloatArray:
-    """Return the shapes nearest to the measured ones that are orthogonal to the mass, each by its certainty.
+    """Return the shapes orthogonal to the mass that are nearest to the measured ones, weighted by certainty.
 
-    The weighted Procrustes problem: with L = M^(1/2), the polar factor of L U W, W = 1/error2. A mode that the sweep
-    hardly shows is then fixed by being orthogonal to those that it shows well.
+    The weighted Procrustes problem: with L = M^(1/2), the polar factor of L U W, W = 1/error2. Orthogonality to the
+    accurate modes then determines a mode that the sweep hardly shows.
 
     Parameters
     ----------

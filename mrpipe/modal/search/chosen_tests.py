@@ -40,10 +40,10 @@ class ChosenTests:
 def choose_tests(
     forced: tuple[FrameTest, ...], tests: FrameTests, layout: Layout, options: IdentificationOptions
 ) -> tuple[ChosenTests, list[str]]:
-    """Find the modes in the tests that are not for validation; sweeps alone where modes are weak there.
+    """Find the modes in the tests that are not for validation; only sweeps are used if modes are weak there.
 
-    Validation tests are used only where the other tests do not show all modes, because the simulated response to a
-    validation test proves nothing once the test is part of the fit.
+    Validation tests are used only where the other tests do not show all modes, because a validation test that is part
+    of the fit no longer validates the result.
     """
     first = tuple(test for test in forced if test.role != "validation") or forced
     arguments = (layout, options.band_low_hz, options.band_high_hz, tests.source, tests.decays)
@@ -85,7 +85,7 @@ def _is_sound(fit: MultiModeFit, layout: Layout) -> bool:
 
 
 def _largest_coupling(fit: MultiModeFit, layout: Layout) -> float:
-    """Return the largest element off the diagonal of the scaled U'MU; zero where it cannot be known."""
+    """Return the largest off-diagonal element of the scaled U'MU; zero if it cannot be computed."""
     if layout.masses is None or not all_floors_measured(fit, layout):
         return 0.0
     coupling = modal_coupling(floor_shapes(fit, layout)[0], np.diag(layout.masses))
@@ -100,13 +100,13 @@ def _imaginary_part(fit: MultiModeFit) -> float:
 def with_clocks(
     chosen: ChosenTests, tests: FrameTests, layout: Layout, options: IdentificationOptions
 ) -> tuple[ChosenTests, tuple[SensorClock, ...]]:
-    """Correct the clocks of the sensors where that makes the mode shapes real, and search again.
+    """Correct the clocks of the sensors if this makes the mode shapes real, and search the modes again.
 
     The modes are searched again after the correction, and the clocks are estimated again with these modes, because a
-    mode that was missing before disturbs the phases. Modes that only wrong clocks produced disappear by it.
+    mode that was missing before disturbs the phases. Modes that only wrong clocks produced disappear.
 
-    Steps wait for the modes: a sweep passes the modes one after another, so that a mode which was not found disturbs
-    the phases from a certain time on, as a step does.
+    Steps are searched only after the modes, because a sweep passes the modes one after another: a mode that was not
+    found disturbs the phases from a certain time on, like a step.
     """
     clocks: list[SensorClock] = []
     best = chosen

@@ -34,12 +34,12 @@ _ROUNDS = 3
 _SEARCH_LINES = 2500
 _FIT_LINES = 6000
 _SAME_POLE = 0.02
-"""Relative change of a frequency in the last fit up to which a pole counts as the same."""
+"""Largest relative change of a frequency in the last fit for the same pole."""
 
 
 @dataclass(frozen=True)
 class ModeSearch:
-    """Modes found.
+    """Result of the search for modes.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class ModeSearch:
     candidates
         The stabilisation chart: poles that appear at several model orders.
     notes
-        What the user should know of the modes, one line each.
+        Messages for the user on the modes, one line each.
     """
 
     fit: MultiModeFit
@@ -64,7 +64,7 @@ class ModeSearch:
 
 @dataclass(frozen=True)
 class _Found:
-    """A fit with more poles than needed, and which of them are modes (empty where the set is not complete)."""
+    """A fit with more poles than needed, and the poles that are modes (empty if the set is not complete)."""
 
     fit: MultiModeFit
     keep: tuple[int, ...]
@@ -74,14 +74,14 @@ class _Found:
 
 
 def bands_to_try(tests: Sequence[FrameTest], low_hz: float, high_hz: float) -> list[tuple[float, float]]:
-    """Return bands [Hz] in which to look for modes, narrow ones first where the excitation reaches far.
+    """Return bands [Hz] in which modes are searched, narrow ones first if the excitation has a wide band.
 
     Parameters
     ----------
     tests
         Forced tests.
     low_hz, high_hz
-        As set by the user; 0 for `high_hz` means up to where the excitation ends.
+        Settings of the user; 0 for `high_hz`: up to the end of the excitation.
     """
     nyquist = 0.5 * min(item.sampling_rate_hz for item in tests)
     if high_hz > 0.0:
@@ -92,7 +92,7 @@ def bands_to_try(tests: Sequence[FrameTest], low_hz: float, high_hz: float) -> l
     while high < 0.8 * tops[-1] and tops[-1] > _USUAL_HIGH_HZ:
         bands.append(high)
         high *= 2.0
-    # tests may reach differently far; where all that finds nothing, a narrower band resolves close modes better
+    # tests may have different bands; if nothing is found, a narrower band resolves close modes better
     narrower = [0.7 * tops[-1]] if len(tests) > 1 else []
     for top in [*tops, *narrower]:
         if all(abs(top - known) > 0.1 * known for known in bands):
@@ -147,7 +147,7 @@ def _look(
 def _of_decays(
     decays: Sequence[FrameTest], known: Sequence[PoleCandidate], band_hz: tuple[float, float]
 ) -> list[PoleCandidate]:
-    """Return the poles that decay tests ring at and that the forced tests do not show as stable."""
+    """Return the poles of decay tests that are not stable poles of the forced tests."""
     new: list[PoleCandidate] = []
     for test in decays:
         omega = strongest_frequency(test, band_hz)
@@ -171,9 +171,9 @@ def find_modes(
     source: Path,
     decays: Sequence[FrameTest] = (),
 ) -> ModeSearch:
-    """Return the modes that the tests show: one for each floor where they can be found, else fewer.
+    """Return the modes that the tests show: one for each floor if they can be found, else fewer.
 
-    Modes that the forced tests hardly show are taken from `decays` where these show them better.
+    Modes that the forced tests hardly show are taken from `decays` if these show them better.
 
     Raises
     ------
@@ -204,9 +204,9 @@ def find_modes(
 def _best_of_bands(
     found: Sequence[_Found], layout: Layout, source: Path, decays: Sequence[FrameTest]
 ) -> ModeSearch | None:
-    """Return the largest set of modes that the last fit leaves, of equal ones the last; None without modes.
+    """Return the largest set of modes after the last fit, of equal ones the last one; None without modes.
 
-    A pole at the end of a narrow band stands for the modes beyond it, and the last fit moves it. The sets are therefore
+    A pole at the end of a narrow band represents the modes beyond it, and the last fit moves it. The sets are therefore
     compared after that fit.
     """
     sets = [(largest_set(item.fit, layout), item) for item in reversed(found)]
@@ -221,7 +221,7 @@ def _best_of_bands(
 def _incomplete(
     best: _Found, chosen: dict[int, int], layout: Layout, source: Path, decays: Sequence[FrameTest]
 ) -> ModeSearch:
-    """Return the modes of a set that is not complete, without those whose shape the last fit makes doubtful."""
+    """Return the modes of a set that is not complete, without those whose shape is doubtful after the last fit."""
     if len(chosen) < layout.floors:
         check_channels(best.fit.coherence[:, list(chosen)], [item.floor for item in best.fit.sensors], source)
     refined, left = _only(best, list(chosen), decays)
@@ -258,7 +258,7 @@ def _only(found: _Found, keep: Sequence[int], decays: Sequence[FrameTest]) -> tu
 
 
 def check_channels(coherence: FloatArray, floors: Sequence[int], source: Path) -> None:
-    """Raise where a sensor, a row of `coherence` (n, r), does not respond to the excitation at any peak."""
+    """Raise UserError if a sensor, a row of `coherence` (n, r), does not respond to the excitation at any peak."""
     dead = np.flatnonzero(np.all(coherence < LEAST_COHERENCE, axis=1))
     if dead.size:
         place = f"channel of floor {floors[dead[0]]}"

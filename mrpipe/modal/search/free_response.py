@@ -1,8 +1,8 @@
-"""What free decays say of modes that the forced tests hardly show: frequency, damping and shape.
+"""Frequency, damping and shape from free decays, for modes that the forced tests hardly show.
 
-A table that moves all floors alike leaves the highest modes of a tall frame nearly at rest, and their peaks drown in
-the noise of a sweep. A decay test has driven its mode at resonance before it let go, so the mode dominates there, and
-after the stop every floor's accelerometer gives the shape, with no excitation to be known.
+A shaking table hardly excites the highest modes of a tall frame, so that their peaks are below the noise of a sweep. A
+decay test has driven its mode at resonance before the release, so that the mode dominates. After the stop the
+accelerometers of the floors give the shape, and the excitation need not be known.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest
 
 ENOUGH_COHERENCE = 0.9
-"""Modes that the forced tests show as well as this need no decay."""
+"""Coherence from which on a mode of the forced tests needs no decay."""
 _LEAST_PERIODS = 20.0
 _FADED = 3.0
 
 
 @dataclass(frozen=True)
 class FreeMode:
-    """A mode as a decay shows it.
+    """A mode from a free decay.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ def same_place(test: FrameTest, first: float, second: float) -> bool:
 
 
 def strongest_frequency(test: FrameTest, band_hz: tuple[float, float]) -> float | None:
-    """Return where [rad/s] a decay test is strongest inside a band; None if it has no line there."""
+    """Return the frequency [rad/s] of the strongest line of a decay test inside a band; None if there is none."""
     accelerations = _accelerations(test)
     frequency = np.fft.rfftfreq(accelerations.shape[0], 1.0 / test.sampling_rate_hz)
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
@@ -62,7 +62,7 @@ def strongest_frequency(test: FrameTest, band_hz: tuple[float, float]) -> float 
 
 
 def _accelerations(test: FrameTest) -> FloatArray:
-    """Return the responses, displacements taken to something like accelerations so that all can be added."""
+    """Return the responses; displacements are scaled to approximate accelerations, so that all can be added."""
     responses = test.responses - test.responses.mean(axis=0)
     flags = np.asarray(test.is_displacement)
     if flags.any() and not flags.all():
@@ -73,14 +73,14 @@ def _accelerations(test: FrameTest) -> FloatArray:
 def free_mode(
     test: FrameTest, mode: int, angular_frequencies: FloatArray, damping_ratios: FloatArray
 ) -> FreeMode | None:
-    """Return mode number `mode` (from 0) as a decay test shows it; None where its decay is too short.
+    """Return mode number `mode` (from 0) from a decay test; None if its decay is too short.
 
     Parameters
     ----------
     test
         The decay.
     mode
-        Of the poles given.
+        Index of the mode among the given poles.
     angular_frequencies, damping_ratios
         Poles, shape (r,): start for this mode, and for other modes that may ring.
     """
@@ -89,7 +89,7 @@ def free_mode(
     loudest = int(np.argmax(np.abs(np.exp(-1j * omega * np.arange(len(responses)) / rate) @ responses)))
     start = decay_start(test, responses[:, loudest], omega) + round(0.5 * np.pi / omega * rate)
     zeta = min(float(damping_ratios[mode]), 0.02)
-    # what has faded is noise; the estimate of damping may be poor, so a good deal of it is let in
+    # after the decay only noise remains; the estimate of damping may be poor, so a longer part is included
     length = min(len(responses) - start, round(max(_FADED / (zeta * omega), 40.0 * np.pi / omega) * rate))
     if length < _LEAST_PERIODS * 2.0 * np.pi / omega * rate:
         return None
@@ -124,7 +124,7 @@ def free_mode(
 
 
 def with_decays(fit: MultiModeFit, decays: Sequence[FrameTest]) -> MultiModeFit:
-    """Return the fit with the modes that it hardly shows taken from decay tests, where these show them better."""
+    """Return the fit; modes that it hardly shows are replaced by those of decay tests, if these are better."""
     weak = np.flatnonzero(fit.mode_coherence() < ENOUGH_COHERENCE)
     for test in decays:
         band = (0.9 * fit.angular_frequencies[0] / (2.0 * np.pi), 1.1 * fit.angular_frequencies[-1] / (2.0 * np.pi))

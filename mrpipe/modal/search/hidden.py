@@ -31,20 +31,21 @@ _LINES = 24000
 _ROUNDS = 2
 _SPARE = 2
 _SETS = 2
-"""So many sets of hidden poles are tried: the best pole of a gap may be what a strong mode leaves near its peak."""
+"""Number of sets of hidden poles that are tried, because the best pole of a gap may be the residual of a strong mode.
+"""
 _BAND = 1.25
 _UNCERTAIN = 0.02
-"""Relative standard error of a damping ratio from which all lines are used, and from which a mode may be replaced."""
+"""Relative standard error of a damping ratio above which all lines are used, and a mode may be replaced."""
 _SAME = 0.005
-"""Relative change of a frequency up to which a fit has found the same mode again."""
+"""Largest relative change of a frequency for the same mode in another fit."""
 
 
 def with_missing_modes(
     search: ModeSearch, tests: Sequence[FrameTest], layout: Layout, high_hz: float = 0.0
 ) -> ModeSearch:
-    """Return the modes with those added that all lines of the spectra show; the same modes where there are none.
+    """Return the modes plus those that all lines of the spectra show in addition, if there are any.
 
-    Missing modes are first looked for up to a little above the modes found, then up to the end of the excitation. The
+    Missing modes are first searched up to a little above the known modes, then up to the end of the excitation. The
     band of the modes found may end below a missing mode.
 
     Parameters
@@ -76,11 +77,11 @@ def with_missing_modes(
 
 
 def contested(search: ModeSearch, tests: Sequence[FrameTest], layout: Layout) -> ModeSearch:
-    """Return a complete set of modes, an uncertain mode replaced where the data support another one better.
+    """Return a complete set of modes; an uncertain mode is replaced if the data support another one better.
 
-    Where the damping ratio of a mode is uncertain, its pole may be spurious and have taken the place of a mode that
-    the search did not try. The poles that the residual supports are fitted together with the modes. The set of modes
-    is chosen again, by certainty. A different set is taken only if its least certain mode is more certain.
+    If the damping ratio of a mode is uncertain, its pole may be spurious, while the search has not tried the true mode.
+    The poles that the residual supports are fitted together with the modes. The set of modes is chosen again, by
+    certainty. A different set is taken only if its least certain mode is more certain.
 
     Parameters
     ----------
@@ -113,9 +114,9 @@ def _is_among(omega: float, fit: MultiModeFit) -> bool:
 
 
 def sharpened(search: ModeSearch, tests: Sequence[FrameTest]) -> ModeSearch:
-    """Return the modes fitted to all lines of the spectra where a damping ratio is uncertain; else the same modes.
+    """Return the modes fitted to all lines of the spectra if a damping ratio is uncertain; else the same modes.
 
-    A part of the lines is enough for modes with a peak. It wastes data on a mode that hardly rises above the noise.
+    A part of the lines is sufficient for modes with a peak, but not for a mode that hardly exceeds the noise.
     """
     modes = search.fit.angular_frequencies.size
     uncertain = float(np.sqrt(np.diag(search.fit.covariance)[modes:].max())) > _UNCERTAIN
@@ -158,7 +159,7 @@ def _with_hidden(
 
 
 def _in_band(fit: MultiModeFit) -> MultiModeFit:
-    """Return the fit without poles beyond its lines: such a pole stands for all that lies there."""
+    """Return the fit without poles beyond its lines, because such a pole represents all modes there."""
     lines = np.concatenate([item.omega for item in fit.spectra])
     omega = fit.angular_frequencies
     return fit.only(np.flatnonzero((omega >= lines.min()) & (omega <= lines.max())).tolist())
@@ -178,7 +179,7 @@ def _with_more(
 
 
 def _chosen(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
-    """Return pole -> mode number (from 1); signs of shapes decide, and where they leave a mode out, resolved poles."""
+    """Return pole -> mode number (from 1), by the signs of shapes or, if they are not sufficient, by resolved poles."""
     numbered = largest_set(fit, layout, certainty(fit))
     if len(numbered) >= layout.floors or all_floors_measured(fit, layout):
         return numbered
@@ -188,7 +189,7 @@ def _chosen(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
 def _refitted(
     search: ModeSearch, spectra: Sequence[RecordSpectrum], fit: MultiModeFit, numbered: dict[int, int], layout: Layout
 ) -> ModeSearch | None:
-    """Fit the modes without the poles that are not modes; None where that makes one of them doubtful."""
+    """Fit the modes without the poles that are not modes; None if one of them then becomes doubtful."""
     keep = sorted(numbered)
     omega, zeta = fit.angular_frequencies[keep], fit.damping_ratios[keep]
     refined = _in_band(fit_modes(spectra, omega, zeta, passes=2, evaluations=10, near=True))

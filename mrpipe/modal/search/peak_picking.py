@@ -1,7 +1,7 @@
 """Peak picking: frequencies and shapes from the largest values of the frequency responses (section 3.2.1).
 
-This is how the thesis finds the modes: the resonance is where the magnitude of the transfer function (3.4) is largest,
-the magnitudes of the floors there are the shape, and the phases there give the signs. The multi-mode fit is more exact,
+The thesis finds the modes by this method: the resonance is the maximum of the magnitude of the transfer function (3.4),
+the magnitudes of the floors there are the shape, and the phases give the signs. The multi-mode fit is more accurate,
 because a peak lies between two lines of the spectrum and the other modes contribute to it.
 """
 
@@ -18,8 +18,9 @@ from mrpipe.modal.records import FrameTest
 from mrpipe.modal.spectra import ComplexArray, record_spectrum
 
 SEARCHED = 0.1
-"""Half of the width in which a peak is searched, over the frequency of the fitted mode; less where another mode is
-near."""
+"""Half of the width in which a peak is searched, relative to the frequency of the fitted mode; less if another mode is
+near.
+"""
 
 AVERAGED_LINES = 3
 """Lines of the spectrum over which cross and auto spectral density are averaged."""
@@ -53,8 +54,8 @@ def pick_peaks(tests: Sequence[FrameTest], fit: MultiModeFit, band_hz: tuple[flo
     tests
         Forced tests with a measured excitation; each mode is taken from the test in which its peak is highest.
     fit
-        Gives the number of modes and where to search. Its damping ratios and errors are kept; the interval of each
-        frequency covers the lines that are averaged.
+        Fit that gives the number of modes and the frequencies at which to search. Its damping ratios and errors are
+        kept; the interval of each frequency covers the lines that are averaged.
     band_hz
         Band of the fit.
     """
@@ -84,14 +85,14 @@ def pick_peaks(tests: Sequence[FrameTest], fit: MultiModeFit, band_hz: tuple[flo
 
 
 def _shape(response: ComplexArray, test: FrameTest, fit: MultiModeFit, mode: int) -> ComplexArray:
-    """Return the magnitudes with the signs of the phases, scaled to the fitted residues; sensors without are kept."""
+    """Return the magnitudes with the signs of the phases, scaled to the fitted residues; other sensors are kept."""
     strongest = response[int(np.argmax(np.abs(response)))]
     signed = np.abs(response) * np.sign(np.real(response * np.conj(strongest)))
     result = fit.residues[:, mode].copy()
     columns = [(row, test.sensors.index(sensor)) for row, sensor in enumerate(fit.sensors) if sensor in test.sensors]
     rows = np.array([row for row, _ in columns])
     picked = signed[[column for _, column in columns]]
-    # the scale of a shape is free; that of the fit keeps residues and their errors comparable
+    # the scale of a shape is arbitrary; with that of the fit, residues and their errors are comparable
     fitted = result[rows].real
     scale = float(picked @ fitted) / float(picked @ picked)
     result[rows] = scale * picked

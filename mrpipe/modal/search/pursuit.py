@@ -1,8 +1,8 @@
 """Search for modes that are hidden under the response of stronger ones.
 
-A mode whose shaker stands near one of its nodes has no separate peak. It still leaves a coherent residual at all
-sensors after the fit of the other modes. The search tries a pole at each frequency of a fine grid and takes the one
-that reduces the residual of all tests and sensors most, judged by the Bayesian information criterion.
+A mode with the shaker near one of its nodes has no separate peak. It still leaves a coherent residual at all sensors
+after the fit of the other modes. The search tries a pole at each frequency of a fine grid and takes the one that
+reduces the residual of all tests and sensors most, judged by the Bayesian information criterion.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _TRIAL_DAMPING = (0.003, 0.012)
 _LEAST_LINES = 12
 _NEIGHBOURS = 3
 _HALF_WIDTHS = 6.0
-"""A pole is judged by the lines within so many half-power half-widths."""
+"""A pole is judged by the lines within this number of half-power half-widths."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class HiddenPole:
     angular_frequency, damping_ratio
         [rad/s], [1]; the damping ratio is a trial value.
     gain
-        Improvement of the information criterion; positive where the data support the pole.
+        Improvement of the information criterion; positive if the data support the pole.
     """
 
     angular_frequency: float
@@ -81,7 +81,7 @@ def _gain(fit: MultiModeFit, residuals: Sequence[ComplexArray], omega: float, ze
         return -np.inf
     q = np.linalg.qr(basis)[0]
     before = target - q @ (q.T @ target)
-    # in a long record the transients of a weak mode are below the noise and not worth their parameters
+    # in a long record the transients of a weak mode are below the noise, so that they need no parameters
     driven = own[:, : 2 * len(problem.inputs)]
     return max(_improvement(before, _unit(stack(columns)), q) for columns in (driven, own))
 
@@ -106,25 +106,25 @@ def _unit(columns: FloatArray) -> FloatArray:
 
 
 def hidden_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: int) -> list[HiddenPole]:
-    """Return up to `number` poles that the residual of a fit supports, best first, one between two known modes."""
+    """Return up to `number` poles that the residual of a fit supports, the best first, one between two known modes."""
     return next(iter(sets_of_poles(fit, band_rad_s, number)), [])
 
 
 def sets_of_poles(fit: MultiModeFit, band_rad_s: tuple[float, float], number: int) -> list[list[HiddenPole]]:
     """Return sets of up to `number` poles that the residual of a fit supports.
 
-    A set has one pole between two known modes, because what a strong mode leaves near its peak must not take all
-    places. The first set has the best pole of each gap. It may be such a remainder, so that the second set has the best
-    pole that the same lines do not explain, and so on.
+    A set has at most one pole between two known modes, because residuals of a strong mode near its peak must not take
+    all poles. The first set has the best pole of each gap. This pole may represent such a residual, so that the second
+    set has the best pole that these lines do not explain, and so on.
 
     Parameters
     ----------
     fit
-        Of the known modes.
+        Fit of the known modes.
     band_rad_s
-        Where poles are tried [rad/s].
+        Band in which poles are tried [rad/s].
     number
-        Most poles of a set.
+        Largest number of poles of a set.
     """
     line = _line(fit)
     gaps: dict[int, list[HiddenPole]] = {}

@@ -1,9 +1,9 @@
-"""Which of the fitted poles are modes of the structure.
+"""Selection of the fitted poles that are modes of the structure.
 
-A pole is usable where its damping is plausible, its response coherent and its shape known. Of the usable poles, those
-are taken that can be the modes of one structure: shapes orthogonal to the mass, and, for a chain of floors, one more
-sign change from mode to mode. Where fewer poles pass than the structure has floors, the largest set that can be
-modes is returned with the mode numbers that it allows, and nothing is added to it.
+A pole is usable if its damping is plausible, its response coherent and its shape known. Of the usable poles, those are
+taken that can be the modes of one structure: shapes orthogonal to the mass, and, for a chain of floors, one more sign
+change from mode to mode. If fewer poles pass than the structure has floors, the largest set of possible modes is
+returned with the mode numbers that it allows.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Layout:
     floors
         Number of floors.
     masses
-        Shape (floors,) [kg]; None where they are unknown.
+        Shape (floors,) [kg]; None if they are unknown.
     is_chain
         Whether all sensors measure in one direction, so that mode r has r - 1 sign changes.
     """
@@ -89,7 +89,7 @@ def shape_errors(fit: MultiModeFit) -> FloatArray:
 
 
 def usable(fit: MultiModeFit) -> BoolArray:
-    """Return which poles may be modes: plausible damping, coherent response, known shape."""
+    """Return the poles that may be modes: plausible damping, coherent response, known shape."""
     inside = (fit.damping_ratios < LARGEST_DAMPING) & (fit.damping_ratios > LEAST_DAMPING)
     return np.asarray(inside & (fit.mode_coherence() >= LEAST_COHERENCE) & (shape_errors(fit) < _UNKNOWN_SHAPE))
 
@@ -118,9 +118,9 @@ def sound(fit: MultiModeFit) -> list[int]:
 
 
 def couplings(fit: MultiModeFit, layout: Layout) -> tuple[FloatArray, FloatArray, float]:
-    """Return U'MU of all poles, its largest element that errors allow, and from where two shapes are the same.
+    """Return U'MU of all poles, its largest element within errors, and the value from which two shapes are the same.
 
-    Where masses or floors are missing, shapes of different modes are not orthogonal: then only equal shapes count.
+    If masses or floors are missing, shapes of different modes are not orthogonal, and only equal shapes are detected.
     """
     if layout.masses is not None and all_floors_measured(fit, layout):
         coupling = modal_coupling(floor_shapes(fit, layout)[0], np.diag(layout.masses))
@@ -131,7 +131,7 @@ def couplings(fit: MultiModeFit, layout: Layout) -> tuple[FloatArray, FloatArray
 
 
 def sign_ranges(fit: MultiModeFit, layout: Layout, tolerance: float = _SHAPE_TOLERANCE) -> list[tuple[int, int]]:
-    """Return the fewest and the most sign changes that each shape can have; a missing sensor widens the range."""
+    """Return the least and the largest number of sign changes of each shape; a missing sensor widens the range."""
     shapes, errors = floor_shapes(fit, layout)
     largest = np.abs(shapes).max(axis=0)
     return [
@@ -141,7 +141,7 @@ def sign_ranges(fit: MultiModeFit, layout: Layout, tolerance: float = _SHAPE_TOL
 
 
 def complete_set(fit: MultiModeFit, layout: Layout) -> tuple[int, ...]:
-    """Return one pole for each floor, or nothing if no such set exists.
+    """Return one pole for each floor; empty if no such set exists.
 
     The modes are the lowest poles of which each has one more sign change and that are orthogonal to the mass. The peak
     of a flexible support above the band has the shape of the highest mode, so the lowest possible choice is taken.
@@ -185,7 +185,7 @@ def _numbered(
 ) -> dict[int, int]:
     """Return pole -> mode number (from 1) with rising sign changes: as many poles as possible, then the largest `size`.
 
-    `size`, shape (r,), is the strength of the poles where nothing else is given.
+    `size`, shape (r,), is by default the strength of the poles.
     """
     score = 1e6 + np.log(np.maximum(strength(fit) if size is None else size, 1e-300))
     ranges = sign_ranges(fit, layout, tolerance)
@@ -234,7 +234,7 @@ def largest_set(fit: MultiModeFit, layout: Layout, size: FloatArray | None = Non
 
 
 def resolved_set(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
-    """Return pole -> mode number (from 1) where one pole for each floor is a mode by its own evidence, else nothing.
+    """Return pole -> mode number (from 1) if one pole for each floor is a mode by its own data; else empty.
 
     Such a pole is usable, its shape is real, and it is farther from each more certain pole than the two half-power
     half-widths together. The sign changes of the shapes are not used, because stiffness between floors that are not

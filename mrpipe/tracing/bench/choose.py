@@ -138,9 +138,7 @@ def choose_model(
 def _near_the_noise(
     selection: Selection, noise: float, declared: int, options: TracingOptions, rng: np.random.Generator, jobs: int
 ) -> bool:
-    """Return whether the error is of the size of the noise, with the chosen effects or a richer form of the same
-    effect.
-    """
+    """Return whether the error is close to the noise, with the chosen effects or a richer form of the same effect."""
     plain = selection.chosen.chi_square / max(noise, 1e-12)
     rules = options.rules.model_error
     if plain < rules.chi_square:

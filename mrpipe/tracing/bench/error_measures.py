@@ -66,8 +66,7 @@ def judged_part(recordings: Recordings, simulated: FloatArray, offset: float | N
 def campaign_offset(
     recordings: Recordings, residual: FloatArray, offsets: FloatArray, first: BoolArray
 ) -> float | None:
-    """Return the common offset of all training tests [N], or None if a separate estimate for each test is more
-    accurate.
+    """Return the common offset of all training tests [N]; None if separate estimates are more accurate.
 
     Both are judged on the training tests: the offset of the later part of a test is predicted from its first part, or
     from all tests together.

@@ -107,10 +107,6 @@ class Histories:
     which: IntArray
     on_storey: FloatArray
 
-    def shear(self, amplitudes: FloatArray) -> FloatArray:
-        """Return the contribution of the effect to the shear force of the storeys, shape (m, n) [N]."""
-        return np.asarray(self.force[:, self.which] @ (amplitudes[:, None] * self.on_storey))
-
 
 def histories_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Histories:
     """Return the unit forces of an effect along a record, ordered by amplitude and then by storey."""

@@ -1,5 +1,4 @@
-"""Dead time of the controller: of the drive relative to the desired force, and of the desired force relative to its
-law.
+"""Dead time of the controller: between desired force and drive, and between law and desired force.
 
 A controller samples, filters and holds its command. The resulting lag is expected and called the granted lag. The drive
 is compared with a table over desired force and velocity at an earlier time, which is fitted to training tests. The

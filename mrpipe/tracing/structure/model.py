@@ -10,7 +10,7 @@ from scipy import fft
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.structures.dynamics import ComplexArray
-from mrpipe.tracing.structure.candidates import Fitted, Surroundings, columns_of, histories_of
+from mrpipe.tracing.structure.candidates import Fitted, Surroundings, columns_of
 from mrpipe.tracing.structure.fit import Base, Columns, Design, coefficients, predicted, solve
 from mrpipe.tracing.structure.spectra import Spectra
 
@@ -47,17 +47,6 @@ class FrameModel:
     def predict(self, record: Spectra) -> ComplexArray:
         """Return the spectral lines of the shear force of each storey, shape (n, b) [N/sqrt(Hz)]."""
         return predicted(self.base, record, self.linear, self.columns(record), self.amplitudes)
-
-    def effect_shear(self, record: Spectra) -> FloatArray:
-        """Return the contribution of all effects to the shear force of each storey in time, shape (m, n) [N]."""
-        total = np.zeros_like(record.motion.acceleration)
-        first = 0
-        for item in self.chosen:
-            found = histories_of(item, record, self.about)
-            last = first + len(found.which)
-            total += found.shear(self.amplitudes[first:last])
-            first = last
-        return total
 
 
 def joined(parts: Sequence[Columns]) -> Columns:

@@ -80,7 +80,7 @@ def test_a_shape_that_open_masses_leave_open_is_not_given() -> None:
     found = _assembled(_modes(count=2, measured=(1, 3), driven=3), np.full(4, np.nan))
     assert np.isnan(found.shapes[[0, 2]]).all() and np.isfinite(found.shapes[[1, 3]]).all()
     assert any(
-        line.startswith("floors without a sensor (1, 3): their mode shapes are not determined, because the data leave")
+        line.startswith("floors without a sensor (1, 3): their mode shapes are not determined, because the data do")
         for line in found.findings
     )
 
@@ -121,4 +121,4 @@ def test_a_frame_that_is_no_chain_of_storeys_is_warned_of() -> None:
         modes.angular_frequencies * np.array([1.0, 1.12, 1.0, 1.0]), modes.damping_ratios, modes.shapes, modes.errors,
         modes.measured, modes.possible_numbers,
     )  # fmt: skip
-    assert any("miss the frequency of mode 2 by" in line for line in _assembled(stiffer, MASSES).findings)
+    assert any("the frequency of mode 2 differs by" in line for line in _assembled(stiffer, MASSES).findings)

@@ -1,1 +1,1 @@
-"""One plausibility check in each module; a module that defines CHECK is found by itself."""
+"""Plausibility checks, one per module; every module that defines CHECK is used."""

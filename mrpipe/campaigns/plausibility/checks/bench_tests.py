@@ -1,4 +1,4 @@
-"""The tests of a bench campaign against each other."""
+"""Comparison of the tests of a bench campaign with each other."""
 
 from __future__ import annotations
 

@@ -70,8 +70,8 @@ def _one_level(campaign: Campaign, levels: FloatArray) -> Iterator[Finding]:
             severity="warning",
             channel="drive",
             sentence=f"the drive is {level:.4g} {unit} in all training tests, so no inverse model is possible, "
-            "and the damper model holds for this drive alone",
-            remedy="add training tests at one other drive at least",
+            "and the damper model is valid for this drive only",
+            remedy="add training tests at another drive",
             numbers={f"level_{unit.lower()}": level},
         )
 

@@ -57,7 +57,7 @@ def _channels(test: Recording) -> Iterator[Finding]:
             continue
         values = test.used(name)
         if is_dead(values):
-            # a table that is fixed or a damper that is absent may well be recorded as zero
+            # the signals of a fixed table or of an absent damper may be recorded as zero
             if floor_of(name) is not None:
                 yield Finding(
                     name="dead-channel",
