@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from mrpipe.dampers.drive import polynomial_coefficients
 from mrpipe.dampers.form import BaseForm
@@ -38,6 +39,11 @@ NUMBERS: dict[str, dict[str, float]] = {
     "dahl-stiffness": {"initial_stiffness": 8e4},
     "bingham": {"transition_velocity": 0.01},
     "bingham-spring": {"spring_stiffness": 6e4},
+    "herschel-bulkley-spring": {
+        "spring_stiffness": 6e4, "velocity_scale": 4e-3, "velocity_exponent": 0.7, "reference_velocity": 0.08,
+    },
+    "iwan": {"initial_stiffness": 8e4, "spread": 1.5},
+    "eyring-spring": {"spring_stiffness": 6e4, "velocity_scale": 4e-3, "reference_velocity": 0.08},
     "biviscous": {"yield_velocity": 0.02, "rest_share": 0.4, "bend": 1.0, "largest_drive": 2.0},
     "hysteretic-biviscous": {
         "yield_velocity": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.1, "rest_share": 0.4,
@@ -100,6 +106,32 @@ def integrated(rate, start, t):
     return answer.y
 
 
+def iwan_loop(x: np.ndarray, p: dict[str, float]) -> np.ndarray:
+    """Return the force of 400 elements over the yield force; each follows the motion as a play does."""
+    shares = (np.arange(400) + 0.5) / 400
+    limits = shares ** p["spread"] * YIELD / p["initial_stiffness"] / np.mean(shares ** p["spread"])
+    centre = np.full(400, x[0])
+    force = np.empty_like(x)
+    for place, here in enumerate(x):
+        centre = np.clip(centre, here - limits, here + limits)
+        force[place] = np.mean(here - centre) * p["initial_stiffness"] / YIELD
+    return force
+
+
+def valve_velocity(name: str, force: float) -> float:
+    """Return the velocity of a valve at this force, by bisection."""
+    p = NUMBERS[name]
+    scale, reference = p["velocity_scale"], p["reference_velocity"]
+
+    def excess(q: float) -> float:
+        if name == "eyring-spring":
+            return YIELD * math.asinh(q / scale) / math.asinh(reference / scale) + VISCOSITY * q - force
+        rounded = math.hypot(q, scale)
+        return q * (YIELD / rounded + VISCOSITY * (rounded / reference) ** (p["velocity_exponent"] - 1.0)) - force
+
+    return float(brentq(excess, -5.0, 5.0, xtol=1e-13))
+
+
 def expected(name: str, t: np.ndarray) -> np.ndarray:
     p, x, v = NUMBERS[name], position(t), speed(t)
     viscous = VISCOSITY * v
@@ -130,6 +162,11 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
             return [speed(time) - math.copysign(excess / VISCOSITY, state[0])]
 
         return k * integrated(spring, [0.0], t)[0]
+    if name in ("herschel-bulkley-spring", "eyring-spring"):
+        k = p["spring_stiffness"]
+        return k * integrated(lambda s, e: [speed(s) - valve_velocity(name, k * e[0])], [0.0], t)[0]
+    if name == "iwan":
+        return YIELD * iwan_loop(x, p) + viscous
     if name == "gamota-filisko":
         k1, c1, k2 = p["solid_stiffness"], p["solid_viscosity"], p["spring_stiffness"]
 
@@ -270,7 +307,9 @@ def test_the_general_loop_contains_those_of_dahl_and_nearly_those_of_bouc_and_we
 
 
 @pytest.mark.property
-@pytest.mark.parametrize("name", ["bingham-spring", "elastic-plastic", "gamota-filisko"])
+@pytest.mark.parametrize(
+    "name", ["bingham-spring", "elastic-plastic", "gamota-filisko", "herschel-bulkley-spring", "eyring-spring"]
+)
 def test_a_yield_force_that_changes_with_the_direction_is_followed_at_250_hz(name: str) -> None:
     stiff = {key: 5.0 * number for key, number in NUMBERS[name].items() if key != "exponent"}
     changing = all_effects()["asymmetry"].form("yield-force").steps({"share": 0.2, "transition_velocity": 0.006})

@@ -26,7 +26,9 @@ REDUNDANT = frozenset(
     {
         "bouc-wen-free",
         "creeping-yield",
+        "eyring-spring",
         "gamota-filisko",
+        "herschel-bulkley-spring",
         "logarithmic-yield",
         "lugre",
         "modified-bouc-wen",
@@ -206,7 +208,7 @@ def test_the_fit_predicts_what_its_damper_gives(campaign, fitted):
 
 
 @pytest.mark.planted
-@pytest.mark.parametrize("form", ["bouc-wen-stiffness", "bingham-spring", "modified-bouc-wen"])
+@pytest.mark.parametrize("form", ["bouc-wen-stiffness", "bingham-spring", "modified-bouc-wen", "eyring-spring"])
 def test_a_coupled_form_predicts_what_its_damper_gives(form):
     tests = planted_tests(form)[1:3]
     problem = problem_of(tests, form, orders=(0, 0), maximum_samples=4000, raw_force=True)

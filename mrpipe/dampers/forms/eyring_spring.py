@@ -1,0 +1,38 @@
+"""Valve with thermally activated flow and a spring in series."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
+from mrpipe.dampers.parameters import Values, constant, shape
+from mrpipe.dampers.plant import Step
+from mrpipe.dampers.series_valve import EYRING, series_valve
+from mrpipe.dampers.viscoplastic import outer_velocity
+
+
+def _steps(values: Values) -> list[Step]:
+    valve = series_valve(EYRING, values["spring_stiffness"], values["velocity_scale"], values["reference_velocity"])
+    return [valve, outer_velocity()]
+
+
+def _post_yield(values: Values, at: Strength) -> FloatArray:
+    scale = values["velocity_scale"]
+    return rounded_sum(np.arcsinh(at.speed / scale) / np.arcsinh(values["reference_velocity"] / scale), at)
+
+
+FORM = BaseForm(
+    name="eyring-spring",
+    summary="Valve F_y asinh(w'/v0)/asinh(v_ref/v0) + c0 w' with a spring in series",
+    source="Eyring 1936, J. Chem. Phys. 4, 283-291 (flow); Sims, Peel, Stanway, Johnson, Bullough 2000, J. Sound Vib. "
+    "229, 207-227 (a valve in series with a spring)",
+    parameters=(
+        shape("spring_stiffness", "N/m", "stiffness of the spring", "force/stroke", 0.5, 3000.0, (20.0, 5.0, 100.0)),
+        shape("velocity_scale", "m/s", "velocity at which the flow begins", "speed", 1e-4, 2.0, (0.02, 0.2)),
+        constant("reference_velocity", "m/s", "speed for which the yield force is given", "speed"),
+    ),
+    steps=_steps,
+    post_yield=_post_yield,
+    coupled=True,
+)

@@ -1,0 +1,46 @@
+"""Herschel-Bulkley valve with a spring in series."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.form import BaseForm, Strength
+from mrpipe.dampers.parameters import Values, constant, shape
+from mrpipe.dampers.plant import Step
+from mrpipe.dampers.series_valve import HERSCHEL_BULKLEY, series_valve
+from mrpipe.dampers.viscoplastic import outer_velocity
+
+
+def _steps(values: Values) -> list[Step]:
+    valve = series_valve(
+        HERSCHEL_BULKLEY,
+        values["spring_stiffness"],
+        values["velocity_scale"],
+        values["reference_velocity"],
+        values["velocity_exponent"],
+    )
+    return [valve, outer_velocity()]
+
+
+def _post_yield(values: Values, at: Strength) -> FloatArray:
+    rounded = np.sqrt(at.speed**2 + values["velocity_scale"] ** 2)
+    thinning = (rounded / values["reference_velocity"]) ** (values["velocity_exponent"] - 1.0)
+    return np.asarray(at.yield_force * at.speed / rounded + at.viscosity * at.speed * thinning, dtype=np.float64)
+
+
+FORM = BaseForm(
+    name="herschel-bulkley-spring",
+    summary="Herschel-Bulkley valve F_y sign(w') + c0 v_ref (|w'|/v_ref)^n sign(w') with a spring in series",
+    source="Sims, Peel, Stanway, Johnson, Bullough 2000, J. Sound Vib. 229, 207-227; Lee and Wereley 1999, J. Intell. "
+    "Mater. Syst. Struct. 10, 761-769 (Herschel-Bulkley flow in a valve)",
+    parameters=(
+        shape("spring_stiffness", "N/m", "stiffness of the spring", "force/stroke", 0.5, 3000.0, (20.0, 5.0, 100.0)),
+        shape("velocity_scale", "m/s", "velocity at which the valve yields", "speed", 1e-4, 1.0, (0.01, 0.1)),
+        shape("velocity_exponent", "1", "power of the velocity in the viscous force", "one", 0.1, 2.0, (0.7,)),
+        constant("reference_velocity", "m/s", "speed for which the viscosity is given", "speed"),
+    ),
+    steps=_steps,
+    post_yield=_post_yield,
+    coupled=True,
+)
