@@ -88,7 +88,7 @@ FORM = BaseForm(
     source="Iwan 1966, J. Appl. Mech. 33, 893-900; Segalman 2005, J. Appl. Mech. 72, 752-760",
     parameters=(
         shape("initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)),
-        shape("spread", "1", "exponent of the distribution of the yield displacements", "one", 0.05, 6.0, (1.0, 3.0)),
+        shape("spread", "1", "exponent of the distribution of the yield displacements", "one", 1e-3, 6.0, (1.0, 0.1)),
     ),
     steps=_steps,
     coupled=True,
