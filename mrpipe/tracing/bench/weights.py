@@ -138,7 +138,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     hum = hum if hum <= rules.most_hum else 0.0
     least = 1.0 + hum
     if not rows or sum(map(len, differences)) < rules.least_samples:
-        limit = _limit(residual[used], least * force[used] + motion[used])
+        limit = _limit(residual[used], least * force[used] + motion[used], recordings.test[used])
         return NoiseScale(limit * least, limit, hum=hum)
     found_in = Differences(tuple(differences), np.concatenate(rows), np.concatenate(steps))
     columns, target = found_in.columns, found_in.squares
@@ -160,7 +160,7 @@ def noise_scale(found: Fit, rules: NoiseRules | None = None) -> NoiseScale:
     force_factor = max(force_factor, float(np.sum(rounding)) / max(float(np.sum(force)), 1e-300))
     if least > 1.0:
         force_factor = max(force_factor, least)
-    limit = _limit(residual[used], (force_factor * force + motion_factor * motion)[used])
+    limit = _limit(residual[used], (force_factor * force + motion_factor * motion)[used], recordings.test[used])
     return NoiseScale(limit * force_factor, limit * motion_factor, len(repeats), len(cycles), events, disturbance, hum)
 
 
@@ -171,9 +171,18 @@ def _relative_speed(recordings: Recordings) -> FloatArray:
     return np.asarray(np.abs(recordings.velocity) / np.maximum(rms, 1e-300)[recordings.test])
 
 
-def _limit(residual: FloatArray, variance: FloatArray) -> float:
-    """Return the factor, at most 1, on the noise variance, because noise cannot exceed the residual of the model."""
-    return min(1.0, float(np.sum(residual**2)) / max(float(np.sum(variance)), 1e-300))
+def _limit(residual: FloatArray, variance: FloatArray, test: IntArray) -> float:
+    """Return the factor, at most 1, on the noise variance, because noise cannot exceed the residual of the model.
+
+    Each test has its own limit, and the factor is the mean over all samples. The simulated variance can be several
+    times too large in one test, if the rod rests for a long time and noise reverses a hysteresis that depends on
+    velocity or acceleration. With one limit for the sums, that test would reduce the noise of all others.
+    """
+    left = np.bincount(test, weights=residual**2)
+    noise = np.bincount(test, weights=variance)
+    count = np.bincount(test).astype(np.float64)
+    share = np.minimum(1.0, left / np.maximum(noise, 1e-300))
+    return float(np.sum(share * count) / np.sum(count))
 
 
 def _aligned(recordings: Recordings, first: IntArray, second: IntArray) -> tuple[IntArray, float]:

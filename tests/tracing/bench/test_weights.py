@@ -11,7 +11,7 @@ from scipy import signal
 from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.weights import sensor_deviation
+from mrpipe.tracing.bench.weights import _limit, sensor_deviation
 from tests.tracing.bench.rig import RATE, campaign
 
 
@@ -50,3 +50,15 @@ def test_the_floor_is_the_error_of_the_true_model(corner_hz: float, step_n: floa
     assert np.sqrt(np.mean(left**2)) > 0.9 * np.sqrt(np.mean(np.concatenate(errors) ** 2))
     assert baseline.noise == pytest.approx(baseline.fit.chi_square, rel=0.5)
     assert baseline.scale.cycles > 0
+
+
+@pytest.mark.property
+def test_noise_that_is_simulated_too_large_in_one_test_leaves_that_of_the_others() -> None:
+    """One limit for all tests made the noise of all a tenth of what the others show."""
+    rng = np.random.default_rng(3)
+    test = np.repeat(np.arange(10), 2000)
+    residual = rng.standard_normal(test.size)
+    variance = np.where(test == 4, 100.0, 0.9)
+    assert _limit(residual, variance, test) == pytest.approx(0.9, abs=0.03)
+    assert _limit(residual, 4.0 * np.ones(test.size), test) == pytest.approx(0.25, rel=0.05)
+    assert _limit(residual, 0.5 * np.ones(test.size), test) == 1.0
