@@ -174,15 +174,17 @@ def _relative_speed(recordings: Recordings) -> FloatArray:
 def _limit(residual: FloatArray, variance: FloatArray, test: IntArray) -> float:
     """Return the factor, at most 1, on the noise variance, because noise cannot exceed the residual of the model.
 
-    Each test has its own limit, and the factor is the mean over all samples. The simulated variance can be several
-    times too large in one test, if the rod rests for a long time and noise reverses a hysteresis that depends on
-    velocity or acceleration. With one limit for the sums, that test would reduce the noise of all others.
+    The simulated variance can be several times too large in one test, if the rod rests for a long time and noise
+    reverses a hysteresis that depends on velocity or acceleration. The limit for the sums would then reduce the noise
+    of all other tests, and the mean of the limits of the tests takes its place. The mean alone would be too small,
+    because noise is above its expected power in some tests and below it in others.
     """
     left = np.bincount(test, weights=residual**2)
-    noise = np.bincount(test, weights=variance)
+    noise = np.maximum(np.bincount(test, weights=variance), 1e-300)
     count = np.bincount(test).astype(np.float64)
-    share = np.minimum(1.0, left / np.maximum(noise, 1e-300))
-    return float(np.sum(share * count) / np.sum(count))
+    together = float(np.sum(left) / np.sum(noise))
+    mean = float(np.sum(np.minimum(1.0, left / noise) * count) / np.sum(count))
+    return max(min(1.0, together), mean)
 
 
 def _aligned(recordings: Recordings, first: IntArray, second: IntArray) -> tuple[IntArray, float]:
