@@ -326,9 +326,11 @@ def forward_selection(
     excess = max(base.chi_square - noise, 0.0)
     if excess <= rules.nothing_missing * noise or most == 0:
         return Selection(base, noise, (), base, nothing_missing=rules.nothing_missing)
+    # of a large excess even a small share is clearly more than noise
+    enough = min(rules.gain * excess, (rules.clear_floors**2 - 1.0) * noise)
     while len(rounds) < most:
         little = chosen.chi_square - noise < min(rules.further * excess, (rules.near_floors**2 - 1.0) * noise)
-        if rounds and little and _nothing_more(chosen, terms, rules.gain * excess, jobs):
+        if rounds and little and _nothing_more(chosen, terms, enough, jobs):
             break
         found = candidates_after(
             chosen,
@@ -347,7 +349,7 @@ def forward_selection(
         ordered = tuple(able + [item for item in found if item not in able])
         gain = chosen.chi_square - able[0].fit.chi_square if able else 0.0
         left = chosen.chi_square - noise
-        if not able or (rounds and (gain < rules.gain * excess or gain < rules.term_share * left)):
+        if not able or (rounds and gain < max(enough, rules.term_share * left)):
             rounds.append(ordered)
             break
         nearer = chosen if not rounds or again else _nearer(chosen, able[0].fit, rules.better_optimum)
@@ -362,7 +364,7 @@ def forward_selection(
             sure = sure and gain >= rules.named_share * left and _leads(ordered, noise, rules)
         proven += int(sure)
         chosen = able[0].fit
-        if chosen.chi_square - noise < max(rules.nothing_missing * noise, rules.gain * excess):
+        if chosen.chi_square - noise < max(rules.nothing_missing * noise, enough):
             break
     return Selection(base, noise, tuple(rounds), chosen, proven, nothing_missing=rules.nothing_missing)
 

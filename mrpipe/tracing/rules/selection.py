@@ -20,6 +20,12 @@ class SelectionRules(Section):
     gain: float = Field(
         0.05, ge=0.0, description="A further effect must recover this share of what the base model lacks."
     )
+    clear_floors: float = Field(
+        2.0,
+        ge=1.0,
+        description="A smaller share than `gain` is sufficient if it alone would raise the error from one noise floor "
+        "to this multiple of it.",
+    )
     term_share: float = Field(
         0.25,
         ge=0.0,

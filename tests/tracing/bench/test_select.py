@@ -91,12 +91,8 @@ def test_a_large_gap_is_found_although_a_small_one_raises_the_error(share: float
     assert found.chi_square < 1.05
 
 
-@pytest.mark.property
-@pytest.mark.parametrize(("left", "rounds"), [(1.8, 2), (1.4, 1)])
-def test_screening_ends_the_search_only_where_the_error_is_near_the_noise_floor(
-    monkeypatch: pytest.MonkeyPatch, left: float, rounds: int
-) -> None:
-    """Screening saw 4 % in a Stribeck effect that removed all: the search ended at 1.4 noise floors without it."""
+def selection_of(monkeypatch: pytest.MonkeyPatch, base: float, *left: float) -> Selection:
+    """Return the selection where effects leave these chi-squares one after another, of a noise of 1."""
 
     def after(found: float, terms: int) -> Any:
         term = SimpleNamespace(form=SimpleNamespace(parameters=(), amplitudes=()), effect=SimpleNamespace(name="any"))
@@ -110,11 +106,29 @@ def test_screening_ends_the_search_only_where_the_error_is_near_the_noise_floor(
 
     def candidates(before: Any, *_: Any, **__: Any) -> list[Candidate]:
         count = len(before.problem.terms) + 1
-        return [Candidate(f"effect-{count}", after(left if count == 1 else 1.0, count), 0.9, {})]
+        return [Candidate(f"effect-{count}", after(left[count - 1], count), 0.9, {})]
 
     monkeypatch.setattr(select, "candidates_after", candidates)
     monkeypatch.setattr(select, "_nothing_more", lambda *_: True)
     monkeypatch.setattr(select, "_nearer", lambda chosen, *_: chosen)
     monkeypatch.setattr(select, "admissible", lambda *_: True)
-    found = forward_selection(after(10.0, 0), 1.0, [], most=2)
-    assert len(found.rounds) == rounds
+    return forward_selection(after(base, 0), 1.0, [], most=len(left))
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(("left", "rounds"), [(1.8, 2), (1.4, 1)])
+def test_screening_ends_the_search_only_where_the_error_is_near_the_noise_floor(
+    monkeypatch: pytest.MonkeyPatch, left: float, rounds: int
+) -> None:
+    """Screening saw 4 % in a Stribeck effect that removed all: the search ended at 1.4 noise floors without it."""
+    assert len(selection_of(monkeypatch, 10.0, left, 1.0).rounds) == rounds
+
+
+@pytest.mark.property
+def test_a_large_first_effect_does_not_hide_a_second_one_that_is_clear(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An end stop left 1.2 % of the excess, five times the noise, and Stribeck friction was not looked for."""
+    found = selection_of(monkeypatch, 350.0, 5.3, 1.1)
+    assert found.chosen.chi_square == 1.1
+    assert found.proven == 2
+    # at two noise floors the rest may be an error of the form of the first effect
+    assert selection_of(monkeypatch, 350.0, 3.5, 1.1).chosen.chi_square == 3.5
