@@ -361,6 +361,7 @@ class Pipeline:
         if name in found:
             return found[name]
         stage = self.stages[name]
+        manifest = Manifest.load(self._manifests, name)
         reasons: list[str] = []
         stale: list[str] = []
         for item in (*stage.inputs, *stage.preferred_inputs, *stage.optional_inputs):
@@ -374,15 +375,19 @@ class Pipeline:
                     if item in stage.inputs:
                         found[name] = before
                         return before
-                else:
+                elif before != ["never built"] or item in stage.inputs or not _ran_without(manifest, item):
                     reasons.append(f"{provider}, which it reads, is stale")
                     stale.append(f"input {item} ")
-        manifest = Manifest.load(self._manifests, name)
         own = reasons_stale(manifest, self._key(stage, self._inputs_there(stage)), self.run_directory, self.hashes)
         # the artifact of a stale stage is there, but does not count: "missing" would send people to look for the file
         own = [reason for reason in own if not reason.startswith(tuple(stale))]
         found[name] = own if own[:1] == ["never built"] else reasons + own
         return found[name]
+
+
+def _ran_without(manifest: Manifest | None, item: str) -> bool:
+    """Return whether a stage ran without an optional input, as `close-loop --campaign` does if there is no frame."""
+    return manifest is not None and not manifest.skipped and manifest.key.inputs.get(item) == ABSENT
 
 
 def _ends_the_run(error: Exception) -> bool:

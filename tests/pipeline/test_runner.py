@@ -344,6 +344,15 @@ def test_a_failure_leaves_out_only_what_depends_on_it(make_pipeline: MakePipelin
     assert mended.build("likes").what == "built"
 
 
+@pytest.mark.property
+def test_a_stage_that_ran_without_an_optional_input_is_up_to_date(make_pipeline: MakePipeline) -> None:
+    """After `close-loop --campaign`, `status` called it stale, because no frame had been identified."""
+    alone = replace(STAGES["first"], name="alone", optional_inputs=("second", "campaign:frame"))
+    stages = {"alone": alone, "second": replace(STAGES["second"], inputs=())}
+    assert make_pipeline(stages).build("alone").what == "built"
+    assert make_pipeline(stages).status(["alone"]) == {"alone": [], "second": ["never built"]}
+
+
 def test_an_optional_input_that_fails_is_done_without(make_pipeline: MakePipeline) -> None:
     stages = with_run("second", _fails)
     pipeline = make_pipeline({**stages, "third": replace(STAGES["first"], optional_inputs=("second",))})
