@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import float64, int64, njit, void
+from numba import float64, njit
 
-from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
     DISPLACEMENT,
     FIRST,
@@ -142,39 +142,3 @@ def saturating_dashpot(stiffness: float, velocity_scale: float) -> Step:
     """Return the spring in series with a saturating dashpot, see :func:`advance_dashpot`."""
     numbers = np.array([stiffness, velocity_scale], dtype=np.float64)
     return Step("saturating-dashpot", Phase.HYSTERESIS, dashpot_step, numbers, state_size=2)
-
-
-@njit(void(float64[::1], int64[::1], float64[::1], float64, float64, float64[::1]), cache=True)
-def _series(
-    velocity: FloatArray,
-    starts: IntArray,
-    dt: FloatArray,
-    stiffness: float,
-    velocity_scale: float,
-    result: FloatArray,
-) -> None:
-    for test in range(starts.shape[0] - 1):
-        theta = 0.0
-        result[starts[test]] = 0.0
-        for index in range(starts[test] + 1, starts[test + 1]):
-            theta = advance_dashpot(theta, velocity[index - 1], velocity[index], dt[test], stiffness, velocity_scale)
-            result[index] = math.tanh(theta)
-
-
-def dashpot_series(
-    velocity: FloatArray, starts: IntArray, dt: FloatArray, stiffness: float, velocity_scale: float
-) -> FloatArray:
-    """Return z, shape (n,), of :func:`advance_dashpot` over concatenated recordings.
-
-    `starts` and `dt` as in :func:`mrpipe.dampers.drive.lag_series`; velocity in m/s.
-    """
-    result = np.empty(len(velocity))
-    _series(
-        np.ascontiguousarray(velocity, dtype=np.float64),
-        np.ascontiguousarray(starts, dtype=np.int64),
-        np.ascontiguousarray(dt, dtype=np.float64),
-        float(stiffness),
-        float(velocity_scale),
-        result,
-    )
-    return result

@@ -22,6 +22,7 @@ from mrpipe.reporting.bench_tracing import (
 )
 from mrpipe.reporting.closed_loop import band_table, law_table, response_by_law
 from mrpipe.reporting.closed_loop_words import in_words
+from mrpipe.reporting.headlines import open_questions
 from mrpipe.reporting.sink import Sink
 from mrpipe.tracing.bench.summary import Tracing
 
@@ -244,7 +245,7 @@ def _next_steps(sink: Sink, summary: Mapping[str, Any]) -> None:
         )
     wanted = summary["next_tests"]
     if wanted["made_already"]:
-        listed = "; ".join(item["decides"] for item in wanted["decides"])
+        listed = open_questions(wanted["decides"])
         sink.text(f"Still open, although the tests for it have been made: {listed}. Longer tests or repeats may help.")
     if not wanted["tests"]:
         return

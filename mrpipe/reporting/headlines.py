@@ -109,6 +109,9 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {floor})"
 
 
+_IN_DOUBT = "whether there is "
+"""Beginning of a question about one effect, as :mod:`mrpipe.tracing.bench.extra_tests` writes it."""
+
 FAR_WORSE = 1.5
 """Ratio of the errors of forward network and damper model from which the network is called worse."""
 
@@ -201,24 +204,28 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
     wanted = summary.get("next_tests", {})
     if wanted.get("tests"):
         lines.append(
-            f"{len(wanted['tests'])} tests in {wanted['file']} would decide {_open_questions(wanted['decides'])}"
+            f"{len(wanted['tests'])} tests in {wanted['file']} would decide {open_questions(wanted['decides'])}"
         )
     elif wanted.get("made_already"):
-        questions = _open_questions(wanted["decides"])
+        questions = open_questions(wanted["decides"])
         lines.append(f"open though the tests for it have been made: {questions}; longer ones or repeats may do")
     return lines
 
 
-def _open_questions(decides: Sequence[Mapping[str, Any]]) -> str:
-    """Return what tests would decide, the rivals of one effect together."""
+def open_questions(decides: Sequence[Mapping[str, Any]]) -> str:
+    """Return what tests would decide, the rivals of one effect together, and likewise the effects in doubt."""
     rivals: dict[str, list[str]] = {}
-    others = []
+    absent, others = [], []
     for item in decides:
         effect, joined, rival = item["decides"].partition(" or ")
         if joined:
             rivals.setdefault(effect, []).append(rival)
+        elif effect.startswith(_IN_DOUBT):
+            absent.append(effect.removeprefix(_IN_DOUBT))
         else:
-            others.append(item["decides"])
+            others.append(effect)
+    if absent:
+        others.append(_IN_DOUBT + " or ".join(absent))
     return "; ".join([*(f"{effect} or {', '.join(names)}" for effect, names in rivals.items()), *others])
 
 

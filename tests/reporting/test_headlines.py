@@ -61,3 +61,13 @@ def test_stages_that_read_data_say_so_in_words() -> None:
     assert headline("record-bench", recorded) == "190 tests, 40 min"
     assert headline("prepare", prepared) == "campaign rig: 14 tests at 1000 Hz, drive in A"
     assert headline("sweep", swept) == "of 31 networks, v,i | 4 past | 10-12-1 is chosen"
+
+
+@pytest.mark.golden
+def test_open_questions_of_one_kind_are_one_sentence() -> None:
+    asked = ["inertia or accumulator", "whether there is delay", "inertia or end-stop", "whether there is remanence"]
+    wanted = {"tests": [{}, {}], "file": "next-tests.yaml", "decides": [{"decides": item} for item in asked]}
+    line = in_brief("close-loop", tracing(next_tests=wanted))[-1]
+    assert line == (
+        "2 tests in next-tests.yaml would decide inertia or accumulator, end-stop; whether there is delay or remanence"
+    )
