@@ -99,3 +99,13 @@ def test_an_unknown_key_is_compared_with_those_of_its_own_mapping(tmp_path: Path
     with pytest.raises(UserError) as caught:
         source.build(Outer, source.content, ())
     assert str(caught.value) == f"{path}: {message}"
+
+
+@pytest.mark.golden
+def test_names_that_look_like_octal_numbers_or_times_stay_names(tmp_path: Path) -> None:
+    """A campaign named 0123 had become 83, and 1:30 had become 90."""
+    (tmp_path / "a.yaml").write_text(
+        "a: 0123\nb: 1:30\nc: 0\nd: -12\ne: 0x1F\nf: 1.5e-3\ng: -.5\nh: 1_000\n", encoding="utf-8"
+    )
+    found = read_yaml(tmp_path / "a.yaml").content
+    assert found == {"a": "0123", "b": "1:30", "c": 0, "d": -12, "e": 31, "f": 1.5e-3, "g": -0.5, "h": 1000}
