@@ -40,6 +40,16 @@ YIELD_DISPLACEMENT = shape(
 )
 GAMMA_SHARE = Parameter("gamma_share", "1", "gamma over gamma plus beta", "one", 0.02, 1.5, (0.5,))
 EXPONENT = shape("exponent", "1", "n of (2.2)", "one", 1.0, 8.0, (1.9, 1.1))
+INITIAL_STIFFNESS = shape(
+    "initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)
+)
+SPRING_STIFFNESS = shape(
+    "spring_stiffness", "N/m", "stiffness of the spring", "force/stroke", 0.5, 3000.0, (20.0, 5.0, 100.0)
+)
+HYSTERESIS_VELOCITY = Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1))
+ACCELERATION_SCALE = shape(
+    "acceleration_scale", "m/s^2", "acceleration over which the branches change", "acceleration", 1e-4, 1.0, (0.02,)
+)
 
 
 def bouc_wen_numbers(values: Values) -> tuple[float, float, float]:

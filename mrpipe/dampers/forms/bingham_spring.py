@@ -9,8 +9,8 @@ from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import displacement_between, parts_of, turning_share
-from mrpipe.dampers.parameters import Values, shape
+from mrpipe.dampers.hysteresis import SPRING_STIFFNESS, displacement_between, parts_of, turning_share
+from mrpipe.dampers.parameters import Values
 from mrpipe.dampers.plant import (
     DISPLACEMENT,
     FIRST,
@@ -129,9 +129,7 @@ FORM = BaseForm(
     name="bingham-spring",
     summary="Bingham element F_y sign(w') + c0 w' with a spring in series",
     source="Bingham 1922; Gamota and Filisko 1991, J. Rheol. 35, 399-425 (its limit with a stiff solid)",
-    parameters=(
-        shape("spring_stiffness", "N/m", "stiffness of the spring", "force/stroke", 0.5, 3000.0, (20.0, 5.0, 100.0)),
-    ),
+    parameters=(SPRING_STIFFNESS,),
     steps=_steps,
     coupled=True,
 )

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import GAMMA_SHARE, growing_hysteresis
-from mrpipe.dampers.parameters import Values, shape
+from mrpipe.dampers.hysteresis import GAMMA_SHARE, INITIAL_STIFFNESS, growing_hysteresis
+from mrpipe.dampers.parameters import Values
 from mrpipe.dampers.plant import Step
 
 
@@ -19,7 +19,7 @@ FORM = BaseForm(
     summary="Bouc-Wen hysteresis with exponent 2 and a constant initial stiffness k: x_y = F_y(u)/k",
     source="Spencer, Dyke, Sain, Carlson 1997, J. Eng. Mech. 123, 230-238 (A and z the same for all voltages)",
     parameters=(
-        shape("initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)),
+        INITIAL_STIFFNESS,
         GAMMA_SHARE,
     ),
     steps=_steps,

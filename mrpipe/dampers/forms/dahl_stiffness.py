@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import growing_hysteresis
-from mrpipe.dampers.parameters import Values, shape
+from mrpipe.dampers.hysteresis import INITIAL_STIFFNESS, growing_hysteresis
+from mrpipe.dampers.parameters import Values
 from mrpipe.dampers.plant import Step
 
 
@@ -16,9 +16,7 @@ FORM = BaseForm(
     name="dahl-stiffness",
     summary="Dahl friction with a constant initial stiffness k: x_y = F_y(u)/k",
     source="Dahl 1968, TOR-158(3107-18): sigma is a property of the contact, the limit depends on the load",
-    parameters=(
-        shape("initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)),
-    ),
+    parameters=(INITIAL_STIFFNESS,),
     steps=_steps,
     coupled=True,
     family="dahl",

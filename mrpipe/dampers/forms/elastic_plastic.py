@@ -7,7 +7,7 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import displacement_between, follow_hysteresis, parts_of
+from mrpipe.dampers.hysteresis import INITIAL_STIFFNESS, displacement_between, follow_hysteresis, parts_of
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
 
@@ -58,7 +58,7 @@ FORM = BaseForm(
     summary="F' = k v (1 - |F/F_y(u)|^n) while loading, F' = k v while unloading; F does not jump with the current",
     source="Prandtl 1928, Z. angew. Math. Mech. 8, 85-106 (n without limit); Ozdemir 1976, PhD thesis, Berkeley",
     parameters=(
-        shape("initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)),
+        INITIAL_STIFFNESS,
         shape("exponent", "1", "sharpness of the change from elastic to plastic", "one", 1.0, 50.0, (4.0, 20.0)),
     ),
     steps=_steps,

@@ -6,6 +6,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
+from mrpipe.dampers.hysteresis import SPRING_STIFFNESS
 from mrpipe.dampers.parameters import Values, constant, shape
 from mrpipe.dampers.plant import Step
 from mrpipe.dampers.series_valve import EYRING, series_valve
@@ -28,7 +29,7 @@ FORM = BaseForm(
     source="Eyring 1936, J. Chem. Phys. 4, 283-291 (flow); Sims, Peel, Stanway, Johnson, Bullough 2000, J. Sound Vib. "
     "229, 207-227 (a valve in series with a spring)",
     parameters=(
-        shape("spring_stiffness", "N/m", "stiffness of the spring", "force/stroke", 0.5, 3000.0, (20.0, 5.0, 100.0)),
+        SPRING_STIFFNESS,
         shape("velocity_scale", "m/s", "velocity at which the flow begins", "speed", 1e-4, 2.0, (0.02, 0.2)),
         constant("reference_velocity", "m/s", "speed for which the yield force is given", "speed"),
     ),

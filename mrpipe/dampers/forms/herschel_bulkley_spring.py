@@ -6,6 +6,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength
+from mrpipe.dampers.hysteresis import SPRING_STIFFNESS
 from mrpipe.dampers.parameters import Values, constant, shape
 from mrpipe.dampers.plant import Step
 from mrpipe.dampers.series_valve import HERSCHEL_BULKLEY, series_valve
@@ -35,7 +36,7 @@ FORM = BaseForm(
     source="Sims, Peel, Stanway, Johnson, Bullough 2000, J. Sound Vib. 229, 207-227; Lee and Wereley 1999, J. Intell. "
     "Mater. Syst. Struct. 10, 761-769 (Herschel-Bulkley flow in a valve)",
     parameters=(
-        shape("spring_stiffness", "N/m", "stiffness of the spring", "force/stroke", 0.5, 3000.0, (20.0, 5.0, 100.0)),
+        SPRING_STIFFNESS,
         shape("velocity_scale", "m/s", "velocity at which the valve yields", "speed", 1e-4, 1.0, (0.01, 0.1)),
         shape("velocity_exponent", "1", "power of the velocity in the viscous force", "one", 0.1, 2.0, (0.7,)),
         constant("reference_velocity", "m/s", "speed for which the viscosity is given", "speed"),

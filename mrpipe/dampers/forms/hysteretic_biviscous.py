@@ -8,7 +8,8 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
-from mrpipe.dampers.parameters import Parameter, Values, shape
+from mrpipe.dampers.hysteresis import ACCELERATION_SCALE, HYSTERESIS_VELOCITY
+from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import ACCELERATION, CURRENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_LOSS, Phase, Step
 from mrpipe.dampers.viscoplastic import rounded_sign
 from mrpipe.dampers.yield_velocity import BEND, LARGEST_DRIVE, REST, growth_of, width_of, yield_velocity
@@ -44,16 +45,8 @@ FORM = BaseForm(
     source="Wereley, Pang, Kamath 1998, J. Intell. Mater. Syst. Struct. 9, 642-649; Pang, Kamath, Wereley 1998",
     parameters=(
         shape("yield_velocity", "m/s", "speed at which it yields", "speed", 1e-3, 1.0, (0.05, 0.2)),
-        Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
-        shape(
-            "acceleration_scale",
-            "m/s^2",
-            "acceleration over which the branches change",
-            "acceleration",
-            1e-4,
-            1.0,
-            (0.02,),
-        ),
+        HYSTERESIS_VELOCITY,
+        ACCELERATION_SCALE,
         REST,
         BEND,
         LARGEST_DRIVE,

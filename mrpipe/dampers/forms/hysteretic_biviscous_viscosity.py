@@ -8,7 +8,8 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
-from mrpipe.dampers.parameters import Parameter, Values, shape
+from mrpipe.dampers.hysteresis import ACCELERATION_SCALE, HYSTERESIS_VELOCITY
+from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import (
     ACCELERATION,
     HYSTERESIS,
@@ -63,16 +64,8 @@ FORM = BaseForm(
             2000.0,
             (20.0, 5.0),
         ),
-        Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
-        shape(
-            "acceleration_scale",
-            "m/s^2",
-            "acceleration over which the branches change",
-            "acceleration",
-            1e-4,
-            1.0,
-            (0.02,),
-        ),
+        HYSTERESIS_VELOCITY,
+        ACCELERATION_SCALE,
     ),
     steps=_steps,
     post_yield=_post_yield,

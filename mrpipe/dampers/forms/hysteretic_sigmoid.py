@@ -10,7 +10,8 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
-from mrpipe.dampers.parameters import Parameter, Values, shape
+from mrpipe.dampers.hysteresis import ACCELERATION_SCALE, HYSTERESIS_VELOCITY
+from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import ACCELERATION, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.dampers.viscoplastic import rounded_sign
 
@@ -39,16 +40,8 @@ FORM = BaseForm(
     source="Wang, Ma, Rakheja, Su 2004, Proc. IMechE D 218, 1235-1247; Ma, Wang, Rakheja, Su 2002",
     parameters=(
         shape("velocity_scale", "m/s", "speed over which the force reverses", "speed", 3e-3, 2.0, (0.1, 0.3, 0.03)),
-        Parameter("hysteresis_velocity", "m/s", "shift of the branches", "speed", 0.0, 0.5, (0.03, 0.1)),
-        shape(
-            "acceleration_scale",
-            "m/s^2",
-            "acceleration over which the branches change",
-            "acceleration",
-            1e-4,
-            1.0,
-            (0.02,),
-        ),
+        HYSTERESIS_VELOCITY,
+        ACCELERATION_SCALE,
     ),
     steps=_steps,
     post_yield=_post_yield,

@@ -13,7 +13,7 @@ from numba import float64, njit, void
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import displacement_between, parts_of, turning_share
+from mrpipe.dampers.hysteresis import INITIAL_STIFFNESS, displacement_between, parts_of, turning_share
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
 
@@ -87,7 +87,7 @@ FORM = BaseForm(
     summary="Elastic-plastic elements in parallel, their yield displacements proportional to s^a for s from 0 to 1",
     source="Iwan 1966, J. Appl. Mech. 33, 893-900; Segalman 2005, J. Appl. Mech. 72, 752-760",
     parameters=(
-        shape("initial_stiffness", "N/m", "stiffness before yield", "force/stroke", 0.3, 3000.0, (15.0, 5.0, 60.0)),
+        INITIAL_STIFFNESS,
         shape("spread", "1", "exponent of the distribution of the yield displacements", "one", 1e-3, 6.0, (1.0, 0.1)),
     ),
     steps=_steps,
