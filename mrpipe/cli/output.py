@@ -19,6 +19,7 @@ _UNITS = {
     "_percent": "%",
     "_hz": "Hz",
     "_kg": "kg",
+    "_j": "J",
     "_m": "m",
     "_n": "N",
     "_s": "s",
@@ -67,7 +68,7 @@ def _lines(key: str, value: Any, depth: int) -> list[str]:
     if isinstance(value, Mapping):
         if not value:
             return [f"{margin}{title}: -"]
-        if len(value) > 1 and all(isinstance(item, Mapping) for item in value.values()):
+        if len(value) > 1 and all(_is_row(item) for item in value.values()):
             rows = [{"": name, **item} for name, item in value.items()]
             return [f"{margin}{title}:", *_table(rows, f"{margin}  ")]
         inner = [line for name, item in value.items() for line in _lines(str(name), item, depth + 1)]
@@ -80,6 +81,14 @@ def _lines(key: str, value: Any, depth: int) -> list[str]:
     if isinstance(value, list) and value and isinstance(value[0], list):
         return [f"{margin}{title}:", *(f"{margin}  {_short(row)}" for row in value)]
     return [f"{margin}{title}: {_short(value) or '-'}"]
+
+
+def _is_row(value: Any) -> bool:
+    """Return whether a mapping holds single values, or mappings of them."""
+    if not isinstance(value, Mapping):
+        return False
+    inner = [part for item in value.values() if isinstance(item, Mapping) for part in item.values()]
+    return not any(isinstance(part, Mapping) for part in inner)
 
 
 def _title(key: str) -> str:

@@ -57,3 +57,11 @@ def test_a_wide_table_has_parts_that_begin_with_the_first_column(capsys: pytest.
     assert max(map(len, lines)) <= 118
     assert sum(line.startswith("    name ") for line in lines) >= 3
     assert " ".join(lines).count("a long name of column") == 12
+
+
+@pytest.mark.golden
+def test_what_is_nested_more_deeply_is_no_table(capsys: pytest.CaptureFixture[str]) -> None:
+    seen = {"velocity": {"smallest_m_s": 0.0, "largest_m_s": 0.2}}
+    content = {"training_range": {"network": {"inputs": seen}, "damper": {"inputs": seen}}}
+    inputs = ["      inputs:", "        velocity: smallest [m/s] 0, largest [m/s] 0.2"]
+    assert printed(content, capsys) == ["  training range:", "    network:", *inputs, "    damper:", *inputs]
