@@ -62,8 +62,7 @@ WIRE_SIZE = 25
 
 BOOKKEEPING = 6
 """Number of values that :func:`advance` stores after the state of the steps: work, slip, time since the last reversal,
-largest current, last velocity other than 0, last force.
-"""
+largest current, last velocity other than 0, last force."""
 
 STEP_SIGNATURE = void(float64[::1], float64[::1], float64[::1], float64)
 """The one compiled signature of a step: `@njit(STEP_SIGNATURE, cache=True)`."""

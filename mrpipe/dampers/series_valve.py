@@ -40,9 +40,13 @@ HERSCHEL_BULKLEY = 0
 EYRING = 1
 
 _SDIRK = 1.0 - math.sqrt(0.5)
+"""Coefficient of the Runge-Kutta method."""
 
 _MOST_ITERATIONS = 60
+"""Numerical technique: most iterations for the velocity of the valve; usually about four are needed."""
+
 _LAST_STEP = 1e-4
+"""Numerical technique: last step of the iterations, relative to the velocity plus the velocity scale."""
 
 
 @njit(float64(int64, float64, float64, float64), cache=True)
@@ -146,8 +150,8 @@ def series_valve_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
         middle, end = (part + _SDIRK) / parts, (part + 1.0) / parts
         after = displacement_between(end, state[0], state[2], x, v, dt)
         # the velocity of the first stage makes the sum over both stages the displacement
-        speed = state[2] + end * (v - state[2])
-        speed = ((after - place) / h - _SDIRK * speed) / (1.0 - _SDIRK)
+        final = state[2] + end * (v - state[2])
+        speed = ((after - place) / h - _SDIRK * final) / (1.0 - _SDIRK)
         limit = norm * (state[3] + middle * (strength - state[3]))
         thick = state[4] + middle * (viscosity - state[4])
         first = flow_velocity(

@@ -109,9 +109,6 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     return f"{verdict}: NRMSE {_number(before)} before, {_number(after)} after (noise floor {floor})"
 
 
-_IN_DOUBT = "whether there is "
-"""Beginning of a question about one effect, as :mod:`mrpipe.tracing.bench.extra_tests` writes it."""
-
 FAR_WORSE = 1.5
 """Ratio of the errors of forward network and damper model from which the network is called worse."""
 
@@ -214,18 +211,20 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
 
 def open_questions(decides: Sequence[Mapping[str, Any]]) -> str:
     """Return what tests would decide, the rivals of one effect together, and likewise the effects in doubt."""
+    from mrpipe.tracing.bench.extra_tests import WHETHER
+
     rivals: dict[str, list[str]] = {}
     absent, others = [], []
     for item in decides:
         effect, joined, rival = item["decides"].partition(" or ")
         if joined:
             rivals.setdefault(effect, []).append(rival)
-        elif effect.startswith(_IN_DOUBT):
-            absent.append(effect.removeprefix(_IN_DOUBT))
+        elif effect.startswith(WHETHER):
+            absent.append(effect.removeprefix(WHETHER))
         else:
             others.append(effect)
     if absent:
-        others.append(_IN_DOUBT + " or ".join(absent))
+        others.append(WHETHER + " or ".join(absent))
     return "; ".join([*(f"{effect} or {', '.join(names)}" for effect, names in rivals.items()), *others])
 
 

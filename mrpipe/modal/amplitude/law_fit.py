@@ -30,8 +30,7 @@ from mrpipe.modal.spectra import ComplexArray
 _LEAST_GAIN = 0.05
 _SUFFICIENT = 0.03
 """RMS error over RMS response below which constant modes are sufficient. An error of a natural frequency of a fiftieth
-of the half-power bandwidth has about this effect.
-"""
+of the half-power bandwidth has about this effect."""
 _LEAST_ENERGY = 0.05
 """Share of the energy of a mode below the smallest amplitude at which its law is reported."""
 _EVALUATIONS = 25

@@ -27,6 +27,9 @@ _BY_STATE: Mapping[str, TestKind] = {
 }
 """State that an unknown residual depends on -> kind of test."""
 
+WHETHER = "whether there is "
+"""Beginning of a question about one effect; a sentence on several of them has it once."""
+
 _IN_DOUBT: tuple[TestKind, ...] = ("speeds", "steps", "amplitudes")
 
 
@@ -111,7 +114,7 @@ def wanted_tests(summary: Mapping[str, Any], library: Mapping[str, Effect], reco
         wanted += [("what is unexplained", kind) for kind in kinds]
     for name in summary.get("untestable", {}):
         asked = library[name].needs if name in library else ()
-        wanted += [(f"whether there is {name}", TESTS_FOR[need]) for need in asked]
+        wanted += [(f"{WHETHER}{name}", TESTS_FOR[need]) for need in asked]
     tests: dict[str, list[dict[str, Any]]] = {}
     reasons: dict[str, dict[str, Any]] = {}
     for decides, kind in wanted:

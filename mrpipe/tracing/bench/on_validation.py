@@ -18,7 +18,7 @@ from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, worst
 from mrpipe.tracing.bench.nuisances import RecordGain, SessionGain, record_gains
 from mrpipe.tracing.bench.residual_structure import correlation_p_value
 from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, training_agreements, with_session
-from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, noise_variances
+from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, noise_limits, noise_variances
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Comparable, Verdict
 
@@ -142,10 +142,13 @@ def on_validation(
         before = before - (judged.offsets - np.median(judged.offsets))[validation.test]
     force, motion = noise_variances(chosen, validation)
     scale = baseline.scale
-    part = _share_of_residual(recordings, judged.measured - after, scale.force * force + scale.motion * motion)
+    # the noise of a displacement, passed through a damper whose force depends on velocity or acceleration, is known
+    # only up to a factor; it cannot exceed the residual of the final model
+    used = recordings.used
+    residual, noise = (judged.measured - after)[used], (scale.force * force + scale.motion * motion)[used]
+    part = noise_limits(residual, noise, recordings.test[used], recordings.tests)[recordings.test]
     force, motion = part * force, part * motion
     floor = np.sqrt(scale.force * force + scale.motion * motion)
-    used = recordings.used
     power = max(_rms(judged.measured[used]), 1e-12)
     parts = {
         "force_white": min(scale.force, 1.0) * force,
@@ -156,18 +159,6 @@ def on_validation(
     return OnValidation(
         recordings, validation, judged.measured, before, after, floor, components, shared is None, gains, scale
     )
-
-
-def _share_of_residual(recordings: Recordings, residual: FloatArray, variance: FloatArray) -> FloatArray:
-    """Return a factor, at most 1, on the noise variance of each sample, the same within a test, shape (n,).
-
-    The noise cannot exceed the residual of the final model. The noise of a displacement, passed through a damper whose
-    force depends on velocity or acceleration, is known only up to a factor.
-    """
-    used, test = recordings.used, recordings.test
-    left = np.bincount(test[used], weights=residual[used] ** 2, minlength=recordings.tests)
-    noise = np.bincount(test[used], weights=variance[used], minlength=recordings.tests)
-    return np.asarray(np.minimum(1.0, left / np.maximum(noise, 1e-300))[test], dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -179,12 +179,23 @@ def _limit(residual: FloatArray, variance: FloatArray, test: IntArray) -> float:
     of all other tests, and the mean of the limits of the tests takes its place. The mean alone would be too small,
     because noise is above its expected power in some tests and below it in others.
     """
-    left = np.bincount(test, weights=residual**2)
-    noise = np.maximum(np.bincount(test, weights=variance), 1e-300)
-    count = np.bincount(test).astype(np.float64)
-    together = float(np.sum(left) / np.sum(noise))
-    mean = float(np.sum(np.minimum(1.0, left / noise) * count) / np.sum(count))
-    return max(min(1.0, together), mean)
+    together = float(np.sum(residual**2)) / max(float(np.sum(variance)), 1e-300)
+    return max(min(1.0, together), float(np.mean(noise_limits(residual, variance, test)[test])))
+
+
+def noise_limits(residual: FloatArray, variance: FloatArray, test: IntArray, tests: int = 0) -> FloatArray:
+    """Return the factor, at most 1, by which the noise variance of each test stays below its residual, shape (tests,).
+
+    Parameters
+    ----------
+    residual, variance, test
+        Residual [N], variance of the noise [N^2] and test of each sample, shape (n,).
+    tests
+        Least number of tests, if the samples are not of all tests.
+    """
+    left = np.bincount(test, weights=residual**2, minlength=tests)
+    noise = np.bincount(test, weights=variance, minlength=tests)
+    return np.asarray(np.minimum(1.0, left / np.maximum(noise, 1e-300)), dtype=np.float64)
 
 
 def _aligned(recordings: Recordings, first: IntArray, second: IntArray) -> tuple[IntArray, float]:
