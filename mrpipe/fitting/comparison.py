@@ -352,9 +352,15 @@ def _settled_shape(found: FormFit, options: FitOptions, unit: str) -> FormFit:
     gain = 1.0 - found.training_nrmse / plain.training_nrmse
     if gain > WORTHWHILE:
         value = found.values["gamma_share"]
-        note = f"gamma_share ended at its bound {value:.3g}; gamma = beta costs {gain:.0%} in error"
+        note = (
+            f"gamma_share ended at its bound {value:.3g} and is kept there, because gamma = beta (0.5) would raise the "
+            f"error by {100.0 * gain:.0f} %"
+        )
         return replace(found, notes=(note,))
-    note = f"gamma_share ran to its bound for a gain of {gain:.1%}: gamma = beta is taken (0.5)"
+    note = (
+        f"gamma_share ended at its bound, which changes the error by only {100.0 * abs(gain):.1f} %: gamma = beta is "
+        "taken (0.5)"
+    )
     return replace(plain, notes=(note,))
 
 

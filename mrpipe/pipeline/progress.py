@@ -133,7 +133,7 @@ def _lines(stage: str, logger: logging.Logger) -> Progress:
             last = now
             left = (now - started) * (1 - fraction) / fraction if fraction > 0.02 else float("nan")
             # a stage that knows its remaining time reports it
-            remaining = f", about {left:.0f} s left" if left == left and not _LEFT.search(text) else ""
-            logger.info("%s: %.0f %%%s %s", stage, 100 * fraction, remaining, text)
+            remaining = f" (about {left:.0f} s left)" if left == left and not _LEFT.search(text) else ""
+            logger.info("%s: %.0f %%%s: %s", stage, 100 * fraction, remaining, text)
 
     return progress

@@ -215,7 +215,12 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     if not effects:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         depends = f" It varies with {_listed(states)}." if states else ""
-        return f"{start} Something is missing, but no known effect explains it.{depends}{added}"
+        form = _base_form_in_words(summary.get("base_form") or {})
+        reached = f" The error is then {_percent(after)}." if form and not flexible else ""
+        unproven = _unproven_in_words(summary.get("further_terms", []))
+        return (
+            f"{start} Something is missing, but no known effect explains it.{form}{unproven}{reached}{depends}{added}"
+        )
     parts = [_effect_in_words(effect) for effect in effects]
     share = summary["ceiling"]["recovered"]
     recovers = f"recovers {100 * share:.0f} % of what a flexible model could"
@@ -249,14 +254,22 @@ def _difference_in_words(found: Mapping[str, Any]) -> str:
     return text
 
 
+def _base_form_in_words(found: Mapping[str, Any]) -> str:
+    """Return a sentence on another base form than the declared one, if the final model has one."""
+    taken = found.get("taken")
+    if not taken or taken == found.get("declared"):
+        return ""
+    return f" The base form {taken} lowers the error, so the final model has it."
+
+
 def _unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
     if not terms:
         return ""
-    names = _listed([f"{item['name']} ({item['form']})" for item in terms])
+    names = _listed([f"{item['name']} ({item['form']}, probability {item['confidence']:.2f})" for item in terms])
     rest = (
-        "lowers the error and is part of it, but is not proven"
+        "lowers the error and is part of the model, but is not proven"
         if len(terms) == 1
-        else ("lower the error and are part of it, but are not proven")
+        else ("lower the error and are part of the model, but are not proven")
     )
     rivals = sorted({name for item in terms for name in item["tied_with"]})
     return f" In addition, {names} {rest}{f' against {_listed(rivals)}' if rivals else ''}."

@@ -151,7 +151,7 @@ def _candidates(sink: Sink, summary: Mapping[str, Any], named_share: float, leas
         {
             "effect": item["name"],
             "form": item["form"],
-            "share": item["share"],
+            "recovered share": item["share"],
             "NRMSE": item["nrmse"],
             "evidence (log-likelihood)": item["evidence"],
             "forms tried": ", ".join(f"{name} {share:.2f}" for name, share in item["forms"].items()),
@@ -250,7 +250,7 @@ def _next_steps(sink: Sink, summary: Mapping[str, Any]) -> None:
     if not wanted["tests"]:
         return
     for item in wanted["decides"]:
-        sink.text(f"To decide {item['decides']}: {', '.join(item['tests'])}.")
+        sink.text(f"Open question: {item['decides']}. Tests that would answer it: {', '.join(item['tests'])}.")
     sink.table(
         "next-tests",
         pd.DataFrame(wanted["tests"]).drop(columns="later"),

@@ -43,7 +43,8 @@ def describe(sink: Sink, result: IdentifiedDamper) -> None:
     sink.text(
         f"Damper model {chosen.fit.form.name} ({chosen.fit.form.summary}; {chosen.fit.form.source}): NRMSE "
         f"{chosen.training.nrmse:.3f} on the training tests, {chosen.validation.nrmse:.3f} on the validation tests. "
-        f"{summary['reason']} Of the forms compared {summary['comparison'][0]['form']} has the smallest error there."
+        f"{summary['reason']} Of the forms compared {summary['comparison'][0]['form']} has the smallest error on the "
+        "validation tests."
     )
     if summary["drive_law"]:
         sink.text(f"Law of the drive: {summary['drive_law']['reason']}.")

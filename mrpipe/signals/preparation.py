@@ -349,8 +349,9 @@ def _motion(work: _Work, options: PreparationOptions) -> tuple[FloatArray, Float
         work.cutoffs["velocity"] = cutoff
         if work.cycles.frequency_hz > 0.3 * cutoff:
             work.findings.append(
-                f"the velocity is cut off at {cutoff:g} Hz, near the motion's {work.cycles.frequency_hz:.3g} Hz: raise "
-                "velocity_cutoff_hz"
+                f"the velocity is filtered at {cutoff:g} Hz, only {cutoff / work.cycles.frequency_hz:.2g} times the "
+                "frequency of the motion, which weakens the velocity; set prepare.velocity_cutoff_hz to "
+                f"{5.0 * work.cycles.frequency_hz:.2g} or more"
             )
         velocity = butterworth_lowpass(velocity, cutoff, work.rate, order=options.order, phase=options.phase)
     if measured is None:

@@ -193,7 +193,10 @@ def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Ef
     path = context.run_directory / NEXT_TESTS
     made = bool(extra.tests) and not new
     if new:
-        about = "Tests that would decide what close-loop left open. On the virtual rig: mrpipe record --settings FILE"
+        about = (
+            "Tests that would decide what close-loop left open. On a real rig, record them and add them to the "
+            "campaign. The virtual rig records them with: mrpipe record --settings FILE"
+        )
     elif made:
         about = "All tests that would decide what close-loop left open have been made: longer ones, or repeats, remain."
     else:

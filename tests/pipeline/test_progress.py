@@ -15,8 +15,8 @@ from mrpipe.pipeline import progress
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("refined 10 of 16, 23 s left", "sweep: 75 % refined 10 of 16, 23 s left"),
-        ("refined 10 of 16", "sweep: 75 %, about 3 s left refined 10 of 16"),
+        ("refined 10 of 16, 23 s left", "sweep: 75 %: refined 10 of 16, 23 s left"),
+        ("refined 10 of 16", "sweep: 75 % (about 3 s left): refined 10 of 16"),
     ],
 )
 def test_a_line_carries_one_remaining_time(

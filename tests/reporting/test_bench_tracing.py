@@ -41,7 +41,8 @@ def test_a_term_that_counts_in_the_error_but_is_not_proven_is_told(summary: dict
     summary["further_terms"] = [_effect("migration", ["stribeck"])]
     text = in_plain_words(summary)
     assert (
-        "In addition, migration (plain) lowers the error and is part of it, but is not proven against stribeck." in text
+        "In addition, migration (plain, probability 0.90) lowers the error and is part of the model, but is not "
+        "proven against stribeck." in text
     )
     assert "lacks **remanence**." in text
 

@@ -299,7 +299,7 @@ def test_cutoffs_that_the_sampling_rate_or_the_motion_do_not_allow() -> None:
     assert "displacement" not in item.cutoffs_hz and item.cutoffs_hz["velocity"] == 20.0
     assert errors(item)["velocity"] < velocity_limit(100.0)
     (item,) = prepare_campaign(campaign(recording("one")), PreparationOptions(velocity_cutoff_hz=2.0)).tests
-    assert any("raise velocity_cutoff_hz" in line for line in item.findings)
+    assert any("set prepare.velocity_cutoff_hz to" in line for line in item.findings)
 
 
 @pytest.mark.golden

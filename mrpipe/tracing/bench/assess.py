@@ -97,6 +97,7 @@ def assess(
     rng: np.random.Generator,
     *,
     several: bool = False,
+    doubts: Sequence[Named] = (),
 ) -> Assessment:
     """Return names, further terms and the verdict of a selection.
 
@@ -115,6 +116,8 @@ def assess(
     several
         Whether several effects were named together before some of them became further terms; the remaining ones keep
         the lower probability of several effects.
+    doubts
+        Terms that lost their name, with the probability that they had as names. They keep it as further terms.
     """
     options, baseline, offsets = case.options, case.choice.baseline, case.offsets
     proven = selection.with_named_alone
@@ -137,7 +140,15 @@ def assess(
     likely = tuple(
         held(item, judgement, options, several=several, beyond=beyond, chosen=item in named) for item in causes
     )
-    return Assessment(named, likely, further, missing, found, alone, judgement)
+    known = {item.effect.name: item for item in doubts}
+    # a further term that never had a name stands at best for a part of what is missing
+    unproven = tuple(
+        replace(item, confidence=known[item.effect.name].confidence)
+        if item.effect.name in known
+        else held(item, judgement, options, several=True, beyond=True)
+        for item in further
+    )
+    return Assessment(named, likely, unproven, missing, found, alone, judgement)
 
 
 def with_likely_names(
@@ -170,7 +181,7 @@ def with_likely_names(
             reason = "" if selection.proven else _unlikely_reason(doubts)
         else:
             selection = selection.with_named_alone
-        assessed = assess(selection, case, gains, reason, rng, several=several)
+        assessed = assess(selection, case, gains, reason, rng, several=several, doubts=doubts)
     return selection, assessed
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.library import base_form, forms_named
+from mrpipe.dampers.library import forms_named
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.drive_laws import adequate_laws
 from mrpipe.fitting.engine import Fit, fit, start_of
@@ -17,12 +17,9 @@ from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Base, Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.reference import own_laws
-from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, fit_with_form, polynomial_laws
+from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, force_deviation, noise_scale, sensor_deviation
 from mrpipe.tracing.rules import NoiseRules
-
-LISTED_FORMS = ("bouc-wen", "bouc-wen-n", "dahl", "yielding-part")
-"""Base forms whose errors are always listed in the result."""
 
 DEFAULT_OF_FAMILY = {"rate-dependent-yield": "yielding-part"}
 """Family of base forms -> form that is used if the settings name the family."""
@@ -154,18 +151,3 @@ def noise_level_of(found: Fit, scale: NoiseScale) -> float:
     root = found.problem.root_weight
     used = root > 0.0
     return float(np.mean((root[used] * sensor_deviation(found, found.problem.recordings, scale)[used]) ** 2))
-
-
-def ladder(found: Fit, known: Mapping[str, Fit] | None = None) -> dict[str, Fit]:
-    """Return fits of the base forms that are always listed, the form of the fit first.
-
-    Parameters
-    ----------
-    found
-        Fit of the declared form.
-    known
-        Fits of forms to the same tests that exist already.
-    """
-    known = {**(known or {}), found.problem.base.name: found}
-    names = dict.fromkeys((found.problem.base.name, *LISTED_FORMS))
-    return {name: known.get(name) or fit_with_form(found, base_form(name), starts=1, iterations=8) for name in names}

@@ -308,23 +308,25 @@ def _sentence(
     verb = "explains" if len(names) == 1 else "explain"
     if kind == "noise":
         return "the residual is noise: nothing is missing"
+    above = evidence.after / max(evidence.floor, 1e-12)
+    limit = f", as far as a flexible model of motion and drive can show; the error is {above:.2g} times the noise floor"
+    limit = limit if above > rules.within_floors else ""
     if kind == "explained":
-        return f"{listed}: {verb} what is missing"
+        return f"{listed}: {verb} what is missing{limit}"
     if kind == "partly explained":
         return (
             f"{listed}: {verb} part of what is missing, {100.0 * evidence.share:.0f} % of what is recoverable on the "
             "validation tests"
         )
     if kind == "base form":
-        return f"the base form: {base_taken} explains what is missing, and no effect is named"
+        return f"the base form: {base_taken} explains what is missing{limit}; no effect is named"
     if evidence.unrepeatable(rules):
         return (
             f"unknown: most of what remains on the validation tests {_unrepeated(evidence)}, and no effect explains it"
         )
     if reason and evidence.structured:
         return reason
-    ratio = evidence.after / max(evidence.floor, 1e-12)
-    return f"unknown: the error on the validation tests is {ratio:.3g} times the noise floor, and no effect explains it"
+    return f"unknown: the error on the validation tests is {above:.3g} times the noise floor, and no effect explains it"
 
 
 def _unrepeated(evidence: Evidence) -> str:

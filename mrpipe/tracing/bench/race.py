@@ -7,10 +7,9 @@ tests. Most samples of this comparison were not used in the fit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
@@ -35,9 +34,6 @@ SCREENED = 8
 
 COMPARED = 60
 """Numerical technique: number of models, the best ones on the draft, that are compared on all training tests."""
-
-LISTED_STEPS = 3
-"""Numerical technique: iterations of fits that are only listed; they start from the fit to the draft."""
 
 Search = Callable[[Fit], Selection]
 
@@ -168,13 +164,6 @@ class Race:
             if model.form == winner.form and model.effects[:count] == winner.effects
         ]
         return self.models[min(able, key=lambda place: float(costs[place]))]
-
-    def alone_on_all_tests(self, problem: Problem, names: Collection[str], *, jobs: int = 1) -> dict[str, Fit]:
-        """Return base forms without effects, of those that were searched, fitted to all tests of a problem."""
-        drafted = {model.form: model.fit for model in self.models if model.effects == self.own and model.form in names}
-        whole = partial(on_all_tests, problem=problem, coupled=self.coupled, iterations=LISTED_STEPS)
-        with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-            return dict(zip(drafted, pool.map(whole, drafted.values()), strict=True))
 
     def support(self, effect: str, lead: float, *, draws: int, rng: np.random.Generator) -> float:
         """Return the share of bootstrap samples of the tests in which the winner has an effect."""

@@ -11,10 +11,11 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.fitting.engine import predict
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.tracing.bench.baseline import LISTED_FORMS, Baseline, ladder
+from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import flexible_residual
 from mrpipe.tracing.bench.error_measures import Score, score
 from mrpipe.tracing.bench.judgement import recovered
+from mrpipe.tracing.bench.listed import COMMON_FORMS, forms_alone
 from mrpipe.tracing.bench.nuisances import session_of
 from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.offsets import OffsetFinding
@@ -107,7 +108,7 @@ class Summary:
             "noise_from": self.baseline.scale.source,
             "before": _score_json(score_before),
             "residual": self._residual(states, options.rules),
-            "base_form": self._ladder(options, found.measured),
+            "base_form": self._base_form(options, found.measured),
             "nuisances": self._nuisances(named, window, options.rules),
             "effects": effects_found,
             "further_terms": [item.as_json() for item in further],
@@ -212,18 +213,17 @@ class Summary:
             for item in self.selection.rounds[0]
         }
 
-    def _ladder(self, options: TracingOptions, measured: FloatArray) -> dict[str, Any]:
+    def _base_form(self, options: TracingOptions, measured: FloatArray) -> dict[str, Any]:
         base = self.selection.base
-        fits = ladder(
-            base, {} if self.race is None else self.race.alone_on_all_tests(base.problem, LISTED_FORMS, jobs=self.jobs)
-        )
+        fits = forms_alone(base, self.race, jobs=self.jobs)
         judged = self.found.recordings
         errors = {name: score(judged, measured, predict(f, judged)).nrmse for name, f in fits.items()}
         if options.model not in errors:
             errors[options.model] = errors[next(iter(fits))]
         # decided on the training tests with a penalty for parameters, and reported on the validation tests
         lead = 1.0 + options.rules.race.listed_lead
-        best = min(fits, key=lambda name: fits[name].chi_square * (1.0 if name == base.problem.base.name else lead))
+        common = [name for name in fits if name in COMMON_FORMS or name == base.problem.base.name]
+        best = min(common, key=lambda name: fits[name].chi_square * (1.0 if name == base.problem.base.name else lead))
         ground = self.selection.ground
         taken = options.model
         if ground is not None:

@@ -27,6 +27,7 @@ from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
 from mrpipe.tracing.bench.offsets import offset_between_tests
 from mrpipe.tracing.bench.on_validation import OnValidation
+from mrpipe.tracing.bench.passes import in_passes
 from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
 from mrpipe.tracing.bench.rivals import Orders, Unseen, with_best_base
 from mrpipe.tracing.bench.select import Selection, forward_selection
@@ -74,7 +75,7 @@ def trace_campaign(
     ordered = sort_tests(tests, rules.validation)
     usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))
     unseen = [t for t in ordered.tests if t.role == "validation"]
-    bench = Bench(usable, effects, declared, rng, jobs, progress, known or {})
+    bench = Bench(usable, effects, declared, rng, jobs, in_passes(progress), known or {})
     begun = begin(bench, options)
     validation = validation_of(bench, begun, unseen)
     progress(0.05, "baseline")

@@ -74,8 +74,9 @@ def test_the_names_that_stay_are_judged_again_when_another_one_goes(monkeypatch:
     plain, chosen = _two_terms()
     likely = [(0.9, 0.3), (0.15,), ()]
 
-    def assess(selection, case, gains, reason, rng, *, several=False):
+    def assess(selection, case, gains, reason, rng, *, several=False, doubts=()):
         assert several is (len(likely) < 3)
+        assert [item.confidence for item in doubts] == [0.3, 0.15][: 3 - len(likely)]
         terms = selection.chosen.problem.terms
         causes = [SimpleNamespace(effect=t.effect, confidence=c) for t, c in zip(terms, likely.pop(0), strict=False)]
         return SimpleNamespace(named=causes, causes=causes, further_terms_fail=False, reason=reason)
