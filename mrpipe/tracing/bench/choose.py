@@ -22,7 +22,7 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import fit_with_form
 from mrpipe.tracing.bench.baseline import Baseline, declared_base, fit_baseline, noise_level_of
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
-from mrpipe.tracing.bench.drive_again import with_laws_again
+from mrpipe.tracing.bench.drive_again import with_laws_again, with_laws_of_leaders
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.pairs import with_play
 from mrpipe.tracing.bench.race import Model, Race, alone_of, on_all_tests, race
@@ -178,7 +178,14 @@ def _raced(
     if not nothing.structured and not _noise_of_motion(baseline):
         return Choice(baseline, nothing), lambda: None
     progress(0.1, "base forms")
-    singles = alone_of(baseline.fit, options, known=known, jobs=jobs)
+    singles = with_laws_of_leaders(
+        alone_of(baseline.fit, options, known=known, jobs=jobs),
+        options.yield_order,
+        options.viscosity_order,
+        enough=options.rules.race.sufficient**2 * baseline.noise,
+        least=least * baseline.noise,
+        jobs=jobs,
+    )
     if not model_error and not weighed:
         baseline, singles = _with_noise_of_best(baseline, singles, options.rules)
         nothing = replace(nothing, base=baseline.fit, noise=baseline.noise, chosen=baseline.fit)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,12 @@ from mrpipe.fitting.problem import Base
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.fitting.start import distinct_levels, polynomial_laws
 from mrpipe.tracing.bench.select import Selection
+
+LEADERS = 6
+"""Numerical technique: largest number of base forms whose laws are chosen again before effects are searched."""
+
+COMPARABLE = 5.0
+"""Numerical technique: largest chi-square of these forms, as a multiple of that of the best form."""
 
 
 def with_laws_again(selection: Selection, yield_order: int, viscosity_order: int) -> Selection:
@@ -56,6 +63,41 @@ def with_adequate_laws(found: Fit, yield_order: int, viscosity_order: int) -> Fi
         return found
     rich = _with_laws(found, richest)
     return _with_laws(rich, replace(richest, laws=adequate_laws(rich)))
+
+
+def with_laws_of_leaders(
+    singles: Mapping[str, Fit], yield_order: int, viscosity_order: int, *, enough: float, least: float, jobs: int = 1
+) -> dict[str, Fit]:
+    """Return base forms without effects, the best of them with laws of the drive that are adequate for the form itself.
+
+    The forms were fitted with the laws of the declared form. A poor declared form hides how the viscosity or the yield
+    force depends on the drive, and an effect would then get the name of this dependence.
+
+    Parameters
+    ----------
+    singles
+        Name -> fit to the draft, all with the laws of the declared form.
+    yield_order, viscosity_order
+        Largest degrees of the polynomials that are tried.
+    enough
+        Chi-square that no form has to fall below. If one form does, all forms are returned as they are.
+    least
+        Least decrease of the chi-square for which a form takes other laws.
+    jobs
+        Threads.
+    """
+    best = min(item.chi_square for item in singles.values())
+    if best <= enough:
+        return dict(singles)
+    ordered = sorted(singles, key=lambda name: singles[name].chi_square)[:LEADERS]
+    names = [name for name in ordered if singles[name].chi_square <= COMPARABLE * best]
+
+    def again(name: str) -> Fit:
+        found = with_adequate_laws(singles[name], yield_order, viscosity_order)
+        return found if found.chi_square < singles[name].chi_square - least else singles[name]
+
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        return {**singles, **dict(zip(names, pool.map(again, names), strict=True))}
 
 
 def _with_polynomials(found: Fit, yield_order: int, viscosity_order: int) -> Base:

@@ -8,7 +8,7 @@ import pytest
 
 from mrpipe.dampers.laws import LawShape
 from mrpipe.fitting.engine import fit, start_of
-from mrpipe.tracing.bench.drive_again import with_final_laws, with_laws_again
+from mrpipe.tracing.bench.drive_again import with_final_laws, with_laws_again, with_laws_of_leaders
 from mrpipe.tracing.bench.select import Selection
 from tests.tracing.bench.fits import plain_fit
 from tests.tracing.bench.test_law_rival import selected
@@ -24,6 +24,25 @@ def test_laws_that_were_too_simple_are_replaced() -> None:
     again = with_laws_again(Selection(base, 1.0, (), chosen), 2, 1)
     assert again.chosen.chi_square < 0.5 * chosen.chi_square
     assert again.chosen.problem.base.laws != poor.laws
+
+
+def test_the_best_forms_of_the_race_have_laws_of_their_own() -> None:
+    """A clean Gamota-Filisko damper was called migration, because it had the laws that suffice for a Bouc-Wen model."""
+    base = plain_fit("")
+    poor = replace(base.problem.base, laws=(LawShape("polynomial", 1), LawShape("polynomial", 0)))
+    problem = replace(base.problem, base=poor)
+    single = fit(problem, start_of(problem, base.base_values, []), iterations=8)
+    theta = single.theta.copy()
+    theta[0] = problem.bounds()[1][0]
+    hopeless = fit(problem, theta, iterations=0)
+    assert hopeless.chi_square > 5.0 * single.chi_square
+    singles = {"good": single, "hopeless": hopeless}
+    found = with_laws_of_leaders(singles, 2, 1, enough=0.0, least=0.0)
+    assert found["good"].chi_square < 0.5 * single.chi_square
+    assert found["hopeless"] is hopeless
+    # a form at the noise needs nothing more, and a small decrease is no reason for more coefficients
+    assert with_laws_of_leaders(singles, 2, 1, enough=single.chi_square, least=0.0) == singles
+    assert with_laws_of_leaders(singles, 2, 1, enough=0.0, least=single.chi_square) == singles
 
 
 def test_laws_that_suffice_are_kept() -> None:
