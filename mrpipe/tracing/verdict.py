@@ -25,6 +25,30 @@ or tests. `equivalent`: all values in it fit about as well. `point`: the uncerta
 
 
 @dataclass(frozen=True)
+class Score:
+    """Errors of one model on validation tests, of a damper or of a structure.
+
+    Attributes
+    ----------
+    nrmse
+        RMS error over the RMS of the measured force, pooled over the tests [1].
+    fit_percent
+        100 (1 - e), where e is the norm of the error over the norm of the measured force [percent]. The mean of the
+        force of a damper is removed before its norm is taken.
+    by_test
+        Name of the test -> NRMSE [1].
+    """
+
+    nrmse: float
+    fit_percent: float
+    by_test: Mapping[str, float]
+
+    def as_json(self) -> dict[str, float]:
+        """Return the pooled errors as JSON."""
+        return {"nrmse": self.nrmse, "fit_percent": self.fit_percent}
+
+
+@dataclass(frozen=True)
 class Interval:
     """An interval of a number.
 

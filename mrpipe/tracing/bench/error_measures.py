@@ -8,15 +8,7 @@ import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.fitting.recordings import Recordings
-
-
-@dataclass(frozen=True)
-class Score:
-    """Errors of one model on some tests."""
-
-    nrmse: float
-    fit_percent: float
-    by_test: dict[str, float]
+from mrpipe.tracing.verdict import Score
 
 
 @dataclass(frozen=True)

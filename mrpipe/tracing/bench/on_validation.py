@@ -13,14 +13,14 @@ from mrpipe.fitting.engine import Fit, predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import Ceiling, cross_fitted
-from mrpipe.tracing.bench.error_measures import Judged, Score, campaign_offset, judged_part, rms, score
+from mrpipe.tracing.bench.error_measures import Judged, campaign_offset, judged_part, rms, score
 from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, worst
 from mrpipe.tracing.bench.nuisances import RecordGain, SessionGain, record_gains
 from mrpipe.tracing.bench.residual_structure import correlation_p_value
 from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, training_agreements, with_session
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, noise_limits, noise_variances
 from mrpipe.tracing.rules import ValidationRules
-from mrpipe.tracing.verdict import Comparable, Verdict
+from mrpipe.tracing.verdict import Comparable, Score, Verdict
 
 
 @dataclass(frozen=True)

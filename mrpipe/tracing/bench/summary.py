@@ -13,7 +13,7 @@ from mrpipe.fitting.engine import predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import LISTED_FORMS, Baseline, ladder
 from mrpipe.tracing.bench.ceiling import flexible_residual
-from mrpipe.tracing.bench.error_measures import Score, score
+from mrpipe.tracing.bench.error_measures import score
 from mrpipe.tracing.bench.judgement import recovered
 from mrpipe.tracing.bench.nuisances import session_of
 from mrpipe.tracing.bench.odd_tests import SortedTests
@@ -25,7 +25,7 @@ from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.verdict import Named, ranking
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import TracingRules
-from mrpipe.tracing.verdict import Unexplained
+from mrpipe.tracing.verdict import Score, Unexplained
 
 UNATTRIBUTED: dict[str, Any] = {
     "name": "unattributed",
@@ -105,7 +105,7 @@ class Summary:
             "noise_floor_nrmse": found.floor_nrmse(),
             "noise_components_nrmse": found.noise_components,
             "noise_from": self.baseline.scale.source,
-            "before": _score_json(score_before),
+            "before": score_before.as_json(),
             "residual": self._residual(states, options.rules),
             "base_form": self._ladder(options, found.measured),
             "nuisances": self._nuisances(named, window, options.rules),
@@ -114,7 +114,7 @@ class Summary:
             **self._verdict(),
             "candidates": [item.as_json() for item in ranking(selection, self._candidate_errors(found.measured))],
             "untestable": dict(untested),
-            "after": _score_json(score_after),
+            "after": score_after.as_json(),
             "ceiling": {
                 "nrmse": min(self.judgement.ceiling, score_after.nrmse),
                 "interval": list(self.judgement.ceiling_interval),
@@ -234,10 +234,6 @@ class Summary:
         tied = list(self.selection.tied_forms)
         # the stage adds the comparison with the damper of identify-damper; a tracing of a structure has none
         return {**declared, "best": best, "taken": taken, "tied_with": tied, "nrmse": errors, "identified": None}
-
-
-def _score_json(value: Score) -> dict[str, float]:
-    return {"nrmse": value.nrmse, "fit_percent": value.fit_percent}
 
 
 def _value(named: Sequence[Named], effect: str, parameter: str) -> float:
