@@ -163,7 +163,19 @@ def on_validation(
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict and the data that it is based on."""
+    """The verdict and the data that it is based on.
+
+    Attributes
+    ----------
+    verdict
+        The verdict.
+    evidence
+        Errors on the comparable part of the validation tests.
+    ceiling, ceiling_interval
+        NRMSE of a flexible model on all validation tests, and its 95 % interval.
+    comparison
+        Comparison of the validation tests with the training tests; None if they were not compared.
+    """
 
     verdict: Verdict
     evidence: Evidence
@@ -207,7 +219,7 @@ def judge(
     base_taken
         Name of the base form that replaces the declared one; empty if none does.
     structured
-        Whether the residual of the training tests holds more than noise.
+        Whether the residual of the training tests contains more than noise.
     reason
         Why nothing is named; empty if something is.
     faults

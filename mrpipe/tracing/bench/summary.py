@@ -45,7 +45,29 @@ LISTED = 6
 
 @dataclass(frozen=True)
 class Tracing:
-    """Result of a tracing; `summary` is printed by `close-loop --json`, the rest is for files and figures."""
+    """Result of a tracing; forces have shape (n,), the samples of the validation tests [N].
+
+    Attributes
+    ----------
+    summary
+        The document that `close-loop --json` prints.
+    selection
+        Base form and effects, fitted to all training tests.
+    baseline
+        Fit of the declared model, its weights and its noise.
+    named
+        Effects that the verdict names.
+    training, validation
+        Recordings.
+    measured, before, after
+        Measured force without offset, and the force of the base model and of the final model.
+    states
+        States of the training tests that the residual may depend on.
+    score_before, score_after
+        Errors of both models on the validation tests.
+    drive_unit
+        `A` or `V`.
+    """
 
     summary: dict[str, Any]
     selection: Selection
