@@ -227,11 +227,11 @@ class Unexplained:
     structured
         Whether more than noise remains.
     share
-        Share of the squared residual before that remains.
+        Share of the squared residual of the base model that remains.
     depends_on
         (state, share of the residual's variance that it explains), largest first.
     whiteness_p_value
-        Probability that its autocorrelation is due to chance; None if it was not tested.
+        Probability that white noise has an autocorrelation as large as the residual; None if it was not tested.
     tests
         Names of the validation tests on which it remains, the worst first; None if tests were not judged one by one.
     """

@@ -24,7 +24,7 @@ BINS = 16
 
 
 def frame_score(model: FrameModel, records: Sequence[Spectra]) -> Score:
-    """Return the errors of the storey shear forces, pooled over storeys and records; noise weights the lines."""
+    """Return the errors of the storey shear forces over all storeys and records, weighted by the sensor noise."""
     errors, wholes, own = 0.0, 0.0, {}
     for record in records:
         error = float(np.sum(np.abs((record.target - model.predict(record)) * record.weight) ** 2))

@@ -45,7 +45,21 @@ FEWEST_PERIODS = 5
 
 @dataclass(frozen=True)
 class FrameTracing:
-    """Result of tracing a structure; `summary` is the JSON of docs/close-loop-json.md."""
+    """Result of tracing a structure.
+
+    Attributes
+    ----------
+    summary
+        The JSON of docs/close-loop-json.md.
+    problem
+        Spectra of the records, and the shear frame that is fitted first.
+    selection
+        Linear frame and effects, as chosen on the training records.
+    before, after
+        The frame with the declared effects alone, and with all named effects.
+    between
+        Changes of the stiffness between tests.
+    """
 
     summary: dict[str, Any]
     problem: FrameProblem
@@ -360,7 +374,7 @@ def _verdict(
     reason: str,
     between: StiffnessBetweenTests,
 ) -> Verdict:
-    # the residual of tests in several states of the structure is their difference, which no effect explains
+    # if the stiffness changed between tests, the residual also contains this change, which no effect explains
     drift = f"; {between.sentence()}" if between.drifts else ""
     if reason:
         return Verdict("unknown" if selection.structured else "noise", f"{reason}{drift}")
