@@ -139,6 +139,8 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
             remedy = _of_quantity(str(unit).strip(), quantity) or f"write one such as {wanted}"
             raise UserError(where or "unit", f"unit {unit!r}", f"is not a unit of {quantity}", remedy)
     try:
+        if registry.Quantity(0.0, parsed).to_base_units().magnitude != 0.0:
+            raise ValueError("its zero is not that of the SI unit")
         return float((1.0 * parsed).to_base_units().magnitude)
     except Exception as error:
         raise UserError(where or "unit", f"unit {unit!r}", "has no factor to SI", "use another unit") from error

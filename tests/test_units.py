@@ -120,3 +120,11 @@ def test_units_in_brackets_are_found_and_remarks_are_not(text: str, units: list[
     found = bracketed_units(text)
     assert [item.unit for item in found] == units
     assert all(text[item.start + 1 : item.end - 1].strip() == item.unit for item in found)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("unit", ["degC", "celsius", "degF"])
+def test_scale_of_temperature_has_no_factor(unit: str) -> None:
+    with pytest.raises(UserError, match="has no factor to SI"):
+        conversion(unit)
+    assert conversion("K") == 1.0
