@@ -4,8 +4,8 @@ from mrpipe.campaigns.checks import require_varying, require_varying_drive
 from mrpipe.campaigns.describe import describe
 from mrpipe.campaigns.header import CampaignHeader, read_header
 from mrpipe.campaigns.loading import campaign_files, load_campaign
-from mrpipe.campaigns.model import Campaign, Recording
-from mrpipe.campaigns.writing import CAMPAIGN_FILE, TestFile, write_campaign
+from mrpipe.campaigns.model import CAMPAIGN_FILE, Campaign, Recording
+from mrpipe.campaigns.writing import TestFile, write_campaign
 
 __all__ = [
     "CAMPAIGN_FILE",

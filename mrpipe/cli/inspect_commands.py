@@ -167,6 +167,7 @@ def init(
 ) -> None:
     """Create a project for your own rig."""
     from mrpipe.artifacts.yaml_source import nearest
+    from mrpipe.campaigns.model import CAMPAIGN_FILE
     from mrpipe.cli.output import print_json
     from mrpipe.cli.project import lay_out
 
@@ -205,7 +206,7 @@ def init(
         for line in item.skipped:
             print(f"  not used: {line}")
     verb = "check the lines marked UNSURE in" if project.proposals else "fill in"
-    files = " and ".join(str(directory / item / "campaign.yaml") for item in project.campaigns)
+    files = " and ".join(str(directory / item / CAMPAIGN_FILE) for item in project.campaigns)
     print(f"next: {verb} {files},")
     print(f"then: cd {directory} && mrpipe check configs/{project.name}.yaml && mrpipe run configs/{project.name}.yaml")
 

@@ -9,6 +9,7 @@ import pytest
 
 from mrpipe.campaigns import load_campaign, require_varying_drive
 from mrpipe.errors import UserError
+from mrpipe.modal.records import frame_tests
 from tests.campaigns.builders import CHANNELS, campaign, content, motion, write_csv
 
 
@@ -261,6 +262,16 @@ def test_a_mass_driver_needs_its_mass(tmp_path: Path) -> None:
     )
     with pytest.raises(UserError, match=r"input_force: unit 'm/s\^2': is not a unit of force; give mass_kg"):
         load_campaign(tmp_path)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", ["campaign.yaml", "own-rig.yaml"])
+def test_messages_name_the_campaign_file_that_was_read(tmp_path: Path, name: str) -> None:
+    campaign(tmp_path).joinpath("campaign.yaml").rename(tmp_path / name)
+    loaded = load_campaign(tmp_path / name)
+    assert loaded.file == tmp_path / name
+    with pytest.raises(UserError, match=f"{name}: rig"):
+        frame_tests(loaded)
 
 
 @pytest.mark.planted
