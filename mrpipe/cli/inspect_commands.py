@@ -10,6 +10,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
+from mrpipe.words import counted
 
 _NOT_FOR_FILES = ("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force")
 
@@ -94,7 +95,7 @@ def check(
     checking.check_headers(loaded)
     without = checking.stages_without_data(loaded)
     result = checking.check_campaigns(loaded)
-    count = "1 error" if result.errors == 1 else f"{result.errors} errors"
+    count = counted(result.errors, "error")
     stages = list(loaded.config.stages)
     if options.json:
         print_json(

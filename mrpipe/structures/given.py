@@ -23,6 +23,7 @@ from mrpipe.structures.given_checks import (
 from mrpipe.structures.options import MatrixEntry, StoreyColumn, StructureSettings
 from mrpipe.structures.shear_frames import frame_from_modes, frame_from_parameter_set, modal_damping_matrix, shear_frame
 from mrpipe.units import bracketed_units, conversion, same_unit_dimension
+from mrpipe.words import counted
 
 Reader = Callable[[Path, str], Any]
 """Function from a file and the name of a variable (empty: the only table) to the content of the variable."""
@@ -308,7 +309,7 @@ def _condensed(frame: Frame, places: IntArray, gone: IntArray, static: FloatArra
     """Return a sentence that says what was condensed, and whether that is exact."""
     names = [frame.names[place] for place in gone]
     listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
-    count = f"{len(names)} degree{'s' if len(names) > 1 else ''} of freedom without mass"
+    count = f"{counted(len(names), 'degree')} of freedom without mass"
     # forces of the dashpots on them while they follow statically
     left = frame.damping[np.ix_(gone, places)] + frame.damping[np.ix_(gone, gone)] @ static
     if np.max(np.abs(left)) > 1e-6 * max(float(np.max(np.abs(frame.damping))), 1e-300):
