@@ -1,6 +1,6 @@
 """Measured campaigns: reading, checking, describing and writing them."""
 
-from mrpipe.campaigns.checks import require_varying, require_varying_drive
+from mrpipe.campaigns.checks import require_varying
 from mrpipe.campaigns.describe import describe
 from mrpipe.campaigns.header import CampaignHeader, read_header
 from mrpipe.campaigns.loading import campaign_files, load_campaign
@@ -18,6 +18,5 @@ __all__ = [
     "load_campaign",
     "read_header",
     "require_varying",
-    "require_varying_drive",
     "write_campaign",
 ]

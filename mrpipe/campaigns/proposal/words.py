@@ -43,20 +43,6 @@ GROUND = {
     *("ground", "base", "table", "shaker", "shaking", "tisch", "boden", "fundament", "sol", "suelo", "mesa", "input"),
     *("terreno", "basis", "rutteltisch", "excitation", "g", "grnd", "basement", "bsmt", "footing", "foundation"),
 }
-FLOOR = {
-    "floor",
-    "storey",
-    "story",
-    "level",
-    "etage",
-    "stockwerk",
-    "geschoss",
-    "piso",
-    "andar",
-    "piano",
-    "decke",
-    "lvl",
-}
 TOP = {"top", "roof", "dach", "techo", "tetto", "toit"}
 COMMAND = {
     *("command", "cmd", "soll", "set", "setpoint", "ref", "reference", "target", "nominal", "consigne", "desired"),
