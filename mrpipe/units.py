@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,6 +53,24 @@ _TERM = rf"\(*{_WORD}{_POWER}(?:\){_POWER})*"
 _UNIT = re.compile(rf"^{_TERM}(?:(?:\s*(?:\*|/|·|⋅)\s*|\s+){_TERM}){{0,9}}$")
 _PLAIN_POWER = re.compile(r"(?<=[A-Za-zµμΩ])([-+]?[23])(?![0-9A-Za-z])")
 _LONGEST = 80
+_BRACKETS = re.compile(r"[\[({<]([^\[\](){}<>]*(?:\([^()]*\))?[^\[\](){}<>]*)[\])}>]")
+"""Text in brackets of any kind, which may hold one pair of round brackets, such as [N/(m/s)]."""
+
+
+class BracketedUnit(NamedTuple):
+    """A unit in brackets within a text.
+
+    Attributes
+    ----------
+    unit
+        The unit as written, without the brackets.
+    start, end
+        Places in the text of the first character of the brackets and of the first character after them.
+    """
+
+    unit: str
+    start: int
+    end: int
 
 
 @cache
@@ -121,6 +139,8 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
             remedy = _of_quantity(str(unit).strip(), quantity) or f"write one such as {wanted}"
             raise UserError(where or "unit", f"unit {unit!r}", f"is not a unit of {quantity}", remedy)
     try:
+        if registry.Quantity(0.0, parsed).to_base_units().magnitude != 0.0:
+            raise ValueError("its zero is not that of the SI unit")
         return float((1.0 * parsed).to_base_units().magnitude)
     except Exception as error:
         raise UserError(where or "unit", f"unit {unit!r}", "has no factor to SI", "use another unit") from error
@@ -129,6 +149,20 @@ def conversion(unit: str, *, where: str = "", quantity: str | None = None) -> fl
 def to_si(values: ArrayLike, unit: str, *, where: str = "", quantity: str | None = None) -> NDArray[np.float64]:
     """Return `values` in SI (see :func:`conversion`)."""
     return np.asarray(values, dtype=np.float64) * conversion(unit, where=where, quantity=quantity)
+
+
+def bracketed_units(text: str) -> list[BracketedUnit]:
+    """Return the units in brackets of a header, such as kN in `force [kN]`, in their order; remarks are left out."""
+    found = []
+    for place in _BRACKETS.finditer(text):
+        unit = place[1].strip()
+        try:
+            known = bool(unit) and conversion(unit) > 0.0
+        except UserError:
+            continue
+        if known:
+            found.append(BracketedUnit(unit, place.start(), place.end()))
+    return found
 
 
 def same_dimension(unit: str, quantity: str) -> bool:

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from mrpipe.errors import UserError
-from mrpipe.units import conversion, same_dimension, to_si
+from mrpipe.units import bracketed_units, conversion, same_dimension, to_si
 
 FACTORS = [
     ("mm", "displacement", 1e-3),
@@ -103,3 +103,28 @@ def test_a_unit_that_is_offered_is_one_of_the_quantity(unit: str) -> None:
         conversion(unit, quantity="force")
     offered = str(told.value).rpartition(" ")[2].strip("?")
     assert same_dimension(offered, "force")
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(
+    ("text", "units"),
+    [
+        ("force [kN]", ["kN"]),
+        ("time (s), acceleration ( cm/s^2 )", ["s", "cm/s^2"]),
+        ("damping {N/(m/s)} of <mm>", ["N/(m/s)", "mm"]),
+        ("force [channel 3] (upper floor)", []),
+        ("force [], force", []),
+    ],
+)
+def test_units_in_brackets_are_found_and_remarks_are_not(text: str, units: list[str]) -> None:
+    found = bracketed_units(text)
+    assert [item.unit for item in found] == units
+    assert all(text[item.start + 1 : item.end - 1].strip() == item.unit for item in found)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("unit", ["degC", "celsius", "degF"])
+def test_scale_of_temperature_has_no_factor(unit: str) -> None:
+    with pytest.raises(UserError, match="has no factor to SI"):
+        conversion(unit)
+    assert conversion("K") == 1.0

@@ -91,7 +91,7 @@ def identify_frame(campaign: Campaign | str | Path, **settings: Any) -> Identifi
     result = identify(frame_tests(loaded), settings_of(IdentifyFrameSettings, "identify_frame", settings), silent)
     if result.frame is None:
         raise UserError(
-            loaded.directory / "campaign.yaml",
+            loaded.file,
             "frame",
             "the tests determine modes, but no mass and stiffness",
             "give frame.floor_masses_kg, or record the force of the excitation",

@@ -17,6 +17,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from mrpipe.errors import UserError
+from mrpipe.words import counted
 
 Place = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
@@ -130,7 +131,7 @@ def expected(fault: Mapping[str, Any]) -> str:
         return f"a list of at most {context['max_length']} values expected"
     if kind == "too_short":
         least = int(context.get("min_length", 1))
-        return f"a list of at least {least} {'value' if least == 1 else 'values'} expected"
+        return f"a list of at least {counted(least, 'value')} expected"
     plain = {
         "finite_number": "a finite number expected",
         "float_parsing": "a number expected",

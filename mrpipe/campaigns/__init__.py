@@ -1,11 +1,11 @@
 """Measured campaigns: reading, checking, describing and writing them."""
 
-from mrpipe.campaigns.checks import require_varying, require_varying_drive
+from mrpipe.campaigns.checks import require_varying
 from mrpipe.campaigns.describe import describe
 from mrpipe.campaigns.header import CampaignHeader, read_header
 from mrpipe.campaigns.loading import campaign_files, load_campaign
-from mrpipe.campaigns.model import Campaign, Recording
-from mrpipe.campaigns.writing import CAMPAIGN_FILE, TestFile, write_campaign
+from mrpipe.campaigns.model import CAMPAIGN_FILE, Campaign, Recording
+from mrpipe.campaigns.writing import TestFile, write_campaign
 
 __all__ = [
     "CAMPAIGN_FILE",
@@ -18,6 +18,5 @@ __all__ = [
     "load_campaign",
     "read_header",
     "require_varying",
-    "require_varying_drive",
     "write_campaign",
 ]

@@ -175,20 +175,8 @@ def force_sign(recordings: Sequence[Recording]) -> float:
     return float(np.mean(figures)) if figures else 0.0
 
 
-def require_varying_drive(campaign: Campaign) -> None:
-    """Refuse a campaign with a constant drive, because it does not determine an inverse model.
-
-    Raises
-    ------
-    UserError
-        If the drive of all training tests is one constant.
-    """
-    drives = {test.name: test.used("drive") for test in campaign.with_role("training") if "drive" in test.channels}
-    require_varying(drives, str(campaign.directory))
-
-
 def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
-    """Refuse drives (test -> samples) that are all the same constant; see :func:`require_varying_drive`.
+    """Refuse drives (test -> samples) that are all the same constant, because they do not determine an inverse model.
 
     Raises
     ------

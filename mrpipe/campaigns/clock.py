@@ -11,6 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.errors import UserError
+from mrpipe.words import counted
 
 RATE_TOLERANCE = 0.01
 """Largest relative difference between a stated rate and the clock."""
@@ -181,9 +182,8 @@ def _irregularities(time: FloatArray, rate: float, parts: tuple[tuple[int, int],
     lost = np.where(pauses, 0, lost_samples(time, rate))
     gaps = np.flatnonzero(lost)
     if gaps.size:
-        count = "1 gap" if gaps.size == 1 else f"{gaps.size} gaps"
         findings.append(
-            f"{count} in the clock, {int(lost.sum())} samples are missing; the first gap is at "
+            f"{counted(gaps.size, 'gap')} in the clock, {int(lost.sum())} samples are missing; the first gap is at "
             f"{time[gaps[0]]:.4g} s, the longest lasts {steps[gaps].max() / rate:.3g} s"
         )
     regular = steps[(lost == 0) & ~pauses]

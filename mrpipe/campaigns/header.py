@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from mrpipe.artifacts.yaml_source import read_yaml
+from mrpipe.campaigns.model import CAMPAIGN_FILE
 from mrpipe.campaigns.schema import CampaignEntry
-from mrpipe.campaigns.writing import CAMPAIGN_FILE
 from mrpipe.errors import UserError
 
 

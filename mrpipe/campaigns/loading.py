@@ -93,6 +93,7 @@ def load_campaign(path: Path) -> Campaign:
         declared_effects=entry.declared_effects,
         floor_masses_kg=tuple(np.nan if mass is None else mass for mass in entry.frame.floor_masses_kg),
         declared=_declared(source.content),
+        file_name=file.name,
     )
     require_roles(campaign, str(file))
     _require_floors(source, campaign)

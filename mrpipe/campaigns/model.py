@@ -11,6 +11,9 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 
+CAMPAIGN_FILE = "campaign.yaml"
+"""Name of the campaign file in the folder of a campaign."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -82,6 +85,8 @@ class Campaign:
         All other entries of campaign.yaml.
     findings
         Findings of the reader for the user (clipping, sign of force, jitter), one line each.
+    file_name
+        Name of the campaign file in `directory`.
     """
 
     name: str
@@ -94,6 +99,12 @@ class Campaign:
     floor_masses_kg: tuple[float, ...] = ()
     declared: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[str, ...] = ()
+    file_name: str = CAMPAIGN_FILE
+
+    @property
+    def file(self) -> Path:
+        """The campaign file, for messages."""
+        return self.directory / self.file_name
 
     def with_role(self, role: str) -> tuple[Recording, ...]:
         """Return the recordings of one role."""

@@ -13,8 +13,7 @@ import yaml
 
 from mrpipe.artifacts import FloatArray, atomic_path, atomic_write_text
 from mrpipe.artifacts.hdf5 import hdf5_in_memory
-
-CAMPAIGN_FILE = "campaign.yaml"
+from mrpipe.campaigns.model import CAMPAIGN_FILE
 
 
 @dataclass(frozen=True)

@@ -112,13 +112,3 @@ def train_inverse(device: BinghamDevice, rng: np.random.Generator, *, hidden: in
         iterations=40,
     )
     return train(training_history(device, rng), spec, options, rng, jobs=jobs)
-
-
-def inverse_validation(device: BinghamDevice, trained: Trained) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return time [s], true and estimated voltage [V] of Figure 6.1 (b): 0.1 m at 3 Hz, a drive of 5 V at 3 Hz."""
-    time: FloatArray = np.arange(0.0, 1.0, 0.001)
-    velocity = 0.1 * 6.0 * np.pi * np.cos(6.0 * np.pi * time)
-    voltage = 5.0 * np.abs(np.sin(6.0 * np.pi * time + 0.5))
-    force = bingham_force(device, velocity, voltage)
-    estimate = trained.network.predict(np.stack([np.abs(velocity), np.abs(force)], axis=1))
-    return time, voltage, estimate

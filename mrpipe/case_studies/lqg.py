@@ -140,19 +140,6 @@ def sampled_controller(
     )
 
 
-def closed_loop_poles(
-    A: FloatArray, B: FloatArray, measured: Outputs, feedback: FloatArray, gain: FloatArray
-) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
-    """Return the poles of plant and observer together, shape (2n,) [rad/s]."""
-    n = A.shape[0]
-    joint = np.zeros((2 * n, 2 * n))
-    joint[:n, :n] = A
-    joint[:n, n:] = -B @ feedback
-    joint[n:, :n] = gain @ measured.C
-    joint[n:, n:] = A - B @ feedback - gain @ measured.C
-    return np.asarray(np.linalg.eigvals(joint), dtype=np.complex128)
-
-
 def sampled_loop_radius(A: FloatArray, B: FloatArray, controller: SampledController) -> float:
     """Return the spectral radius of plant and sampled controller together; below 1 the loop is stable.
 

@@ -10,6 +10,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
+from mrpipe.words import noun
 
 if TYPE_CHECKING:
     from mrpipe.reporting.compare import KeptRun
@@ -101,7 +102,7 @@ def _print(content: Mapping[str, Any]) -> None:
 def _print_rows(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     from mrpipe.cli.showing import print_table
 
-    print(f"\n{title}: {len(rows) or 'no'} difference{'' if len(rows) == 1 else 's'}")
+    print(f"\n{title}: {len(rows) or 'no'} {noun(len(rows), 'difference')}")
     if rows:
         print_table(header, rows)
 
@@ -125,7 +126,7 @@ def _print_results(results: Sequence[Mapping[str, Any]], compared: int) -> None:
     if not compared:
         print("\nresults: nothing to compare, because no stage was built in both runs")
         return
-    print(f"\nresults: {len(results) or 'no'} difference{'' if len(results) == 1 else 's'}")
+    print(f"\nresults: {len(results) or 'no'} {noun(len(results), 'difference')}")
     for stage in dict.fromkeys(row["stage"] for row in results):
         rows = [row for row in results if row["stage"] == stage]
         print(f"{stage}")

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
+from mrpipe.words import counted
+
+if TYPE_CHECKING:
+    from mrpipe.cli.checking import CheckResult
+    from mrpipe.cli.project import Project
+    from mrpipe.config.model import RunSettings
 
 _NOT_FOR_FILES = ("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force")
 
@@ -69,32 +76,17 @@ def check(
     from mrpipe.cli import checking
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import load
-    from mrpipe.config.model import options as all_options
     from mrpipe.errors import CheckFailed
-    from mrpipe.pipeline.settings_view import setting_named
 
     loaded = load(replace(options, quiet=True))
     checking.check_stages(loaded)
     if explain:
-        content = [
-            {
-                "setting": name,
-                "meaning": text,
-                "value": None if "[]" in name else _shown(setting_named(loaded.config, name)),
-            }
-            for name, text, _ in all_options()
-        ]
-        if options.json:
-            print_json(content)
-        else:
-            for row in content:
-                value = "" if row["value"] is None else f" = {row['value']}"
-                print(f"{row['setting']}{value}\n    {row['meaning']}")
+        _explain(loaded.config, options.json)
         return
     checking.check_headers(loaded)
     without = checking.stages_without_data(loaded)
     result = checking.check_campaigns(loaded)
-    count = "1 error" if result.errors == 1 else f"{result.errors} errors"
+    count = counted(result.errors, "error")
     stages = list(loaded.config.stages)
     if options.json:
         print_json(
@@ -109,20 +101,47 @@ def check(
     else:
         verdict = f"{count} in the data" if result.errors else "valid"
         print(f"{_shortest(loaded.path)}: {verdict}, {len(stages)} stages")
-        for rig, text in result.campaigns.items():
-            print(f"  campaign {rig}: {text}")
-            for note in result.notes.get(rig, []):
-                print(f"    note: {note}")
-            for item in result.findings.get(rig, []):
-                print(f"    {item.severity}: {item.line}")
-        for stage, campaign in without.items():
-            print(f"  {stage}: will be skipped, because there is no {campaign} campaign")
+        _print_findings(result, without)
         if not result.errors:
             named = "" if options.config is None and options.campaign else options.config or _shortest(loaded.path)
             given = f"--campaign {options.campaign}" if options.campaign else ""
             print(" ".join(f"next: mrpipe run {named} {given}".split()))
     if result.errors:
         raise CheckFailed(f"{loaded.path}: {count} in the measured data (listed above)")
+
+
+def _explain(config: RunSettings, as_json: bool) -> None:
+    """Print every setting with its meaning and value."""
+    from mrpipe.cli.output import print_json
+    from mrpipe.config.model import options as all_options
+    from mrpipe.pipeline.settings_view import setting_named
+
+    content = [
+        {
+            "setting": name,
+            "meaning": text,
+            "value": None if "[]" in name else _shown(setting_named(config, name)),
+        }
+        for name, text, _ in all_options()
+    ]
+    if as_json:
+        print_json(content)
+        return
+    for row in content:
+        value = "" if row["value"] is None else f" = {row['value']}"
+        print(f"{row['setting']}{value}\n    {row['meaning']}")
+
+
+def _print_findings(result: CheckResult, without: Mapping[str, str]) -> None:
+    """Print the findings on every campaign, and the stages that have no data."""
+    for rig, text in result.campaigns.items():
+        print(f"  campaign {rig}: {text}")
+        for note in result.notes.get(rig, []):
+            print(f"    note: {note}")
+        for item in result.findings.get(rig, []):
+            print(f"    {item.severity}: {item.line}")
+    for stage, campaign in without.items():
+        print(f"  {stage}: will be skipped, because there is no {campaign} campaign")
 
 
 def _shortest(path: Path) -> Path:
@@ -192,6 +211,13 @@ def init(
             }
         )
         return
+    _print_project(project, directory)
+
+
+def _print_project(project: Project, directory: Path) -> None:
+    """Print the files that were written, the proposals for the campaigns, and the next steps."""
+    from mrpipe.campaigns.model import CAMPAIGN_FILE
+
     for path in project.written:
         print(path)
     for item in project.proposals:
@@ -205,7 +231,7 @@ def init(
         for line in item.skipped:
             print(f"  not used: {line}")
     verb = "check the lines marked UNSURE in" if project.proposals else "fill in"
-    files = " and ".join(str(directory / item / "campaign.yaml") for item in project.campaigns)
+    files = " and ".join(str(directory / item / CAMPAIGN_FILE) for item in project.campaigns)
     print(f"next: {verb} {files},")
     print(f"then: cd {directory} && mrpipe check configs/{project.name}.yaml && mrpipe run configs/{project.name}.yaml")
 

@@ -113,11 +113,13 @@ def one_config(named: Path | None, positional: Path | None) -> Path | None:
     UserError
         If two different ones were given, or the file is a campaign.
     """
+    from mrpipe.campaigns.model import CAMPAIGN_FILE
+
     if named is not None and positional is not None and named != positional:
         raise UserError("--config", str(named), f"and {positional} are two configurations", "give one of them")
     chosen = named or positional
-    if chosen is not None and (chosen.name == "campaign.yaml" or (chosen / "campaign.yaml").is_file()):
-        folder = chosen.parent if chosen.name == "campaign.yaml" else chosen
+    if chosen is not None and (chosen.name == CAMPAIGN_FILE or (chosen / CAMPAIGN_FILE).is_file()):
+        folder = chosen.parent if chosen.name == CAMPAIGN_FILE else chosen
         raise UserError(chosen, "", "is a campaign and not a configuration", f"use --campaign {folder}")
     return chosen
 

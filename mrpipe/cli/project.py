@@ -109,6 +109,8 @@ def lay_out(directory: Path, rig: Rig | None = None, source: Path | None = None)
     UserError
         If the directory is a file or holds such a project already, or `source` holds nothing that can be read.
     """
+    from mrpipe.campaigns.model import CAMPAIGN_FILE
+
     if directory.exists() and not directory.is_dir():
         raise UserError(directory, "", "is a file", "give a directory")
     name = slug(directory.resolve().name) or "my-rig"
@@ -128,7 +130,7 @@ def lay_out(directory: Path, rig: Rig | None = None, source: Path | None = None)
     files = {
         "README.md": _readme(name, names),
         f"configs/{name}.yaml": _config(name, folders, proposals),
-        **{f"data/{item}/campaign.yaml": text for item, text in zip(names, texts, strict=True)},
+        **{f"data/{item}/{CAMPAIGN_FILE}": text for item, text in zip(names, texts, strict=True)},
         "runs/README.md": "Run directories, one for each configuration; mrpipe writes them.\n",
     }
     there = [item for item in files if (directory / item).exists()]
@@ -156,7 +158,9 @@ def slug(text: str) -> str:
 
 
 def _readme(name: str, campaigns: Sequence[str]) -> str:
-    listed = " and ".join(f"`data/{item}/campaign.yaml`" for item in campaigns)
+    from mrpipe.campaigns.model import CAMPAIGN_FILE
+
+    listed = " and ".join(f"`data/{item}/{CAMPAIGN_FILE}`" for item in campaigns)
     says = f"{listed} {'says' if len(campaigns) == 1 else 'say'}"
     return _README.format(name=name, campaigns=says, first=f"data/{campaigns[0]}")
 

@@ -21,7 +21,7 @@ def describe_any(path: Path) -> dict[str, Any]:
     UserError
         If it is none of these, or cannot be read; the message says what to do with it.
     """
-    from mrpipe.campaigns.writing import CAMPAIGN_FILE
+    from mrpipe.campaigns.model import CAMPAIGN_FILE
     from mrpipe.reporting.contents import describe_file
 
     if path.is_dir():

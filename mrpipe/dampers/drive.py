@@ -7,9 +7,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import float64, int64, njit, void
+from numba import float64, njit
 
-from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.laws import LAW_SIZE, Law
 from mrpipe.dampers.plant import (
     CURRENT,
@@ -140,38 +140,3 @@ def coefficients(yield_force: Law, viscosity: Law, part: Law | None = None) -> S
         return polynomial_coefficients(yield_force.numbers, viscosity.numbers)
     last = np.zeros(LAW_SIZE) if part is None else part.packed
     return Step("drive-laws", Phase.COEFFICIENTS, laws_step, np.concatenate([*(law.packed for law in both), last]))
-
-
-@njit(void(float64[::1], int64[::1], float64[::1], float64, float64[::1]), cache=True)
-def _series(drive: FloatArray, starts: IntArray, dt: FloatArray, eta: float, result: FloatArray) -> None:
-    for test in range(starts.shape[0] - 1):
-        lagged = drive[starts[test]]
-        result[starts[test]] = lagged
-        for index in range(starts[test] + 1, starts[test + 1]):
-            lagged = advance_lag(lagged, drive[index - 1], drive[index], eta * dt[test])
-            result[index] = lagged
-
-
-def lag_series(drive: FloatArray, starts: IntArray, dt: FloatArray, eta: float) -> FloatArray:
-    """Return the effective drive [A or V], shape (n,), over concatenated recordings.
-
-    Parameters
-    ----------
-    drive
-        Shape (n,) [A or V].
-    starts
-        Shape (tests + 1,), see :func:`mrpipe.dampers.hysteresis.hysteresis_series`.
-    dt
-        Shape (tests,) [s].
-    eta
-        Rate of the lag [1/s].
-    """
-    result = np.empty(len(drive))
-    _series(
-        np.ascontiguousarray(drive, dtype=np.float64),
-        np.ascontiguousarray(starts, dtype=np.int64),
-        np.ascontiguousarray(dt, dtype=np.float64),
-        float(eta),
-        result,
-    )
-    return result

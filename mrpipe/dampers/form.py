@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.parameters import Parameter, Scales, Values
+from mrpipe.dampers.parameters import Parameter, Parametrised, Scales, Values
 from mrpipe.dampers.plant import Step
 
 
@@ -50,7 +50,7 @@ def fully_yielded(values: Values, at: Strength) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class BaseForm:
+class BaseForm(Parametrised):
     """One base form.
 
     Attributes
@@ -118,16 +118,6 @@ class BaseForm:
     def blocks(self) -> tuple[str, ...]:
         """Names of the laws of the drive, in order."""
         return ("yield_force", "c0", self.part) if self.part else ("yield_force", "c0")
-
-    @property
-    def searched(self) -> tuple[Parameter, ...]:
-        """Parameters that a fit searches."""
-        return tuple(item for item in self.parameters if item.role not in ("amplitude", "constant"))
-
-    @property
-    def amplitudes(self) -> tuple[Parameter, ...]:
-        """Parameters that a fit solves for."""
-        return tuple(item for item in self.parameters if item.role == "amplitude")
 
     def constants(self, scales: Scales) -> dict[str, float]:
         """Return the references that the scales of a campaign fix."""

@@ -17,9 +17,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import float64, int64, njit, void
+from numba import float64, int64, njit
 
-from mrpipe.artifacts import FloatArray, IntArray
+from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.parameters import Parameter, Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
 
@@ -286,55 +286,3 @@ def growing_hysteresis(
     """Return the Bouc-Wen hysteresis with x_y = yield_displacement (F_y/reference_force)^growth [m], [N]."""
     numbers = np.array([yield_displacement, gamma_share, exponent, growth, reference_force], dtype=np.float64)
     return Step("growing-hysteresis", Phase.HYSTERESIS, growing_hysteresis_step, numbers, state_size=3)
-
-
-@njit(void(float64[::1], int64[::1], float64, float64, float64, float64[::1]), cache=True)
-def _series(
-    displacement: FloatArray,
-    starts: IntArray,
-    yield_displacement: float,
-    gamma_share: float,
-    exponent: float,
-    result: FloatArray,
-) -> None:
-    for test in range(starts.shape[0] - 1):
-        zeta = 0.0
-        result[starts[test]] = 0.0
-        for index in range(starts[test] + 1, starts[test + 1]):
-            increment = displacement[index] - displacement[index - 1]
-            zeta = advance_hysteresis(zeta, increment, yield_displacement, gamma_share, exponent)
-            result[index] = zeta
-
-
-def hysteresis_series(
-    displacement: FloatArray,
-    starts: IntArray,
-    yield_displacement: float,
-    gamma_share: float = 0.5,
-    exponent: float = 2.0,
-) -> FloatArray:
-    """Return zeta, shape (n,), over concatenated recordings.
-
-    Parameters
-    ----------
-    displacement
-        Shape (n,) [m].
-    starts
-        Shape (tests + 1,): first sample of each recording, and n; zeta starts at 0 in each.
-    yield_displacement
-        Displacement at which the hysteresis yields [m].
-    gamma_share
-        gamma over gamma + beta [1].
-    exponent
-        n of Bouc-Wen [1].
-    """
-    result = np.empty(len(displacement))
-    _series(
-        np.ascontiguousarray(displacement, dtype=np.float64),
-        np.ascontiguousarray(starts, dtype=np.int64),
-        float(yield_displacement),
-        float(gamma_share),
-        float(exponent),
-        result,
-    )
-    return result

@@ -90,6 +90,28 @@ class Parameter:
         return tuple(start * unit for start in self.starts)
 
 
+class Parametrised:
+    """A form that is described by its parameters.
+
+    Attributes
+    ----------
+    parameters
+        Parameters of the form.
+    """
+
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def searched(self) -> tuple[Parameter, ...]:
+        """Parameters that a fit searches."""
+        return tuple(item for item in self.parameters if item.role not in ("amplitude", "constant"))
+
+    @property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """Parameters that a fit solves for."""
+        return tuple(item for item in self.parameters if item.role == "amplitude")
+
+
 def shape(
     name: str, unit: str, meaning: str, scale: str, lower: float, upper: float, starts: tuple[float, ...]
 ) -> Parameter:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from mrpipe.dampers.parameters import Parameter, Values, amplitude, shape, strength
+from mrpipe.dampers.parameters import Parameter, Parametrised, Values, amplitude, shape, strength
 from mrpipe.dampers.parameters import Scales as EffectScales
 from mrpipe.dampers.plant import Step
 
@@ -47,7 +47,7 @@ TESTS_FOR: Mapping[Needs, TestKind] = {
 
 
 @dataclass(frozen=True)
-class EffectForm:
+class EffectForm(Parametrised):
     """One functional shape of an effect.
 
     Attributes
@@ -70,16 +70,6 @@ class EffectForm:
     steps: Callable[[Values], list[Step]]
     amplitude_steps: Mapping[str, int] = field(default_factory=dict)
     dissipative: bool = False
-
-    @property
-    def searched(self) -> tuple[Parameter, ...]:
-        """Parameters that a fit searches."""
-        return tuple(item for item in self.parameters if item.role not in ("amplitude", "constant"))
-
-    @property
-    def amplitudes(self) -> tuple[Parameter, ...]:
-        """Parameters that are solved for."""
-        return tuple(item for item in self.parameters if item.role == "amplitude")
 
     def without_strength(self, scales: EffectScales) -> dict[str, float]:
         """Return values at which nothing changes: strengths and amplitudes 0, shapes at their first start."""

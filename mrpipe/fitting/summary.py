@@ -13,6 +13,7 @@ from mrpipe.fitting.comparison import Comparison, JudgedFit
 from mrpipe.fitting.drive_laws import law_values
 from mrpipe.fitting.form_fit import FormFit
 from mrpipe.fitting.start import distinct_levels
+from mrpipe.words import counted
 
 
 def parameter_table(fit: FormFit) -> dict[str, dict[str, Any]]:
@@ -130,7 +131,7 @@ def findings(fit: FormFit) -> list[str]:
     lines += [f"{fit.form.name}: {name} ended at its bound, because the data do not determine it" for name in silent]
     levels = distinct_levels(problem.recordings)
     if levels < 4:
-        count = "1 level" if levels == 1 else f"{levels} levels"
+        count = counted(levels, "level")
         lines.append(f"{count} of drive: as a function of the drive the yield force is {problem.base.laws[0].name}")
     drive = np.linspace(0.0, problem.scales.drive, 50)
     strength = fit.model.yield_force(drive)

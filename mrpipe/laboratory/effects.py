@@ -201,8 +201,6 @@ FORMS: tuple[Form, ...] = (
 # fmt: on
 EFFECT_NAMES = tuple(dict.fromkeys(form.effect for form in FORMS if form.effect != "unfamiliar"))
 """The effects of docs/effects.md that can be planted in a damper."""
-UNFAMILIAR_FORMS = tuple(form.form for form in FORMS if form.effect == "unfamiliar")
-"""Shapes that belong to no family."""
 
 
 def find_form(effect: str, form: str = "", *, source: str = "laboratory.effects") -> Form:

@@ -335,7 +335,7 @@ def frame_tests(campaign: Campaign) -> FrameTests:
     UserError
         If the rig is not a shear-frame, no test is forced or ambient, or masses are too few or not positive.
     """
-    source = campaign.directory / "campaign.yaml"
+    source = campaign.file
     if campaign.rig != "shear-frame":
         raise UserError(source, "rig", f"is {campaign.rig!r}", "identify-frame needs a campaign of a shear-frame")
     used = [item for item in campaign.recordings if item.kind in {"sweep", "random", "ambient"}]

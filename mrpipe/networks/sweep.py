@@ -27,6 +27,7 @@ from mrpipe.networks.problem import Problem
 from mrpipe.networks.scaling import NORMALISATION, Normalisation, scaling_of
 from mrpipe.networks.stopping import StoppingRules
 from mrpipe.networks.training import in_parallel, initial_parameters
+from mrpipe.words import duration
 
 Crossings = Callable[[Mapping[Candidate, float]], list[Candidate]]
 """Function from the errors of the screened candidates to further candidates."""
@@ -128,7 +129,7 @@ def sweep(
     more = f" and up to {further} combinations of the best" if further else ""
     cores = "1 free core" if jobs <= 1 else f"{jobs} free cores"
     more += f" ({sum(kept)} screened by an earlier run)" if any(kept) else ""
-    tell(f"{len(candidates)} candidates{more} x {options.starts} starts: about {readable(predicted)} on {cores}")
+    tell(f"{len(candidates)} candidates{more} x {options.starts} starts: about {duration(predicted)} on {cores}")
     middle = screening / max(screening + refining, 1e-9)
 
     def screen_all(wanted: Sequence[Candidate], text: str, part: Progress) -> list[_Fits]:
@@ -179,13 +180,6 @@ def _mean(errors: FloatArray) -> float:
     return float(np.mean(np.log(errors)))
 
 
-def readable(seconds: float) -> str:
-    """Return a duration in a readable unit, such as 45 s, 12 min or 3.2 h."""
-    if seconds < 120.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
-
-
 def _pass(
     work: Callable[[int], _Fits], count: int, jobs: int, progress: Progress, text: str, known: int = 0
 ) -> list[_Fits]:
@@ -195,7 +189,7 @@ def _pass(
     def timed(fraction: float, message: str = "") -> None:
         fresh = round(fraction * count) - known
         if fresh > 0:
-            message += f", {readable((time.perf_counter() - began) * (count - known - fresh) / fresh)} left"
+            message += f", {duration((time.perf_counter() - began) * (count - known - fresh) / fresh)} left"
         progress(fraction, message)
 
     return list(in_parallel(work, count, jobs, timed, text))  # type: ignore[arg-type]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
+from mrpipe.words import listed
 
 AFTER = COLOURS[0]
 """Colour of the model with the effects."""
@@ -214,7 +215,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         return f"{start} {summary['verdict'][:1].upper()}{summary['verdict'][1:]}."
     if not effects:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
-        depends = f" It varies with {_listed(states)}." if states else ""
+        depends = f" It varies with {listed(states)}." if states else ""
         form = _base_form_in_words(summary.get("base_form") or {})
         reached = f" The error is then {_percent(after)}." if form and not flexible else ""
         unproven = _unproven_in_words(summary.get("further_terms", []))
@@ -231,8 +232,8 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     end += _unproven_in_words(summary.get("further_terms", []))
     if summary["unexplained"]["structured"]:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
-        end += f" Something is still unexplained{'; it varies with ' + _listed(states) if states else ''}."
-    names = _listed([f"**{effect['name']}**" for effect in effects])
+        end += f" Something is still unexplained{'; it varies with ' + listed(states) if states else ''}."
+    names = listed([f"**{effect['name']}**" for effect in effects])
     return f"{start} The model lacks {names}. {' '.join(parts)} {end}{added}"
 
 
@@ -265,14 +266,14 @@ def _base_form_in_words(found: Mapping[str, Any]) -> str:
 def _unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
     if not terms:
         return ""
-    names = _listed([f"{item['name']} ({item['form']}, probability {item['confidence']:.2f})" for item in terms])
+    names = listed([f"{item['name']} ({item['form']}, probability {item['confidence']:.2f})" for item in terms])
     rest = (
         "lowers the error and is part of the model, but is not proven"
         if len(terms) == 1
         else ("lower the error and are part of the model, but are not proven")
     )
     rivals = sorted({name for item in terms for name in item["tied_with"]})
-    return f" In addition, {names} {rest}{f' against {_listed(rivals)}' if rivals else ''}."
+    return f" In addition, {names} {rest}{f' against {listed(rivals)}' if rivals else ''}."
 
 
 def _effect_in_words(effect: Mapping[str, Any]) -> str:
@@ -288,14 +289,10 @@ def _effect_in_words(effect: Mapping[str, Any]) -> str:
         text += f" Source of the law: {effect['source']}."
     if effect["tied_with"]:
         tests = "; ".join(f"{k}: {v}" for k, v in effect.get("separating_tests", {}).items())
-        text += f" These tests do not separate it from {_listed(effect['tied_with'])}{f' ({tests})' if tests else ''}."
+        text += f" These tests do not separate it from {listed(effect['tied_with'])}{f' ({tests})' if tests else ''}."
     if effect.get("corrected_in") == "prepare":
         text += " It is a fault of sensors: corrections.yaml takes it out in prepare, it does not go into the damper."
     return text
-
-
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
 
 
 def _percent(share: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mrpipe.reporting.words import listed
+from mrpipe.words import listed
 
 WHEN = ("before", "after", "recalibrated")
 """How a law was simulated."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mrpipe.reporting.words import duration
+from mrpipe.words import duration
 
 
 def headline(stage: str, summary: Mapping[str, Any]) -> str:

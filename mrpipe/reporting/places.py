@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mrpipe.words import counted
+
 _FLOOR = re.compile(r"^floor (\d+)(?: (\S+))?$")
 _MODE = re.compile(r"^mode \d+$")
 ROTATION = "rotation"
@@ -52,11 +54,11 @@ def is_chain(names: Sequence[str]) -> bool:
 def size_in_words(names: Sequence[str]) -> str:
     """Return how large a structure is, such as `5 floors` or `2 floors with 6 degrees of freedom`."""
     found = by_direction(names)
-    freedoms = f"{len(names)} degree{'s' if len(names) > 1 else ''} of freedom"
+    freedoms = f"{counted(len(names), 'degree')} of freedom"
     if found is None:
         return freedoms
     floors = sorted({floor for places in found.values() for floor in places})
-    count = f"{len(floors)} floor{'s' if len(floors) > 1 else ''}"
+    count = counted(len(floors), "floor")
     if is_chain(names):
         return count
     # floors may be missing, as after a reduction

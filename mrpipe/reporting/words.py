@@ -66,20 +66,6 @@ def with_interval(value: float, low: float, high: float, unit: str) -> str:
     return f"{shown[0]}{' ' + name if name else ''} ({shown[1]} to {shown[2]})"
 
 
-def listed(names: list[str]) -> str:
-    """Return `a`, `a and b`, `a, b and c`."""
-    if len(names) < 2:
-        return "".join(names)
-    return f"{', '.join(names[:-1])} and {names[-1]}"
-
-
 def plain(name: str) -> str:
     """Return an identifier as words."""
     return name.replace("_", " ").replace("-", " ")
-
-
-def duration(seconds: float) -> str:
-    """Return a time as people say it: 45 s, 12 min, 3.2 h."""
-    if seconds < 120.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"

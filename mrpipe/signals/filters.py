@@ -88,11 +88,6 @@ def resample(values: FloatArray, from_hz: float, to_hz: float) -> FloatArray:
     )
 
 
-def decimate(values: FloatArray, factor: int) -> FloatArray:
-    """Return every `factor`-th sample after a zero-phase anti-aliasing filter, shape (ceil(n / factor),)."""
-    return resample(values, float(factor), 1.0)
-
-
 def advance(values: FloatArray, seconds: float, sampling_rate_hz: float) -> FloatArray:
     """Return `values` at times later by `seconds` (cubic interpolation), with constant values beyond the ends."""
     if seconds == 0.0:

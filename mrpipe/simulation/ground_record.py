@@ -16,7 +16,7 @@ from mrpipe.campaigns.readers.strong_motion import (
     refuse_other_records,
 )
 from mrpipe.errors import UserError
-from mrpipe.units import conversion, to_si
+from mrpipe.units import bracketed_units, conversion, same_dimension, to_si
 
 HORIZONTAL = 2
 """Largest number of horizontal channels of a record that are used if none is named."""
@@ -27,7 +27,6 @@ UNIFORM_SHARE = 0.9
 LONGEST_GAP = 10.0
 """Longest step of the clock of a recorder over its usual one; a longer one is a gap in the record."""
 
-_BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]")
 _DECIMAL_COMMA = re.compile(r"^[+-]?\d+,\d+([eE][+-]?\d+)?$")
 
 
@@ -166,10 +165,8 @@ def _require_clock(path: Path, time_s: FloatArray) -> None:
 def _require_unit(path: Path, headers: Sequence[str], unit: str, quantity: str, unit_setting: str) -> None:
     """Refuse a unit that a header contradicts, as in `acceleration [g]`."""
     wanted = conversion(unit, where=unit_setting, quantity=quantity)
-    for said in (found for line in headers for found in _BRACKETS.findall(line)):
-        try:
-            factor = conversion(said.strip(), quantity=quantity)
-        except UserError:
-            continue  # another quantity, such as the time, or a remark
-        if not np.isclose(factor, wanted, rtol=1e-3):
-            raise UserError(unit_setting, unit, f"is not the unit that the header of {path} says", f"set it to {said}")
+    for stated in (found.unit for line in headers for found in bracketed_units(line)):
+        # a header also states units of other quantities, such as that of the time
+        if same_dimension(stated, quantity) and not np.isclose(conversion(stated), wanted, rtol=1e-3):
+            problem = f"is not the unit that the header of {path} states"
+            raise UserError(unit_setting, unit, problem, f"set it to {stated}")

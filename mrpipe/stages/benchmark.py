@@ -112,11 +112,12 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.base_isolated import study as bench
     from mrpipe.case_studies.base_isolated.structure import building_of
     from mrpipe.case_studies.inverse import train_inverse
+    from mrpipe.case_studies.laws import require_known
     from mrpipe.case_studies.motion import SEVEN_MOTIONS, load_motion
     from mrpipe.thesis.entries import printed_columns
 
     settings = context.settings.benchmark.base_isolated
-    bench.check_laws(settings.laws)
+    require_known(settings.laws, bench.STRUCTURE)
     device = _bingham(settings.damper)
     building = building_of(
         settings.model,
@@ -182,13 +183,14 @@ def _wind_load(context: StageContext, settings: Any) -> WindLoad:
 
 def _wind(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.inverse import train_inverse
+    from mrpipe.case_studies.laws import require_known
     from mrpipe.case_studies.wind import report
     from mrpipe.case_studies.wind import study as bench
     from mrpipe.case_studies.wind.structure import DEFAULT_CAPACITIES, DEFAULT_DAMPERS, place_device, tower_of
     from mrpipe.thesis.entries import printed_columns
 
     settings = context.settings.benchmark.wind
-    bench.check_laws(settings.laws)
+    require_known(settings.laws, bench.STRUCTURE)
     device = _bingham(settings.damper)
     reference = tower_of(settings.model, settings.surrogate)
     load = _wind_load(context, settings.load)

@@ -84,11 +84,6 @@ def _before(stage: Stage, known: Mapping[str, Stage]) -> set[str]:
     return {name for name in names if name in known and name != stage.name}
 
 
-def all_variants() -> tuple[Stage, ...]:
-    """Return the stages that may take the place of another one and declare it in `VARIANTS` of their module."""
-    return tuple(stage for module in _modules() for stage in getattr(module, "VARIANTS", ()))
-
-
 def stages_for(configuration: RunSettings, given: str = "") -> dict[str, Stage]:
     """Return the stages that suit a configuration.
 

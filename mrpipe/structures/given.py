@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,15 +22,13 @@ from mrpipe.structures.given_checks import (
 )
 from mrpipe.structures.options import MatrixEntry, StoreyColumn, StructureSettings
 from mrpipe.structures.shear_frames import frame_from_modes, frame_from_parameter_set, modal_damping_matrix, shear_frame
-from mrpipe.units import conversion, same_unit_dimension
+from mrpipe.units import bracketed_units, conversion, same_unit_dimension
+from mrpipe.words import counted
 
 Reader = Callable[[Path, str], Any]
 """Function from a file and the name of a variable (empty: the only table) to the content of the variable."""
 
 _GROUND = ("ground", "0")
-
-_UNIT_IN_NAME = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
-"""A unit in brackets at the end of the name of a column."""
 
 
 def structure_from_settings(
@@ -138,14 +135,10 @@ def _column(key: str, column: StoreyColumn, file: str, read: Reader, si: str) ->
 
 
 def _unit_of_column(column: StoreyColumn, where: str) -> str:
-    """Return the unit of a column, which its name may state in brackets; empty: neither says."""
-    found = _UNIT_IN_NAME.search(column.name)
-    named = found.group(1).strip() if found and not column.values else ""
-    try:
-        factor = conversion(named) if named else 0.0
-    except UserError:
-        return column.unit  # a remark in brackets
-    if column.unit and named and not math.isclose(conversion(column.unit, where=f"{where}.unit"), factor):
+    """Return the unit of a column, which its name may end with in brackets; empty if neither states it."""
+    found = [] if column.values else bracketed_units(column.name)
+    named = found[-1].unit if found and not column.name[found[-1].end :].strip() else ""
+    if column.unit and named and not math.isclose(conversion(column.unit, where=f"{where}.unit"), conversion(named)):
         problem = f"is {column.unit}, and the column is called {column.name!r}"
         raise UserError(where, "unit", problem, f"give {named}, or correct the name of the column")
     return column.unit or named
@@ -316,7 +309,7 @@ def _condensed(frame: Frame, places: IntArray, gone: IntArray, static: FloatArra
     """Return a sentence that says what was condensed, and whether that is exact."""
     names = [frame.names[place] for place in gone]
     listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
-    count = f"{len(names)} degree{'s' if len(names) > 1 else ''} of freedom without mass"
+    count = f"{counted(len(names), 'degree')} of freedom without mass"
     # forces of the dashpots on them while they follow statically
     left = frame.damping[np.ix_(gone, places)] + frame.damping[np.ix_(gone, gone)] @ static
     if np.max(np.abs(left)) > 1e-6 * max(float(np.max(np.abs(frame.damping))), 1e-300):

@@ -1,8 +1,7 @@
 """Reduction of a large structure: static condensation, Craig-Bampton, modal and balanced truncation.
 
-All methods except :func:`balanced`, which truncates a state space, return a structure with M, C, K and an influence
-vector. The error of a reduction is the largest deviation of the frequency response to ground motion, at the retained
-degrees of freedom, relative to the largest response.
+All methods return a structure with M, C, K and an influence vector. The error of a reduction is the largest deviation
+of the frequency response to ground motion, at the retained degrees of freedom, relative to the largest response.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, eigh, null_space, solve_continuous_lyapunov, solve_triangular, svd
+from scipy.linalg import cholesky, eigh, null_space, solve_continuous_lyapunov, solve_triangular
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError
@@ -212,41 +211,6 @@ def reduced_structure(frame: Frame, settings: ReductionSettings) -> Reduced:
     return modal(frame, settings.modes, kept, high)
 
 
-def balanced(space: StateSpace, outputs: FloatArray, order: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Return the balanced truncation of a stable system with x' = A x + B u, y = C x (Moore 1981).
-
-    Parameters
-    ----------
-    space
-        The system; A must be stable.
-    outputs
-        C, shape (p, 2n).
-    order
-        Number of retained states.
-
-    Returns
-    -------
-    A, B, C of the reduced system, and the bound of the error: twice the sum of the truncated Hankel singular values,
-    divided by the largest value.
-
-    Raises
-    ------
-    UserError
-        If the system is not stable.
-    """
-    _require_stable(space)
-    controllable = solve_continuous_lyapunov(space.A, -space.B @ space.B.T)
-    observable = solve_continuous_lyapunov(space.A.T, -outputs.T @ outputs)
-    left, right = _root(controllable), _root(observable)
-    U, hankel, Vt = svd(right.T @ left)
-    order = min(order, int(np.sum(hankel > 1e-12 * hankel[0])))
-    scale = 1.0 / np.sqrt(hankel[:order])
-    into = left @ Vt[:order].T * scale
-    back = (right @ U[:, :order] * scale).T
-    bound = 2.0 * float(np.sum(hankel[order:])) / float(hankel[0])
-    return back @ space.A @ into, back @ space.B, outputs @ into, bound
-
-
 def _require_stable(space: StateSpace) -> None:
     poles = np.linalg.eigvals(space.A)
     if np.max(poles.real) >= -1e-9 * np.max(np.abs(poles)):
@@ -321,13 +285,3 @@ def _projected(frame: Frame, basis: FloatArray, kept: Sequence[int], band_high_h
         band_high_hz = max(0.5 * float(omega[-1]), BEYOND_FIRST * float(omega[0])) / (2.0 * math.pi)
     error = frequency_error(frame, reduced, basis, kept, band_high_hz)
     return Reduced(reduced, basis, tuple(kept), error, band_high_hz)
-
-
-def _root(gramian: FloatArray) -> FloatArray:
-    """Return L with L L' = gramian, even if rounding makes the gramian slightly indefinite."""
-    symmetric = 0.5 * (gramian + gramian.T)
-    try:
-        return np.asarray(cholesky(symmetric, lower=True))
-    except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(symmetric)
-        return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

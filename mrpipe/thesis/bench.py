@@ -29,7 +29,6 @@ OMEGA = 8.0
 SWITCH_N = 18.0
 LAWS = ("vd", "vdps", "vdns", "fdns")
 CYCLES = 40
-SETTLING = 20
 DECAY_S = 6.0
 
 

@@ -25,6 +25,30 @@ or tests. `equivalent`: all values in it fit about as well. `point`: the uncerta
 
 
 @dataclass(frozen=True)
+class Score:
+    """Errors of one model on validation tests, of a damper or of a structure.
+
+    Attributes
+    ----------
+    nrmse
+        RMS error over the RMS of the measured force, pooled over the tests [1].
+    fit_percent
+        100 (1 - e), where e is the norm of the error over the norm of the measured force [percent]. The mean of the
+        force of a damper is removed before its norm is taken.
+    by_test
+        Name of the test -> NRMSE [1].
+    """
+
+    nrmse: float
+    fit_percent: float
+    by_test: Mapping[str, float]
+
+    def as_json(self) -> dict[str, float]:
+        """Return the pooled errors as JSON."""
+        return {"nrmse": self.nrmse, "fit_percent": self.fit_percent}
+
+
+@dataclass(frozen=True)
 class Interval:
     """An interval of a number.
 
@@ -203,11 +227,11 @@ class Unexplained:
     structured
         Whether more than noise remains.
     share
-        Share of the squared residual before that remains.
+        Share of the squared residual of the base model that remains.
     depends_on
         (state, share of the residual's variance that it explains), largest first.
     whiteness_p_value
-        Probability that its autocorrelation is due to chance; None if it was not tested.
+        Probability that white noise has an autocorrelation as large as the residual; None if it was not tested.
     tests
         Names of the validation tests on which it remains, the worst first; None if tests were not judged one by one.
     """

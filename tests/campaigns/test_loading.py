@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrpipe.campaigns import load_campaign, require_varying_drive
+from mrpipe.campaigns import load_campaign, require_varying
 from mrpipe.errors import UserError
+from mrpipe.modal.records import frame_tests
 from tests.campaigns.builders import CHANNELS, campaign, content, motion, write_csv
 
 
@@ -263,6 +264,16 @@ def test_a_mass_driver_needs_its_mass(tmp_path: Path) -> None:
         load_campaign(tmp_path)
 
 
+@pytest.mark.property
+@pytest.mark.parametrize("name", ["campaign.yaml", "own-rig.yaml"])
+def test_messages_name_the_campaign_file_that_was_read(tmp_path: Path, name: str) -> None:
+    campaign(tmp_path).joinpath("campaign.yaml").rename(tmp_path / name)
+    loaded = load_campaign(tmp_path / name)
+    assert loaded.file == tmp_path / name
+    with pytest.raises(UserError, match=f"{name}: rig"):
+        frame_tests(loaded)
+
+
 @pytest.mark.planted
 def test_clipping_dropouts_and_jitter_are_reported(tmp_path: Path) -> None:
     columns = motion()
@@ -318,11 +329,13 @@ def test_printed_times_are_no_jitter(tmp_path: Path) -> None:
 
 @pytest.mark.golden
 def test_an_inverse_model_needs_a_drive_that_changes(tmp_path: Path) -> None:
+    constant = load_campaign(campaign(tmp_path / "a"))
     with pytest.raises(UserError, match=r"drive: never changes in the training tests \(1\)"):
-        require_varying_drive(load_campaign(campaign(tmp_path / "a")))
+        require_varying({test.name: test.used("drive") for test in constant.with_role("training")}, "a")
     columns = motion()
     columns["i"] = columns["i"] * np.abs(np.sin(2 * np.pi * columns["t"]))
-    require_varying_drive(load_campaign(campaign(tmp_path / "b", columns)))
+    varying = load_campaign(campaign(tmp_path / "b", columns))
+    require_varying({test.name: test.used("drive") for test in varying.with_role("training")}, "b")
 
 
 FRAME = {

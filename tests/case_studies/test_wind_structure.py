@@ -22,12 +22,10 @@ from mrpipe.case_studies.wind.load import (
 )
 from mrpipe.case_studies.wind.structure import (
     HEIGHT_M,
-    REDUCED_FLOORS,
     WIDTH_M,
     Tower,
     condensed_cantilever,
     published_tower,
-    reduced_model,
     surrogate_tower,
     with_outrigger,
     with_tuned_mass,
@@ -99,25 +97,6 @@ def test_uniform_cantilever_converges_to_bernoulli_euler() -> None:
     force = np.zeros(40)
     force[-1] = 1.0
     assert np.linalg.solve(K, force)[-1] == pytest.approx(20.0**3 / (3.0 * 2e9), rel=1e-6)
-
-
-@pytest.mark.property
-@pytest.mark.parametrize("position", ["ground", "outrigger"])
-def test_reduced_model_keeps_the_modes_and_the_floors(tower: Tower, position: str) -> None:
-    placed = tower if position == "ground" else with_outrigger(tower, 40, 21.0)
-    full, kept = modal_model(placed.model), modal_model(placed.model, 23)
-    reduced = reduced_model(kept)
-    assert reduced.A.shape == (46, 46)
-    assert reduced.B.shape == (46, 1)
-    assert reduced.E.shape == (46, 76)
-    poles = np.linalg.eigvals(reduced.A)
-    sizes = np.sort(np.abs(poles[poles.imag > 0.0]))
-    np.testing.assert_allclose(sizes, full.angular_frequencies[:23], rtol=1e-4)
-    # an eigenvector of a kept mode is that mode at the 23 floors
-    vectors = np.linalg.eig(reduced.A)[1]
-    first = vectors[:23, np.argmin(np.abs(np.abs(poles) - full.angular_frequencies[0]))]
-    shape = full.shapes[np.array(REDUCED_FLOORS) - 1, 0]
-    np.testing.assert_allclose((first / first[-1]).real, shape / shape[-1], rtol=1e-5)
 
 
 @pytest.mark.literature

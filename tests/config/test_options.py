@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import re
 from pathlib import Path
 
 import pytest
 
+import mrpipe.stages
 from mrpipe.config.model import config_model, options
-from mrpipe.stages.registry import all_stages, all_variants
+from mrpipe.pipeline.stage import Stage
+from mrpipe.stages.registry import all_stages
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "mrpipe"
@@ -31,10 +35,17 @@ def _source() -> str:
 SOURCE = _source()
 
 
+def _variants() -> list[Stage]:
+    """Return the stages that may take the place of another one."""
+    names = [item.name for item in pkgutil.iter_modules(mrpipe.stages.__path__)]
+    modules = [importlib.import_module(f"mrpipe.stages.{name}") for name in names]
+    return [stage for module in modules for stage in getattr(module, "VARIANTS", ())]
+
+
 def _read_by(name: str) -> list[str]:
     return [
         stage.name
-        for stage in (*all_stages().values(), *all_variants())
+        for stage in (*all_stages().values(), *_variants())
         if any(name == item or name.startswith((f"{item}.", f"{item}[")) for item in stage.settings)
     ]
 

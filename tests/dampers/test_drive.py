@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lsim
 
-from mrpipe.dampers.drive import advance_lag, driver_lag, driver_lag_apart, lag_series, polynomial_coefficients
+from mrpipe.dampers.drive import advance_lag, driver_lag, driver_lag_apart, polynomial_coefficients
 from mrpipe.dampers.plant import CURRENT, VISCOSITY, YIELD_FORCE, build_chain, run_chain
+from tests.dampers.series import lag_series
 
 numbers = st.floats(-5.0, 5.0)
 
@@ -32,7 +33,7 @@ def test_the_lag_agrees_with_scipys_first_order_hold():
     times = np.arange(0.0, 1.0, 1e-3)
     drive = 4.0 * np.abs(np.sin(2 * np.pi * 2.2 * times + 0.3))
     _, expected, _ = lsim(([[-100.0]], [[100.0]], [[1.0]], [[0.0]]), drive, times, X0=[drive[0]], interp=True)
-    lagged = lag_series(drive, np.array([0, len(times)]), np.array([1e-3]), 100.0)
+    lagged = lag_series(drive, 1e-3, 100.0)
     np.testing.assert_allclose(lagged, expected, atol=1e-11)
 
 
@@ -59,6 +60,6 @@ def test_steps_write_what_the_polynomials_give():
     chain = build_chain([polynomial_coefficients([1.0, 2.0, 3.0, -0.5], [10.0, 4.0]), driver_lag(80.0)])
     wires = run_chain(chain, zero, zero, zero, drive, 1e-3)
     u = wires[:, CURRENT]
-    np.testing.assert_array_equal(u, lag_series(drive, np.array([0, 50]), np.array([1e-3]), 80.0))
+    np.testing.assert_array_equal(u, lag_series(drive, 1e-3, 80.0))
     np.testing.assert_allclose(wires[:, YIELD_FORCE], 1.0 + 2.0 * u + 3.0 * u**2 - 0.5 * u**3, rtol=1e-13)
     np.testing.assert_allclose(wires[:, VISCOSITY], 10.0 + 4.0 * u, rtol=1e-13)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mrpipe.dampers.drive import polynomial_coefficients
+from mrpipe.dampers.form import Strength
 from mrpipe.dampers.library import base_form
 from mrpipe.dampers.plant import FORCE, build_chain, run_chain
 from mrpipe.dampers.series_valve import EYRING, HERSCHEL_BULKLEY, flow_velocity, viscous_velocity, yield_share
@@ -34,6 +35,27 @@ def test_the_velocity_of_the_valve_solves_its_equation(law, load, weight, start,
     viscous = viscosity * viscous_velocity(law, q, scale, reference, power)
     left = strength * yield_share(law, q, scale, reference) + viscous + weight * q - load
     assert abs(left) <= 1e-5 * max(abs(load), 1e-9)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(("form", "law"), [("herschel-bulkley-spring", HERSCHEL_BULKLEY), ("eyring-spring", EYRING)])
+@given(
+    speed=st.floats(0.0, 10.0),
+    scale=st.floats(1e-4, 2.0),
+    reference=st.floats(1e-2, 2.0),
+    power=st.floats(0.1, 2.0),
+    strength=st.floats(0.0, 1e5),
+    viscosity=st.floats(0.0, 1e5),
+)
+def test_post_yield_force_of_an_inverse_is_that_of_the_valve(
+    form, law, speed, scale, reference, power, strength, viscosity
+):
+    values = {"velocity_scale": scale, "velocity_exponent": power, "reference_velocity": reference}
+    zero = np.zeros(1)
+    at = Strength(zero + speed, zero, zero + strength, zero + viscosity, zero)
+    plastic = strength * yield_share(law, speed, scale, reference)
+    viscous = viscosity * viscous_velocity(law, speed, scale, reference, power)
+    assert base_form(form).post_yield(values, at)[0] == pytest.approx(plastic + viscous, rel=1e-12)
 
 
 def forces(form: str, values: dict[str, float], other: str, other_values: dict[str, float]) -> list[np.ndarray]:

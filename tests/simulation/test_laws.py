@@ -10,8 +10,8 @@ from mrpipe.networks.assembly import join
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
 from mrpipe.simulation import LoopOptions, SensorNoise
-from mrpipe.thesis.entries import loop_columns
 from tests.networks.rig import bench_test
+from tests.thesis.columns import loop_columns
 
 LAWS = ("vd", "vdps", "vdns", "fdns", "nnc", "lqg", "passive-off", "passive-on")
 """Laws of the thesis; the further ones switch, and tests/control/laws holds them to their formulas."""

@@ -13,7 +13,7 @@ from mrpipe.errors import UserError
 from mrpipe.structures import natural_modes, read_frame, shear_frame, state_space
 from mrpipe.structures.frame import write_frame
 from mrpipe.structures.options import ReductionSettings
-from mrpipe.structures.reduction import balanced, balanced_structure, craig_bampton, guyan, modal, reduced_structure
+from mrpipe.structures.reduction import balanced_structure, craig_bampton, guyan, modal, reduced_structure
 
 FRAME = shear_frame(np.full(12, 100.0), np.linspace(9e5, 4e5, 12), 0.02)
 KEPT = (2, 5, 8, 11)
@@ -59,23 +59,6 @@ def test_the_stated_error_is_that_of_the_response() -> None:
     assert fine.error < 0.1 * coarse.error
 
 
-@pytest.mark.oracle
-def test_balanced_truncation_keeps_its_bound() -> None:
-    space = state_space(FRAME)
-    outputs = np.hstack([np.eye(12), np.zeros((12, 12))])[[11]]
-    A, B, C, bound = balanced(space, outputs, 8)
-    assert np.max(np.linalg.eigvals(A).real) < 0.0
-    omega = np.linspace(1.0, 200.0, 400)
-
-    def gain(a, b, c):  # type: ignore[no-untyped-def]
-        return np.array([(c @ np.linalg.solve(1j * w * np.eye(len(a)) - a, b))[0, 0] for w in omega])
-
-    full, small = gain(space.A, space.B[:, :1], outputs), gain(A, B[:, :1], C)
-    hankel_largest = 0.5 * np.max(np.abs(full))
-    assert np.max(np.abs(full - small)) < 3.0 * bound * hankel_largest
-    assert np.max(np.abs(full - small)) < 0.05 * np.max(np.abs(full))
-
-
 @pytest.mark.property
 def test_mistakes() -> None:
     for kept in ((), tuple(range(12)), (1, 1)):
@@ -83,7 +66,7 @@ def test_mistakes() -> None:
             guyan(FRAME, kept)
     undamped = shear_frame([1.0, 1.0], [10.0, 10.0], 0.0)
     with pytest.raises(UserError, match="stable"):
-        balanced(state_space(undamped), np.eye(4), 2)
+        balanced_structure(undamped, (0,), 2)
 
 
 @pytest.mark.property

@@ -11,7 +11,8 @@ import pytest
 
 from mrpipe.thesis.claim import Missing, Value, deviation, judge, rule_text
 from mrpipe.thesis.document import as_markdown, counted
-from mrpipe.thesis.entries import RULES, Entry, all_entries, loop_columns, printed_columns, printed_gains, tables
+from mrpipe.thesis.entries import RULES, Entry, all_entries, printed_columns, printed_gains, tables
+from tests.thesis.columns import loop_columns
 
 ROOT = Path(__file__).resolve().parents[2]
 NUMBERS = {

@@ -43,20 +43,6 @@ GROUND = {
     *("ground", "base", "table", "shaker", "shaking", "tisch", "boden", "fundament", "sol", "suelo", "mesa", "input"),
     *("terreno", "basis", "rutteltisch", "excitation", "g", "grnd", "basement", "bsmt", "footing", "foundation"),
 }
-FLOOR = {
-    "floor",
-    "storey",
-    "story",
-    "level",
-    "etage",
-    "stockwerk",
-    "geschoss",
-    "piso",
-    "andar",
-    "piano",
-    "decke",
-    "lvl",
-}
 TOP = {"top", "roof", "dach", "techo", "tetto", "toit"}
 COMMAND = {
     *("command", "cmd", "soll", "set", "setpoint", "ref", "reference", "target", "nominal", "consigne", "desired"),
@@ -64,7 +50,6 @@ COMMAND = {
 }
 DAMPER = {"damper", "dampfer", "mr", "amortisseur", "amortiguador", "smorzatore", "tlumik"}
 
-_BRACKETS = re.compile(r"[\[({<]([^\[\](){}<>]*(?:\([^()]*\))?[^\[\](){}<>]*)[\])}>]")
 _TAIL = re.compile(r"(?:\s+in\s+|[/_\s])([A-Za-zµμ²³^/0-9*]{1,8})$")
 _LETTERS = {"α": "a", "β": "b", "δ": "d", "ł": "l", "ø": "o", "ß": "ss", "²": "2", "³": "3"}
 
@@ -135,10 +120,9 @@ def unit_quantity(unit: str) -> str:
 
 def _unit_of(text: str) -> tuple[str, str]:
     """Return the unit in a header and the header without it."""
-    for found in reversed(list(_BRACKETS.finditer(text))):
-        unit = found[1].strip()
-        if unit and unit_quantity(unit):
-            return unit, text[: found.start()] + text[found.end() :]
+    for found in reversed(units.bracketed_units(text)):
+        if unit_quantity(found.unit):
+            return found.unit, text[: found.start] + text[found.end :]
     tail = _TAIL.search(text.strip())
     # `a_g` is the acceleration of the ground, not one in g
     if tail and tail[0] != "_g" and unit_quantity(tail[1]) and tail.start() > 0:

@@ -20,7 +20,6 @@ from mrpipe.structures import Frame
 from mrpipe.structures.given_storage import read_matrix
 
 FLOORS = 8
-BEARINGS = 92
 BEARING_STIFFNESS = 919.422e3
 """N/m of one linear bearing of the published building."""
 BEARING_VISCOSITY = 27.717e3

@@ -12,7 +12,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.base_isolated.design import IsolationGains, isolation_gains, isolation_lqg
 from mrpipe.case_studies.base_isolated.structure import FLOORS, IsolatedBuilding
 from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
-from mrpipe.case_studies.laws import controller_of, require_known
+from mrpipe.case_studies.laws import controller_of
 from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
 from mrpipe.case_studies.options import LqgWeights
@@ -32,11 +32,6 @@ REASON = (
 
 STRUCTURE = "the base-isolated building"
 """What messages call it."""
-
-
-def check_laws(laws: Sequence[str]) -> None:
-    """Raise UserError if one of them is not in :data:`~mrpipe.case_studies.laws.LAWS`."""
-    require_known(laws, STRUCTURE)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import least_squares
 
 from mrpipe.artifacts import FloatArray, ParameterSet, load_parameter_set
-from mrpipe.case_studies.model import BenchmarkModel, ModalModel, Origin, published_frame
+from mrpipe.case_studies.model import BenchmarkModel, Origin, published_frame
 from mrpipe.case_studies.public_files import named_file
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame
@@ -285,49 +285,3 @@ def place_device(
     if position == "tuned-mass":
         return with_tuned_mass(tower, mass_kg, frequency_ratio)
     return tower
-
-
-@dataclass(frozen=True)
-class ReducedModel:
-    """x' = A x + B u + E W with x = displacements and velocities of some floors (C.2).
-
-    Attributes
-    ----------
-    A, B, E
-        Shapes (2n, 2n), (2n, k), (2n, m); B is of forces that push.
-    floors
-        The floors, from 1.
-    """
-
-    A: FloatArray
-    B: FloatArray
-    E: FloatArray
-    floors: tuple[int, ...]
-
-
-def reduced_model(modal: ModalModel, floors: tuple[int, ...] = REDUCED_FLOORS) -> ReducedModel:
-    """Return the state-reduced model that keeps the modes of `modal` exactly and has floors' motion as its state.
-
-    Parameters
-    ----------
-    modal
-        As many modes as floors.
-    floors
-        Which floors' motion is the state.
-
-    Raises
-    ------
-    ValueError
-        If the numbers of modes and floors differ.
-    """
-    if modal.modes != len(floors):
-        raise ValueError(f"{modal.modes} modes and {len(floors)} floors")
-    seen = modal.shapes[np.array(floors) - 1]
-    T = block_diag(seen, seen)
-    inverse = block_diag(np.linalg.inv(seen), np.linalg.inv(seen))
-    return ReducedModel(
-        A=T @ modal.state_matrix() @ inverse,
-        B=T @ modal.input_matrix(modal.devices),
-        E=T @ modal.input_matrix(modal.load),
-        floors=floors,
-    )

@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
-from mrpipe.case_studies.laws import controller_of, require_known
+from mrpipe.case_studies.laws import controller_of
 from mrpipe.case_studies.lqg import SampledController
 from mrpipe.case_studies.model import ModalModel, modal_model
 from mrpipe.case_studies.options import LqgWeights
@@ -34,11 +34,6 @@ FADE_SHARE = 0.01
 
 STRUCTURE = "the tower"
 """What messages call it."""
-
-
-def check_laws(laws: Sequence[str]) -> None:
-    """Raise UserError if one of them is not in :data:`~mrpipe.case_studies.laws.LAWS`."""
-    require_known(laws, STRUCTURE)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.modal.decays.decay import DecayMethod, DecayResult, Estimate, analyse_decay
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.records import FrameTest, FrameTests, Place
+from mrpipe.words import noun
 
 _NORMAL_95 = 1.959964
 _WIDEST_DECAY_INTERVAL = 0.02
@@ -114,7 +115,5 @@ def choose_damping(
     without = [str(mode) for mode in range(1, len(sweep) + 1) if mode not in decays]
     if without and damping_from == "decay":
         tests = "forced tests" if other == "sweep" else f"{other} tests"
-        findings.append(
-            f"no free decay of mode{'s' if len(without) > 1 else ''} {', '.join(without)}: damping from the {tests}"
-        )
+        findings.append(f"no free decay of {noun(len(without), 'mode')} {', '.join(without)}: damping from the {tests}")
     return tuple(chosen), tuple(sources), findings

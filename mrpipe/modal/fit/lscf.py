@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.modal.fit.projection import stack
 from mrpipe.modal.records import Place, Sensor
-from mrpipe.modal.spectra import ComplexArray, RecordSpectrum, all_inputs, all_sensors
+from mrpipe.modal.spectra import RecordSpectrum, all_inputs, all_sensors
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,6 @@ class PoleCandidate:
     angular_frequency: float
     damping_ratio: float
     occurrences: int
-
-
-def _stack(matrix: ComplexArray) -> FloatArray:
-    return np.concatenate([matrix.real, matrix.imag], axis=0)
 
 
 def _triangle(
@@ -56,8 +53,8 @@ def _triangle(
             block[:, part] = z * (excitation / (np.linalg.norm(excitation) or 1.0))[:, None]
         start = (order + 1) * (len(inputs) + index)
         block[:, start : start + order + 1] = z / np.sqrt(item.omega.size)
-        left.append(_stack(block))
-        rows.append(_stack(z * (response / (np.linalg.norm(response) or 1.0))[:, None]))
+        left.append(stack(block))
+        rows.append(stack(z * (response / (np.linalg.norm(response) or 1.0))[:, None]))
     return np.asarray(np.linalg.qr(np.hstack([np.vstack(left), np.vstack(rows)]), mode="r"), dtype=np.float64)
 
 

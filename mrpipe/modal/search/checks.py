@@ -49,13 +49,6 @@ def _off_diagonal(coupling: FloatArray) -> float:
     return 0.5 * float(np.sum(coupling**2) - np.sum(np.diag(coupling) ** 2))
 
 
-def sign_changes(mode_shape: ArrayLike, negligible: float = 0.03) -> int:
-    """Return the number of sign changes of a mode shape, shape (n,), from the ground up, without elements near zero."""
-    shape = np.asarray(mode_shape, dtype=np.float64)
-    signs = np.sign(shape[np.abs(shape) > negligible * np.abs(shape).max()])
-    return int(np.count_nonzero(signs[1:] != signs[:-1]))
-
-
 def wrong_signs(mode_shapes: ArrayLike, mass: ArrayLike) -> tuple[tuple[int, int], ...]:
     """Return the fewest elements (floor, mode), from 1, whose sign must change to make the columns orthogonal.
 

@@ -11,9 +11,10 @@ import numpy as np
 from mrpipe.artifacts import Artifact, BoolArray, FloatArray
 from mrpipe.control.laws import law_named, law_names
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.words import listed, number, percent
+from mrpipe.reporting.words import number, percent
 from mrpipe.structures import Frame, read_frame
 from mrpipe.structures.response import linear_response
+from mrpipe.words import listed
 
 UNCONTROLLED = "no damper"
 

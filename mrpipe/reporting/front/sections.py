@@ -16,8 +16,9 @@ from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
 from mrpipe.reporting.places import is_chain, names_of
-from mrpipe.reporting.words import listed, number, percent, quantity
+from mrpipe.reporting.words import number, percent, quantity
 from mrpipe.reporting.writer import Section
+from mrpipe.words import listed
 
 _POINTS_OF_A_LOOP = 700
 _POINTS_OF_A_CURVE = 1500

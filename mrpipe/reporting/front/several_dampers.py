@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from mrpipe.reporting.facts import RunFacts
-from mrpipe.reporting.words import listed, number
+from mrpipe.reporting.words import number
+from mrpipe.words import listed
 
 
 def answer(facts: RunFacts) -> str:

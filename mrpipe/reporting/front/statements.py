@@ -14,7 +14,8 @@ from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front import several_dampers
 from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.places import names_of, size_in_words
-from mrpipe.reporting.words import duration, listed, number, percent, plain, quantity, with_interval
+from mrpipe.reporting.words import number, percent, plain, quantity, with_interval
+from mrpipe.words import counted, duration, listed, noun
 
 NARROW = 0.001
 """Half width of an interval, over the value, below which its digits are not written out: it holds the noise alone."""
@@ -210,7 +211,7 @@ def weak_spots(facts: RunFacts) -> str:
     worst = sorted(tests, key=lambda row: -float(row["nrmse_after"]))[:2]
     made = _conditions(facts)
     named = listed([f"{row['name']} ({percent(row['nrmse_after'])}{made.get(str(row['name']), '')})" for row in worst])
-    text = f"The error of the final model is largest in {'test' if len(worst) == 1 else 'tests'} {named}."
+    text = f"The error of the final model is largest in {noun(len(worst), 'test')} {named}."
     states = [str(item["state"]) for item in loop["unexplained"].get("depends_on", [])[:3]]
     if states and loop["unexplained"]["structured"]:
         text += f" It varies with {listed(states)}."
@@ -327,7 +328,7 @@ def next_tests(facts: RunFacts) -> str:
     wanted = facts.summary("close-loop").get("next_tests") or {}
     if wanted.get("tests"):
         questions = "; ".join(item["decides"] for item in wanted["decides"][:3])
-        number_of = f"{len(wanted['tests'])} tests" if len(wanted["tests"]) > 1 else "1 test"
+        number_of = counted(len(wanted["tests"]), "test")
         parts.append(f"{number_of} would decide {questions}: {_described(wanted['tests'])} ({wanted['file']}).")
     elif wanted.get("made_already"):
         questions = "; ".join(item["decides"] for item in wanted["decides"][:3])

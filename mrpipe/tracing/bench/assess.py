@@ -34,9 +34,9 @@ class Case:
     training, validation
         Recordings; effects are decided on the first and judged on the second.
     options
-        Of the tracing.
+        Options of the tracing.
     ordered
-        The tests, sorted, with the faults that were found in them.
+        The tests that are used, and the faults that were found in tests.
     declared
         Number of terms that the campaign declares. They come first and are part of the baseline.
     offsets
@@ -68,7 +68,7 @@ class Assessment:
     further
         Terms of the model whose cause is not proven.
     missing
-        Whether the residual of the training tests holds more than noise.
+        Whether the residual of the training tests contains more than noise.
     found, alone
         Errors on the validation tests of the whole model, and of the model without further terms.
     judgement
@@ -162,14 +162,16 @@ def with_likely_names(
 
     Parameters
     ----------
-    selection, case
-        What is assessed.
+    selection
+        Named effects with their fit, and further terms.
+    case
+        Data that do not change.
     gains
-        Of the named effects on left-out tests.
+        Gains of the named effects on tests that were left out.
     reason
-        Why nothing is named, where that is already known.
+        Why nothing is named; empty if something is.
     rng
-        For intervals.
+        Source of randomness.
     """
     assessed = assess(selection, case, gains, reason, rng)
     several = len(assessed.named) > 1
@@ -207,11 +209,11 @@ def without_names(
     selection
         Named effects with their fit, and further terms.
     gains
-        Of the named effects.
+        Gains of the named effects on tests that were left out.
     places
-        Which of the named effects become further terms.
+        Indices, among the named effects, of those that become further terms.
     declared
-        How many terms the campaign declares.
+        Number of terms that the campaign declares.
     """
     alone = selection.with_named_alone.chosen
     count = len(alone.problem.terms) - declared

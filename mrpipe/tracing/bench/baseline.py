@@ -58,16 +58,16 @@ def form_name(model: str) -> str:
 def declared_base(
     recordings: Recordings, name: str, yield_order: int, viscosity_order: int, form_files: Sequence[Path] = ()
 ) -> Base:
-    """Return the declared form with laws of the drive that the levels of drive determine.
+    """Return the declared form with polynomial laws of the drive, of at most the degree that the drive levels allow.
 
     Parameters
     ----------
     recordings
         Training tests.
     name
-        Of the form, in the library or in one of `form_files`.
+        Name of the form, which is in the library or in one of `form_files`.
     yield_order, viscosity_order
-        Degrees of the laws of the drive.
+        Degrees of the polynomials for the yield force and for the viscosity.
     form_files
         The user's own files that define further base forms.
 

@@ -86,7 +86,7 @@ def cross_fitted(
     validation, measured, simulated
         Validation tests, their offset-free force and the simulated one [N], shape (m,).
     seed
-        Of the trees.
+        Seed of the random numbers of the trees.
     iterations
         Number of trees.
     """
@@ -181,7 +181,7 @@ def flexible_residual(
     validation
         Validation tests.
     seed
-        Of the trees.
+        Seed of the random numbers of the trees.
     iterations
         Number of trees.
 
@@ -214,7 +214,7 @@ def _trees(seed: int, iterations: int) -> HistGradientBoostingRegressor:
 
 
 def flexible_chi_square(found: Fit, *, folds: int = 3, seed: int = 0, iterations: int = 80) -> float:
-    """Return the mean square of the weighted residual minus a flexible model, on whole tests left out."""
+    """Return the mean square of the weighted residual [1] that a flexible model leaves on tests left out of its fit."""
     problem = found.problem
     used = problem.root_weight > 0.0
     features, target = lagged_states(found, problem.recordings), found.residual

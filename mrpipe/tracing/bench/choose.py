@@ -33,13 +33,14 @@ from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
 
 ROUNDED_FORM = "yielding-part"
-"""Base form with which the filter of the recorder is judged, because a rounded yield rounds the loops too."""
+"""Base form with which a moving average by the recorder is judged. Its yield is rounded, so that the average is found
+only if it explains more than a rounded yield does: both round the loops of force over displacement."""
 
 PROMOTED = 3
-"""Numerical technique: candidates of a round that are fitted to all training tests (others: draft only) ..."""
+"""Numerical technique: candidates of each round that are fitted to all training tests, not only to the draft ..."""
 
 PROMOTED_STEPS = 6
-"""Numerical technique: ... and iterations of these fits."""
+"""Numerical technique: ... and largest number of iterations of these fits."""
 
 
 @dataclass(frozen=True)

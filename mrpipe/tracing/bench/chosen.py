@@ -27,7 +27,7 @@ from mrpipe.tracing.bench.testability import untestable
 from mrpipe.tracing.options import TracingOptions
 
 ITERATIONS = 15
-"""Numerical technique: most steps of a fit at a higher rate of what was chosen at a lower one."""
+"""Numerical technique: largest number of steps of the fit, at a higher rate, of a model chosen at a lower rate."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Chosen(Start):
-    """The same, with the chosen base form and effects.
+    """Training tests in the form in which they are fitted, and the chosen base form with its effects.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ def choose(bench: Bench, begun: Start) -> Chosen:
     Parameters
     ----------
     bench
-        What the tracing has at hand.
+        Inputs of the tracing.
     begun
         Training tests and declared model.
     """
@@ -211,7 +211,7 @@ def validation_of(bench: Bench, begun: Start, unseen: Sequence[PreparedTest]) ->
     Parameters
     ----------
     bench
-        What the tracing has at hand.
+        Inputs of the tracing.
     begun
         Training tests and their filter; with the choice, if it has been made.
     unseen

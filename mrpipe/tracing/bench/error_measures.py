@@ -8,15 +8,7 @@ import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.fitting.recordings import Recordings
-
-
-@dataclass(frozen=True)
-class Score:
-    """Errors of one model on some tests."""
-
-    nrmse: float
-    fit_percent: float
-    by_test: dict[str, float]
+from mrpipe.tracing.verdict import Score
 
 
 @dataclass(frozen=True)
@@ -103,14 +95,15 @@ def score(recordings: Recordings, measured: FloatArray, simulated: FloatArray) -
     for index, name in enumerate(recordings.names):
         own = used & (recordings.test == index)
         if own.any():
-            by_test[name] = _rms(error[own]) / max(_rms(measured[own]), 1e-12)
+            by_test[name] = rms(error[own]) / max(rms(measured[own]), 1e-12)
     spread = measured[used] - np.mean(measured[used])
     return Score(
-        nrmse=_rms(error[used]) / max(_rms(measured[used]), 1e-12),
+        nrmse=rms(error[used]) / max(rms(measured[used]), 1e-12),
         fit_percent=100.0 * (1.0 - float(np.linalg.norm(error[used])) / max(float(np.linalg.norm(spread)), 1e-12)),
         by_test=by_test,
     )
 
 
-def _rms(values: FloatArray) -> float:
+def rms(values: FloatArray) -> float:
+    """Return the root mean square of values, shape (n,), in their unit; 0 without values."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0

@@ -1,4 +1,4 @@
-"""Gates of the tracing: whether the base predicts at all, whether anything is missing, what validation shows."""
+"""Decisions that end or permit a tracing: whether the base form predicts the validation tests, and what is missing."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def validated(
     options: TracingOptions,
     own_offsets: bool = False,
 ) -> OnValidation:
-    """Return the errors on the validation tests by the options of the tracing."""
+    """Return the errors on the validation tests, with the thresholds from the options of the tracing."""
     return on_validation(
         base, chosen, baseline, training, validation, options.rules.validation,
         own_offsets=own_offsets, record_gain=options.record_gain,
@@ -68,7 +68,7 @@ def predicts(
     training
         Training tests.
     options
-        Of the tracing.
+        Options of the tracing.
     faults
         Known faults of validation tests.
     jobs
@@ -105,7 +105,7 @@ def refusal_of(
     training, validation
         Recordings.
     options
-        Of the tracing.
+        Options of the tracing.
     faults
         Known faults of validation tests.
     jobs
@@ -140,7 +140,7 @@ def judged(
     ordered: SortedTests,
     jobs: int,
 ) -> Judgement:
-    """Return the verdict on the validation tests by the options of the tracing."""
+    """Return the verdict on the validation tests, with the thresholds from the options of the tracing."""
     taken = selection.ground.problem.base.name if selection.ground is not None else ""
     rules = options.rules
     session = session_of(
@@ -161,7 +161,7 @@ def structured(
     options: TracingOptions,
     named: bool,
 ) -> bool:
-    """Return whether the residual of the training tests holds more than noise."""
+    """Return whether the residual of the training tests contains more than noise."""
     if named or not selection.structured or baseline.scale.repeats:
         return selection.structured
     # without repeats coloured noise looks like a structure; it counts as one only if a flexible model can predict it

@@ -50,7 +50,7 @@ class Evidence:
     conditions
         The validation tests one by one.
     structured
-        Whether the residual of the training tests holds more than noise.
+        Whether the residual of the training tests contains more than noise.
     effects
         Whether effects are named.
     base_changed

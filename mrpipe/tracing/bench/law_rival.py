@@ -34,7 +34,7 @@ def without_laws_of_drive(
     selection
         Named effects with their fit, without further terms.
     gains
-        Of the named effects on tests that were left out.
+        Gains of the named effects on tests that were left out.
     declared
         Number of terms that the campaign declares; they are part of every model.
     unseen

@@ -26,7 +26,15 @@ FIRST_STEP, LEAST_WINDOW = 0.02, 0.005
 
 @dataclass(frozen=True)
 class RecordGain:
-    """Factor on the simulated force of one test that minimises the error, with its 95 % interval."""
+    """Factor on the simulated force of one test that minimises the error.
+
+    Attributes
+    ----------
+    value, interval
+        The factor [1] and its 95 % interval.
+    least
+        Least difference from 1 that is reported.
+    """
 
     value: float
     interval: tuple[float, float]

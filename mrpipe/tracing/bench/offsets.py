@@ -15,7 +15,21 @@ from mrpipe.tracing.verdict import Estimate, Interval
 
 @dataclass(frozen=True)
 class OffsetFinding:
-    """Offsets that differ between tests."""
+    """Offsets that differ between tests.
+
+    Attributes
+    ----------
+    effect
+        The effect `offset` of the library.
+    spread_n, interval
+        Standard deviation of the offsets, and its 95 % interval [N].
+    evidence
+        Gain of the log-likelihood by one offset for each test, compared with one offset for all tests.
+    share
+        Spread over the RMS force [1].
+    confidence
+        Probability that the zero moves between tests.
+    """
 
     effect: Effect
     spread_n: float

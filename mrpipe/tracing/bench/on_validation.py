@@ -13,14 +13,14 @@ from mrpipe.fitting.engine import Fit, predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import Ceiling, cross_fitted
-from mrpipe.tracing.bench.error_measures import Judged, Score, campaign_offset, judged_part, score
+from mrpipe.tracing.bench.error_measures import Judged, campaign_offset, judged_part, rms, score
 from mrpipe.tracing.bench.judgement import Condition, Evidence, classify, worst
 from mrpipe.tracing.bench.nuisances import RecordGain, SessionGain, record_gains
 from mrpipe.tracing.bench.residual_structure import correlation_p_value
 from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, training_agreements, with_session
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, noise_limits, noise_variances
 from mrpipe.tracing.rules import ValidationRules
-from mrpipe.tracing.verdict import Comparable, Verdict
+from mrpipe.tracing.verdict import Comparable, Score, Verdict
 
 
 @dataclass(frozen=True)
@@ -75,12 +75,12 @@ class OnValidation:
     def nrmse(self, simulated: FloatArray, part: BoolArray | None = None) -> float:
         """Return the NRMSE over a part of the samples that are compared."""
         used = self.recordings.used if part is None else part & self.recordings.used
-        return _rms((self.measured - simulated)[used]) / max(_rms(self.measured[used]), 1e-12)
+        return rms((self.measured - simulated)[used]) / max(rms(self.measured[used]), 1e-12)
 
     def floor_nrmse(self, part: BoolArray | None = None) -> float:
         """Return the NRMSE that noise alone causes."""
         used = self.recordings.used if part is None else part & self.recordings.used
-        return _rms(self.floor[used]) / max(_rms(self.measured[used]), 1e-12)
+        return rms(self.floor[used]) / max(rms(self.measured[used]), 1e-12)
 
     def unexplained(self, rules: ValidationRules) -> tuple[bool, float, float]:
         """Return whether more than noise remains, its share of the residual before, and the whiteness p-value."""
@@ -149,7 +149,7 @@ def on_validation(
     part = noise_limits(residual, noise, recordings.test[used], recordings.tests)[recordings.test]
     force, motion = part * force, part * motion
     floor = np.sqrt(scale.force * force + scale.motion * motion)
-    power = max(_rms(judged.measured[used]), 1e-12)
+    power = max(rms(judged.measured[used]), 1e-12)
     parts = {
         "force_white": min(scale.force, 1.0) * force,
         "force_in_band": max(scale.force - 1.0, 0.0) * force,
@@ -163,7 +163,19 @@ def on_validation(
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict and the data that it is based on."""
+    """The verdict and the data that it is based on.
+
+    Attributes
+    ----------
+    verdict
+        The verdict.
+    evidence
+        Errors on the comparable part of the validation tests.
+    ceiling, ceiling_interval
+        NRMSE of a flexible model on all validation tests, and its 95 % interval.
+    comparison
+        Comparison of the validation tests with the training tests; None if they were not compared.
+    """
 
     verdict: Verdict
     evidence: Evidence
@@ -207,7 +219,7 @@ def judge(
     base_taken
         Name of the base form that replaces the declared one; empty if none does.
     structured
-        Whether the residual of the training tests holds more than noise.
+        Whether the residual of the training tests contains more than noise.
     reason
         Why nothing is named; empty if something is.
     faults
@@ -286,7 +298,7 @@ def _evidence(
                 upper,
             )
         )  # fmt: skip
-    power = max(_rms(found.measured[part & found.recordings.used]), 1e-12)
+    power = max(rms(found.measured[part & found.recordings.used]), 1e-12)
     return Evidence(
         found.nrmse(found.before, part),
         found.nrmse(found.after, part),
@@ -341,7 +353,3 @@ def _unrepeated(evidence: Evidence) -> str:
 def open_tests(judgement: Judgement, rules: ValidationRules) -> tuple[str, ...]:
     """Return the names of the validation tests with an unexplained error, the worst first."""
     return worst(judgement.evidence.conditions, rules)
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0

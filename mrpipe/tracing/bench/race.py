@@ -93,7 +93,8 @@ class Race:
     noise
         Mean squared weighted residual that noise leaves.
     coupled
-        Names of the base forms whose steps read the laws of the drive; these laws are kept fixed during the race.
+        Names of the base forms whose equations contain the laws of the drive, so that they are nonlinear in the
+        coefficients of the laws. These laws are kept fixed during the race.
     rules
         Decision thresholds.
     """
@@ -108,7 +109,10 @@ class Race:
     rules: RaceRules = field(default_factory=RaceRules)
 
     def costs(self, weights: FloatArray | None = None) -> FloatArray:
-        """Return the cost of each model, shape (models,): excess of its error over a sufficient one, times its penalty.
+        """Return the cost of each model, shape (models,): excess of its squared error over noise, times a penalty.
+
+        An error that is at most slightly larger than noise is sufficient, and a share of the noise is added to every
+        excess. The penalty grows with the number of fitted numbers and of effects (:func:`claims_of`).
 
         Parameters
         ----------

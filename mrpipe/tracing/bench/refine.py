@@ -52,7 +52,7 @@ def with_richer_forms(
     declared
         Number of terms that the campaign declares; they keep their forms.
     folds, draws
-        Of the cross-validation and its bootstrap.
+        Number of folds of the cross-validation, and of draws of its bootstrap.
     rng
         Source of randomness.
     model_error
@@ -98,7 +98,7 @@ def with_further_terms(
     selection
         Named effects with their fit, and the extension that is considered.
     folds, draws
-        Of the cross-validation and its bootstrap.
+        Number of folds of the cross-validation, and of draws of its bootstrap.
     rng
         Source of randomness.
     jobs

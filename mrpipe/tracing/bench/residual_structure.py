@@ -32,7 +32,15 @@ THIRD = 1.0 / 3.0
 
 @dataclass(frozen=True)
 class States:
-    """States of a recording that a residual may depend on, each of shape (n,), and blocks of samples."""
+    """States of a recording that a residual may depend on.
+
+    Attributes
+    ----------
+    values
+        Name of the state, such as `velocity` -> its value at each sample, shape (n,), in SI.
+    block
+        Index of the block of each sample, shape (n,).
+    """
 
     values: dict[str, FloatArray]
     block: IntArray

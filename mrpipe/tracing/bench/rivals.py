@@ -119,9 +119,9 @@ def with_best_base(
     selection
         Named effects with their fit.
     declared
-        How many terms the campaign declares: they keep their forms.
+        Number of terms that the campaign declares; they keep their forms.
     orders
-        Of the laws of the drive.
+        Largest degrees of the laws of the drive.
     race
         The models that competed; None where nothing is missing.
     worth_a_try
@@ -170,9 +170,9 @@ def with_base_of(rival: Model, small: Fit, places: Sequence[int], declared: int,
     places
         Indices of the terms that are kept.
     declared
-        How many terms the campaign declares: they keep their forms.
+        Number of terms that the campaign declares; they keep their forms.
     orders
-        Of the laws of the drive.
+        Largest degrees of the laws of the drive.
     """
     given = small.problem
     problem = replace(
@@ -203,9 +203,9 @@ def best_rival(
     sets
         Sets of indices of the terms that are kept.
     declared
-        How many terms the campaign declares: they keep their forms.
+        Number of terms that the campaign declares; they keep their forms.
     orders
-        Of the laws of the drive.
+        Largest degrees of the laws of the drive.
     race
         The models that competed.
     jobs

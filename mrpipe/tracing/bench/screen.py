@@ -92,7 +92,18 @@ def grid(term: Term, problem: Problem) -> Iterable[dict[str, float]]:
 
 
 def sensitivity(term: Term, values: dict[str, float], tangent: Tangent) -> Screened:
-    """Return the first-order gain of a form at one point of its grid."""
+    """Return the gain of a form, to first order, at one point of its grid.
+
+    Parameters
+    ----------
+    term
+        The effect in the form that is tried.
+    values
+        Parameter -> value at this point of the grid.
+    tangent
+        Tangent space of the present model. Only the part of the force of the form outside of this space counts,
+        because a refit of the model produces the rest.
+    """
     found, w = tangent.fit, tangent.weighting
     problem = replace(found.problem, terms=(*found.problem.terms, term))
     scales = problem.scales

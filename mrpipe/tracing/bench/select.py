@@ -45,7 +45,7 @@ class Candidate:
     Attributes
     ----------
     name
-        Of the effect.
+        Name of the effect.
     fit
         Fit with the terms that were chosen before, and with this one as the last term.
     share
@@ -137,7 +137,7 @@ def share_of(base: Fit, found: Fit, noise: float) -> float:
 
 
 def left_of(found: Fit, noise: float, share: float) -> float:
-    """Return the excess of the chi-square over the noise, plus a share of the noise that does not separate fits."""
+    """Return the excess of the chi-square over the noise, plus a share of the noise within which fits are equal."""
     return max(found.chi_square - noise, 0.0) + share * noise
 
 

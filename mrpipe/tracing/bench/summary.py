@@ -13,7 +13,7 @@ from mrpipe.fitting.engine import predict
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import flexible_residual
-from mrpipe.tracing.bench.error_measures import Score, score
+from mrpipe.tracing.bench.error_measures import score
 from mrpipe.tracing.bench.judgement import recovered
 from mrpipe.tracing.bench.listed import COMMON_FORMS, forms_alone
 from mrpipe.tracing.bench.nuisances import session_of
@@ -26,7 +26,7 @@ from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.verdict import Named, ranking
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import TracingRules
-from mrpipe.tracing.verdict import Unexplained
+from mrpipe.tracing.verdict import Score, Unexplained
 
 UNATTRIBUTED: dict[str, Any] = {
     "name": "unattributed",
@@ -46,7 +46,29 @@ LISTED = 6
 
 @dataclass(frozen=True)
 class Tracing:
-    """Result of a tracing; `summary` is printed by `close-loop --json`, the rest is for files and figures."""
+    """Result of a tracing; forces have shape (n,), the samples of the validation tests [N].
+
+    Attributes
+    ----------
+    summary
+        The document that `close-loop --json` prints.
+    selection
+        Base form and effects, fitted to all training tests.
+    baseline
+        Fit of the declared model, its weights and its noise.
+    named
+        Effects that the verdict names.
+    training, validation
+        Recordings.
+    measured, before, after
+        Measured force without offset, and the force of the base model and of the final model.
+    states
+        States of the training tests that the residual may depend on.
+    score_before, score_after
+        Errors of both models on the validation tests.
+    drive_unit
+        `A` or `V`.
+    """
 
     summary: dict[str, Any]
     selection: Selection
@@ -106,7 +128,7 @@ class Summary:
             "noise_floor_nrmse": found.floor_nrmse(),
             "noise_components_nrmse": found.noise_components,
             "noise_from": self.baseline.scale.source,
-            "before": _score_json(score_before),
+            "before": score_before.as_json(),
             "residual": self._residual(states, options.rules),
             "base_form": self._base_form(options, found.measured),
             "nuisances": self._nuisances(named, window, options.rules),
@@ -115,7 +137,7 @@ class Summary:
             **self._verdict(),
             "candidates": [item.as_json() for item in ranking(selection, self._candidate_errors(found.measured))],
             "untestable": dict(untested),
-            "after": _score_json(score_after),
+            "after": score_after.as_json(),
             "ceiling": {
                 "nrmse": min(self.judgement.ceiling, score_after.nrmse),
                 "interval": list(self.judgement.ceiling_interval),
@@ -234,10 +256,6 @@ class Summary:
         tied = list(self.selection.tied_forms)
         # the stage adds the comparison with the damper of identify-damper; a tracing of a structure has none
         return {**declared, "best": best, "taken": taken, "tied_with": tied, "nrmse": errors, "identified": None}
-
-
-def _score_json(value: Score) -> dict[str, float]:
-    return {"nrmse": value.nrmse, "fit_percent": value.fit_percent}
 
 
 def _value(named: Sequence[Named], effect: str, parameter: str) -> float:

@@ -28,7 +28,7 @@ def untestable(
 
 
 def missing(recordings: Recordings, rules: TestabilityRules | None = None) -> dict[Needs, str]:
-    """Return need of effects that the tests do not meet -> the reason, and which tests to record."""
+    """Return the needs of effects that the tests do not meet: need -> reason, and the tests that should be recorded."""
     rules = rules or TestabilityRules()
     pieces = [
         slice(int(a), int(b)) for a, b in zip(recordings.starts[:-1], recordings.starts[1:], strict=True) if b > a

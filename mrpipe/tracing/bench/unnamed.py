@@ -89,7 +89,7 @@ def without_beaten_names(
     selection
         Named effects with their fit, and further terms.
     gains
-        Of the named effects on tests that were left out.
+        Gains of the named effects on tests that were left out.
     declared
         Number of terms that the campaign declares; they are part of every model.
     unseen
@@ -126,7 +126,7 @@ def with_linear_memory(found: Fit, declared: int, start: Fit | None = None) -> F
     found
         Base form with declared terms and named effects.
     declared
-        How many terms are kept.
+        Number of declared terms, which are kept.
     start
         A fit of the same model to a share of the tests; None: the search starts from `found`.
     """

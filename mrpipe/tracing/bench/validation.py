@@ -12,6 +12,7 @@ from mrpipe.campaigns.plausibility import Finding
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.crossvalidation import left_out_residual
+from mrpipe.tracing.bench.error_measures import rms
 from mrpipe.tracing.bench.nuisances import SessionGain
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Difference
@@ -85,10 +86,10 @@ def agreements(
         found.append(
             Agreement(
                 name,
-                _rms(measured[own]),
-                _rms((measured - simulated)[own]),
-                _rms((measured - simulated)[late]),
-                _rms(measured[late] - predicted),
+                rms(measured[own]),
+                rms((measured - simulated)[own]),
+                rms((measured - simulated)[late]),
+                rms(measured[late] - predicted),
                 gain,
                 lag,
                 offset,
@@ -200,7 +201,7 @@ def compare(
     whole = float(np.sum((squares - floor**2)[used]))
     for item in agreements(validation, measured, simulated, rules):
         own = used & (validation.test == validation.names.index(item.name))
-        noise = _rms(floor[own])
+        noise = rms(floor[own])
         expected = max(typical * item.rms_n, noise)
         if item.error_n <= rules.odd_ratio * max(high * item.rms_n, noise):
             corrected_squares += float(np.sum(squares[own]))
@@ -359,7 +360,3 @@ def _difference(kind: str, found: Sequence[tuple[str, float]], tests: int) -> Di
     where = "all validation tests" if len(names) == tests > 1 else ", ".join(names)
     session = " (another session)" if len(names) == tests > 1 and kind in ("gain", "lag", "offset") else ""
     return Difference(kind, names, value, unit, f"{where}: {words.format(value, 100.0 * value)}{session}")
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0

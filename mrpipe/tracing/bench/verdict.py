@@ -19,7 +19,23 @@ from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
 
 @dataclass(frozen=True)
 class Named:
-    """One named effect of the verdict, with its definition."""
+    """One named effect of the verdict, with its definition.
+
+    Attributes
+    ----------
+    effect, form
+        The effect of the library, and the name of its form.
+    parameters
+        Parameter -> estimate.
+    confidence
+        Evidence for the effect, or the calibrated probability that it is present [1].
+    tied_with
+        Effects that these tests do not separate from it.
+    separating_tests
+        Rival -> advice on tests that separate it.
+    gain
+        Gain on left-out tests; None if it was not computed.
+    """
 
     effect: Effect
     form: str

@@ -2,6 +2,9 @@
 
 A comparison at one frequency favours a law that moves the resonance away from this frequency. A locked damper, for
 example, has a small response at the old resonance and by far the largest one at the new resonance.
+
+A way is a name of an arrangement of the loop, with a damper model and a controller: `before`, `after` or
+`recalibrated` (:func:`~mrpipe.tracing.loop.comparison.compare_laws`).
 """
 
 from __future__ import annotations
@@ -73,7 +76,7 @@ def curves_of(
     jobs: int = 1,
     progress: Progress = no_progress,
 ) -> dict[str, dict[str, ResponseCurve | None]]:
-    """Return law -> way -> response curve; None if the response grows without bound at some frequency.
+    """Return law -> way -> response curve; the curve is None if the response grows without bound at some frequency.
 
     Parameters
     ----------

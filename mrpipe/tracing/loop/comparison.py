@@ -76,7 +76,7 @@ class LoopRun:
 
 @dataclass(frozen=True)
 class Arrangement:
-    """One way of running the loop: the damper, and the function that makes the controller of a run."""
+    """One way in which the loop runs: the damper, and the function that returns the controller of a run."""
 
     chain: Chain
     controller: Callable[[LoopRun], Controller]

@@ -184,7 +184,19 @@ def _as_it_ran(rig: Rig, run: LoopRun) -> Controller:
 
 @dataclass(frozen=True)
 class Renewed:
-    """The renewed parts of a controller for the damper with its effects."""
+    """The renewed parts of a controller for the damper with its effects.
+
+    Attributes
+    ----------
+    inverse
+        Network or table that gives the drive for a desired force; None if the controller has none.
+    threshold_n
+        Desired force below which the drive is 0 [N].
+    factors
+        Law -> factor on its calibrated gains [1].
+    summary
+        Keys of docs/close-loop-json.md on the renewed parts.
+    """
 
     inverse: Network | InverseTable | None
     threshold_n: float

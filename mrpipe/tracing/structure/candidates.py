@@ -52,7 +52,15 @@ def unit_forces(
 
 @dataclass(frozen=True)
 class Placed:
-    """A form of an effect at a place: `floor` from 1 for an effect on a floor, 0 for all storeys together."""
+    """A form of an effect at a place.
+
+    Attributes
+    ----------
+    effect, form
+        The effect, and the form of it.
+    floor
+        Floor on which it acts, from 1; 0 for an effect that acts on all storeys or on the base.
+    """
 
     effect: StructuralEffect
     form: StructuralForm
@@ -61,7 +69,17 @@ class Placed:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A placed form with its searched parameters; its amplitudes are solved for by the design."""
+    """A placed form with values of its searched parameters; the amplitudes follow from least squares.
+
+    Attributes
+    ----------
+    placed
+        The form and its place.
+    numbers
+        Values of the searched parameters, in SI.
+    at_bound
+        Names of the parameters that end at a bound of the search.
+    """
 
     placed: Placed
     numbers: FloatArray
@@ -91,16 +109,16 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class Histories:
-    """Unit forces in time.
+    """Forces of an effect over time, for amplitudes of 1.
 
     Attributes
     ----------
     force
-        Shape (m, h).
+        The h different histories of m samples, shape (m, h).
     which
-        History of each amplitude, shape (k,).
+        Column of `force` that each of the k amplitudes multiplies, shape (k,).
     on_storey
-        Contribution of one unit of an amplitude to the shear force of each storey, shape (k, n).
+        Factor of this column in the shear force of each storey, shape (k, n).
     """
 
     force: FloatArray
@@ -109,7 +127,7 @@ class Histories:
 
 
 def histories_of(fitted: Fitted, spectra: Spectra, about: Surroundings) -> Histories:
-    """Return the unit forces of an effect along a record, ordered by amplitude and then by storey."""
+    """Return the unit forces of an effect along a record, storey after storey, with all amplitudes of each storey."""
     effect, form = fitted.placed.effect, fitted.placed.form
     motion, dt, n = spectra.motion, spectra.record.dt, spectra.record.floors
     kinds = len(form.amplitudes)
@@ -178,7 +196,7 @@ def search(
     placed
         Form of an effect at its place.
     design
-        The linear frame that the residual is judged against.
+        Linear frame that is fitted to the records.
     before
         Projected columns of the effects chosen before, shape (k, n, 2 b).
     about

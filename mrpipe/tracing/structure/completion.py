@@ -111,7 +111,7 @@ def _identified(campaign: Campaign, missing: Sequence[int], progress: Progress) 
     if frame is None or not np.all(np.isfinite(frame.stiffness)):
         listed = ", ".join(map(str, missing))
         problem = f"floors without a sensor ({listed}), and the others do not determine the stiffness of the frame"
-        raise UserError(campaign.directory / "campaign.yaml", "channels", problem, "record more floors or modes")
+        raise UserError(campaign.file, "channels", problem, "record more floors or modes")
     return frame
 
 

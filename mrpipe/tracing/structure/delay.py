@@ -1,9 +1,9 @@
 """Dead time of the controller: between desired force and drive, and between law and desired force.
 
 A controller samples, filters and holds its command. The resulting lag is expected and called the granted lag. The drive
-is compared with a table over desired force and velocity at an earlier time, which is fitted to training tests. The
-desired force is compared with its law: it is proportional to velocity and displacement where it is not clipped. The lag
-is the time shift with the smallest error.
+is predicted from desired force and velocity at an earlier time, by a table that is fitted to the training tests. The
+desired force is predicted by its law: it is a linear function of velocity and displacement where it is not clipped. The
+lag is the time shift with the smallest error of this prediction on the validation tests.
 """
 
 from __future__ import annotations

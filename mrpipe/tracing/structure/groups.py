@@ -12,7 +12,8 @@ from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.fit import Design, stacked
 
 LINES_OF_A_GROUP = 24
-"""Numerical technique: number of lines of a group; fewer have more scatter, more blur the resonances."""
+"""Numerical technique: number of lines of a group. A smaller group has more scatter; a larger one does not resolve the
+resonances."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from scipy import signal
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.clock import longest_part
-from mrpipe.campaigns.model import Campaign, Recording
+from mrpipe.campaigns.model import CAMPAIGN_FILE, Campaign, Recording
 from mrpipe.errors import UserError
 from mrpipe.modal.records import is_input, require_signal
 
@@ -96,7 +96,7 @@ class FrameData:
     records: tuple[FrameRecord, ...]
     loops: tuple[Recording, ...]
     left_out: tuple[str, ...]
-    source: Path = Path("campaign.yaml")
+    source: Path = Path(CAMPAIGN_FILE)
 
     def with_role(self, *roles: str) -> list[FrameRecord]:
         """Return the records of these roles."""
@@ -123,7 +123,7 @@ def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
     UserError
         If the masses are missing or do not fit the floors, no test records every floor, or there is no validation test.
     """
-    source = campaign.directory / "campaign.yaml"
+    source = campaign.file
     floors = max((floor for item in campaign.recordings for floor in _floors_of(item)), default=0)
     loops = tuple(
         item

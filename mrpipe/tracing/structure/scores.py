@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingRegressor
@@ -12,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.structure.model import FrameModel, in_time
 from mrpipe.tracing.structure.spectra import Spectra
+from mrpipe.tracing.verdict import Score
 
 LAGS = (0.03, 0.1, 0.3, 0.8)
 """Numerical technique: lags of the states that the flexible model reads, in periods of the lowest mode."""
@@ -23,17 +23,8 @@ BINS = 16
 """Numerical technique: number of steps of the step function of a state."""
 
 
-@dataclass(frozen=True)
-class FrameScore:
-    """Errors of the storey shear forces, pooled over storeys and records; lines are weighted by the sensor noise."""
-
-    nrmse: float
-    fit_percent: float
-    by_test: Mapping[str, float]
-
-
-def frame_score(model: FrameModel, records: Sequence[Spectra]) -> FrameScore:
-    """Return the RMS error over the RMS of the storey shear forces, on some records."""
+def frame_score(model: FrameModel, records: Sequence[Spectra]) -> Score:
+    """Return the errors of the storey shear forces over all storeys and records, weighted by the sensor noise."""
     errors, wholes, own = 0.0, 0.0, {}
     for record in records:
         error = float(np.sum(np.abs((record.target - model.predict(record)) * record.weight) ** 2))
@@ -41,7 +32,7 @@ def frame_score(model: FrameModel, records: Sequence[Spectra]) -> FrameScore:
         own[record.record.name] = float(np.sqrt(error / max(whole, 1e-300)))
         errors, wholes = errors + error, wholes + whole
     nrmse = float(np.sqrt(errors / max(wholes, 1e-300)))
-    return FrameScore(nrmse, 100.0 * (1.0 - nrmse), own)
+    return Score(nrmse, 100.0 * (1.0 - nrmse), own)
 
 
 def noise_floor(records: Sequence[Spectra], scale: FloatArray) -> float:

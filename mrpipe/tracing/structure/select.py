@@ -25,12 +25,22 @@ REFINED = 3
 """Numerical technique: effects whose parameters are searched in full after screening."""
 
 MOST_FORMS = (5, 2)
-"""Numerical technique: forms of the best and of every other effect that are searched."""
+"""Numerical technique: largest number of forms that are searched, of the best effect and of every other effect."""
 
 
 @dataclass(frozen=True)
 class FrameCandidate:
-    """An effect in its best form, in addition to those chosen before."""
+    """An effect in its best form, in addition to those chosen before.
+
+    Attributes
+    ----------
+    outcome
+        The form with its parameters, and the fit with it.
+    share
+        Share of the excess of the residual over the noise that all effects together explain [1].
+    forms
+        Name of the form -> share, of all forms that were tried.
+    """
 
     outcome: Outcome
     share: float
@@ -151,7 +161,7 @@ def _round(
 
 
 def admissible(item: Outcome) -> bool:
-    """Return whether the amplitudes of the last form lie within their bounds, for bounds that are shares."""
+    """Return whether dimensionless amplitudes of the last form, such as shares, do not exceed their upper bounds."""
     form = item.fitted.placed.form
     own = item.solved.amplitudes[-len(form.amplitudes) :]
     shares = [parameter.scale == "one" for parameter in form.amplitudes]
@@ -215,7 +225,7 @@ def select(
     rng
         Source of randomness.
     draws
-        Of the bootstrap.
+        Number of draws of the bootstrap.
     jobs
         Processes; the result does not depend on their number.
     progress

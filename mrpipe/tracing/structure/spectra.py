@@ -40,8 +40,9 @@ QUIET_SECOND = 0.01
 power; the mean of a laser signal is then taken there."""
 
 ABOVE_BAND, HIGHEST_START, HIGHEST = 1.25, 0.3, 0.45
-"""Numerical technique: noise is measured above this multiple of the band's upper edge, which starts at the second share
-of the sampling rate at the latest and ends at the third."""
+"""Numerical technique: sensor noise is measured between two frequencies. The lower one is the first number times the
+upper edge of the band, but at most the second number times the sampling rate; the upper one is the third number times
+the sampling rate."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from mrpipe.tracing.structure.candidates import Fitted
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
 from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.records import FrameData
-from mrpipe.tracing.structure.scores import FrameScore, dependence, flexible_score, frame_score, noise_floor
+from mrpipe.tracing.structure.scores import dependence, flexible_score, frame_score, noise_floor
 from mrpipe.tracing.structure.select import FrameCandidate, FrameSelection, select
 from mrpipe.tracing.structure.spectra import Spectra
 from mrpipe.tracing.verdict import Candidate, Estimate, Interval, LeftOutGain, NamedEffect, Unexplained, Verdict
@@ -45,7 +45,21 @@ FEWEST_PERIODS = 5
 
 @dataclass(frozen=True)
 class FrameTracing:
-    """Result of tracing a structure; `summary` is the JSON of docs/close-loop-json.md."""
+    """Result of tracing a structure.
+
+    Attributes
+    ----------
+    summary
+        The JSON of docs/close-loop-json.md.
+    problem
+        Spectra of the records, and the shear frame that is fitted first.
+    selection
+        Linear frame and effects, as chosen on the training records.
+    before, after
+        The frame with the declared effects alone, and with all named effects.
+    between
+        Changes of the stiffness between tests.
+    """
 
     summary: dict[str, Any]
     problem: FrameProblem
@@ -172,7 +186,7 @@ def _summary(
         "declared_effects": [item.name for item in declared],
         "noise_floor_nrmse": noise_floor(problem.validation, selection.groups.scale),
         "noise_from": "accelerometers above the highest mode",
-        "before": _json(scores[0]),
+        "before": scores[0].as_json(),
         "residual": {
             "structured": structured,
             "p_value": float(max(min(1.0, float(np.min(p_values)) * len(p_values)), 1e-300)),
@@ -191,7 +205,7 @@ def _summary(
         "effects": [item.as_json() for item in named],
         **_verdict(selection, named, share, rules, reason, between).sentence_as_json(),
         "candidates": [item.as_json() for item in ranking(selection, problem)],
-        "after": _json(scores[1]),
+        "after": scores[1].as_json(),
         "ceiling": {"nrmse": best, "recovered": float(np.clip(recovered, 0.0, 1.0))},
         "unexplained": Unexplained(
             bool(still),
@@ -214,10 +228,6 @@ def _summary(
 def _depends_on(after: FrameModel, problem: FrameProblem, storey: int) -> tuple[tuple[str, float], ...]:
     found = dependence(after, problem.training, storey)[:LISTED]
     return tuple((f"{name} of storey {storey + 1}", value) for name, value in found if value > problem.rules.listed)
-
-
-def _json(value: FrameScore) -> dict[str, float]:
-    return {"nrmse": value.nrmse, "fit_percent": value.fit_percent}
 
 
 def _by_storey(selection: FrameSelection) -> list[float]:
@@ -364,7 +374,7 @@ def _verdict(
     reason: str,
     between: StiffnessBetweenTests,
 ) -> Verdict:
-    # the residual of tests in several states of the structure is their difference, which no effect explains
+    # if the stiffness changed between tests, the residual also contains this change, which no effect explains
     drift = f"; {between.sentence()}" if between.drifts else ""
     if reason:
         return Verdict("unknown" if selection.structured else "noise", f"{reason}{drift}")

@@ -122,7 +122,7 @@ def trace_structure(
     parts += [item for item in found if item is not None]
     if not parts:
         raise UserError(
-            campaign.directory / "campaign.yaml", "tests", "no test can be judged, because floors or drive are missing",
+            campaign.file, "tests", "no test can be judged, because floors or drive are missing",
             "record the acceleration of every floor; or damper_force, drive and the motion of floor 1",
         )  # fmt: skip
     summary = {"campaign": campaign.name, **merged(parts), "declared_effects": list(names)}
@@ -173,7 +173,7 @@ def _by_direction(
             findings.append(f"direction {axis} is not traced: no validation test has a measured excitation along it")
     if not found:
         raise UserError(
-            campaigns[0].directory / "campaign.yaml",
+            campaigns[0].file,
             "channels",
             "no validation test has a measured excitation along one of its sensors",
             f"give {' or '.join(f'ground_acceleration_{axis}' for axis in axes)}",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -10,7 +12,7 @@ import pytest
 
 from mrpipe.campaigns import load_campaign
 from mrpipe.config.sections.laboratory import CustomTest
-from mrpipe.effects.contract import TESTS_FOR, TestKind
+from mrpipe.effects.contract import TESTS_FOR, Separation, TestKind
 from mrpipe.effects.library import all_effects, damper_effects
 from mrpipe.laboratory.bench import record_bench
 from mrpipe.laboratory.blind import write_bench
@@ -47,6 +49,40 @@ def test_every_advice_and_need_of_the_library_leads_to_tests() -> None:
             assert kinds_between(effect.name, rival, damper_effects()) == separation.kinds
             kinds += separation.kinds
         assert set(kinds) <= set(extra_tests._MAKERS)
+
+
+@pytest.mark.property
+def test_pairs_that_no_effect_separates_lead_to_general_tests() -> None:
+    library = damper_effects()
+    general = kinds_between("no such effect", "nor this one", library)
+    assert general and set(general) <= set(extra_tests._MAKERS)
+    for one, other in itertools.permutations(library, 2):
+        stated = [
+            library[a].separated_by[b].kinds for a, b in ((one, other), (other, one)) if b in library[a].separated_by
+        ]
+        assert kinds_between(one, other, library) == next((kinds for kinds in stated if kinds), general)
+        if not any(stated):
+            assert kinds_between(other, one, library) == general
+
+
+@pytest.mark.property
+def test_rival_without_bench_tests_of_its_own_leads_to_those_that_the_other_one_states() -> None:
+    library = damper_effects()
+    one, other = library["accumulator"], library["inertia"]
+    silent = replace(one, separated_by={other.name: Separation("no bench test separates them")})
+    stated = replace(other, separated_by={one.name: Separation("change the frequency", ("frequencies",))})
+    quiet = replace(other, separated_by={})
+    assert kinds_between(one.name, other.name, {one.name: silent, other.name: stated}) == ("frequencies",)
+    general = kinds_between(one.name, other.name, {})
+    assert kinds_between(one.name, other.name, {one.name: silent, other.name: quiet}) == general
+
+
+@pytest.mark.property
+def test_unexplained_residual_of_a_state_without_a_kind_leads_to_general_tests() -> None:
+    general = kinds_between("accumulator", "inertia", {})
+    unknown = {"structured": True, "depends_on": [{"state": "no such state", "share": 0.3}]}
+    found = wanted_tests(verdict(unexplained=unknown), {}, None)  # type: ignore[arg-type]
+    assert [(item["decides"], tuple(item["kinds"])) for item in found.reasons] == [("what is unexplained", general)]
 
 
 @pytest.mark.property

@@ -1,0 +1,29 @@
+"""Words of messages and reports: lists, counts and times as people write them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return `a`, `a and b`, `a, b and c`; empty without names."""
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def noun(count: int, word: str) -> str:
+    """Return a regular noun in the number that a count requires: `test` for 1, else `tests`."""
+    return word if count == 1 else f"{word}s"
+
+
+def counted(count: int, word: str) -> str:
+    """Return a count with its regular noun: `1 test`, `3 tests`."""
+    return f"{count} {noun(count, word)}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in a readable unit: 45 s, 12 min, 3.2 h."""
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
