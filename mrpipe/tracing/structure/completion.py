@@ -108,7 +108,9 @@ def _identified(campaign: Campaign, missing: Sequence[int], progress: Progress) 
     campaign = replace(campaign, declared=declared)
     result = identify_frame(frame_tests(campaign), IdentificationOptions(), progress)
     frame = result.frame
-    if frame is None or not np.all(np.isfinite(frame.stiffness)):
+    # a frame that reproduces no test is no basis for the motion of floors without a sensor
+    reproduced = any(np.median(item.fit_percent) > 0.0 for item in result.in_time)
+    if frame is None or not np.all(np.isfinite(frame.stiffness)) or not reproduced:
         listed = ", ".join(map(str, missing))
         problem = f"floors without a sensor ({listed}), and the others do not determine the stiffness of the frame"
         raise UserError(campaign.file, "channels", problem, "record more floors or modes")
