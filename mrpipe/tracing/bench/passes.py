@@ -5,10 +5,10 @@ from __future__ import annotations
 from mrpipe.artifacts import Progress
 
 FIRST_STEP = 0.1
-"""Share that each pass reports first."""
+"""Numerical technique: share that each pass reports first."""
 
 LAST_STEP = 0.85
-"""Share that is reached when no further pass follows."""
+"""Numerical technique: share that is reached when no further pass follows."""
 
 
 def in_passes(progress: Progress) -> Progress:
