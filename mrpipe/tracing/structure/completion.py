@@ -108,7 +108,7 @@ def _identified(campaign: Campaign, missing: Sequence[int], progress: Progress) 
     campaign = replace(campaign, declared=declared)
     result = identify_frame(frame_tests(campaign), IdentificationOptions(), progress)
     frame = result.frame
-    # a frame that reproduces no test is no basis for the motion of floors without a sensor
+    # the motion of floors without a sensor cannot be computed from a frame that reproduces no test
     reproduced = any(np.median(item.fit_percent) > 0.0 for item in result.in_time)
     if frame is None or not np.all(np.isfinite(frame.stiffness)) or not reproduced:
         listed = ", ".join(map(str, missing))
