@@ -9,6 +9,7 @@ from mrpipe.artifacts import Artifact
 from mrpipe.artifacts.plain import plain
 from mrpipe.structures.options import DamperSettings
 from mrpipe.structures.over_amplitude import depends_on_amplitude
+from mrpipe.words import listed
 
 KEPT = ("name", "form", "place", "parameters", "confidence", "physics", "source")
 """Keys of an effect of close-loop that the JSON file of an export repeats."""
@@ -38,7 +39,7 @@ def effects_left_out(summary: Mapping[str, Any], where: str, remedy: str) -> lis
     ]
     if not names:
         return []
-    return [f"close-loop found {' and '.join(names)}, which this export does not contain: {remedy}"]
+    return [f"close-loop found {listed(names)}, which this export does not contain: {remedy}"]
 
 
 def frame_left_out(frame: Artifact, amplitude_m: float, tracing: Mapping[str, Any]) -> list[str]:
@@ -74,11 +75,11 @@ def dampers_left_out(dampers: Sequence[DamperSettings]) -> list[str]:
     """
     if not dampers:
         return []
-    listed = ", ".join(
+    places = ", ".join(
         f"{item.name or f'damper {place}'} ({item.between[0]} to {item.between[1]}, law {item.law})"
         for place, item in enumerate(dampers, start=1)
     )
     return [
-        f"structure.dampers are not in this export, which is the structure without dampers: {listed}; "
+        f"structure.dampers are not in this export, which is the structure without dampers: {places}; "
         "a controlled damper is not a linear element"
     ]

@@ -12,6 +12,7 @@ from mrpipe.config.loader import LoadedConfig
 from mrpipe.config.sections.campaigns import LABORATORY
 from mrpipe.pipeline.fingerprint import FileHashes
 from mrpipe.pipeline.stage import Stage
+from mrpipe.words import listed
 
 CAMPAIGN_RECORDERS = {"bench": "record-bench", "frame": "record-frame", "closed-loop": "record-closed-loop"}
 """Kind of rig -> stage that records its campaign on the virtual laboratory."""
@@ -83,7 +84,7 @@ class Sources:
             return ""
         key = f"campaigns.{rigs[recorder]}"
         return (
-            f"records a virtual campaign, because {key} is `{LABORATORY}`, but {' and '.join(given)} "
+            f"records a virtual campaign, because {key} is `{LABORATORY}`, but {listed(given)} "
             f"{'describes' if len(given) == 1 else 'describe'} your own rig: results mix both. Give your campaign as "
             f"{key}, or null where no campaign of this kind exists"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mrpipe.words import duration
+from mrpipe.words import duration, listed
 
 
 def headline(stage: str, summary: Mapping[str, Any]) -> str:
@@ -174,7 +174,7 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
             f"{name.replace('_', ' ')} {_number(value['value'])} {value['unit']}".removesuffix(" 1")
             for name, value in effect["parameters"].items()
         )
-        rivals = f", not separated from {' and '.join(effect['tied_with'])}" if effect["tied_with"] else ""
+        rivals = f", not separated from {listed(effect['tied_with'])}" if effect["tied_with"] else ""
         confidence = f", confidence {effect['confidence']:.2f}" if effect["name"] != "unattributed" else ""
         shown = f": {numbers}" if numbers else ""
         place = f" at {effect['place']}" if effect.get("place") else ""

@@ -23,6 +23,7 @@ from mrpipe.reporting.front.sections import sections
 from mrpipe.reporting.front.statements import statements
 from mrpipe.reporting.words import number
 from mrpipe.reporting.writer import Section
+from mrpipe.words import listed
 
 __all__ = ["ReportStage", "RunFacts", "first_screen", "write_report"]
 
@@ -56,7 +57,7 @@ def _source_line(facts: RunFacts) -> str:
     from mrpipe import __version__
 
     parts = [
-        f"campaign {' and '.join(facts.campaigns)}" if facts.campaigns else "",
+        f"campaign {listed(facts.campaigns)}" if facts.campaigns else "",
         facts.date,
         f"mrpipe {__version__}",
     ]

@@ -26,6 +26,7 @@ from mrpipe.campaigns.readers.strong_motion import (
 )
 from mrpipe.errors import UserError
 from mrpipe.units import to_si
+from mrpipe.words import listed
 
 GRAVITY = 9.80665
 SMALLEST_PEAK, LARGEST_PEAK = 0.05 * GRAVITY, 1.5 * GRAVITY
@@ -211,7 +212,7 @@ def _read_v2(path: Path) -> _Raw:
     if abs(channels[-1].interval_s / channels[0].interval_s - 1.0) > SAME_INTERVAL:
         channels = channels[:1]
     _, values = common_window(path, channels)
-    names = " and ".join(item.name for item in channels)
+    names = listed([item.name for item in channels])
     further = f", the first of {len(horizontal)} horizontal ones" if len(horizontal) > len(channels) else ""
     return _Raw(values, channels[0].interval_s, "in m/s^2", (f"channels {names}{further}",))
 
@@ -282,8 +283,8 @@ def _split_clock(path: Path, values: FloatArray, header: str) -> _Raw:
     back = np.flatnonzero(steps <= 0)
     if len(back):
         row = int(back[0]) + 2
-        listed = f"the clock goes from {first[row - 2]:g} to {first[row - 1]:g} s"
-        raise UserError(path, f"row {row}", listed, "times must rise from row to row")
+        order = f"the clock goes from {first[row - 2]:g} to {first[row - 1]:g} s"
+        raise UserError(path, f"row {row}", order, "times must rise from row to row")
     bad = np.flatnonzero(~(np.abs(steps - np.median(steps)) < 0.02 * np.median(steps)))
     if len(bad):
         raise UserError(path, f"row {int(bad[0]) + 2}", "the clock is not uniform", "resample to equal intervals first")
@@ -355,11 +356,11 @@ def _unit(path: Path, raw: _Raw, given: str | None) -> tuple[str, str]:
 def _check_peaks(path: Path, values: FloatArray, unit: str) -> None:
     peaks = np.abs(values).max(axis=0)
     if peaks.max() > IMPOSSIBLE_PEAK:
-        listed = f"peak {peaks.max() / GRAVITY:.3g} g in {unit}"
-        raise UserError(path, "unit", f"{listed} is not a ground motion", "the unit is wrong: g, cm/s^2 or m/s^2?")
+        largest = f"peak {peaks.max() / GRAVITY:.3g} g in {unit}"
+        raise UserError(path, "unit", f"{largest} is not a ground motion", "the unit is wrong: g, cm/s^2 or m/s^2?")
     moving = peaks[peaks > 0.0]
     if moving.max() > 50.0 * moving.min():
-        listed = ", ".join(f"{peak:.3g}" for peak in peaks)
+        largest = ", ".join(f"{peak:.3g}" for peak in peaks)
         raise UserError(
-            path, "components", f"peaks {listed} m/s^2 differ too much: mixed units", "use one unit for all"
+            path, "components", f"peaks {largest} m/s^2 differ too much: mixed units", "use one unit for all"
         )

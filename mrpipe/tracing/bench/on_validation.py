@@ -21,6 +21,7 @@ from mrpipe.tracing.bench.validation import Comparison, compare, first_parts, tr
 from mrpipe.tracing.bench.weights import AS_SHOWN, NoiseScale, noise_limits, noise_variances
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Comparable, Score, Verdict
+from mrpipe.words import listed
 
 
 @dataclass(frozen=True)
@@ -316,7 +317,7 @@ def _evidence(
 def _sentence(
     kind: str, evidence: Evidence, names: Sequence[str], base_taken: str, reason: str, rules: ValidationRules
 ) -> str:
-    listed = " and ".join(names) + (f" with the base form {base_taken}" if base_taken else "")
+    found = listed(names) + (f" with the base form {base_taken}" if base_taken else "")
     verb = "explains" if len(names) == 1 else "explain"
     if kind == "noise":
         return "the residual is noise: nothing is missing"
@@ -324,10 +325,10 @@ def _sentence(
     limit = f", as far as a flexible model of motion and drive can show; the error is {above:.2g} times the noise floor"
     limit = limit if above > rules.within_floors else ""
     if kind == "explained":
-        return f"{listed}: {verb} what is missing{limit}"
+        return f"{found}: {verb} what is missing{limit}"
     if kind == "partly explained":
         return (
-            f"{listed}: {verb} part of what is missing, {100.0 * evidence.share:.0f} % of what is recoverable on the "
+            f"{found}: {verb} part of what is missing, {100.0 * evidence.share:.0f} % of what is recoverable on the "
             "validation tests"
         )
     if kind == "base form":

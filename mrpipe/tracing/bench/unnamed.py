@@ -25,6 +25,7 @@ from mrpipe.tracing.bench.assess import without_names
 from mrpipe.tracing.bench.crossvalidation import Gain
 from mrpipe.tracing.bench.rivals import HOPELESS, ITERATIONS, Unseen
 from mrpipe.tracing.bench.select import Selection, draft
+from mrpipe.words import listed
 
 RELAXATION_TIMES = tuple(float(item) for item in np.geomspace(0.02, 12.0, 5))
 """Numerical technique: relaxation times of the elements, in units of stroke over speed. They differ by factors of five,
@@ -111,7 +112,7 @@ def without_beaten_names(
     effects = [term.effect.name for term in named.problem.terms[declared:]]
     verb = "lowers" if len(effects) == 1 else "lower"
     reason = (
-        f"no effect is named: {' and '.join(effects)} {verb} the error, but a linear memory of the motion, which has "
+        f"no effect is named: {listed(effects)} {verb} the error, but a linear memory of the motion, which has "
         "no name in the library, predicts tests that were left out as well or better"
     )
     shorter, kept = without_names(selection, gains, range(selection.proven), declared)

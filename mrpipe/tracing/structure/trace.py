@@ -24,6 +24,7 @@ from mrpipe.tracing.structure.scores import dependence, flexible_score, frame_sc
 from mrpipe.tracing.structure.select import FrameCandidate, FrameSelection, select
 from mrpipe.tracing.structure.spectra import Spectra
 from mrpipe.tracing.verdict import Candidate, Estimate, Interval, LeftOutGain, NamedEffect, Unexplained, Verdict
+from mrpipe.words import listed
 
 QUANTITY = (
     "shear force of every storey (mass times absolute acceleration, summed from the top) from the measured motion, "
@@ -378,7 +379,7 @@ def _verdict(
     drift = f"; {between.sentence()}" if between.drifts else ""
     if reason:
         return Verdict("unknown" if selection.structured else "noise", f"{reason}{drift}")
-    names = " and ".join(f"{item.name} ({item.place})" for item in named)
+    names = listed([f"{item.name} ({item.place})" for item in named])
     if share >= rules.named_share:
         return Verdict("explained", f"{names}: explains what is missing{drift}", share)
     form = "explains part of what is missing; its form is not proven"
