@@ -322,8 +322,11 @@ def _sentence(
     if kind == "noise":
         return "the residual is noise: nothing is missing"
     above = evidence.after / max(evidence.floor, 1e-12)
-    limit = f", as far as a flexible model of motion and drive can show; the error is {above:.2g} times the noise floor"
-    limit = limit if above > rules.within_floors else ""
+    limit = ""
+    if above > rules.within_floors:
+        limit = (
+            f", as far as a flexible model of motion and drive can show; the error is {above:.2g} times the noise floor"
+        )
     if kind == "explained":
         return f"{found}: {verb} what is missing{limit}"
     if kind == "partly explained":

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from mrpipe.artifacts import Progress
 
-FIRST_STEP = 0.1
-"""Numerical technique: share that each pass reports first."""
-
 LAST_STEP = 0.85
 """Numerical technique: share that is reached when no further pass follows."""
 
@@ -24,7 +21,7 @@ def in_passes(progress: Progress) -> Progress:
 
     def report(fraction: float, text: str = "") -> None:
         nonlocal number, last
-        if fraction <= FIRST_STEP < last:
+        if fraction < last:
             number += 1
         last = fraction
         begin = LAST_STEP * (1.0 - 0.5 ** (number - 1))
