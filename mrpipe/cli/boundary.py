@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from mrpipe.errors import CheckFailed, MrpipeError, UserError
+from mrpipe.words import listed
 
 INTERRUPTED = 130
 WRONG_INPUT = 2
@@ -54,9 +55,9 @@ def as_user_error(error: BaseException) -> MrpipeError | None:
 def _of_system(error: OSError) -> UserError:
     names = [str(name) for name in (error.filename, error.filename2) if name is not None]
     if error.errno is None:  # h5py raises errors without a number
-        return UserError(" and ".join(names) or "file", "", f"cannot be used ({_line(error)})", "build it again")
+        return UserError(listed(names) or "file", "", f"cannot be used ({_line(error)})", "build it again")
     remedy = _REMEDIES.get(error.errno, "check the path and the disk")
-    return UserError(" and ".join(names) or "system", "", os.strerror(error.errno).lower(), remedy)
+    return UserError(listed(names) or "system", "", os.strerror(error.errno).lower(), remedy)
 
 
 def _line(error: BaseException) -> str:

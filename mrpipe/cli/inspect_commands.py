@@ -11,7 +11,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
-from mrpipe.words import counted
+from mrpipe.words import counted, listed
 
 if TYPE_CHECKING:
     from mrpipe.cli.checking import CheckResult
@@ -231,7 +231,7 @@ def _print_project(project: Project, directory: Path) -> None:
         for line in item.skipped:
             print(f"  not used: {line}")
     verb = "check the lines marked UNSURE in" if project.proposals else "fill in"
-    files = " and ".join(str(directory / item / CAMPAIGN_FILE) for item in project.campaigns)
+    files = listed([str(directory / item / CAMPAIGN_FILE) for item in project.campaigns])
     print(f"next: {verb} {files},")
     print(f"then: cd {directory} && mrpipe check configs/{project.name}.yaml && mrpipe run configs/{project.name}.yaml")
 

@@ -159,9 +159,10 @@ def slug(text: str) -> str:
 
 def _readme(name: str, campaigns: Sequence[str]) -> str:
     from mrpipe.campaigns.model import CAMPAIGN_FILE
+    from mrpipe.words import listed
 
-    listed = " and ".join(f"`data/{item}/{CAMPAIGN_FILE}`" for item in campaigns)
-    says = f"{listed} {'says' if len(campaigns) == 1 else 'say'}"
+    files = [f"`data/{item}/{CAMPAIGN_FILE}`" for item in campaigns]
+    says = f"{listed(files)} {'says' if len(campaigns) == 1 else 'say'}"
     return _README.format(name=name, campaigns=says, first=f"data/{campaigns[0]}")
 
 

@@ -10,27 +10,22 @@ from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
-from mrpipe.modal.ambient.clocks import synchronised
-from mrpipe.modal.ambient.modes import find_ambient_modes
 from mrpipe.modal.amplitude.law_fit import amplitude_finding, find_amplitude_dependence
 from mrpipe.modal.clocks.delays import SensorClock, corrected, expected_clocks
 from mrpipe.modal.decays.choice import choose_damping, decays_of_modes
 from mrpipe.modal.decays.decay import Estimate
-from mrpipe.modal.fit.own_residues import with_own_residues
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.identification import FrameIdentification, GivenShapes, errors_of_rows
 from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial
 from mrpipe.modal.matrices.rigid_floors import RigidShapes, assemble_rigid, rigid_response, rigid_shapes
 from mrpipe.modal.matrices.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.matrices.tridiagonal import fit_tridiagonal
+from mrpipe.modal.mode_finding import find_modes
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests
 from mrpipe.modal.search.checks import check_mode_matrix, orthogonal_shapes, reversed_finding
-from mrpipe.modal.search.chosen_tests import ChosenTests, choose_tests, training_first, with_clocks, without_complex
+from mrpipe.modal.search.chosen_tests import ChosenTests, training_first
 from mrpipe.modal.search.forced_modes import ModeSearch, check_channels
-from mrpipe.modal.search.free_response import with_decays
-from mrpipe.modal.search.hidden import contested, sharpened, with_missing_modes
-from mrpipe.modal.search.peak_picking import pick_peaks
 from mrpipe.modal.search.selection import (
     LEAST_COHERENCE,
     Layout,
@@ -56,31 +51,6 @@ from mrpipe.structures import (
 )
 
 _LOOSE_SIGNS = 0.03
-
-
-def _ambient_findings(tests: FrameTests) -> list[str]:
-    given = np.isfinite(tests.floor_masses).any()
-    known = "given floor masses" if given else "the added masses" if tests.with_added_masses else ""
-    scale = f"the scale of M, C and K comes from {known}" if known else "and nothing gives M, C and K a scale"
-    return [f"the excitation was not measured, so modal masses and participations cannot be determined; {scale}"]
-
-
-def _clock_findings(clocks: Sequence[SensorClock]) -> list[str]:
-    findings = []
-    for name in dict.fromkeys(item.test for item in clocks):
-        own = [item for item in clocks if item.test == name]
-        delays = ", ".join(_delay_text(item) for item in own)
-        findings.append(f"test {name}: clocks of sensors were corrected ({delays})")
-    return findings
-
-
-def _delay_text(clock: SensorClock) -> str:
-    text = f"floor {clock.sensor.floor}{clock.sensor.direction} {1e3 * clock.offset_s:+.2f} ms"
-    if clock.drift:
-        text += f" and {1e6 * clock.drift:+.1f} us/s"
-    if clock.step_s:
-        text += f" and {1e3 * clock.step_s:+.2f} ms from {clock.step_at_s:.3g} s"
-    return text
 
 
 def _check_coherence(fit: MultiModeFit, tests: FrameTests) -> list[str]:
@@ -162,37 +132,7 @@ def _identify(
     forced = training_first(tests.forced)
     if given is not None:
         _check_given(given, tests.floor_masses)
-    progress(0.05, "poles")
-    clocks: tuple[SensorClock, ...] = ()
-    if not forced:
-        band = (options.band_low_hz, options.band_high_hz)
-        ambient, clocks = synchronised(tests.ambient, band, options)
-        search = find_ambient_modes(ambient, layout, *band, tests.source, options.ambient_method)
-        chosen = ChosenTests(search, ())
-        findings = _ambient_findings(tests) + _clock_findings(clocks) + list(search.notes)
-    else:
-        chosen, findings = choose_tests(forced, tests, layout, options)
-    if tests.ambient and forced:
-        findings.append("ambient tests were not used, because forced tests determine the modes better")
-    if options.clock_correction and forced:
-        progress(0.3, "clocks")
-        chosen, clocks = with_clocks(chosen, tests, layout, options)
-        findings += _clock_findings(clocks)
-        chosen = ChosenTests(without_complex(chosen.search), chosen.tests)
-    if forced and layout.is_chain and len(chosen.search.numbers) < layout.floors:
-        progress(0.4, "hidden modes")
-        more = with_missing_modes(chosen.search, chosen.tests, layout, options.band_high_hz)
-        chosen = ChosenTests(more, chosen.tests)
-    if forced and layout.is_chain and len(chosen.search.numbers) == layout.floors:
-        chosen = ChosenTests(contested(chosen.search, chosen.tests, layout), chosen.tests)
-    if forced:
-        sharp = sharpened(chosen.search, chosen.tests)
-        # a fit of the forced tests alone does not contain the modes that decay tests show better
-        whole = with_decays(with_own_residues(sharp.fit), tests.decays)
-        chosen = ChosenTests(replace(sharp, fit=whole), chosen.tests)
-    if options.modes_from == "peak-picking" and chosen.tests:
-        picked = pick_peaks(chosen.tests, chosen.search.fit, chosen.search.band_hz)
-        chosen = replace(chosen, search=replace(chosen.search, fit=picked))
+    chosen, clocks, findings = find_modes(tests, forced, layout, options, progress)
     fit = chosen.search.fit
     findings += tests.notes
     if layout.is_chain and chosen.search.numbers[0] == 1:
@@ -202,12 +142,7 @@ def _identify(
     progress(0.5, "decays")
     decays, notes = decays_of_modes(tests, fit)
     findings += notes
-    modes = fit.angular_frequencies.size
-    poles = np.concatenate([fit.angular_frequencies, fit.damping_ratios])
-    freedom = fit.freedom if fit.freedom.size else np.full(poles.size, np.inf)
-    errors = np.sqrt(np.diag(fit.covariance))
-    estimates = tuple(map(Estimate.of_logarithm, poles.tolist(), errors.tolist(), freedom.tolist()))
-    frequencies, sweep = estimates[:modes], estimates[modes:]
+    frequencies, sweep = _estimates(fit)
     damping, sources, notes = choose_damping(
         sweep, decays, options.damping_from, "sweep" if forced else "ambient", options.decay_method
     )
@@ -271,6 +206,16 @@ def _identify(
         if amplitude is None
         else tuple(compare_in_time(amplitude.model.response(test), test, inside) for test in shown),
     )
+
+
+def _estimates(fit: MultiModeFit) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...]]:
+    """Return angular frequencies [rad/s] and damping ratios of the fit, with their intervals."""
+    modes = fit.angular_frequencies.size
+    poles = np.concatenate([fit.angular_frequencies, fit.damping_ratios])
+    freedom = fit.freedom if fit.freedom.size else np.full(poles.size, np.inf)
+    errors = np.sqrt(np.diag(fit.covariance))
+    estimates = tuple(map(Estimate.of_logarithm, poles.tolist(), errors.tolist(), freedom.tolist()))
+    return estimates[:modes], estimates[modes:]
 
 
 def _verified(

@@ -27,6 +27,7 @@ from mrpipe.structures.records import GroundMotion
 from mrpipe.thesis.claim import Missing, Outcomes, Value
 from mrpipe.thesis.entries import printed_columns, table_id
 from mrpipe.units import same_unit_dimension
+from mrpipe.words import listed
 
 _FLOORS, _MASS, _STIFFNESS = 10, 5000.0, 1.5e7
 _RATED_N = 1.0e6
@@ -110,7 +111,7 @@ def _units() -> Outcomes:
     said = f"it is taken in {values.units['drive_limit']}, 0 to {values.scalar('drive_limit'):g}"
     # f_b and c_b of Table 6.1 are slopes of force and viscosity over the command
     found = sorted({unit_of_command("kN/A", "kN"), unit_of_command("kN*s/m/V", "kN*s/m")})
-    words = "one unit" if len(found) == 1 else " and ".join(found)
+    words = "one unit" if len(found) == 1 else listed(found)
     return {"A17": Value(words, "units of the terms with the command", said)}
 
 

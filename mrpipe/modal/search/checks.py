@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.words import listed
 
 LARGEST_COUPLING = 0.1
 _FLIPS = 3
@@ -121,7 +122,7 @@ def check_mode_matrix(
     findings.append(ModeMatrixFinding("not-orthogonal", message))
     elements = wrong_signs(U, mass)
     if elements:
-        names = " and ".join(f"U{floor}{mode} = {U[floor - 1, mode - 1]:+.3f}" for floor, mode in elements)
+        names = listed([f"U{floor}{mode} = {U[floor - 1, mode - 1]:+.3f}" for floor, mode in elements])
         corrected = U.copy()
         for floor, mode in elements:
             corrected[floor - 1, mode - 1] *= -1.0
@@ -194,12 +195,12 @@ def reversed_finding(mode_shape: ArrayLike, error: ArrayLike) -> list[str]:
     fewer = up if up.size < down.size else down
     if not fewer.size:
         return []
-    listed = ", ".join(map(str, fewer))
+    names = listed(list(map(str, fewer)))
     one = fewer.size == 1
     subject, sign = (
-        (f"floor {listed} moves", "the sign of its sensor is")
+        (f"floor {names} moves", "the sign of its sensor is")
         if one
-        else (f"floors {listed} move", "the signs of their sensors are")
+        else (f"floors {names} move", "the signs of their sensors are")
     )
     return [
         f"{subject} against the others in the first mode, which springs between floors do not allow: {sign} probably "

@@ -18,7 +18,7 @@ from mrpipe.fitting.reference import with_own_laws
 from mrpipe.fitting.start import distinct_levels, polynomial_laws
 from mrpipe.tracing.bench.select import Selection
 
-LEADERS = 6
+FORMS_WITH_LAWS_AGAIN = 6
 """Numerical technique: largest number of base forms whose laws are chosen again before effects are searched."""
 
 COMPARABLE = 5.0
@@ -89,7 +89,7 @@ def with_laws_of_leaders(
     best = min(item.chi_square for item in singles.values())
     if best <= enough:
         return dict(singles)
-    ordered = sorted(singles, key=lambda name: singles[name].chi_square)[:LEADERS]
+    ordered = sorted(singles, key=lambda name: singles[name].chi_square)[:FORMS_WITH_LAWS_AGAIN]
     names = [name for name in ordered if singles[name].chi_square <= COMPARABLE * best]
 
     def again(name: str) -> Fit:

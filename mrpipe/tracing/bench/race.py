@@ -26,7 +26,7 @@ from mrpipe.tracing.bench.select import Selection, draft, left_of
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import RaceRules
 
-LEADERS = 3
+SEARCHED_FORMS = 3
 """Numerical technique: base forms, in addition to the declared one, under which effects are searched."""
 
 SCREENED = 8
@@ -220,7 +220,7 @@ def race(
         # the error of a base form without effects is that of noise, so no effect is needed
         return _compared(fits, base, {}, noise, coupled, rules, jobs)
     ordered = sorted(singles, key=lambda name: _draft_cost(singles[name], noise, rules))
-    names = list(dict.fromkeys((base.problem.base.name, *ordered[:LEADERS])))
+    names = list(dict.fromkeys((base.problem.base.name, *ordered[:SEARCHED_FORMS])))
     searches: dict[str, Selection] = {}
 
     def searched(name: str) -> None:

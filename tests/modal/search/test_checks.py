@@ -107,7 +107,7 @@ def test_sensors_with_the_opposite_sign_are_named():
     [line] = reversed_finding(first * [1, -1, 1, 1, 1], small)
     assert line.startswith("floor 2 moves against the others") and "sign of its sensor is" in line
     [line] = reversed_finding(first * [1, 1, -1, 1, -1], small)
-    assert line.startswith("floors 3, 5 move against the others") and "their sensors are" in line
+    assert line.startswith("floors 3 and 5 move against the others") and "their sensors are" in line
     # a sign within the error, or at a floor without a sensor, is open
     assert reversed_finding(first * [1, -1, 1, 1, 1], [1e-3, 0.2, 1e-3, 1e-3, 1e-3]) == []
     assert reversed_finding(first * [1, 0, 1, 1, 1], [1e-3, np.inf, 1e-3, 1e-3, 1e-3]) == []
