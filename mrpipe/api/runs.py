@@ -82,7 +82,7 @@ class Run:
     @property
     def damper_traced(self) -> DamperModel:
         """The damper with the effects that close-loop named."""
-        from mrpipe.dampers.model import read_damper
+        from mrpipe.effects.damper import read_damper
 
         return read_damper(self.artifact("damper-traced"))
 
