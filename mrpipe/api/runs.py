@@ -109,7 +109,10 @@ class Run:
         return read_network(self.artifact(kind), "network")
 
     def response(self, law: str) -> pd.DataFrame:
-        """Return the histories of a simulated law, a column for each history and floor."""
+        """Return the histories of a simulated law in SI units, a column for each history and floor.
+
+        The columns have the names of the artifact: `time`, `force`, `displacement_1` for floor 1.
+        """
         import pandas as pd
 
         from mrpipe.simulation.storage import read_histories
@@ -120,7 +123,7 @@ class Run:
                 columns[name] = values
             else:
                 columns.update({f"{name}_{floor + 1}": values[:, floor] for floor in range(values.shape[1])})
-        length = len(columns["time_s"])
+        length = len(columns["time"])
         return pd.DataFrame({name: values for name, values in columns.items() if len(values) == length})
 
 

@@ -15,6 +15,7 @@ from mrpipe.artifacts import ArtifactWriter, Provenance, load_parameter_set
 from mrpipe.dampers.model import Addition, damper_from_parameter_set, write_damper
 from mrpipe.effects.library import damper_effects
 from mrpipe.errors import UserError
+from mrpipe.simulation.storage import write_response
 from mrpipe.structures import frame_from_parameter_set, write_frame
 from tests.campaigns.builders import campaign, motion
 
@@ -86,6 +87,26 @@ def test_a_run_opens_its_traced_damper_with_the_effects(tmp_path: Path) -> None:
         write_damper(artifact, traced)
     found = mrpipe.open_run(tmp_path).damper_traced
     assert [item.name for item in found.effects] == ["inertia"] and found == traced
+
+
+@pytest.mark.property
+def test_a_run_opens_its_frame_response_and_verdict(tmp_path: Path) -> None:
+    frame = frame_from_parameter_set("thesis")
+    damper = damper_from_parameter_set(load_parameter_set("dampers", "set-c"))
+    loop = mrpipe.simulate(frame, damper, law="fdns", base_amplitude_m_s2=0.79, frequency_rad_s=8.0)
+    with ArtifactWriter.create(tmp_path / "frame.h5", Provenance("identify-frame")) as artifact:
+        write_frame(artifact, frame)
+    with ArtifactWriter.create(tmp_path / "response-fdns.h5", Provenance("simulate")) as artifact:
+        write_response(artifact, loop.response, damper.drive_unit)
+    run = mrpipe.open_run(tmp_path)
+    np.testing.assert_array_equal(run.frame.stiffness, frame.stiffness)
+    table = run.response("fdns")
+    np.testing.assert_array_equal(table["time"], loop.response.time_s)
+    np.testing.assert_array_equal(table[f"displacement_{frame.floors}"], loop.response.displacement[:, -1])
+    with pytest.raises(UserError, match="run mrpipe close-loop first"):
+        _ = run.verdict
+    (tmp_path / "close-loop.json").write_text('{"verdict": "noise"}', encoding="utf-8")
+    assert run.verdict["verdict"] == "noise"
 
 
 @pytest.mark.oracle
