@@ -12,12 +12,13 @@ import pytest
 
 import mrpipe
 from mrpipe.artifacts import ArtifactWriter, Provenance, load_parameter_set
-from mrpipe.dampers.model import Addition, damper_from_parameter_set, write_damper
+from mrpipe.dampers.model import damper_from_parameter_set, write_damper
 from mrpipe.effects.library import damper_effects
 from mrpipe.errors import UserError
 from mrpipe.simulation.storage import write_response
 from mrpipe.structures import frame_from_parameter_set, write_frame
 from tests.campaigns.builders import campaign, motion
+from tests.effects.test_damper import added
 
 
 @pytest.fixture(scope="module")
@@ -78,11 +79,8 @@ def test_a_run_is_opened_by_its_directory(tmp_path: Path) -> None:
 
 @pytest.mark.property
 def test_a_run_opens_its_traced_damper_with_the_effects(tmp_path: Path) -> None:
-    inertia = damper_effects()["inertia"]
-    shape = inertia.forms[0]
-    units = {item.name: item.unit for item in shape.parameters}
-    addition = Addition("inertia", shape.name, dict.fromkeys(units, 1.5), units, inertia.sensor, shape.steps)
-    traced = replace(damper_from_parameter_set(load_parameter_set("dampers", "set-c")), effects=(addition,))
+    inertia = added("inertia", damper_effects()["inertia"].forms[0].name, mass=1.5)
+    traced = replace(damper_from_parameter_set(load_parameter_set("dampers", "set-c")), effects=(inertia,))
     with ArtifactWriter.create(tmp_path / "damper-traced.h5", Provenance("close-loop")) as artifact:
         write_damper(artifact, traced)
     found = mrpipe.open_run(tmp_path).damper_traced
