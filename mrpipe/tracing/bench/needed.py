@@ -22,7 +22,14 @@ ITERATIONS = 15
 
 
 def without_superfluous(
-    selection: Selection, declared: int, *, lead: float, orders: Orders, race: Race | None = None, jobs: int = 1
+    selection: Selection,
+    declared: int,
+    *,
+    lead: float,
+    orders: Orders,
+    worth_a_try: float,
+    race: Race | None = None,
+    jobs: int = 1,
 ) -> Selection:
     """Return the selection without effects that richer forms, richer laws of the drive or a base form replace.
 
@@ -38,6 +45,9 @@ def without_superfluous(
         An effect is dropped if the fit without it has at most this multiple of the chi-square of the fit with it.
     orders
         Largest degrees of the laws of the drive.
+    worth_a_try
+        All base forms are tried with the best forms of the effects only if the excess of the chi-square over the noise,
+        in units of the noise, exceeds this.
     race
         The models that were compared; None if no other base form is tried.
     jobs
@@ -45,7 +55,9 @@ def without_superfluous(
     """
     kept = selection
     while kept.proven > 1 and len(kept.chosen.problem.terms) >= declared + 2:
-        shorter = _shorter(kept, declared, lead, orders, jobs) or _with_rival(kept, declared, lead, orders, race, jobs)
+        shorter = _shorter(kept, declared, lead, orders, jobs) or _with_rival(
+            kept, declared, lead, orders, worth_a_try, race, jobs
+        )
         if shorter is None:
             break
         kept = shorter
@@ -81,18 +93,26 @@ def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: 
 
 
 def _with_rival(
-    kept: Selection, declared: int, lead: float, orders: Orders, race: Race | None, jobs: int
+    kept: Selection,
+    declared: int,
+    lead: float,
+    orders: Orders,
+    worth_a_try: float,
+    race: Race | None,
+    jobs: int,
 ) -> Selection | None:
     """Return the selection without one of its named effects, under another base form; None if each is needed."""
     if race is None:
         return None
     small, named = draft(kept.chosen), _named(kept, declared)
     sets = [[k for k in range(len(small.problem.terms)) if k != place] for place in named]
-    found = best_rival(kept, small, sets, declared, orders, race, jobs)
-    if found is None or found[1].chi_square > lead * small.chi_square:
+    full = with_best_forms(small, named, jobs=jobs)
+    more = full if full.chi_square > (1.0 + worth_a_try) * kept.noise else None
+    found = best_rival(kept, small, sets, declared, orders, race, jobs, full=more)
+    if found is None:
         return None
     rival, best = found
-    if best.chi_square > lead * with_best_forms(small, named, jobs=jobs).chi_square:
+    if best.chi_square > lead * full.chi_square:
         return None
     again = taken(kept, race, rival, best)
     return again if again.chosen.chi_square <= lead * kept.chosen.chi_square else None

@@ -187,7 +187,7 @@ def _richer(chosen: Fit, place: int, count: int, jobs: int = 1) -> Iterator[Fit]
     starts = [
         (form, given)
         for form in forms
-        for given in _starts(form, small.term_values[place], small.problem.scales)
+        for given in starts_of(form, small.term_values[place], small.problem.scales)
         if _fits_in_chain(chosen, place, form)
     ]
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
@@ -217,7 +217,7 @@ def _fits_in_chain(chosen: Fit, place: int, form: EffectForm) -> bool:
     return others + len(form.steps(form.without_strength(chosen.problem.scales))) < CHAIN_LENGTH
 
 
-def _starts(form: EffectForm, known: Mapping[str, float], scales: EffectScales) -> Iterator[dict[str, float]]:
+def starts_of(form: EffectForm, known: Mapping[str, float], scales: EffectScales) -> Iterator[dict[str, float]]:
     """Yield starts: fitted values of the simple form for parameters of the same name, else the starts of the form.
 
     For a strength with distant starts these are tried too, because the simple form may have ended in another minimum.

@@ -7,19 +7,20 @@ effects are known, each with richer forms of the effects and adequate laws of th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.problem import Term
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.choose import promoted
 from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.drive_again import with_adequate_laws
-from mrpipe.tracing.bench.race import Model, Race, on_all_tests
-from mrpipe.tracing.bench.refine import with_best_forms
+from mrpipe.tracing.bench.race import Model, Race, on_all_tests, with_effects_of
+from mrpipe.tracing.bench.refine import starts_of, with_best_forms
 from mrpipe.tracing.bench.select import Selection, draft
 
 RIVALS = 3
@@ -29,6 +30,9 @@ HOPELESS = 5.0
 """Numerical technique: richer forms are not tried if the simple ones have this multiple of the chi-square of the chosen
 fit.
 """
+
+RANKED_STEPS = 3
+"""Numerical technique: number of steps of the fits that rank all base forms with the named effects."""
 
 ITERATIONS = 15
 """Numerical technique: largest number of steps of a fit with another base form ..."""
@@ -144,7 +148,7 @@ def with_best_base(
     if full.chi_square < (1.0 + worth_a_try) * selection.noise:
         # only a richer form of the effect is missing
         return selection
-    found = best_rival(selection, small, [places], declared, orders, race, jobs)
+    found = best_rival(selection, small, [places], declared, orders, race, jobs, full=full)
     if found is None:
         return selection
     rival, best = found
@@ -193,6 +197,7 @@ def best_rival(
     orders: Orders,
     race: Race,
     jobs: int,
+    full: Fit | None = None,
 ) -> tuple[Model, Fit] | None:
     """Return the best rival with one of several sets of terms, and its fit on the draft; None without a rival.
 
@@ -210,14 +215,70 @@ def best_rival(
         The models that competed.
     jobs
         Threads.
+    full
+        Fit on the draft with the same terms in their best forms; with these, all base forms of the race are rivals.
+        None if they are not tried.
     """
-    pairs = [(rival, places) for rival in rivals_of(selection, race) for places in sets]
-    if not pairs:
+    trials: list[tuple[Model, Fit, Sequence[int]]] = [
+        (rival, small, places) for rival in rivals_of(selection, race) for places in sets
+    ]
+    if full is not None:
+        trials += _ranked(selection, full, sets, race, declared, jobs)
+    if not trials:
         return None
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        fits = list(pool.map(lambda item: with_base_of(item[0], small, item[1], declared, orders), pairs))
-    best = min(range(len(pairs)), key=lambda place: fits[place].chi_square)
-    return pairs[best][0], fits[best]
+        fits = list(pool.map(lambda item: with_base_of(item[0], item[1], item[2], declared, orders), trials))
+    best = min(range(len(trials)), key=lambda place: fits[place].chi_square)
+    return trials[best][0], fits[best]
+
+
+def _ranked(
+    selection: Selection, full: Fit, sets: Sequence[Sequence[int]], race: Race, declared: int, jobs: int
+) -> list[tuple[Model, Fit, Sequence[int]]]:
+    """Return the best base forms with one of several sets of the terms of a fit; each with its fit and its terms.
+
+    The race compares base forms with the simple forms of the effects, which change the force. If the true effect
+    changes the yield force before the damper yields, the correct base form can be far from the best ones. All base
+    forms are therefore compared with the forms of the named effects that do so.
+    """
+    plain: dict[str, Model] = {}
+    for model in sorted(race.models, key=lambda item: float(np.sum(item.squares))):
+        if model.effects == race.own and model.form != selection.chosen.problem.base.name:
+            plain.setdefault(model.form, model)
+    problems = [item.fit.problem.on_samples_of(full.problem) for item in plain.values()]
+    singles = [
+        fit(replace(problem, window_share=full.problem.window_share), item.fit.theta, iterations=0)
+        for problem, item in zip(problems, plain.values(), strict=True)
+    ]
+    trials: list[tuple[Model, Fit, Sequence[int]]] = []
+    for places in sets:
+        for shorter in _before_yielding(full, places, declared):
+            for found in with_effects_of(shorter, singles, iterations=RANKED_STEPS, jobs=jobs):
+                trials.append((plain[found.problem.base.name], found, range(len(places))))
+    trials.sort(key=lambda item: item[1].chi_square)
+    return [(replace(model, fit=found), found, places) for model, found, places in trials[:RIVALS]]
+
+
+def _before_yielding(full: Fit, places: Sequence[int], declared: int) -> Iterator[Fit]:
+    """Yield a fit with some of its terms, and with each form of a named effect that acts before the damper yields.
+
+    The simple forms of such an effect are linear in its strength. A form that is not is among the richer ones.
+    """
+    terms = [full.problem.terms[k] for k in places]
+    values = [full.term_values[k] for k in places]
+    choices = [(terms, values)]
+    for place in range(declared, len(terms)):
+        term = terms[place]
+        if any(item.role == "strength" for form in term.effect.forms for item in form.parameters):
+            continue
+        for form in term.effect.refinements:
+            if form.name != term.form.name and any(item.role == "strength" for item in form.parameters):
+                start = next(starts_of(form, values[place], full.problem.scales))
+                others = [*terms[:place], Term(term.effect, form), *terms[place + 1 :]]
+                choices.append((others, [*values[:place], start, *values[place + 1 :]]))
+    for chosen, given in choices:
+        problem = replace(full.problem, terms=tuple(chosen))
+        yield fit(problem, start_of(problem, full.base_values, given), iterations=0)
 
 
 def taken(selection: Selection, race: Race, rival: Model, found: Fit) -> Selection:

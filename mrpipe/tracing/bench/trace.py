@@ -170,7 +170,15 @@ def _needed(
     orders = Orders(options.yield_order, options.viscosity_order)
     by_force = choice.baseline.model_error
     lead = (rules.selection_by_force if by_force else rules.selection).lead
-    kept = without_superfluous(selection, declared, lead=lead, orders=orders, race=choice.race, jobs=jobs)
+    kept = without_superfluous(
+        selection,
+        declared,
+        lead=lead,
+        orders=orders,
+        worth_a_try=rules.refinement.worth_a_try,
+        race=choice.race,
+        jobs=jobs,
+    )
     return with_best_base(
         kept,
         declared,

@@ -35,7 +35,7 @@ def _with_terms(planted: str, *forms: tuple[str, str]) -> Fit:
 def _names(planted: str, *forms: tuple[str, str]) -> tuple[list[tuple[str, str]], int]:
     chosen = _with_terms(planted, *forms)
     selection = Selection(plain_fit(planted), 1.0, (), chosen, proven=len(forms))
-    kept = without_superfluous(selection, 0, lead=1.25, orders=Orders(3, 1))
+    kept = without_superfluous(selection, 0, lead=1.25, orders=Orders(3, 1), worth_a_try=0.1)
     return [(term.effect.name, term.form.name) for term in kept.chosen.problem.terms], kept.proven
 
 
@@ -60,6 +60,6 @@ def test_one_effect_is_never_dropped() -> None:
 def test_what_is_dropped_is_offered_as_a_further_term() -> None:
     chosen = _with_terms("soft-stop", ("accumulator", "curved"), ("end-stop", "linear"))
     selection = Selection(plain_fit("soft-stop"), 1.0, (), chosen, proven=2)
-    kept = without_superfluous(selection, 0, lead=1.25, orders=Orders(3, 1))
+    kept = without_superfluous(selection, 0, lead=1.25, orders=Orders(3, 1), worth_a_try=0.1)
     assert kept.extension is not None
     assert [term.effect.name for term in kept.extension.problem.terms] == ["end-stop", "accumulator"]

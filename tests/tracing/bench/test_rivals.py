@@ -14,7 +14,7 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.needed import without_superfluous
 from mrpipe.tracing.bench.race import Race, _compared, alone, on_all_tests, with_effects_of
-from mrpipe.tracing.bench.rivals import Orders, Unseen, rivals_of, with_best_base
+from mrpipe.tracing.bench.rivals import Orders, Unseen, _before_yielding, rivals_of, with_best_base
 from mrpipe.tracing.bench.select import Selection, draft
 from mrpipe.tracing.rules import RaceRules
 from tests.tracing.bench.fits import plain_fit
@@ -69,6 +69,29 @@ def test_the_form_that_fits_best_with_the_same_effects_is_taken() -> None:
     assert found.ground.problem.base.name == "dahl"
 
 
+def test_a_form_that_the_race_did_not_combine_with_the_effect_is_tried_with_its_best_form() -> None:
+    selection, race = _raced(("end-stop", "linear"))
+    alone_only = replace(race, models=tuple(item for item in race.models if item.form != "dahl" or not item.effects))
+    assert rivals_of(selection, alone_only) == []
+    found = with_best_base(selection, 0, ORDERS, alone_only, worth_a_try=0.2, lead=0.1, unseen=_unseen())
+    assert _names(found) == ("dahl", ["end-stop"])
+    assert found.chosen.chi_square < 0.5 * selection.chosen.chi_square
+
+
+def test_forms_that_act_before_the_damper_yields_are_tried_for_effects_whose_simple_forms_change_the_force() -> None:
+    small = draft(plain_fit(PLANTED))
+    pair = _with_terms(small, ("migration", "slip"), ("backlash", "held"))
+
+    def forms(places: list[int], declared: int = 0) -> list[list[str]]:
+        return [[term.form.name for term in item.problem.terms] for item in _before_yielding(pair, places, declared)]
+
+    assert forms([0]) == [["slip"], ["yield-force"], ["yield-force-time"]]
+    # the play of the simple form changes the motion of the damper already
+    assert forms([1]) == [["held"]]
+    assert forms([0, 1]) == [["slip", "held"], ["yield-force", "held"], ["yield-force-time", "held"]]
+    assert forms([0, 1], declared=1) == [["slip", "held"]]
+
+
 class _Worse(Unseen):
     """Tests that were left out and that the other base form predicts worse."""
 
@@ -87,7 +110,7 @@ def test_a_form_that_fits_better_but_predicts_unseen_tests_worse_is_not_taken() 
 def test_a_second_effect_that_corrects_the_base_form_is_dropped() -> None:
     selection, race = _raced(("end-stop", "linear"), ("migration", "slip"))
     assert _names(selection) == ("bouc-wen", ["end-stop", "migration"])
-    found = without_superfluous(selection, 0, lead=1.25, orders=ORDERS, race=race)
+    found = without_superfluous(selection, 0, lead=1.25, orders=ORDERS, worth_a_try=0.2, race=race)
     assert _names(found) == ("dahl", ["end-stop"])
     assert found.proven == 1
 
