@@ -251,11 +251,7 @@ def promoted(found: Race, winner: Model, base: Fit) -> Selection:
     count = len(found.own)
     ground = None
     if winner.form != found.declared:
-        plain = min(
-            (item for item in found.models if item.form == winner.form and item.effects == found.own),
-            key=lambda item: float(item.squares.sum()),
-        )
-        ground = on_all_tests(plain.fit, problem, found.coupled)
+        ground = on_all_tests(found.plain(winner.form).fit, problem, found.coupled)
     chosen = ground or base
     if len(winner.effects) > count:
         chosen = on_all_tests(winner.fit, problem, found.coupled)

@@ -106,13 +106,15 @@ def _with_rival(
         return None
     small, named = draft(kept.chosen), _named(kept, declared)
     sets = [[k for k in range(len(small.problem.terms)) if k != place] for place in named]
-    full = with_best_forms(small, named, jobs=jobs)
-    more = full if full.chi_square > (1.0 + worth_a_try) * kept.noise else None
+    limit = (1.0 + worth_a_try) * kept.noise
+    # the best forms only lower the error, and they take long
+    full = with_best_forms(small, named, jobs=jobs) if small.chi_square > limit else None
+    more = full if full is not None and full.chi_square > limit else None
     found = best_rival(kept, small, sets, declared, orders, race, jobs, full=more)
-    if found is None:
+    if found is None or found[1].chi_square > lead * small.chi_square:
         return None
     rival, best = found
-    if best.chi_square > lead * full.chi_square:
+    if best.chi_square > lead * (full or with_best_forms(small, named, jobs=jobs)).chi_square:
         return None
     again = taken(kept, race, rival, best)
     return again if again.chosen.chi_square <= lead * kept.chosen.chi_square else None

@@ -158,6 +158,11 @@ class Race:
                 found[model.form] = min(float(cost), found.get(model.form, np.inf))
         return tuple(sorted(found, key=lambda name: found[name]))
 
+    def plain(self, form: str) -> Model:
+        """Return the best model of a base form with the effects of the baseline alone."""
+        able = [model for model in self.models if model.form == form and model.effects == self.own]
+        return min(able, key=lambda model: float(model.squares.sum()))
+
     def extended(self, winner: Model) -> Model:
         """Return the cheapest model with the form and effects of the winner and further effects; else the winner."""
         costs = self.costs()

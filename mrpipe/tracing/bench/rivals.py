@@ -241,10 +241,8 @@ def _ranked(
     changes the yield force before the damper yields, the correct base form can be far from the best ones. All base
     forms are therefore compared with the forms of the named effects that do so.
     """
-    plain: dict[str, Model] = {}
-    for model in sorted(race.models, key=lambda item: float(np.sum(item.squares))):
-        if model.effects == race.own and model.form != selection.chosen.problem.base.name:
-            plain.setdefault(model.form, model)
+    others = {model.form for model in race.models} - {selection.chosen.problem.base.name}
+    plain = {form: race.plain(form) for form in sorted(others)}
     problems = [item.fit.problem.on_samples_of(full.problem) for item in plain.values()]
     singles = [
         fit(replace(problem, window_share=full.problem.window_share), item.fit.theta, iterations=0)
