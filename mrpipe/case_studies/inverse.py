@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.networks.assembly import History
-from mrpipe.networks.network import FeatureSpec
+from mrpipe.networks.network import FeatureSpec, Network
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import Trained, train
 
@@ -16,6 +18,40 @@ KINDS = ("sine", "triangle", "step", "gaussian")
 RATE_HZ = 200.0
 """Sampling of the training records; the inverse has no memory, so it can be used at any rate."""
 _RECORD_S = 4.0
+_FREQUENCY_HZ = 3.0
+_AMPLITUDE_M = 0.1
+_COMMAND_V = 5.0
+_CYCLES = 3
+
+
+@dataclass(frozen=True)
+class ValidatedInverse:
+    """A neural inverse, its error on held-out records, and its estimate in the validation of Figure 6.1 (b).
+
+    The thesis gives a displacement of 0.1 m and a command with an amplitude of 5, both at 3 Hz. The command of this
+    damper cannot be negative, so the magnitude of the sine is used.
+
+    Attributes
+    ----------
+    network
+        The inverse: |v|, |f| to volts.
+    held_out_nrmse
+        Error on the records that the training did not use, divided by the RMS of their voltage.
+    time_s, voltage_v, estimate_v
+        The validation: time, the voltage that gave the force, and the voltage that the network estimates, shape (n,).
+    """
+
+    network: Network
+    held_out_nrmse: float
+    time_s: FloatArray
+    voltage_v: FloatArray
+    estimate_v: FloatArray
+
+    @property
+    def nrmse(self) -> float:
+        """Return the RMS error of the validation divided by the RMS of the voltage."""
+        error, truth = self.estimate_v - self.voltage_v, self.voltage_v
+        return float(np.sqrt(np.mean(error**2) / np.mean(truth**2)))
 
 
 def bingham_force(device: BinghamDevice, velocity: FloatArray, voltage: FloatArray) -> FloatArray:
@@ -112,3 +148,23 @@ def train_inverse(device: BinghamDevice, rng: np.random.Generator, *, hidden: in
         iterations=40,
     )
     return train(training_history(device, rng), spec, options, rng, jobs=jobs)
+
+
+def validated_inverse(device: BinghamDevice, trained: Trained) -> ValidatedInverse:
+    """Return the validation of Figure 6.1 (b) for a trained inverse.
+
+    Parameters
+    ----------
+    device
+        The damper that the network inverts.
+    trained
+        Result of `train_inverse`.
+    """
+    angular_frequency = 2.0 * np.pi * _FREQUENCY_HZ
+    time: FloatArray = np.arange(round(_CYCLES / _FREQUENCY_HZ * 1000.0), dtype=np.float64) / 1000.0
+    velocity = _AMPLITUDE_M * angular_frequency * np.cos(angular_frequency * time)
+    # a phase between motion and command, so that the command is not zero at each reversal
+    voltage = _COMMAND_V * np.abs(np.sin(angular_frequency * time + 0.5))
+    force = bingham_force(device, velocity, voltage)
+    estimate = trained.network.predict(np.stack([np.abs(velocity), np.abs(force)], axis=1))
+    return ValidatedInverse(trained.network, trained.starts[0].held_out_nrmse, time, voltage, np.asarray(estimate))

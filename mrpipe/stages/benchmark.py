@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
+    from mrpipe.case_studies.inverse import ValidatedInverse
     from mrpipe.case_studies.run import BinghamDevice, Response
     from mrpipe.case_studies.wind.load import WindLoad
     from mrpipe.structures.records import GroundMotion
@@ -107,11 +108,21 @@ def _ten_storey(context: StageContext) -> Mapping[str, Any]:
     return {**summary, "motion_details": _motion_summary(motion)}
 
 
+def _neural_inverse(context: StageContext, device: BinghamDevice, settings: Any) -> ValidatedInverse | None:
+    """Train and validate the inverse network of the damper; return None if the settings use the formula."""
+    from mrpipe.case_studies.inverse import train_inverse, validated_inverse
+
+    if not settings.neural_inverse:
+        return None
+    context.progress(0.05, "neural inverse of the damper")
+    trained = train_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
+    return validated_inverse(device, trained)
+
+
 def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.case_studies.base_isolated import report
     from mrpipe.case_studies.base_isolated import study as bench
     from mrpipe.case_studies.base_isolated.structure import building_of
-    from mrpipe.case_studies.inverse import train_inverse
     from mrpipe.case_studies.laws import require_known
     from mrpipe.case_studies.motion import SEVEN_MOTIONS, load_motion
     from mrpipe.thesis.entries import printed_columns
@@ -127,14 +138,11 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     )
     motion = _motion(context, settings.motion, 2)
     seven = [load_motion(name, context.rng) for name in SEVEN_MOTIONS] if settings.all_motions else []
-    trained = None
-    if settings.neural_inverse:
-        context.progress(0.05, "neural inverse of the damper")
-        trained = train_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
+    inverse = _neural_inverse(context, device, settings)
     study = bench.isolation_study(
         building,
         device=device,
-        network=trained.network if trained else None,
+        network=None if inverse is None else inverse.network,
         damping_ratio=settings.damping_ratio,
         stiffness_share=settings.stiffness_share,
         lqg=settings.lqg,
@@ -149,8 +157,7 @@ def _base_isolated(context: StageContext) -> Mapping[str, Any]:
     law = settings.laws[0]
     context.progress(0.8, "sensitivity to damper capacity")
     sweep = bench.capacity_sensitivity(study, motion, law, settings.dampers)
-    error = trained.starts[0].held_out_nrmse if trained else float("nan")
-    result = report.IsolationResult(study, motion, free, cases, motions, law, sweep, error)
+    result = report.IsolationResult(study, motion, free, cases, motions, law, sweep, inverse)
     printed = printed_columns("Table 6.2", "T6.2")
     summary = report.summary(result, printed)
     with context.write("benchmark-base-isolated.h5") as artifact:
@@ -182,7 +189,6 @@ def _wind_load(context: StageContext, settings: Any) -> WindLoad:
 
 
 def _wind(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.case_studies.inverse import train_inverse
     from mrpipe.case_studies.laws import require_known
     from mrpipe.case_studies.wind import report
     from mrpipe.case_studies.wind import study as bench
@@ -202,16 +208,13 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
         mass_kg=settings.tuned_mass_kg,
         frequency_ratio=settings.tuned_frequency_ratio,
     )
-    trained = None
-    if settings.neural_inverse:
-        context.progress(0.05, "neural inverse of the damper")
-        trained = train_inverse(device, context.rng, hidden=settings.hidden_neurons, jobs=context.jobs)
+    inverse = _neural_inverse(context, device, settings)
     study = bench.wind_study(
         reference,
         tower,
         load,
         device=device,
-        network=trained.network if trained else None,
+        network=None if inverse is None else inverse.network,
         stiffness_share=settings.stiffness_share,
         tuned_mass_kg=settings.tuned_mass_kg,
         lqg=settings.lqg,
@@ -226,8 +229,7 @@ def _wind(context: StageContext) -> Mapping[str, Any]:
     law = settings.laws[0]
     multiples = settings.capacities or DEFAULT_CAPACITIES[settings.position]
     sweep = bench.wind_sensitivity(study, law, [study.dampers * item for item in multiples], context.jobs)
-    error = trained.starts[0].held_out_nrmse if trained else float("nan")
-    result = report.WindResult(study, cases, law, sweep, error)
+    result = report.WindResult(study, cases, law, sweep, inverse)
     printed = printed_columns("Table 6.3", "T6.3")
     summary = report.summary(result, printed)
     with context.write("benchmark-wind.h5") as artifact:

@@ -26,7 +26,7 @@ from mrpipe.case_studies.base_isolated.study import (
 )
 from mrpipe.case_studies.gains import damped_modes
 from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
-from mrpipe.case_studies.inverse import bingham_force, train_inverse
+from mrpipe.case_studies.inverse import train_inverse, validated_inverse
 from mrpipe.case_studies.laws import LAWS
 from mrpipe.case_studies.lqg import (
     observer_gain,
@@ -280,16 +280,11 @@ def test_indices_by_hand() -> None:
 
 @pytest.mark.planted
 def test_neural_inverse_of_the_bingham_damper(study: IsolationStudy, motion: GroundMotion, free: Response) -> None:
-    trained = train_inverse(BinghamDevice(), np.random.default_rng(4))
-    # Figure 6.1 (b): a motion of 0.1 m at 3 Hz, and a drive of 5 V at 3 Hz
-    time = np.arange(0.0, 1.0, 0.001)
-    velocity = 0.1 * 6.0 * np.pi * np.cos(6.0 * np.pi * time)
-    truth = 5.0 * np.abs(np.sin(6.0 * np.pi * time + 0.5))
-    force = bingham_force(BinghamDevice(), velocity, truth)
-    estimate = trained.network.predict(np.stack([np.abs(velocity), np.abs(force)], axis=1))
-    assert np.sqrt(np.mean((estimate - truth) ** 2)) < 0.02 * np.sqrt(np.mean(truth**2))
+    inverse = validated_inverse(BinghamDevice(), train_inverse(BinghamDevice(), np.random.default_rng(4)))
+    assert inverse.held_out_nrmse < 0.02 and inverse.nrmse < 0.02
+    assert inverse.voltage_v.max() == pytest.approx(5.0, rel=1e-3) and inverse.time_s[-1] == pytest.approx(0.999)
     formula = study.indices(study.run(motion, study.controller("vd")), free)
-    neural = replace(study, network=trained.network)
+    neural = replace(study, network=inverse.network)
     by_network = neural.indices(neural.run(motion, neural.controller("vd")), free)
     for name, value in formula.items():
         assert by_network[name] == pytest.approx(value, rel=0.02), name

@@ -92,7 +92,7 @@ def test_base_isolated_building() -> None:
     free, cases = run_cases(study, motion, LAWS)
     sweep = capacity_sensitivity(study, motion, "vd", (1.0, 3.0))
     motions = {motion.name: {case.law: {**case.indices, **case.summary} for case in cases}}
-    result = isolated.IsolationResult(study, motion, free, cases, motions, "vd", sweep, float("nan"))
+    result = isolated.IsolationResult(study, motion, free, cases, motions, "vd", sweep, None)
     found = _checked(isolated.summary(result, PRINTED))
     assert found["sensitivity"]["law"] == "vd" and set(found["sensitivity"]) == {"law", "1", "3"}
     assert found["runs"]["vd"]["peak_force_n"] == pytest.approx(np.abs(cases[0].response.forces).max())
@@ -100,7 +100,7 @@ def test_base_isolated_building() -> None:
     sink = Kept()
     isolated.describe(sink, result, PRINTED)
     tops = {f"top-{word}-{axis}" for word in ("acceleration", "displacement") for axis in "xy"}
-    assert tops | {"indices", "floors", "loops", "motion", "sensitivity"} == set(sink.figures)
+    assert tops | {"force-diagram", "indices", "floors", "loops", "motion", "sensitivity"} == set(sink.figures)
     assert len(sink.tables["motions"]) == len(LAWS)
 
 
@@ -114,7 +114,7 @@ def test_tower_in_wind() -> None:
     )  # fmt: skip
     cases = run_wind_cases(study, LAWS)
     sweep = wind_sensitivity(study, "vd", (2.0, 4.0))
-    result = wind.WindResult(study, cases, "vd", sweep, float("nan"))
+    result = wind.WindResult(study, cases, "vd", sweep, None)
     found = _checked(wind.summary(result, PRINTED))
     free = wind_response(study.uncontrolled)
     assert found["uncontrolled"]["peak_x76_m"] == pytest.approx(np.abs(free.displacement_m[:, -1]).max())
@@ -122,4 +122,5 @@ def test_tower_in_wind() -> None:
     assert found["sensitivity"]["4"]["J1"] == pytest.approx(found["laws"]["vd"]["J1"])
     sink = Kept()
     wind.describe(sink, result, PRINTED)
-    assert {"top-displacement", "top-acceleration", "floors", "loops", "indices", "sensitivity"} == set(sink.figures)
+    expected = {"force-diagram", "top-displacement", "top-acceleration", "floors", "loops", "indices", "sensitivity"}
+    assert expected == set(sink.figures)

@@ -12,6 +12,8 @@ import pandas as pd
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies import report as figures
 from mrpipe.case_studies.base_isolated.study import REASON, IsolationCase, IsolationStudy, isolated_response
+from mrpipe.case_studies.device_report import describe_device
+from mrpipe.case_studies.inverse import ValidatedInverse
 from mrpipe.case_studies.model import natural_periods
 from mrpipe.case_studies.run import Response
 from mrpipe.reporting.sink import Sink
@@ -30,8 +32,8 @@ class IsolationResult:
         Motion -> law -> indices, for those of the seven motions that were requested.
     sweep_law, sweep
         Law whose sensitivity was computed; dampers at a position -> indices.
-    inverse_nrmse
-        Error of the neural inverse on held-out records; NaN without one.
+    inverse
+        The neural inverse of the damper; None if its formula is used.
     """
 
     study: IsolationStudy
@@ -41,7 +43,7 @@ class IsolationResult:
     motions: Mapping[str, Mapping[str, Mapping[str, float]]]
     sweep_law: str
     sweep: Mapping[float, Mapping[str, float]]
-    inverse_nrmse: float
+    inverse: ValidatedInverse | None
 
 
 def summary(result: IsolationResult, printed: figures.Table) -> dict[str, Any]:
@@ -71,7 +73,8 @@ def summary(result: IsolationResult, printed: figures.Table) -> dict[str, Any]:
             "fdns_alpha_n_m": gains.friction,
             "damping_ratio": gains.damping_ratio,
         },
-        "neural_inverse_nrmse": result.inverse_nrmse,
+        "neural_inverse_nrmse": None if result.inverse is None else result.inverse.held_out_nrmse,
+        "neural_inverse_validation_nrmse": None if result.inverse is None else result.inverse.nrmse,
         "thesis": printed,
         "why_different": REASON,
         "sensitivity": {
@@ -98,6 +101,7 @@ def describe(sink: Sink, result: IsolationResult, printed: figures.Table) -> Non
         f"plane it has {_listed(rigid)} s; with the flexibility of the superstructure the three isolation modes have "
         f"{_listed(flexible)} s."
     )
+    describe_device(sink, result.study.device, result.inverse)
     laws = {case.law: case.indices for case in result.cases}
     sink.table(
         "indices",

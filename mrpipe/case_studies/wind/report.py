@@ -10,7 +10,9 @@ import numpy as np
 import pandas as pd
 
 from mrpipe.case_studies import report as figures
+from mrpipe.case_studies.device_report import describe_device
 from mrpipe.case_studies.indices import WIND_FLOORS
+from mrpipe.case_studies.inverse import ValidatedInverse
 from mrpipe.case_studies.wind.study import REASON, WindCase, WindStudy, wind_response
 from mrpipe.reporting.sink import Sink
 
@@ -25,15 +27,15 @@ class WindResult:
         The tower under the load, and its laws.
     sweep_law, sweep
         Law whose sensitivity was computed; dampers -> indices.
-    inverse_nrmse
-        Error of the neural inverse on held-out records; NaN without one.
+    inverse
+        The neural inverse of the damper; None if its formula is used.
     """
 
     study: WindStudy
     cases: Sequence[WindCase]
     sweep_law: str
     sweep: Mapping[float, Mapping[str, float]]
-    inverse_nrmse: float
+    inverse: ValidatedInverse | None
 
 
 def summary(result: WindResult, printed: figures.Table) -> dict[str, Any]:
@@ -70,7 +72,8 @@ def summary(result: WindResult, printed: figures.Table) -> dict[str, Any]:
         "gains": asdict(study.gains),
         "optimal_gains": asdict(study.optimum),
         "lqg_force_n": study.lqg_force_n,
-        "neural_inverse_nrmse": result.inverse_nrmse,
+        "neural_inverse_nrmse": None if result.inverse is None else result.inverse.held_out_nrmse,
+        "neural_inverse_validation_nrmse": None if result.inverse is None else result.inverse.nrmse,
         "thesis": printed,
         "why_different": REASON,
         "sensitivity": {
@@ -90,6 +93,7 @@ def describe(sink: Sink, result: WindResult, printed: figures.Table) -> None:
         f"Device: {study.tower.position}, {study.dampers:g} dampers of 1000 kN; {2 * study.modal.modes} states. Gains "
         f"of vd are {study.gains.capacity_share:.3g} of the optimum, which is what the dampers can give in this wind."
     )
+    describe_device(sink, study.device, result.inverse)
     laws = {case.law: case.indices for case in result.cases}
     sink.table("indices", figures.beside_thesis(laws, printed, origin), f"Table 6.3 and our results ({origin} model).")
     sink.figure("indices", figures.index_bars(laws, printed), "Indices (ratios) compared with Table 6.3.")

@@ -1,0 +1,70 @@
+"""Part of the reports on the 1000 kN damper: its force diagram and the validation of its neural inverse."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mrpipe.case_studies.inverse import ValidatedInverse, bingham_force
+from mrpipe.case_studies.run import BinghamDevice
+from mrpipe.reporting.sink import Sink
+from mrpipe.reporting.style import COLOURS, MEASURED, figure_with_axes, label
+
+VOLTAGES = (2.0, 4.0, 6.0)
+"""Levels of the command in Figure 6.1 (a) [V]; the thesis prints them in A."""
+_STROKE_M = 0.1
+_FREQUENCY_HZ = 3.0
+
+
+def describe_device(sink: Sink, device: BinghamDevice, inverse: ValidatedInverse | None) -> None:
+    """Write the figures of one damper.
+
+    Parameters
+    ----------
+    sink
+        Section of the report.
+    device
+        The damper.
+    inverse
+        Its neural inverse; None if the formula is used.
+    """
+    sink.figure(
+        "force-diagram",
+        force_diagram(device),
+        "Force of one damper at constant voltages, sine of 0.1 m at 3 Hz (Figure 6.1 (a)).",
+    )
+    if inverse is not None:
+        sink.figure(
+            "inverse-validation",
+            inverse_figure(inverse),
+            "Voltage that the neural inverse estimates from velocity and force, and the voltage that gave this force. "
+            f"The error is {100.0 * inverse.nrmse:.2g} % of the RMS voltage (Figure 6.1 (b)).",
+        )
+
+
+def force_diagram(device: BinghamDevice) -> Figure:
+    """Return force against displacement and against velocity at constant voltages."""
+    figure, axes = figure_with_axes(1, 2, width=8.0, height=3.2)
+    # the force jumps at each reversal: the samples start and end next to it, so that the jump is drawn vertically
+    phase = np.linspace(0.0, 2.0 * np.pi, 2001)
+    displacement = _STROKE_M * np.sin(phase)
+    velocity = _STROKE_M * 2.0 * np.pi * _FREQUENCY_HZ * np.cos(phase)
+    for colour, voltage in zip(COLOURS, VOLTAGES, strict=False):
+        force = bingham_force(device, velocity, np.full_like(velocity, voltage)) * 1e-3
+        axes[0, 0].plot(displacement * 1e3, force, color=colour, linewidth=0.9, label=f"{voltage:g} V")
+        axes[0, 1].plot(velocity, force, color=colour, linewidth=0.9, label=f"{voltage:g} V")
+    axes[0, 0].legend(fontsize=7)
+    label(axes[0, 0], "displacement [mm]", "force [kN]")
+    label(axes[0, 1], "velocity [m/s]", "force [kN]")
+    return figure
+
+
+def inverse_figure(inverse: ValidatedInverse) -> Figure:
+    """Return the voltage and its estimate against time."""
+    figure, axes = figure_with_axes(1, 1, width=9.0, height=3.0)
+    axis = axes[0, 0]
+    axis.plot(inverse.time_s, inverse.voltage_v, color=MEASURED, linewidth=2.0, alpha=0.6, label="given")
+    axis.plot(inverse.time_s, inverse.estimate_v, color=COLOURS[0], linewidth=0.8, label="neural inverse")
+    axis.legend(fontsize=7)
+    label(axis, "time [s]", "voltage [V]")
+    return figure
