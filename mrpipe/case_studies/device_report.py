@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 
-from mrpipe.case_studies.inverse import ValidatedInverse, bingham_force
+from mrpipe.case_studies.inverse import AMPLITUDE_M, FREQUENCY_HZ, ValidatedInverse, bingham_force
 from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.reporting.sink import Sink
 from mrpipe.reporting.style import COLOURS, MEASURED, figure_with_axes, label
 
 VOLTAGES = (2.0, 4.0, 6.0)
 """Levels of the command in Figure 6.1 (a) [V]; the thesis prints them in A."""
-_STROKE_M = 0.1
-_FREQUENCY_HZ = 3.0
+
+
+def inverse_errors(inverse: ValidatedInverse | None) -> dict[str, Any]:
+    """Return the entries of the summary on the neural inverse; None where the formula is used."""
+    return {
+        "neural_inverse_nrmse": None if inverse is None else inverse.held_out_nrmse,
+        "neural_inverse_validation_nrmse": None if inverse is None else inverse.nrmse,
+    }
 
 
 def describe_device(sink: Sink, device: BinghamDevice, inverse: ValidatedInverse | None) -> None:
@@ -31,7 +39,7 @@ def describe_device(sink: Sink, device: BinghamDevice, inverse: ValidatedInverse
     sink.figure(
         "force-diagram",
         force_diagram(device),
-        "Force of one damper at constant voltages, sine of 0.1 m at 3 Hz (Figure 6.1 (a)).",
+        f"Force of one damper at constant voltages, sine of {AMPLITUDE_M:g} m at {FREQUENCY_HZ:g} Hz (Figure 6.1 (a)).",
     )
     if inverse is not None:
         sink.figure(
@@ -45,10 +53,10 @@ def describe_device(sink: Sink, device: BinghamDevice, inverse: ValidatedInverse
 def force_diagram(device: BinghamDevice) -> Figure:
     """Return force against displacement and against velocity at constant voltages."""
     figure, axes = figure_with_axes(1, 2, width=8.0, height=3.2)
-    # the force jumps at each reversal: the samples start and end next to it, so that the jump is drawn vertically
+    # the force jumps at each reversal; samples are so dense that the jump is drawn as a vertical line
     phase = np.linspace(0.0, 2.0 * np.pi, 2001)
-    displacement = _STROKE_M * np.sin(phase)
-    velocity = _STROKE_M * 2.0 * np.pi * _FREQUENCY_HZ * np.cos(phase)
+    displacement = AMPLITUDE_M * np.sin(phase)
+    velocity = AMPLITUDE_M * 2.0 * np.pi * FREQUENCY_HZ * np.cos(phase)
     for colour, voltage in zip(COLOURS, VOLTAGES, strict=False):
         force = bingham_force(device, velocity, np.full_like(velocity, voltage)) * 1e-3
         axes[0, 0].plot(displacement * 1e3, force, color=colour, linewidth=0.9, label=f"{voltage:g} V")

@@ -9,6 +9,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.networks.assembly import History
+from mrpipe.networks.evaluation import error_figures
 from mrpipe.networks.network import FeatureSpec, Network
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import Trained, train
@@ -18,8 +19,10 @@ KINDS = ("sine", "triangle", "step", "gaussian")
 RATE_HZ = 200.0
 """Sampling of the training records; the inverse has no memory, so it can be used at any rate."""
 _RECORD_S = 4.0
-_FREQUENCY_HZ = 3.0
-_AMPLITUDE_M = 0.1
+FREQUENCY_HZ = 3.0
+"""Frequency of the motion and the command of Figure 6.1."""
+AMPLITUDE_M = 0.1
+"""Amplitude of the motion of Figure 6.1."""
 _COMMAND_V = 5.0
 _CYCLES = 3
 
@@ -50,8 +53,7 @@ class ValidatedInverse:
     @property
     def nrmse(self) -> float:
         """Return the RMS error of the validation divided by the RMS of the voltage."""
-        error, truth = self.estimate_v - self.voltage_v, self.voltage_v
-        return float(np.sqrt(np.mean(error**2) / np.mean(truth**2)))
+        return error_figures(self.voltage_v, self.estimate_v).nrmse
 
 
 def bingham_force(device: BinghamDevice, velocity: FloatArray, voltage: FloatArray) -> FloatArray:
@@ -160,9 +162,9 @@ def validated_inverse(device: BinghamDevice, trained: Trained) -> ValidatedInver
     trained
         Result of `train_inverse`.
     """
-    angular_frequency = 2.0 * np.pi * _FREQUENCY_HZ
-    time: FloatArray = np.arange(round(_CYCLES / _FREQUENCY_HZ * 1000.0), dtype=np.float64) / 1000.0
-    velocity = _AMPLITUDE_M * angular_frequency * np.cos(angular_frequency * time)
+    angular_frequency = 2.0 * np.pi * FREQUENCY_HZ
+    time: FloatArray = np.arange(round(_CYCLES / FREQUENCY_HZ * 1000.0), dtype=np.float64) / 1000.0
+    velocity = AMPLITUDE_M * angular_frequency * np.cos(angular_frequency * time)
     # a phase between motion and command, so that the command is not zero at each reversal
     voltage = _COMMAND_V * np.abs(np.sin(angular_frequency * time + 0.5))
     force = bingham_force(device, velocity, voltage)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from mrpipe.case_studies.device_report import VOLTAGES, describe_device, force_diagram, inverse_figure
 from mrpipe.case_studies.inverse import ValidatedInverse, training_history, validated_inverse
@@ -12,22 +11,7 @@ from mrpipe.case_studies.run import BinghamDevice
 from mrpipe.networks.network import FeatureSpec
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
-
-
-class Shown:
-    """A section of a report that keeps captions of figures."""
-
-    def __init__(self) -> None:
-        self.captions: dict[str, str] = {}
-
-    def text(self, paragraph: str) -> None:
-        raise NotImplementedError
-
-    def table(self, name: str, frame: object, caption: str) -> None:
-        raise NotImplementedError
-
-    def figure(self, name: str, figure: Figure, caption: str) -> None:
-        self.captions[name] = caption
+from tests.case_studies.section import Kept
 
 
 @pytest.mark.literature
@@ -45,7 +29,7 @@ def test_force_at_a_constant_voltage_follows_the_bingham_model() -> None:
 
 @pytest.mark.property
 def test_the_inverse_is_shown_only_where_there_is_one() -> None:
-    device, rng, sink = BinghamDevice(), np.random.default_rng(3), Shown()
+    device, rng, sink = BinghamDevice(), np.random.default_rng(3), Kept()
     describe_device(sink, device, None)
     assert set(sink.captions) == {"force-diagram"}
     history = training_history(device, rng, records=1)
@@ -54,8 +38,9 @@ def test_the_inverse_is_shown_only_where_there_is_one() -> None:
     inverse: ValidatedInverse = validated_inverse(device, train(history, spec, options, rng))
     error = inverse.estimate_v - inverse.voltage_v
     assert inverse.nrmse == pytest.approx(np.linalg.norm(error) / np.linalg.norm(inverse.voltage_v))
-    describe_device(sink, device, inverse)
-    assert f"{100.0 * inverse.nrmse:.2g} %" in sink.captions["inverse-validation"]
+    shown = Kept()
+    describe_device(shown, device, inverse)
+    assert f"{100.0 * inverse.nrmse:.2g} %" in shown.captions["inverse-validation"]
     given, estimate = inverse_figure(inverse).axes[0].lines
     np.testing.assert_array_equal(np.asarray(given.get_ydata()), inverse.voltage_v)
     np.testing.assert_array_equal(np.asarray(estimate.get_ydata()), inverse.estimate_v)

@@ -6,9 +6,7 @@ import json
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.artifacts.plain import plain
@@ -26,31 +24,12 @@ from mrpipe.case_studies.wind.load import synthetic_wind
 from mrpipe.case_studies.wind.structure import HEIGHT_M, WIDTH_M, place_device, surrogate_tower
 from mrpipe.case_studies.wind.study import run_wind_cases, wind_response, wind_sensitivity, wind_study
 from mrpipe.dampers.model import damper_from_parameter_set
+from tests.case_studies.section import Kept
 
 pytestmark = pytest.mark.golden
 
 LAWS = ("vd", "passive-on")
 PRINTED = {"vd": {"J1": 0.5, "J2": 0.6}}
-
-
-class Kept:
-    """A section of a report that keeps what is written to it."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-        self.tables: dict[str, pd.DataFrame] = {}
-        self.figures: dict[str, Figure] = {}
-
-    def text(self, paragraph: str) -> None:
-        self.texts.append(paragraph)
-
-    def table(self, name: str, frame: pd.DataFrame, caption: str) -> None:
-        assert name not in self.tables and caption.endswith(".")
-        self.tables[name] = frame
-
-    def figure(self, name: str, figure: Figure, caption: str) -> None:
-        assert name not in self.figures and caption.endswith(".")
-        self.figures[name] = figure
 
 
 def _checked(summary: dict[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import pandas as pd
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies import report as figures
 from mrpipe.case_studies.base_isolated.study import REASON, IsolationCase, IsolationStudy, isolated_response
-from mrpipe.case_studies.device_report import describe_device
+from mrpipe.case_studies.device_report import describe_device, inverse_errors
 from mrpipe.case_studies.inverse import ValidatedInverse
 from mrpipe.case_studies.model import natural_periods
 from mrpipe.case_studies.run import Response
@@ -73,8 +73,7 @@ def summary(result: IsolationResult, printed: figures.Table) -> dict[str, Any]:
             "fdns_alpha_n_m": gains.friction,
             "damping_ratio": gains.damping_ratio,
         },
-        "neural_inverse_nrmse": None if result.inverse is None else result.inverse.held_out_nrmse,
-        "neural_inverse_validation_nrmse": None if result.inverse is None else result.inverse.nrmse,
+        **inverse_errors(result.inverse),
         "thesis": printed,
         "why_different": REASON,
         "sensitivity": {

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mrpipe.case_studies import report as figures
-from mrpipe.case_studies.device_report import describe_device
+from mrpipe.case_studies.device_report import describe_device, inverse_errors
 from mrpipe.case_studies.indices import WIND_FLOORS
 from mrpipe.case_studies.inverse import ValidatedInverse
 from mrpipe.case_studies.wind.study import REASON, WindCase, WindStudy, wind_response
@@ -72,8 +72,7 @@ def summary(result: WindResult, printed: figures.Table) -> dict[str, Any]:
         "gains": asdict(study.gains),
         "optimal_gains": asdict(study.optimum),
         "lqg_force_n": study.lqg_force_n,
-        "neural_inverse_nrmse": None if result.inverse is None else result.inverse.held_out_nrmse,
-        "neural_inverse_validation_nrmse": None if result.inverse is None else result.inverse.nrmse,
+        **inverse_errors(result.inverse),
         "thesis": printed,
         "why_different": REASON,
         "sensitivity": {
