@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrpipe.errors import UserError
+from mrpipe.words import counted
 
 if TYPE_CHECKING:
     from mrpipe.campaigns import Campaign
@@ -226,7 +227,7 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
             result.findings[key] = _without_law(load_campaign(measured[key]))
             continue
         campaign = load_campaign(measured[key])
-        result.campaigns[key] = f"{campaign.name}: {len(campaign.recordings)} tests"
+        result.campaigns[key] = f"{campaign.name}: {counted(len(campaign.recordings), 'test')}"
         result.notes[key] = list(campaign.findings)
         result.findings[key] = [*judge(campaign), *_too_short(loaded, campaign), *_no_validation(loaded, key, campaign)]
         if key == "closed_loop":

@@ -221,7 +221,7 @@ def _print_project(project: Project, directory: Path) -> None:
     for path in project.written:
         print(path)
     for item in project.proposals:
-        print(f"{item.rig}: {len(item.tests)} tests")
+        print(f"{item.rig}: {counted(len(item.tests), 'test')}")
         for channel, column in item.channels.items():
             print(f"  {channel}: {column}")
         for name, role in item.tests:

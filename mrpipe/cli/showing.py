@@ -177,11 +177,12 @@ def _figure(value: float) -> str:
 
 def _print_campaign(description: Mapping[str, Any]) -> None:
     from mrpipe.units import conversion
+    from mrpipe.words import noun
 
     tests = description["tests"]
     counts = ", ".join(f"{count} {role}" for role, count in description["roles"].items() if count)
-    print(f"campaign {description['campaign']}: {description['rig']}, {len(tests)} tests ({counts}), ", end="")
-    print(f"{_figure(description['duration_s'])} s")
+    size = f"{len(tests)} {noun(len(tests), 'test')} ({counts}), {_figure(description['duration_s'])} s"
+    print(f"campaign {description['campaign']}: {description['rig']}, {size}")
     if description["declared_effects"]:
         print(f"declared effects: {', '.join(description['declared_effects'])}")
     if "floor_masses_kg" in description:

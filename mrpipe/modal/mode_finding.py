@@ -90,7 +90,9 @@ def _ambient_findings(tests: FrameTests) -> list[str]:
     given = np.isfinite(tests.floor_masses).any()
     known = "given floor masses" if given else "the added masses" if tests.with_added_masses else ""
     scale = f"the scale of M, C and K comes from {known}" if known else "and nothing gives M, C and K a scale"
-    return [f"the excitation was not measured, so modal masses and participations cannot be determined; {scale}"]
+    return [
+        "the modes come from the responses alone, so modal masses and participations cannot be determined; " + scale
+    ]
 
 
 def _clock_findings(clocks: Sequence[SensorClock]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mrpipe.words import duration, listed
+from mrpipe.words import counted, duration, listed
 
 
 def headline(stage: str, summary: Mapping[str, Any]) -> str:
@@ -15,7 +15,7 @@ def headline(stage: str, summary: Mapping[str, Any]) -> str:
     if stage.startswith("train-"):
         return _training(summary)
     if stage.startswith("record-") and summary:
-        return f"{summary.get('tests')} tests, {duration(float(summary.get('duration_s') or 0.0))}"
+        return f"{counted(int(summary.get('tests') or 0), 'test')}, {duration(float(summary.get('duration_s') or 0.0))}"
     lines = {
         "prepare": _prepared,
         "assemble": _assembled,
@@ -34,7 +34,7 @@ def _number(value: Any, factor: float = 1.0, digits: int = 3) -> str:
 
 def _prepared(summary: Mapping[str, Any]) -> str:
     return (
-        f"campaign {summary.get('campaign', '')}: {summary.get('test_count')} tests at "
+        f"campaign {summary.get('campaign', '')}: {counted(int(summary.get('test_count') or 0), 'test')} at "
         f"{_number(summary.get('sampling_rate_hz'), digits=4)} Hz, drive in {summary.get('drive_unit', '')}"
     )
 
@@ -79,7 +79,7 @@ def _damper(summary: Mapping[str, Any]) -> str:
 
 def _frame(summary: Mapping[str, Any]) -> str:
     frequencies = summary.get("frequencies_hz") or []
-    return f"{len(frequencies)} modes: " + ", ".join(_number(value) for value in frequencies) + " Hz"
+    return f"{counted(len(frequencies), 'mode')}: " + ", ".join(_number(value) for value in frequencies) + " Hz"
 
 
 def _calibration(summary: Mapping[str, Any]) -> str:

@@ -96,6 +96,6 @@ def method_in_words(forced: bool) -> str:
             "independent method."
         )
     return (
-        "The excitation was not measured. Poles come from the responses alone, and frequency and damping of each mode "
+        "Poles come from the responses alone, without the excitation, and frequency and damping of each mode "
         "from maximum likelihood. Damping comes from free decays where there are any."
     )

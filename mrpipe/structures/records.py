@@ -19,7 +19,6 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.readers.peer import peer_record
 from mrpipe.campaigns.readers.strong_motion import (
     ENDINGS,
-    SAME_INTERVAL,
     common_window,
     read_strong_motion,
     refuse_other_records,
@@ -209,12 +208,10 @@ def _read_v2(path: Path) -> _Raw:
     if not horizontal:
         raise UserError(path, "", "holds no horizontal channel", "give a record with a horizontal channel")
     channels = horizontal[:2]
-    if abs(channels[-1].interval_s / channels[0].interval_s - 1.0) > SAME_INTERVAL:
-        channels = channels[:1]
-    _, values = common_window(path, channels)
+    time_s, values = common_window(path, channels)
     names = listed([item.name for item in channels])
     further = f", the first of {len(horizontal)} horizontal ones" if len(horizontal) > len(channels) else ""
-    return _Raw(values, channels[0].interval_s, "in m/s^2", (f"channels {names}{further}",))
+    return _Raw(values, float(time_s[1] - time_s[0]), "in m/s^2", (f"channels {names}{further}",))
 
 
 def _read_mat(path: Path) -> _Raw:

@@ -57,11 +57,11 @@ START = "4/26/21, 17:09:54.0"
 def test_a_bridge_with_one_file_for_each_channel_in_a_zip(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "bridge.zip", "w") as archive:
         archive.writestr("b/chan001.v2", _bridge(1, "Up", "Abutment 1", RECORD, start=START))
-        archive.writestr("b/chan002.v2", _bridge(2, "Tran", "Abutment 1", 0.5 * RECORD, start=START))
+        archive.writestr("b/chan002.v2", _bridge(2, "Tran", "Deck Level near Abut 1", 0.5 * RECORD, start=START))
         text = _bridge(2, "Tran", "Bent 4: South Column, Grnd Level", RECORD, station=25, start=START)
         archive.writestr("b/chan025.v2", text.replace("\n", "\r\n"))
     up, deck, ground = read_strong_motion(tmp_path / "bridge.zip")
-    assert [up.name, deck.name] == ["1: Up, Abutment 1", "2: Tran, Abutment 1"]
+    assert [up.name, deck.name] == ["1: Up, Abutment 1", "2: Tran, Deck Level near Abut 1"]
     assert ground.name == "25: Tran, Bent 4: South Column, Grnd Level", "the station's number, not the recorder's"
     assert (up.vertical, deck.vertical, ground.vertical) == (True, False, False)
     np.testing.assert_allclose(ground.acceleration_m_s2, 1e-2 * RECORD, atol=1e-12)
@@ -69,7 +69,7 @@ def test_a_bridge_with_one_file_for_each_channel_in_a_zip(tmp_path: Path) -> Non
     proposal = propose_campaigns(tmp_path, "bridge", None, tmp_path)[0]
     assert proposal.rig == "frame"
     assert proposal.channels["ground_acceleration"] == "25: Tran, Bent 4: South Column, Grnd Level [m/s^2]"
-    assert proposal.channels["floor_acceleration_1"] == "2: Tran, Abutment 1 [m/s^2]"
+    assert proposal.channels["floor_acceleration_1"] == "2: Tran, Deck Level near Abut 1 [m/s^2]"
     assert "Columns not used: 1: Up" in proposal.text and proposal.tests == (("bridge", "random"),)
 
 
@@ -259,3 +259,46 @@ def test_a_channel_of_one_sample_is_refused_in_one_line(tmp_path: Path) -> None:
     path.write_text(_bridge(1, "Tran", "Deck", RECORD[:1], start=START))
     with pytest.raises(UserError, match="fewer than two samples"):
         open_data_file(path)
+
+
+@pytest.mark.property
+def test_recorders_with_different_intervals_are_brought_to_the_shortest(tmp_path: Path) -> None:
+    # two film recorders of the same bridge were digitised at 0.02 and 0.01 s
+    clock = np.arange(800) * 0.005
+    slow = 2.0 * np.sin(2.0 * np.pi * 3.0 * clock) * np.hanning(clock.size)
+    with zipfile.ZipFile(tmp_path / "bridge.zip", "w") as archive:
+        every_fourth = _bridge(2, "Tran", "Deck: Middle", slow[::4], start=START)
+        archive.writestr("chan02.v2", every_fourth.replace("0.005", "0.020"))
+        archive.writestr("chan03.v2", _bridge(3, "Tran", "Center Column at Grnd Level", slow, start=START))
+    file = open_data_file(tmp_path / "bridge.zip")
+    assert file.sampling_rate_hz == 200.0
+    np.testing.assert_allclose(file.column("2", "test"), 0.01 * slow, atol=2e-5)
+    np.testing.assert_allclose(file.column("3", "test"), 0.01 * slow, atol=1e-8)
+
+
+@pytest.mark.planted
+def test_supports_and_soil_near_a_bridge_are_not_floors(tmp_path: Path) -> None:
+    places = {
+        1: "Abutment 1",
+        2: "Freefield",
+        3: "Deck: Near West Abutment",
+        4: "Middle Bent: Top of Column",
+        5: "Middle Bent: Column at Grnd Level",
+        6: "On Ground: Near East Abutment",
+        7: "South Embankment",
+    }
+    path = tmp_path / "bridge.V2"
+    path.write_text("".join(_bridge(n, "Tran", place, RECORD / n, start=START) for n, place in places.items()))
+    channels = propose_campaigns(tmp_path, "bridge", None, tmp_path)[0].channels
+    assert channels["ground_acceleration"].startswith("5: Tran")
+    assert [channels[name][:1] for name in channels if name.startswith("floor")] == ["3", "4"]
+
+
+@pytest.mark.planted
+def test_the_free_field_is_the_ground_only_where_nothing_else_is(tmp_path: Path) -> None:
+    path = tmp_path / "bridge.V2"
+    channels = ((1, "Freefield"), (2, "Deck: Middle"))
+    path.write_text("".join(_bridge(n, "Tran", place, RECORD / n, start=START) for n, place in channels))
+    proposal = propose_campaigns(tmp_path, "bridge", None, tmp_path)[0]
+    assert proposal.channels["ground_acceleration"].startswith("1: Tran, Freefield")
+    assert any("may move differently" in line for line in proposal.unsure)

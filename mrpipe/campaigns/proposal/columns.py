@@ -16,6 +16,7 @@ from mrpipe.campaigns.proposal.words import Header, read_header
 from mrpipe.errors import UserError
 
 MOST_COLUMNS = 200
+_BESIDE = "no sensor at the base was found; this one is near the structure and may move differently"
 _DRIVE_GUESSED = "no unit in the header; guessed from the numbers"
 
 
@@ -117,7 +118,7 @@ def _of_a_record(name: str) -> Header:
     _, _, place = name.partition(":")
     _, _, location = place.partition(",")
     said = read_header(location)
-    return Header("acceleration", "m/s^2", "acceleration", said.floor)
+    return Header("acceleration", "m/s^2", "acceleration", said.floor, support=said.support)
 
 
 def _width(file: DataFile, name: str) -> int:
@@ -181,11 +182,14 @@ def lay_out_frame(columns: list[Column], file: DataFile) -> Layout:
         taken.add(time.name)
     for quantity in ("acceleration", "displacement", "velocity"):
         group = [item for item in columns if item.name not in taken and _says(item, quantity)]
-        ground = next((item for item in group if item.header.floor == 0), None)
+        ground = _ground(group)
         if ground is not None and quantity != "velocity":
-            channels[f"ground_{quantity}"] = _guess(ground, quantity)
+            guess = _guess(ground, quantity)
+            unsure = guess.unsure or (_BESIDE if ground.header.support else "")
+            channels[f"ground_{quantity}"] = replace(guess, unsure=unsure)
             taken.add(ground.name)
-        floors = [item for item in group if item is not ground and not item.header.damper]
+        # a second sensor on the ground does not measure a floor
+        floors = [item for item in group if not (_on_the_ground(item) or item.header.damper)]
         _number_floors(channels, taken, floors, quantity)
     for channel, quantity in (("damper_force", "force"), ("damper_displacement", "displacement")):
         column = next((item for item in columns if item.name not in taken and _says(item, quantity)), None)
@@ -199,6 +203,17 @@ def lay_out_frame(columns: list[Column], file: DataFile) -> Layout:
         taken.add(drive.name)
     used = {guess.column for guess in channels.values()}
     return Layout(channels, tuple(item.name for item in columns if item.name not in used))
+
+
+def _on_the_ground(column: Column) -> bool:
+    return column.header.floor == 0 or column.header.support
+
+
+def _ground(group: Sequence[Column]) -> Column | None:
+    """Return the column of the motion that excites the structure: at its base, else on the soil near it."""
+    return next((item for item in group if item.header.floor == 0), None) or next(
+        (item for item in group if item.header.support), None
+    )
 
 
 def _across(file: DataFile) -> set[str]:

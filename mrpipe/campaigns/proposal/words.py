@@ -43,6 +43,9 @@ GROUND = {
     *("ground", "base", "table", "shaker", "shaking", "tisch", "boden", "fundament", "sol", "suelo", "mesa", "input"),
     *("terreno", "basis", "rutteltisch", "excitation", "g", "grnd", "basement", "bsmt", "footing", "foundation"),
 }
+SUPPORTS = {"abutment", "abut", "freefield", "embankment"}
+"""Places that move with the soil, unless the header names the deck too (`Deck: Near West Abutment`)."""
+DECK = {"deck", "span", "girder"}
 TOP = {"top", "roof", "dach", "techo", "tetto", "toit"}
 COMMAND = {
     *("command", "cmd", "soll", "set", "setpoint", "ref", "reference", "target", "nominal", "consigne", "desired"),
@@ -70,6 +73,8 @@ class Header:
         Floor of a frame; 0 for the ground, -1 for the top, None where it does not say.
     command, damper
         Whether it names a command, and a damper.
+    support
+        Whether it names a place that moves with the soil and is not the base of the structure.
     """
 
     quantity: str = ""
@@ -78,6 +83,7 @@ class Header:
     floor: int | None = None
     command: bool = False
     damper: bool = False
+    support: bool = False
 
 
 def read_header(text: str, unit_row: str = "") -> Header:
@@ -95,6 +101,7 @@ def read_header(text: str, unit_row: str = "") -> Header:
         floor=_floor(words),
         command=any(word in COMMAND for word in words),
         damper=any(word in DAMPER for word in words),
+        support=bool(SUPPORTS & set(words)) and not (GROUND | DECK) & set(words),
     )
 
 

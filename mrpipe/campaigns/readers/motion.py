@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from scipy.signal import resample_poly
 
 from mrpipe.artifacts import FloatArray
+
+_SAME_INTERVAL = 1e-6
+"""Relative difference up to which two sampling intervals are the same."""
 
 
 @dataclass(frozen=True)
@@ -30,3 +37,12 @@ class StrongMotion:
     interval_s: float
     vertical: bool
     start_s: float | None = None
+
+    def at_interval(self, interval_s: float) -> StrongMotion:
+        """Return the channel at another sampling interval [s], by a linear-phase filter without delay and aliases."""
+        if abs(self.interval_s / interval_s - 1.0) <= _SAME_INTERVAL:
+            return self
+        ratio = Fraction(self.interval_s / interval_s).limit_denominator(1000)
+        taps = {"window": ("kaiser", 8.0), "padtype": "line"}
+        values = resample_poly(self.acceleration_m_s2, ratio.numerator, ratio.denominator, **taps)
+        return replace(self, acceleration_m_s2=np.asarray(values), interval_s=interval_s)

@@ -30,8 +30,6 @@ NOT_READ = {
     ".v1a": ("an uncorrected record of GeoNet, which is not read", "give the .V2A file of the same record"),
 }
 """Endings of files of data centres that hold no acceleration in a known form -> what they are, and a remedy."""
-SAME_INTERVAL = 1e-6
-"""Relative difference up to which two sampling intervals are the same."""
 DEEPEST_ARCHIVE = 3
 """Archives within archives that are opened; a download of several stations has two."""
 ENDINGS = (*COSMOS_ENDINGS, *peer.ENDINGS, *smc.ENDINGS, *geonet.ENDINGS, ".zip")
@@ -144,18 +142,16 @@ def common_window(path: Path, channels: Sequence[StrongMotion]) -> tuple[FloatAr
     """Return the time [s] from the common start on, shape (m,), and the accelerations [m/s^2], shape (m, k).
 
     Recorders of a structure start and stop at their own times. Channels whose headers state different starts are
-    shifted by whole samples, and all are cut to the time that they share.
+    shifted by whole samples, and all are cut to the time that they share. Recorders of a structure may also have
+    different sampling intervals. All channels are brought to the shortest one, because that loses nothing.
 
     Raises
     ------
     UserError
-        If the channels differ in sampling interval, or share no time.
+        If the channels share no time.
     """
-    interval = channels[0].interval_s
-    for item in channels:
-        if abs(item.interval_s / interval - 1.0) > SAME_INTERVAL:
-            problem = f"{item.name} has the interval {item.interval_s:g} s, {channels[0].name} {interval:g} s"
-            raise UserError(path, "", problem, "give or name channels with one interval")
+    interval = min(item.interval_s for item in channels)
+    channels = [item.at_interval(interval) for item in channels]
     starts = [item.start_s for item in channels if item.start_s is not None]
     skipped = [0] * len(channels)
     if len(starts) == len(channels):
@@ -181,7 +177,7 @@ def _read(path: Path, _layout: TextEntry | None = None) -> DataFile:
         names=tuple(columns),
         fetch=columns.__getitem__,
         time_s=time_s,
-        sampling_rate_hz=1.0 / channels[0].interval_s,
+        sampling_rate_hz=1.0 / float(time_s[1]),
         accelerations={item.name: not item.vertical for item in channels},
         aliases={number: name for number, name in zip(numbers, columns, strict=True) if numbers.count(number) == 1},
     )

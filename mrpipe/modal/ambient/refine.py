@@ -34,6 +34,7 @@ _DAMPING_RANGE = (5e-4, 0.15)
 _LEAST_LINES = 24
 _RANGE_OF_LEVELS = 20.0
 """Bound on the logarithm of noise and neighbours over the lowest power in the band."""
+_LARGEST_EXPONENT = 300.0
 _EXPONENT_SPREAD = 2.0
 """Prior standard deviation of the exponent of the frequency: forces of wind fall with up to f^-4."""
 
@@ -111,7 +112,8 @@ class _Peak:
     def _terms(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the density at each line, shape (m,), and its derivatives by the parameters, shape (p, m)."""
         value, by_pole, by_zeta = _resonance(self.spectrum.omega, float(np.exp(theta[0])), float(np.exp(theta[1])))
-        own = np.exp(theta[2] + theta[4] * self.distance)
+        # a step of the search far outside must not overflow
+        own = np.exp(np.clip(theta[2] + theta[4] * self.distance, -_LARGEST_EXPONENT, _LARGEST_EXPONENT))
         noise, rest = np.exp(theta[3]), np.exp(theta[5:])
         density = own * value + noise + rest @ self.others
         rows = [own * by_pole, own * by_zeta, own * value, np.full(density.size, noise), own * value * self.distance]

@@ -195,9 +195,12 @@ def find_modes(
     best = _best_of_bands(incomplete, layout, source, decays)
     if best is None:
         span = f"between {low_hz:g} and {max(high for _, high in bands):.3g} Hz"
-        raise UserError(
-            source, "forced tests", f"no mode found {span}", "check the channels, or set identify_frame.band_high_hz"
+        remedy = (
+            "check the channels, or set identify_frame.band_high_hz; if the structure also moves at supports that were "
+            "not measured, or on soft soil, write kind: ambient for these tests, so that the modes come from the "
+            "responses alone"
         )
+        raise UserError(source, "forced tests", f"no mode found {span}", remedy)
     return best
 
 

@@ -68,7 +68,7 @@ def test_validation_tests_are_used_where_the_others_show_no_modes_and_this_is_sa
 
 def test_a_campaign_without_modes_is_refused() -> None:
     forced = (_noise("a", "training"),)
-    with pytest.raises(UserError, match="no mode found"):
+    with pytest.raises(UserError, match=r"no mode found.*kind: ambient"):
         choose_tests(forced, _tests(*forced), LAYOUT, OPTIONS)
 
 
