@@ -101,6 +101,7 @@ def run_in(directory: Path, loop: Mapping[str, Any] | None = None) -> RunFacts:
         "frequency_intervals_hz": [[value - 0.01, value + 0.01] for value in frequencies],
         "damping_ratio_intervals": [[0.004, 0.006]] * 3,
         "mac": [1.0, 0.99, 0.98],
+        "stiffness": frame.stiffness.tolist(),
     }
     prepared = {
         "campaign": "my-rig",

@@ -113,3 +113,15 @@ def test_a_form_that_no_table_of_candidates_has_is_explained(tmp_path: Path) -> 
     text = " ".join(str(item.get("text", "")) for item in found.items)
     assert "**accumulator** (form gas)" in text
     assert "best single form, linear. Once it was named, all its forms were fitted again, and gas did better." in text
+
+
+def test_modes_without_matrices_are_not_compared_with_a_model(tmp_path: Path) -> None:
+    def columns() -> list[str]:
+        structure = next(section for section in sections(facts) if section.anchor == "structure")
+        return next(list(item["frame"]) for item in structure.items if item.get("name") == "modes")
+
+    facts = run_in(tmp_path)
+    assert "MAC of the model" in columns()
+    summary = next(stage.summary for stage in facts.stages if stage.name == "identify-frame")
+    summary["stiffness"] = None
+    assert "MAC of the model" not in columns()
