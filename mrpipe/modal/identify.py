@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.errors import UserError
-from mrpipe.modal.amplitude.law_fit import amplitude_finding, find_amplitude_dependence
 from mrpipe.modal.clocks.delays import SensorClock, corrected, expected_clocks
+from mrpipe.modal.comparison import compare_with_tests
 from mrpipe.modal.decays.choice import choose_damping, decays_of_modes
-from mrpipe.modal.decays.decay import Estimate
+from mrpipe.modal.decays.decay import DecayResult, Estimate
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.identification import FrameIdentification, GivenShapes, errors_of_rows
 from mrpipe.modal.matrices.assembly import Assembly, PartialModes, assemble_partial
-from mrpipe.modal.matrices.rigid_floors import RigidShapes, assemble_rigid, rigid_response, rigid_shapes
+from mrpipe.modal.matrices.rigid_floors import RigidShapes, assemble_rigid, rigid_shapes
 from mrpipe.modal.matrices.scaling import Scale, find_scale, masses_of
 from mrpipe.modal.matrices.tridiagonal import fit_tridiagonal
 from mrpipe.modal.mode_finding import find_modes
@@ -32,13 +32,6 @@ from mrpipe.modal.search.selection import (
     all_floors_measured,
     floor_shapes,
     sign_ranges,
-)
-from mrpipe.modal.verification import (
-    TimeVerification,
-    compare_in_time,
-    misfit_findings,
-    verify_in_frequency,
-    verify_in_time,
 )
 from mrpipe.structures import (
     Frame,
@@ -125,33 +118,35 @@ def _layout(tests: FrameTests) -> Layout:
     return Layout(tests.floor_masses.size, masses, is_chain=len(directions) <= 1)
 
 
+@dataclass(frozen=True)
+class _Damping:
+    """Frequencies and damping ratios of the modes, from the fit, from decays, and as they are used for C."""
+
+    frequencies: tuple[Estimate, ...]
+    of_the_fit: tuple[Estimate, ...]
+    decays: dict[int, DecayResult]
+    used: tuple[Estimate, ...]
+    sources: tuple[str, ...]
+
+
 def _identify(
     tests: FrameTests, options: IdentificationOptions, progress: Progress, given: GivenShapes | None
 ) -> FrameIdentification:
     layout = _layout(tests)
-    forced = training_first(tests.forced)
     if given is not None:
         _check_given(given, tests.floor_masses)
-    chosen, clocks, findings = find_modes(tests, forced, layout, options, progress)
+    chosen, clocks, findings = find_modes(tests, training_first(tests.forced), layout, options, progress)
     fit = chosen.search.fit
-    findings += tests.notes
-    if layout.is_chain and chosen.search.numbers[0] == 1:
-        shapes, errors = floor_shapes(fit, layout)
-        findings += reversed_finding(shapes[:, 0], errors[:, 0])
-    findings += _check_coherence(fit, tests) if forced else []
+    findings += [*tests.notes, *_shape_findings(chosen.search, layout)]
+    findings += _check_coherence(fit, tests) if tests.forced else []
     progress(0.5, "decays")
-    decays, notes = decays_of_modes(tests, fit)
-    findings += notes
-    frequencies, sweep = _estimates(fit)
-    damping, sources, notes = choose_damping(
-        sweep, decays, options.damping_from, "sweep" if forced else "ambient", options.decay_method
-    )
+    damping, notes = _damping(tests, fit, options)
     findings += notes
     progress(0.6, "matrices")
-    zeta = np.array([item.value for item in damping])
-    scale, notes = find_scale(chosen.search.fit, tests, layout, options)
+    scale, notes = find_scale(fit, tests, layout, options)
     findings += notes
     rigid = rigid_shapes(fit, tests.positions, tests.source) if tests.positions else None
+    zeta = np.array([item.value for item in damping.used])
     if rigid is None:
         assembly, notes = _assemble(chosen.search, zeta, tests, layout, options, given, scale)
     else:
@@ -160,40 +155,27 @@ def _identify(
         notes = list(assembly.findings)
     findings += notes
     progress(0.75, "verification")
-    shown = _shown(forced, chosen, clocks)
-    # beyond its highest mode the frame carries no information on a flexible support
-    band = chosen.search.band_hz
-    inside = (band[0], min(band[1], 1.15 * float(fit.angular_frequencies[-1]) / (2.0 * np.pi)))
-    frame = assembly.frame
-    in_time: tuple[TimeVerification, ...] = ()
-    if frame is not None and forced:
-        in_time = tuple(_verified(frame, test, inside, None if rigid is None else tests.positions) for test in shown)
-        findings += misfit_findings(frame, shown, in_time, inside) if rigid is None else []
-    # the synthesised frequency responses are those of one direction
-    verified = frame if rigid is None and forced else None
-    amplitude = None
-    # errors of picked modes are those of the lines of the spectrum; a law over amplitude would only explain these
-    if forced and options.amplitude_dependence and options.modes_from == "fit":
-        progress(0.85, "amplitude")
-        amplitude = find_amplitude_dependence(fit, [test for test in chosen.tests if test.excitation is not None])
-        findings += [] if amplitude is None else [amplitude_finding(amplitude)]
+    shown = _shown(training_first(tests.forced), chosen, clocks)
+    positions = None if rigid is None else tests.positions
+    compared, notes = compare_with_tests(assembly.frame, shown, chosen, positions, options, progress)
+    findings += notes
     return FrameIdentification(
-        frame=frame,
-        frequencies=frequencies,
-        damping=damping,
-        damping_source=sources,
-        sweep_damping=sweep,
+        frame=assembly.frame,
+        frequencies=damping.frequencies,
+        damping=damping.used,
+        damping_source=damping.sources,
+        sweep_damping=damping.of_the_fit,
         mode_shapes=assembly.shapes,
         mac=_assurance(fit, layout, assembly, rigid),
         shape_errors=errors_of_rows(assembly.shapes, *_measured_rows(fit, layout, rigid)),
-        decays=decays,
+        decays=damping.decays,
         fit=fit,
         tridiagonal=assembly.storeys,
-        in_time=in_time,
-        in_frequency=None if verified is None else verify_in_frequency(verified, fit, inside),
+        in_time=compared.in_time,
+        in_frequency=compared.in_frequency,
         phase_scatter=np.abs(fit.residues.imag).max(axis=0) / np.abs(fit.residues).max(axis=0),
-        tests=shown,
-        band_hz=band,
+        tests=compared.tests,
+        band_hz=chosen.search.band_hz,
         findings=tuple(findings),
         numbers=assembly.numbers,
         clocks=clocks,
@@ -201,11 +183,25 @@ def _identify(
         degrees_of_freedom=_names(fit, layout) if rigid is None else rigid.names,
         masses=assembly.masses,
         mass_intervals=assembly.mass_intervals,
-        amplitude=amplitude,
-        amplitude_in_time=()
-        if amplitude is None
-        else tuple(compare_in_time(amplitude.model.response(test), test, inside) for test in shown),
+        amplitude=compared.amplitude,
+        amplitude_in_time=compared.amplitude_in_time,
     )
+
+
+def _shape_findings(search: ModeSearch, layout: Layout) -> list[str]:
+    """Return findings on the first shape of a chain of floors: sensors with the opposite sign."""
+    if not layout.is_chain or search.numbers[0] != 1:
+        return []
+    shapes, errors = floor_shapes(search.fit, layout)
+    return reversed_finding(shapes[:, 0], errors[:, 0])
+
+
+def _damping(tests: FrameTests, fit: MultiModeFit, options: IdentificationOptions) -> tuple[_Damping, list[str]]:
+    decays, findings = decays_of_modes(tests, fit)
+    frequencies, of_the_fit = _estimates(fit)
+    other = "sweep" if tests.forced else "ambient"
+    used, sources, notes = choose_damping(of_the_fit, decays, options.damping_from, other, options.decay_method)
+    return _Damping(frequencies, of_the_fit, decays, used, sources), [*findings, *notes]
 
 
 def _estimates(fit: MultiModeFit) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...]]:
@@ -216,15 +212,6 @@ def _estimates(fit: MultiModeFit) -> tuple[tuple[Estimate, ...], tuple[Estimate,
     errors = np.sqrt(np.diag(fit.covariance))
     estimates = tuple(map(Estimate.of_logarithm, poles.tolist(), errors.tolist(), freedom.tolist()))
     return estimates[:modes], estimates[modes:]
-
-
-def _verified(
-    frame: Frame, test: FrameTest, band_hz: tuple[float, float], positions: Mapping[str, tuple[float, float]] | None
-) -> TimeVerification:
-    """Simulate a forced test with the identified frame; `positions`: positions of the sensors on rigid floors."""
-    if positions is None:
-        return verify_in_time(frame, test, band_hz)
-    return compare_in_time(rigid_response(frame, test, positions), test, band_hz)
 
 
 def _shown(forced: Sequence[FrameTest], chosen: ChosenTests, clocks: Sequence[SensorClock]) -> tuple[FrameTest, ...]:
