@@ -54,6 +54,15 @@ def _unseen() -> Unseen:
     return Unseen(3, 100, np.random.default_rng(1))
 
 
+def _again(
+    selection: Selection, race: Race | None, noise: float | None = None, unseen: Unseen | None = None
+) -> Selection:
+    """Return the selection after the comparison with the other base forms."""
+    limit = selection.noise if noise is None else noise
+    compared = unseen or _unseen()
+    return with_best_base(selection, 0, ORDERS, race, noise=limit, worth_a_try=0.2, lead=0.1, unseen=compared)
+
+
 def _names(selection: Selection) -> tuple[str, list[str]]:
     problem = selection.chosen.problem
     return problem.base.name, [term.effect.name for term in problem.terms]
@@ -62,7 +71,7 @@ def _names(selection: Selection) -> tuple[str, list[str]]:
 def test_the_form_that_fits_best_with_the_same_effects_is_taken() -> None:
     selection, race = _raced(("end-stop", "linear"))
     assert _names(selection) == ("bouc-wen", ["end-stop"])
-    found = with_best_base(selection, 0, ORDERS, race, worth_a_try=0.2, lead=0.1, unseen=_unseen())
+    found = _again(selection, race)
     assert _names(found) == ("dahl", ["end-stop"])
     assert found.chosen.chi_square < 0.5 * selection.chosen.chi_square
     assert found.ground is not None
@@ -73,7 +82,7 @@ def test_a_form_that_the_race_did_not_combine_with_the_effect_is_tried_with_its_
     selection, race = _raced(("end-stop", "linear"))
     alone_only = replace(race, models=tuple(item for item in race.models if item.form != "dahl" or not item.effects))
     assert rivals_of(selection, alone_only) == []
-    found = with_best_base(selection, 0, ORDERS, alone_only, worth_a_try=0.2, lead=0.1, unseen=_unseen())
+    found = _again(selection, alone_only)
     assert _names(found) == ("dahl", ["end-stop"])
     assert found.chosen.chi_square < 0.5 * selection.chosen.chi_square
 
@@ -102,8 +111,7 @@ class _Worse(Unseen):
 
 def test_a_form_that_fits_better_but_predicts_unseen_tests_worse_is_not_taken() -> None:
     selection, race = _raced(("end-stop", "linear"))
-    unseen = _Worse(3, 100, np.random.default_rng(1))
-    found = with_best_base(selection, 0, ORDERS, race, worth_a_try=0.2, lead=0.1, unseen=unseen)
+    found = _again(selection, race, unseen=_Worse(3, 100, np.random.default_rng(1)))
     assert found is selection
 
 
@@ -118,7 +126,14 @@ def test_a_second_effect_that_corrects_the_base_form_is_dropped() -> None:
 def test_nothing_is_compared_where_the_chosen_fit_leaves_no_more_than_noise() -> None:
     selection, race = _raced(("end-stop", "linear"))
     quiet = selection.with_floor(selection.chosen.chi_square)
-    assert with_best_base(quiet, 0, ORDERS, race, worth_a_try=0.2, lead=0.1, unseen=_unseen()) is quiet
+    assert _again(quiet, race) is quiet
+
+
+def test_other_base_forms_are_compared_where_the_error_of_a_model_takes_the_place_of_the_noise() -> None:
+    selection, race = _raced(("end-stop", "linear"))
+    # the error of the best model without effects hides the error of a wrong base form
+    hidden = selection.with_floor(selection.chosen.chi_square)
+    assert _names(_again(hidden, race, noise=0.0)) == ("dahl", ["end-stop"])
 
 
 def test_a_rival_has_another_form_and_no_effect_that_is_not_named() -> None:
