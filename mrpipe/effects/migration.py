@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
+from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
@@ -66,10 +66,11 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     wire[FORCE] += parameters[0] * force * rise * shape_of
 
 
-@njit(STEP_SIGNATURE, cache=True)
-def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: share, length [m] or time [s], exponent, kind of rise (0 slip, 1 time), speed of a reversal [m/s].
+@njit(float64(float64[::1], float64[::1], float64[::1], float64), cache=True)
+def _rise_of_fast_reversals(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> float:
+    """Return the rise since the last reversal that was fast enough.
 
+    Parameters: share, length [m] or time [s], exponent, kind of rise (0 slip, 1 time), speed of a reversal [m/s].
     State: rise at the last sample, rise before the last reversal, and its share that has vanished. The flow must reach
     a least speed to move the particles; below it the rise from before the reversal remains.
     """
@@ -85,7 +86,25 @@ def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray
     fast = (wire[VELOCITY] / parameters[4]) ** 4
     state[2] = max(state[2], fast / (1.0 + fast))
     state[0] = state[1] + (rise - state[1]) * state[2]
-    change_yield_force(wire, 1.0 + parameters[0] * state[0])
+    return state[0]
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Change the yield force before the damper yields; parameters as for the rise of fast reversals."""
+    change_yield_force(wire, 1.0 + parameters[0] * _rise_of_fast_reversals(wire, state, parameters, dt))
+
+
+@njit(STEP_SIGNATURE, cache=True)
+def fast_reversal_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
+    """Change the hysteretic force; parameters as for the rise of fast reversals."""
+    rise = _rise_of_fast_reversals(wire, state, parameters, dt)
+    wire[FORCE] += parameters[0] * wire[YIELD_FORCE] * rise * wire[HYSTERESIS]
+
+
+def _fast_reversals(values: Values) -> list[Step]:
+    numbers = np.array([values["share"], values["slip_length"], values["power"], 0.0, values["reversal_speed"]])
+    return [Step("migration", Phase.FORCE_EFFECT, fast_reversal_step, numbers, 3)]
 
 
 def _yield_force(size: str, power: str, kind: float) -> Callable[[Values], list[Step]]:
@@ -203,6 +222,13 @@ EFFECT = Effect(
             "alpha (1 + s (1 - (1 + slip/(p L))^-p))",
             (_LENGTH, _RATIONAL, _SHARE),
             _power_law,
+            {"share": 0},
+        ),
+        EffectForm(
+            "power-law-fast-reversals",
+            "alpha (1 + s (1 - (1 + slip/(p L))^-p)), slip since the last fast reversal",
+            (_LENGTH, _RATIONAL, _REVERSAL, _SHARE),
+            _fast_reversals,
             {"share": 0},
         ),
         EffectForm(

@@ -10,7 +10,7 @@ import pytest
 from mrpipe.dampers.drive import driver_lag, polynomial_coefficients
 from mrpipe.dampers.hysteresis import hysteresis
 from mrpipe.dampers.library import base_form
-from mrpipe.dampers.plant import CURRENT, FORCE, YIELD_FORCE, build_chain, run_chain
+from mrpipe.dampers.plant import CURRENT, FORCE, HYSTERESIS, YIELD_FORCE, build_chain, run_chain
 from mrpipe.effects.checks import checks_of
 from mrpipe.effects.contract import EffectForm, EffectScales
 from mrpipe.effects.library import all_effects, damper_effects, effects_named, load_effect_file
@@ -103,6 +103,13 @@ LIMITS = [
             ),
             ("pinching", "flat", {"depth": 0.3, "width": 0.002, "middle": 0.001, "exponent": 3.0}),
         )
+    ),
+    (
+        "migration",
+        "power-law-fast-reversals",
+        {"share": 0.3, "slip_length": 0.004, "power": 2.0, "reversal_speed": 1e-6},
+        "power-law",
+        {"share": 0.3, "slip_length": 0.004, "power": 2.0},
     ),
     (
         "migration",
@@ -218,12 +225,20 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.property
-def test_a_reversal_moves_particles_once_the_flow_is_fast_enough() -> None:
-    form = all_effects()["migration"].form("yield-force")
+@pytest.mark.parametrize("name", ["yield-force", "power-law-fast-reversals"])
+def test_a_reversal_moves_particles_once_the_flow_is_fast_enough(name: str) -> None:
+    form = all_effects()["migration"].form(name)
     values = {"share": 0.5, "slip_length": 0.001, "power": 2.0, "reversal_speed": 0.02}
     x, v, a, _, dt = motion()
-    chain = build_chain([*base_steps(), *form.steps(values)])
-    found = run_chain(chain, x, v, a, np.zeros_like(x), dt)[:, YIELD_FORCE] / 22.0
+    wires = run_chain(build_chain([*base_steps(), *form.steps(values)]), x, v, a, np.zeros_like(x), dt)
+    plain = run_chain(build_chain(base_steps()), x, v, a, np.zeros_like(x), dt)
+    if name == "yield-force":
+        found = wires[:, YIELD_FORCE] / 22.0
+    else:
+        # the factor of the hysteretic force, known where this force is not zero
+        known = np.flatnonzero(np.abs(plain[:, HYSTERESIS]) > 0.1)
+        added = (wires[known, FORCE] - plain[known, FORCE]) / (22.0 * plain[known, HYSTERESIS])
+        found = 1.0 + np.interp(np.arange(len(v)), known, added)
     late = np.arange(len(v)) > 1000
     # until the speed is reached the yield force stays as it was before the reversal, then it begins anew
     assert np.min(found[late & (np.abs(v) < 0.005)]) > 1.4
