@@ -5,7 +5,7 @@ This stage replaces the stage for one damper if the configuration has `structure
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,21 +14,17 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
     from mrpipe.config.model import RunSettings
+    from mrpipe.control.placed import PlacedCalibration
+    from mrpipe.dampers.model import DamperModel
+    from mrpipe.structures import Frame
+    from mrpipe.structures.options import DamperSettings
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
-    from mrpipe.control.assembly import expected_amplitude
-    from mrpipe.control.calibration import CalibrationOptions, balanced_weights
-    from mrpipe.control.limits import placement_warning
-    from mrpipe.control.placed import calibrate_placed, modes_together, placed_warnings
-    from mrpipe.control.placed_storage import (
-        accelerometers_of,
-        damper_as_json,
-        placed_dampers,
-        together_as_json,
-        write_placed,
-    )
-    from mrpipe.dampers.model import read_tested
+    from mrpipe.control.calibration import CalibrationOptions
+    from mrpipe.control.operation import operation_of
+    from mrpipe.control.placed import calibrate_placed
+    from mrpipe.control.placed_storage import accelerometers_of, placed_dampers, write_placed
     from mrpipe.reporting import several_dampers as report
     from mrpipe.simulation.several_rig import damper_model
     from mrpipe.structures import read_frame
@@ -48,37 +44,51 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     )
     found = calibrate_placed(frame, dampers, options, together=settings.together)
     context.progress(0.8, "forces")
-    tested = read_tested(context.artifact("identify-damper")) if "identify-damper" in context.inputs else {}
-    rows, weights = [], []
+    operations = []
     for entry, item in zip(entries, found, strict=True):
         model = damper_model(entry, settings.damper, context.artifact)
-        amplitude = entry.expected_amplitude_m or settings.expected_amplitude_m
-        if amplitude is None:
-            known = tested if (entry.damper or settings.damper) == "identified" else {}
-            amplitude = expected_amplitude(model, known, item.modes)
-        speed = amplitude * item.modes.omega_0
-        residual, largest = (float(model.quasi_static_force(speed, drive)) for drive in (0.0, model.drive_limit))
-        rows.append(damper_as_json(item, amplitude, residual, settings.friction_rounding_share * speed))
-        weights.append(balanced_weights(item.modes, residual, **settings.regulator.known()))
-        if entry.target_mode is None and item.damper.mode != settings.target_mode:
-            context.warn(
-                f"{item.damper.name}: mode {settings.target_mode} does not move this damper, so that it is calibrated "
-                f"for mode {item.damper.mode}"
-            )
-        if hardly := placement_warning(frame, item.modes):
-            context.warn(f"{item.damper.name}: {hardly}")
-        for line in placed_warnings(item, amplitude_m=amplitude, residual_force_n=residual, largest_force_n=largest):
+        operation = operation_of(
+            frame,
+            item,
+            model,
+            _amplitude(context, entry, model, item),
+            wanted_mode=entry.target_mode or settings.target_mode,
+            rounding_share=settings.friction_rounding_share,
+            regulator=settings.regulator,
+        )
+        operations.append(operation)
+        for line in operation.warnings:
             context.warn(line)
+    summary = {"dampers": [item.summary for item in operations], **_together(frame, found)}
+    with context.write("control.h5") as artifact:
+        write_placed(artifact, found, [item.weights for item in operations], summary)
+    report.describe_calibration(context.report, summary)
+    return summary
+
+
+def _amplitude(context: StageContext, entry: DamperSettings, model: DamperModel, item: PlacedCalibration) -> float:
+    """Return the expected amplitude of a damper [m]: that of the settings, or one that follows from its tests."""
+    from mrpipe.control.assembly import expected_amplitude
+    from mrpipe.dampers.model import read_tested
+
+    settings = context.settings.calibrate
+    given = entry.expected_amplitude_m or settings.expected_amplitude_m
+    if given is not None:
+        return given
+    identified = (entry.damper or settings.damper) == "identified" and "identify-damper" in context.inputs
+    return expected_amplitude(model, read_tested(context.artifact("identify-damper")) if identified else {}, item.modes)
+
+
+def _together(frame: Frame, found: Sequence[PlacedCalibration]) -> dict[str, Any]:
+    """Return the damping of the target modes and of the first three modes, with gains for all dampers and for each."""
+    from mrpipe.control.placed import modes_together
+    from mrpipe.control.placed_storage import together_as_json
+
     modes = sorted({item.damper.mode for item in found} | set(range(1, min(frame.floors, 3) + 1)))
-    summary = {
-        "dampers": rows,
+    return {
         "together": together_as_json(frame, modes_together(frame, found, modes), modes),
         "alone": together_as_json(frame, modes_together(frame, found, modes, alone=True), modes),
     }
-    with context.write("control.h5") as artifact:
-        write_placed(artifact, found, weights, summary)
-    report.describe_calibration(context.report, summary)
-    return summary
 
 
 VARIANTS = (

@@ -17,7 +17,7 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.assess import Case, with_likely_names
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.choose import Choice, judged_by_trees
-from mrpipe.tracing.bench.chosen import Bench, begin, choose, validation_of
+from mrpipe.tracing.bench.chosen import Bench, Chosen, begin, choose, validation_of
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
 from mrpipe.tracing.bench.drive_again import with_final_laws
 from mrpipe.tracing.bench.gates import judged, refusal_of, validated
@@ -89,28 +89,8 @@ def trace_campaign(
     taken = choose(bench, begun)
     options, training, choice = taken.options, taken.training, taken.choice
     validation = validation_of(bench, taken, unseen)
-    baseline, selection = choice.baseline, choice.selection
-    window = selection.base.problem.window_share
-    if not baseline.model_error:
-        window, selection = _with_window(selection, baseline.noise, training, taken.able, options, jobs)
-    selection = _needed(selection, choice, len(declared), options, rng, jobs)
-    gains, selection = _cross_validated(selection, len(declared), options, rng, jobs)
-    compared = Unseen(options.folds, options.bootstrap_draws, rng)
-    reason = unnamed_reason(selection, options)
-    if reason:
-        selection = replace(selection, chosen=selection.without_effects)
-    else:
-        selection = _refined(selection, len(declared), baseline.model_error, options, rng, jobs)
-        selection, gains, reason = without_laws_of_drive(selection, gains, len(declared), compared, jobs)
-    selection = with_final_laws(selection, rules.refinement.least_gain)
-    selection = with_further_terms(
-        selection,
-        folds=options.folds,
-        draws=options.bootstrap_draws,
-        rng=rng,
-        jobs=jobs,
-        rules=options.rules.refinement,
-    )
+    baseline = choice.baseline
+    window, selection, gains, reason = _named_on_training(taken, len(declared), rng, jobs)
     progress(0.85, "ceiling")
     offsets = offset_between_tests(
         selection.chosen,
@@ -120,6 +100,7 @@ def trace_campaign(
     )
     case = Case(choice, training, validation, options, ordered, len(declared), offsets, jobs)
     if not reason:
+        compared = Unseen(options.folds, options.bootstrap_draws, rng)
         selection, gains, reason = without_beaten_names(selection, gains, len(declared), compared, jobs)
     selection, assessed = with_likely_names(selection, case, gains, reason, rng)
     causes, further, found, judgement = assessed.causes, assessed.further, assessed.found, assessed.judgement
@@ -132,6 +113,42 @@ def trace_campaign(
         judgement = judged(found, selection, training, options, causes, assessed.missing, reason, ordered, jobs)
     report = Summary(selection, baseline, training, offsets, found, judgement, ordered, choice.race, jobs)
     return report.build(options, causes, further, taken.reasons, window, [item.name for item in declared])
+
+
+def _named_on_training(
+    taken: Chosen, declared: int, rng: np.random.Generator, jobs: int
+) -> tuple[float, Selection, list[Gain | None], str]:
+    """Return the effects that the training tests require, in the forms and with the laws of the drive that they need.
+
+    Returns
+    -------
+    Window of the filter of the displacement, the selection, the gains of its effects on tests left out, and the reason
+    why no effect is named (empty if effects are named).
+    """
+    options, choice = taken.options, taken.choice
+    baseline, selection = choice.baseline, choice.selection
+    window = selection.base.problem.window_share
+    if not baseline.model_error:
+        window, selection = _with_window(selection, baseline.noise, taken.training, taken.able, options, jobs)
+    selection = _needed(selection, choice, declared, options, rng, jobs)
+    gains, selection = _cross_validated(selection, declared, options, rng, jobs)
+    reason = unnamed_reason(selection, options)
+    if reason:
+        selection = replace(selection, chosen=selection.without_effects)
+    else:
+        compared = Unseen(options.folds, options.bootstrap_draws, rng)
+        selection = _refined(selection, declared, baseline.model_error, options, rng, jobs)
+        selection, gains, reason = without_laws_of_drive(selection, gains, declared, compared, jobs)
+    selection = with_final_laws(selection, options.rules.refinement.least_gain)
+    selection = with_further_terms(
+        selection,
+        folds=options.folds,
+        draws=options.bootstrap_draws,
+        rng=rng,
+        jobs=jobs,
+        rules=options.rules.refinement,
+    )
+    return window, selection, gains, reason
 
 
 def _nothing_traced(

@@ -9,30 +9,26 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from mrpipe.artifacts import FloatArray, Progress, no_progress
+from mrpipe.artifacts import Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
-from mrpipe.tracing.bench.verdict import confidence_of
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
-from mrpipe.tracing.structure.candidates import Fitted
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
 from mrpipe.tracing.structure.model import FrameModel, model_of
+from mrpipe.tracing.structure.naming import named_effects
 from mrpipe.tracing.structure.records import FrameData
 from mrpipe.tracing.structure.scores import dependence, flexible_score, frame_score, noise_floor
 from mrpipe.tracing.structure.select import FrameCandidate, FrameSelection, select
 from mrpipe.tracing.structure.spectra import Spectra
-from mrpipe.tracing.verdict import Candidate, Estimate, Interval, LeftOutGain, NamedEffect, Unexplained, Verdict
+from mrpipe.tracing.verdict import Candidate, NamedEffect, Unexplained, Verdict
 from mrpipe.words import listed
 
 QUANTITY = (
     "shear force of every storey (mass times absolute acceleration, summed from the top) from the measured motion, "
     "pooled over storeys; lines of the spectrum weighted by the accelerometers' noise"
 )
-
-BY_STOREY = 3
-"""Numerical technique: with fewer storeys their largest amplitude is reported, else the median of acting storeys."""
 
 LISTED = 6
 """Numerical technique: largest number of states that are listed under `depends_on`."""
@@ -161,61 +157,33 @@ def _summary(
     rules: NamingRules,
     reason: str,
 ) -> dict[str, Any]:
-    scores = frame_score(before, problem.validation), frame_score(after, problem.validation)
-    named = [] if reason else _named(selection, after, rules)
-    structured = selection.structured
-    lacking = [k for k, value in enumerate(_by_storey(selection)) if value > problem.rules.least_storey]
-    ceiling = scores[0].nrmse
-    if lacking:
-        period = 1.0 / float(problem.frequencies_hz[0])
-        ceiling = flexible_score(before, problem.training, problem.validation, lacking, period)
-    best = min(ceiling, scores[1].nrmse)
-    gain = scores[0].nrmse ** 2 - best**2
-    recovered = (scores[0].nrmse ** 2 - scores[1].nrmse ** 2) / gain if gain > NO_GAIN else 0.0
+    first, last = frame_score(before, problem.validation), frame_score(after, problem.validation)
+    named = [] if reason else named_effects(selection, after, rules)
     share = selection.share(selection.residual) if named else 0.0
-    still = (
-        structured
-        and share < rules.named_share
-        and selection.groups.material(selection.residual if named else selection.design.residual)
-    )
-    worst = _worst_storey(selection)
-    squares = selection.groups.mean_square(selection.design.residual)
-    p_values = stats.chi2.sf(squares * selection.groups.count, selection.groups.count)
     return {
         "model": selection.base,
         "quantity": QUANTITY,
         "declared_effects": [item.name for item in declared],
         "noise_floor_nrmse": noise_floor(problem.validation, selection.groups.scale),
         "noise_from": "accelerometers above the highest mode",
-        "before": scores[0].as_json(),
-        "residual": {
-            "structured": structured,
-            "p_value": float(max(min(1.0, float(np.min(p_values)) * len(p_values)), 1e-300)),
-            "where": {f"storey_{k + 1}": value for k, value in enumerate(_by_storey(selection))},
-            "by_test": _by_test(selection, problem),
-            "chi_square": selection.design.chi_square,
-            "chi_square_of_noise": float(np.mean(selection.groups.scale)),
-        },
+        "before": first.as_json(),
+        "residual": _residual(selection, problem),
         "base_form": {
             "name": selection.base,
             "best": selection.base,
             "chi_square": selection.chi_squares,
-            "nrmse": {selection.base: scores[0].nrmse},
+            "nrmse": {selection.base: first.nrmse},
         },
         "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
         "effects": [item.as_json() for item in named],
         **_verdict(selection, named, share, rules, reason, between).sentence_as_json(),
         "candidates": [item.as_json() for item in ranking(selection, problem)],
-        "after": scores[1].as_json(),
-        "ceiling": {"nrmse": best, "recovered": float(np.clip(recovered, 0.0, 1.0))},
-        "unexplained": Unexplained(
-            bool(still),
-            float(np.clip(1.0 - share, 0.0, 1.0)) if structured else 0.0,
-            _depends_on(after, problem, worst) if still else (),
-        ).as_json(),
+        "after": last.as_json(),
+        "ceiling": _ceiling(problem, selection, before, first.nrmse, last.nrmse),
+        "unexplained": _unexplained(problem, selection, after, rules, share if named else None).as_json(),
         "tests": [
-            {"name": name, "nrmse_before": value, "nrmse_after": scores[1].by_test[name]}
-            for name, value in scores[0].by_test.items()
+            {"name": name, "nrmse_before": value, "nrmse_after": last.by_test[name]}
+            for name, value in first.by_test.items()
         ],
         "frame": {
             "frequencies_hz": problem.frequencies_hz.tolist(),
@@ -224,6 +192,52 @@ def _summary(
             "between_tests": between.as_json(),
         },
     }
+
+
+def _residual(selection: FrameSelection, problem: FrameProblem) -> dict[str, Any]:
+    """Return whether the residual of the linear frame has a structure, and in which storeys and tests it is."""
+    squares = selection.groups.mean_square(selection.design.residual)
+    p_values = stats.chi2.sf(squares * selection.groups.count, selection.groups.count)
+    return {
+        "structured": selection.structured,
+        "p_value": float(max(min(1.0, float(np.min(p_values)) * len(p_values)), 1e-300)),
+        "where": {f"storey_{k + 1}": value for k, value in enumerate(_by_storey(selection))},
+        "by_test": _by_test(selection, problem),
+        "chi_square": selection.design.chi_square,
+        "chi_square_of_noise": float(np.mean(selection.groups.scale)),
+    }
+
+
+def _ceiling(
+    problem: FrameProblem, selection: FrameSelection, before: FrameModel, nrmse_before: float, nrmse_after: float
+) -> dict[str, float]:
+    """Return the error of a flexible model, and the share of the error above it that the named effects remove."""
+    lacking = [k for k, value in enumerate(_by_storey(selection)) if value > problem.rules.least_storey]
+    flexible = nrmse_before
+    if lacking:
+        period = 1.0 / float(problem.frequencies_hz[0])
+        flexible = flexible_score(before, problem.training, problem.validation, lacking, period)
+    best = min(flexible, nrmse_after)
+    gain = nrmse_before**2 - best**2
+    recovered = (nrmse_before**2 - nrmse_after**2) / gain if gain > NO_GAIN else 0.0
+    return {"nrmse": best, "recovered": float(np.clip(recovered, 0.0, 1.0))}
+
+
+def _unexplained(
+    problem: FrameProblem, selection: FrameSelection, after: FrameModel, rules: NamingRules, share: float | None
+) -> Unexplained:
+    """Return the part of the residual that the named effects leave; `share` is what they explain, None without any."""
+    explained = share or 0.0
+    still = (
+        selection.structured
+        and explained < rules.named_share
+        and selection.groups.material(selection.design.residual if share is None else selection.residual)
+    )
+    return Unexplained(
+        bool(still),
+        float(np.clip(1.0 - explained, 0.0, 1.0)) if selection.structured else 0.0,
+        _depends_on(after, problem, _worst_storey(selection)) if still else (),
+    )
 
 
 def _depends_on(after: FrameModel, problem: FrameProblem, storey: int) -> tuple[tuple[str, float], ...]:
@@ -249,101 +263,6 @@ def _worst_storey(selection: FrameSelection) -> int:
     residual = selection.residual if selection.chosen else selection.design.residual
     over = selection.groups.over(residual)
     return int(np.argmax(np.bincount(selection.groups.storey, weights=over)))
-
-
-def _named(selection: FrameSelection, after: FrameModel, rules: NamingRules) -> list[NamedEffect]:
-    found, first = [], 0
-    total = selection.share(selection.residual)
-    for place, item in enumerate(selection.chosen):
-        count = _amplitudes_of(item, len(selection.design.residual))
-        own = after.amplitudes[first : first + count]
-        first += count
-        if place < selection.declared:
-            continue
-        candidates = selection.rounds[place - selection.declared]
-        lead = candidates[0].share - max((other.share for other in candidates[1:]), default=0.0)
-        rivals = [other.name for other in candidates[1:] if other.share > candidates[0].share - rules.lead]
-        gain = selection.gains[place - selection.declared] if selection.gains else None
-        effect = item.placed.effect
-        interval = None if gain is None else LeftOutGain(gain.share, Interval(*gain.interval))
-        found.append(
-            NamedEffect(
-                effect.name,
-                item.placed.form.name,
-                parameters_of(item, own, selection.rules.acting),
-                confidence_of(total, 0.5 + 0.5 * min(1.0, 2.0 * lead), None, rules),
-                effect.physics,
-                effect.remedy,
-                effect.source,
-                "structure",
-                place_in_words(item, own, selection.rules.acting),
-                tuple(rivals),
-                {name: effect.separated_by[name].advice for name in rivals if name in effect.separated_by},
-                interval,
-            )
-        )
-    return found
-
-
-def _amplitudes_of(item: Fitted, floors: int) -> int:
-    kinds = len(item.placed.form.amplitudes)
-    return kinds * floors if item.placed.effect.acts_on == "storey" else kinds
-
-
-def place_in_words(item: Fitted, amplitudes: FloatArray, acting: float) -> str:
-    """Return where an effect acts: a floor, every storey, or the storeys with a large amplitude.
-
-    Parameters
-    ----------
-    item
-        The effect.
-    amplitudes
-        Its amplitudes, storey after storey.
-    acting
-        Share of the largest amplitude from which on a storey is named.
-    """
-    if item.placed.floor:
-        return f"floor {item.placed.floor}"
-    if item.placed.effect.acts_on == "base":
-        return "base"
-    by_storey = amplitudes.reshape(-1, len(item.placed.form.amplitudes)).sum(axis=1)
-    strong = np.flatnonzero(by_storey > acting * float(by_storey.max()))
-    if len(strong) == len(by_storey):
-        return "every storey"
-    return "storey " + ", ".join(str(k + 1) for k in strong)
-
-
-def parameters_of(item: Fitted, amplitudes: FloatArray, acting: float) -> dict[str, Estimate]:
-    """Return value and unit of every parameter; amplitudes of several storeys by storey, with their median as value.
-
-    Parameters
-    ----------
-    item
-        The effect.
-    amplitudes
-        Its amplitudes, storey after storey.
-    acting
-        Share of the largest amplitude below which a storey does not count in the median.
-    """
-    found = {
-        parameter.name: Estimate(float(value), parameter.unit, Interval.point(float(value)))
-        for parameter, value in zip(item.placed.form.searched, item.numbers, strict=True)
-    }
-    kinds = len(item.placed.form.amplitudes)
-    for k, parameter in enumerate(item.placed.form.amplitudes):
-        own = amplitudes[k::kinds]
-        value = float(np.max(own)) if len(own) < BY_STOREY else _typical(own, acting)
-        interval = Interval(float(np.min(own)), float(np.max(own)), "range", None)
-        storeys = tuple(float(number) for number in own) if len(own) > 1 else ()
-        found[parameter.name] = Estimate(value, parameter.unit, interval if storeys else Interval.point(value), storeys)
-    if item.placed.floor:
-        found["floor"] = Estimate(item.placed.floor, "1", Interval.point(item.placed.floor))
-    return found
-
-
-def _typical(values: FloatArray, acting: float) -> float:
-    strong = values[values > acting * float(values.max())] if float(values.max()) > 0.0 else values
-    return float(np.median(strong))
 
 
 def ranking(selection: FrameSelection, problem: FrameProblem) -> list[Candidate]:

@@ -1,0 +1,82 @@
+"""Operation of one of several dampers: its expected amplitude, its forces at this amplitude, its weights, warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mrpipe.control.calibration import balanced_weights
+from mrpipe.control.calibration_settings import RegulatorSettings
+from mrpipe.control.limits import placement_warning
+from mrpipe.control.lqg import Weights
+from mrpipe.control.placed import PlacedCalibration, placed_warnings
+from mrpipe.control.placed_storage import damper_as_json
+from mrpipe.dampers.model import DamperModel
+from mrpipe.structures import Frame
+
+
+@dataclass(frozen=True)
+class PlacedOperation:
+    """Operation of a calibrated damper at its expected amplitude.
+
+    Attributes
+    ----------
+    summary
+        What `mrpipe calibrate --json` prints for the damper.
+    weights
+        Weights of the regulator of clipped LQG.
+    warnings
+        Reasons why the calibration may not hold, one sentence each.
+    """
+
+    summary: Mapping[str, Any]
+    weights: Weights
+    warnings: tuple[str, ...]
+
+
+def operation_of(
+    frame: Frame,
+    item: PlacedCalibration,
+    model: DamperModel,
+    amplitude_m: float,
+    *,
+    wanted_mode: int,
+    rounding_share: float,
+    regulator: RegulatorSettings,
+) -> PlacedOperation:
+    """Return the operation of a calibrated damper.
+
+    Parameters
+    ----------
+    frame
+        The structure.
+    item
+        The damper and its gains.
+    model
+        Model of the damper.
+    amplitude_m
+        Expected amplitude of the damper [m].
+    wanted_mode
+        Target mode of the settings; a warning says if the damper is calibrated for another one.
+    rounding_share
+        Speed over which friction changes its sign, as a share of the largest speed at the expected amplitude.
+    regulator
+        Settings of clipped LQG.
+    """
+    name, speed = item.damper.name, amplitude_m * item.modes.omega_0
+    residual, largest = (float(model.quasi_static_force(speed, drive)) for drive in (0.0, model.drive_limit))
+    warnings = []
+    if item.damper.mode != wanted_mode:
+        warnings.append(
+            f"{name}: mode {wanted_mode} does not move this damper, so that it is calibrated for mode "
+            f"{item.damper.mode}"
+        )
+    if hardly := placement_warning(frame, item.modes):
+        warnings.append(f"{name}: {hardly}")
+    warnings += placed_warnings(item, amplitude_m=amplitude_m, residual_force_n=residual, largest_force_n=largest)
+    return PlacedOperation(
+        damper_as_json(item, amplitude_m, residual, rounding_share * speed),
+        balanced_weights(item.modes, residual, **regulator.known()),
+        tuple(warnings),
+    )

@@ -1,0 +1,122 @@
+"""Names of the effects of a structure: where each acts, values of its parameters, rivals and confidence."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.tracing.bench.verdict import confidence_of
+from mrpipe.tracing.options import NamingRules
+from mrpipe.tracing.structure.candidates import Fitted
+from mrpipe.tracing.structure.model import FrameModel
+from mrpipe.tracing.structure.select import FrameSelection
+from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
+
+BY_STOREY = 3
+"""Numerical technique: with fewer storeys their largest amplitude is reported, else the median of acting storeys."""
+
+
+def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRules) -> list[NamedEffect]:
+    """Return the effects that were chosen, with their places, parameters, rivals and confidence.
+
+    Parameters
+    ----------
+    selection
+        Linear frame and effects, as chosen on the training records.
+    after
+        Model with all chosen effects; its amplitudes are in the order of the effects.
+    rules
+        Rules for naming an effect.
+    """
+    found, first = [], 0
+    total = selection.share(selection.residual)
+    for place, item in enumerate(selection.chosen):
+        count = _amplitudes_of(item, len(selection.design.residual))
+        own = after.amplitudes[first : first + count]
+        first += count
+        if place < selection.declared:
+            continue
+        candidates = selection.rounds[place - selection.declared]
+        lead = candidates[0].share - max((other.share for other in candidates[1:]), default=0.0)
+        rivals = [other.name for other in candidates[1:] if other.share > candidates[0].share - rules.lead]
+        gain = selection.gains[place - selection.declared] if selection.gains else None
+        effect = item.placed.effect
+        interval = None if gain is None else LeftOutGain(gain.share, Interval(*gain.interval))
+        found.append(
+            NamedEffect(
+                effect.name,
+                item.placed.form.name,
+                parameters_of(item, own, selection.rules.acting),
+                confidence_of(total, 0.5 + 0.5 * min(1.0, 2.0 * lead), None, rules),
+                effect.physics,
+                effect.remedy,
+                effect.source,
+                "structure",
+                place_in_words(item, own, selection.rules.acting),
+                tuple(rivals),
+                {name: effect.separated_by[name].advice for name in rivals if name in effect.separated_by},
+                interval,
+            )
+        )
+    return found
+
+
+def _amplitudes_of(item: Fitted, floors: int) -> int:
+    kinds = len(item.placed.form.amplitudes)
+    return kinds * floors if item.placed.effect.acts_on == "storey" else kinds
+
+
+def place_in_words(item: Fitted, amplitudes: FloatArray, acting: float) -> str:
+    """Return where an effect acts: a floor, every storey, or the storeys with a large amplitude.
+
+    Parameters
+    ----------
+    item
+        The effect.
+    amplitudes
+        Its amplitudes, storey after storey.
+    acting
+        Share of the largest amplitude from which on a storey is named.
+    """
+    if item.placed.floor:
+        return f"floor {item.placed.floor}"
+    if item.placed.effect.acts_on == "base":
+        return "base"
+    by_storey = amplitudes.reshape(-1, len(item.placed.form.amplitudes)).sum(axis=1)
+    strong = np.flatnonzero(by_storey > acting * float(by_storey.max()))
+    if len(strong) == len(by_storey):
+        return "every storey"
+    return "storey " + ", ".join(str(k + 1) for k in strong)
+
+
+def parameters_of(item: Fitted, amplitudes: FloatArray, acting: float) -> dict[str, Estimate]:
+    """Return value and unit of every parameter; amplitudes of several storeys by storey, with their median as value.
+
+    Parameters
+    ----------
+    item
+        The effect.
+    amplitudes
+        Its amplitudes, storey after storey.
+    acting
+        Share of the largest amplitude below which a storey does not count in the median.
+    """
+    found = {
+        parameter.name: Estimate(float(value), parameter.unit, Interval.point(float(value)))
+        for parameter, value in zip(item.placed.form.searched, item.numbers, strict=True)
+    }
+    kinds = len(item.placed.form.amplitudes)
+    for k, parameter in enumerate(item.placed.form.amplitudes):
+        own = amplitudes[k::kinds]
+        value = float(np.max(own)) if len(own) < BY_STOREY else _typical(own, acting)
+        interval = Interval(float(np.min(own)), float(np.max(own)), "range", None)
+        storeys = tuple(float(number) for number in own) if len(own) > 1 else ()
+        found[parameter.name] = Estimate(value, parameter.unit, interval if storeys else Interval.point(value), storeys)
+    if item.placed.floor:
+        found["floor"] = Estimate(item.placed.floor, "1", Interval.point(item.placed.floor))
+    return found
+
+
+def _typical(values: FloatArray, acting: float) -> float:
+    strong = values[values > acting * float(values.max())] if float(values.max()) > 0.0 else values
+    return float(np.median(strong))
