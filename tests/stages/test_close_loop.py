@@ -45,6 +45,7 @@ LAWS = ("vd", "vdns", "fdns", "nnc", "lqg", "bang-bang", "passive-on")
 SETTINGS: dict[str, Any] = {
     "close_loop": {"laws": LAWS},
     "simulate": {
+        "plant_rate_hz": 1000.0,
         "controller": {"inverse": "model", "residual_force_n": 18.0},
         "excitation": {
             "frequency_rad_s": 8.0,
