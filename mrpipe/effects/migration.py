@@ -102,15 +102,13 @@ def fast_reversal_step(wire: FloatArray, state: FloatArray, parameters: FloatArr
     wire[FORCE] += parameters[0] * wire[YIELD_FORCE] * rise * wire[HYSTERESIS]
 
 
-def _fast_reversals(values: Values) -> list[Step]:
-    numbers = np.array([values["share"], values["slip_length"], values["power"], 0.0, values["reversal_speed"]])
-    return [Step("migration", Phase.FORCE_EFFECT, fast_reversal_step, numbers, 3)]
+def _fast_reversals(size: str, power: str, kind: float, *, before_yield: bool) -> Callable[[Values], list[Step]]:
+    phase = Phase.COEFFICIENT_EFFECT if before_yield else Phase.FORCE_EFFECT
+    kernel = yield_force_step if before_yield else fast_reversal_step
 
-
-def _yield_force(size: str, power: str, kind: float) -> Callable[[Values], list[Step]]:
     def steps(values: Values) -> list[Step]:
         numbers = np.array([values["share"], values[size], values[power], kind, values["reversal_speed"]])
-        return [Step("migration", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers, 3)]
+        return [Step("migration", phase, kernel, numbers, 3)]
 
     return steps
 
@@ -228,20 +226,20 @@ EFFECT = Effect(
             "power-law-fast-reversals",
             "alpha (1 + s (1 - (1 + slip/(p L))^-p)), slip since the last fast reversal",
             (_LENGTH, _RATIONAL, _REVERSAL, _SHARE),
-            _fast_reversals,
+            _fast_reversals("slip_length", "power", 0.0, before_yield=False),
             {"share": 0},
         ),
         EffectForm(
             "yield-force",
             "F_y (1 + s (1 - (1 + slip/(p L))^-p)) before the damper yields",
             (_LENGTH, _RATIONAL, _REVERSAL, _LATE),
-            _yield_force("slip_length", "power", 0.0),
+            _fast_reversals("slip_length", "power", 0.0, before_yield=True),
         ),
         EffectForm(
             "yield-force-time",
             "F_y (1 + s (1 - exp(-(t_rev/tau)^p))) before the damper yields",
             (_TIME, replace(_POWER, starts=(1.0,)), _REVERSAL, _LATE),
-            _yield_force("rise_time", "exponent", 1.0),
+            _fast_reversals("rise_time", "exponent", 1.0, before_yield=True),
         ),
         free_profile(
             "profile",

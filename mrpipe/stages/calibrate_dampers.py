@@ -14,6 +14,7 @@ from mrpipe.pipeline.stage import Stage, StageContext
 
 if TYPE_CHECKING:
     from mrpipe.config.model import RunSettings
+    from mrpipe.config.sections.calibrate import CalibrateSettings
     from mrpipe.control.placed import PlacedCalibration
     from mrpipe.dampers.model import DamperModel
     from mrpipe.structures import Frame
@@ -25,6 +26,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.operation import operation_of
     from mrpipe.control.placed import calibrate_placed
     from mrpipe.control.placed_storage import accelerometers_of, placed_dampers, write_placed
+    from mrpipe.dampers.model import read_tested
     from mrpipe.reporting import several_dampers as report
     from mrpipe.simulation.several_rig import damper_model
     from mrpipe.structures import read_frame
@@ -44,6 +46,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     )
     found = calibrate_placed(frame, dampers, options, together=settings.together)
     context.progress(0.8, "forces")
+    tested = read_tested(context.artifact("identify-damper")) if "identify-damper" in context.inputs else {}
     operations = []
     for entry, item in zip(entries, found, strict=True):
         model = damper_model(entry, settings.damper, context.artifact)
@@ -51,7 +54,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
             frame,
             item,
             model,
-            _amplitude(context, entry, model, item),
+            _amplitude(settings, entry, model, item, tested),
             wanted_mode=entry.target_mode or settings.target_mode,
             rounding_share=settings.friction_rounding_share,
             regulator=settings.regulator,
@@ -66,17 +69,21 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     return summary
 
 
-def _amplitude(context: StageContext, entry: DamperSettings, model: DamperModel, item: PlacedCalibration) -> float:
+def _amplitude(
+    settings: CalibrateSettings,
+    entry: DamperSettings,
+    model: DamperModel,
+    item: PlacedCalibration,
+    tested: Mapping[str, float],
+) -> float:
     """Return the expected amplitude of a damper [m]: that of the settings, or one that follows from its tests."""
     from mrpipe.control.assembly import expected_amplitude
-    from mrpipe.dampers.model import read_tested
 
-    settings = context.settings.calibrate
     given = entry.expected_amplitude_m or settings.expected_amplitude_m
     if given is not None:
         return given
-    identified = (entry.damper or settings.damper) == "identified" and "identify-damper" in context.inputs
-    return expected_amplitude(model, read_tested(context.artifact("identify-damper")) if identified else {}, item.modes)
+    known = tested if (entry.damper or settings.damper) == "identified" else {}
+    return expected_amplitude(model, known, item.modes)
 
 
 def _together(frame: Frame, found: Sequence[PlacedCalibration]) -> dict[str, Any]:

@@ -111,7 +111,7 @@ def with_best_base(
     orders: Orders,
     race: Race | None,
     *,
-    noise: float,
+    model_error: bool = False,
     worth_a_try: float,
     lead: float,
     unseen: Unseen,
@@ -129,9 +129,9 @@ def with_best_base(
         Largest degrees of the laws of the drive.
     race
         The models that competed; None where nothing is missing.
-    noise
-        Chi-square of the noise. Zero where the error of a model takes the place of the noise, because this error can be
-        that of a wrong base form; other base forms are then always compared.
+    model_error
+        Whether the error of a model takes the place of the noise. This error can be that of a wrong base form, so that
+        other base forms are then always compared.
     worth_a_try
         Other base forms are compared only if the excess of the chi-square over the noise, in units of the noise,
         exceeds this.
@@ -144,12 +144,13 @@ def with_best_base(
     """
     chosen = selection.chosen
     named = range(declared, min(declared + selection.proven, len(chosen.problem.terms)))
-    if race is None or not named or chosen.chi_square < (1.0 + worth_a_try) * noise:
+    limit = 0.0 if model_error else (1.0 + worth_a_try) * selection.noise
+    if race is None or not named or chosen.chi_square < limit:
         return selection
     small = draft(chosen)
     places = range(len(small.problem.terms))
     full = with_best_forms(orders.adequate(small), named, jobs=jobs)
-    if full.chi_square < (1.0 + worth_a_try) * noise:
+    if full.chi_square < limit:
         # only a richer form of the effect is missing
         return selection
     found = best_rival(selection, small, [places], declared, orders, race, jobs, full=full)

@@ -201,7 +201,7 @@ def _needed(
         declared,
         orders,
         choice.race,
-        noise=0.0 if by_force else kept.noise,
+        model_error=by_force,
         worth_a_try=rules.refinement.worth_a_try,
         lead=rules.race.form_lead,
         unseen=Unseen(options.folds, options.bootstrap_draws, rng),

@@ -55,12 +55,13 @@ def _unseen() -> Unseen:
 
 
 def _again(
-    selection: Selection, race: Race | None, noise: float | None = None, unseen: Unseen | None = None
+    selection: Selection, race: Race | None, *, model_error: bool = False, unseen: Unseen | None = None
 ) -> Selection:
     """Return the selection after the comparison with the other base forms."""
-    limit = selection.noise if noise is None else noise
     compared = unseen or _unseen()
-    return with_best_base(selection, 0, ORDERS, race, noise=limit, worth_a_try=0.2, lead=0.1, unseen=compared)
+    return with_best_base(
+        selection, 0, ORDERS, race, model_error=model_error, worth_a_try=0.2, lead=0.1, unseen=compared
+    )
 
 
 def _names(selection: Selection) -> tuple[str, list[str]]:
@@ -133,7 +134,7 @@ def test_other_base_forms_are_compared_where_the_error_of_a_model_takes_the_plac
     selection, race = _raced(("end-stop", "linear"))
     # the error of the best model without effects hides the error of a wrong base form
     hidden = selection.with_floor(selection.chosen.chi_square)
-    assert _names(_again(hidden, race, noise=0.0)) == ("dahl", ["end-stop"])
+    assert _names(_again(hidden, race, model_error=True)) == ("dahl", ["end-stop"])
 
 
 def test_a_rival_has_another_form_and_no_effect_that_is_not_named() -> None:
