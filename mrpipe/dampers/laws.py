@@ -10,13 +10,14 @@ consists of sums of Bernstein polynomials; with coefficients that are not negati
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
+from numba import boolean, float64, njit, void
 
 from mrpipe.artifacts import FloatArray
 
@@ -142,8 +143,7 @@ class LawShape:
         if self.saturates:
             full = saturation(self.kind, 1.0 / scale_share)
             return np.stack([np.ones_like(share), saturation(self.kind, share / scale_share) / full])
-        columns = np.stack(bernstein(share, self.order))
-        return columns if self.kind == "polynomial" else np.cumsum(columns[::-1], axis=0)[::-1]
+        return bernstein(share, self.order, monotone=self.kind == "monotone")
 
     def matrix(self, limit: float, scale_share: float = 1.0) -> FloatArray:
         """Return the matrix from coefficients of the basis to the numbers of a :class:`Law`, shape (count, count)."""
@@ -160,14 +160,41 @@ class LawShape:
         return Law("polynomial", numbers)
 
 
-def bernstein(share: FloatArray, order: int) -> list[FloatArray]:
-    """Return the Bernstein polynomials of degree `order` at `share` (0..1 on the drive's range)."""
-    rest = 1.0 - share
-    ones = np.ones_like(share)
-    # repeated products, because a power of every sample takes much longer
-    rising = list(itertools.accumulate([ones] + order * [share], np.multiply))
-    falling = list(itertools.accumulate([ones] + order * [rest], np.multiply))
-    return [math.comb(order, k) * rising[k] * falling[order - k] for k in range(order + 1)]
+def bernstein(share: FloatArray, order: int, *, monotone: bool = False) -> FloatArray:
+    """Return the Bernstein polynomials of degree `order` at `share` (0..1 on the drive's range), shape (order + 1, n).
+
+    Parameters
+    ----------
+    share
+        Drive over its limit, shape (n,).
+    order
+        Degree.
+    monotone
+        Whether row k is the sum of the polynomials k to `order`, which does not fall.
+    """
+    rows = np.empty((order + 1, len(share)))
+    _bernstein(np.ascontiguousarray(share), _binomials(order), monotone, rows)
+    return rows
+
+
+@cache
+def _binomials(order: int) -> FloatArray:
+    return np.array([math.comb(order, k) for k in range(order + 1)], dtype=np.float64)
+
+
+@njit(void(float64[::1], float64[::1], boolean, float64[:, ::1]), cache=True, nogil=True)
+def _bernstein(share: FloatArray, binomials: FloatArray, monotone: bool, rows: FloatArray) -> None:
+    last = len(binomials) - 1
+    for at in range(len(share)):
+        rising, falling = 1.0, 1.0
+        for k in range(last + 1):
+            rows[k, at] = binomials[k] * rising
+            rising *= share[at]
+        for k in range(last, -1, -1):
+            rows[k, at] *= falling
+            falling *= 1.0 - share[at]
+            if monotone and k < last:
+                rows[k, at] += rows[k + 1, at]
 
 
 def bernstein_to_power(order: int, limit: float) -> FloatArray:

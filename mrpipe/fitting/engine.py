@@ -144,7 +144,7 @@ def regressors(problem: Problem, theta: FloatArray) -> FloatArray:
     row = 0
     scales = base.scale_shares(problem.values(theta)[0], drive)
     for law, signal, scale in zip(base.laws, signals, scales, strict=False):
-        columns[row : row + law.count] = law.basis(share, scale) * signal
+        np.multiply(law.basis(share, scale), signal, out=columns[row : row + law.count])
         row += law.count
     if base.form.known:
         columns[row] = wires[KNOWN_AT]
@@ -194,18 +194,9 @@ def solve(problem: Problem, theta: FloatArray, w: Weighting) -> Solved:
     if not np.all(np.isfinite(means)):
         wrong = np.full(len(w.at), 1e6)
         return Solved(wrong, np.zeros(count), np.zeros(len(w.sums)), np.ones(count, bool))
-    low, high = linear_bounds(problem)
+    low, high = problem.linear_bounds
     linear, at_bound = bounded_solution(rows @ rows.T, rows @ w.target, low, high)
     return Solved(w.target - linear @ rows, linear, w.target_means - linear @ means, at_bound)
-
-
-def linear_bounds(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """Return bounds of the linear coefficients: laws of the drive are not negative, a known force has the factor 1."""
-    known = int(problem.base.form.known)
-    free = problem.base.columns - known
-    bounds = [parameter.bounds(problem.scales) for _, parameter in problem.amplitudes]
-    low = np.concatenate([np.zeros(free), np.ones(known), [item[0] for item in bounds]])
-    return low, np.concatenate([np.full(free, np.inf), np.ones(known), [item[1] for item in bounds]])
 
 
 def bounded_solution(
@@ -217,8 +208,8 @@ def bounded_solution(
     if the gradient points away from it (Lawson and Hanson 1974, Solving Least Squares Problems, chapter 23).
     """
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    scaled = gram / np.outer(scale, scale)
-    scaled[np.diag_indices_from(scaled)] += 1e-10
+    scaled = gram / (scale[:, None] * scale)
+    scaled.flat[:: len(scale) + 1] += 1e-10
     target = right / scale
     low, high = low * scale, high * scale
     solution = np.zeros(len(right))
@@ -226,13 +217,18 @@ def bounded_solution(
     solution[fixed] = low[fixed]
     for _ in range(3 * len(right) + 1):
         free = ~fixed
-        rest = target[free] - scaled[np.ix_(free, fixed)] @ solution[fixed]
-        solution[free] = np.linalg.solve(scaled[np.ix_(free, free)], rest)
+        if fixed.any():
+            rest = target[free] - scaled[np.ix_(free, fixed)] @ solution[fixed]
+            solution[free] = np.linalg.solve(scaled[np.ix_(free, free)], rest)
+        else:
+            solution = np.linalg.solve(scaled, target)
         outside = free & ((solution < low - 1e-12) | (solution > high + 1e-12))
         if outside.any():
             solution[outside] = np.clip(solution[outside], low[outside], high[outside])
             fixed |= outside
             continue
+        if not fixed.any():
+            break
         slope = target - scaled @ solution
         inward = fixed & (low < high) & np.where(solution <= low, slope > 1e-9, slope < -1e-9)
         if not inward.any():

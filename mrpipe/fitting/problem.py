@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import BoolArray, FloatArray
 from mrpipe.dampers.drive import coefficients, driver_lag, driver_lag_apart
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.laws import Law, LawShape
@@ -141,34 +142,53 @@ class Problem:
         """Return the same model compared on the recordings of another problem, with its weights."""
         return replace(self, recordings=other.recordings, root_weight=other.root_weight)
 
-    @property
-    def searched(self) -> list[tuple[int, Parameter]]:
-        """Return (index of the term, or -1 for the base; parameter) for all searched parameters."""
-        found = [(-1, parameter) for parameter in self.base.parameters()]
-        for index, term in enumerate(self.terms):
-            found += [(index, parameter) for parameter in term.form.searched]
-        return found
+    @cached_property
+    def searched(self) -> tuple[tuple[int, Parameter], ...]:
+        """Pairs (index of the term, or -1 for the base; parameter) of all searched parameters."""
+        own = [(-1, parameter) for parameter in self.base.parameters()]
+        return *own, *((index, item) for index, term in enumerate(self.terms) for item in term.form.searched)
 
-    @property
-    def amplitudes(self) -> list[tuple[int, Parameter]]:
-        """Return (index of the term, or -1 for the base; parameter) for all amplitudes."""
+    @cached_property
+    def amplitudes(self) -> tuple[tuple[int, Parameter], ...]:
+        """Pairs (index of the term, or -1 for the base; parameter) of all amplitudes."""
         own = [(-1, item) for item in self.base.form.amplitudes]
-        return own + [(index, item) for index, term in enumerate(self.terms) for item in term.form.amplitudes]
+        return *own, *((index, item) for index, term in enumerate(self.terms) for item in term.form.amplitudes)
+
+    @cached_property
+    def _coordinates(self) -> tuple[BoolArray, FloatArray]:
+        """Which searched parameters are searched by their logarithm, and the scale of each, shape (p,)."""
+        parameters = [parameter for _, parameter in self.searched]
+        logarithmic = np.array([item.logarithmic for item in parameters], dtype=bool)
+        return logarithmic, np.array([self.scales.of(item.scale) for item in parameters], dtype=np.float64)
 
     def encode(self, values: Sequence[float]) -> FloatArray:
         """Return searched parameters in the coordinates of the search, shape (p,)."""
-        pairs = zip(self.searched, values, strict=True)
-        return np.array([np.log(v) if p.logarithmic else v / self.scales.of(p.scale) for (_, p), v in pairs])
+        given = np.asarray(values, dtype=np.float64)
+        logarithmic, scale = self._coordinates
+        found = given / scale
+        found[logarithmic] = np.log(given[logarithmic])
+        return found
 
     def decode(self, theta: FloatArray) -> list[float]:
         """Return the parameter values (SI) for coordinates of the search, shape (p,)."""
-        pairs = zip(self.searched, theta, strict=True)
-        return [float(np.exp(t)) if p.logarithmic else float(t * self.scales.of(p.scale)) for (_, p), t in pairs]
+        logarithmic, scale = self._coordinates
+        found = theta * scale
+        found[logarithmic] = np.exp(theta[logarithmic])
+        return [float(value) for value in found]
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return lower and upper bounds in the coordinates of the search, shape (p,) each."""
         low, high = zip(*(p.bounds(self.scales) for _, p in self.searched), strict=True)
         return self.encode(low), self.encode(high)
+
+    @cached_property
+    def linear_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Bounds of the linear coefficients: laws of the drive are not negative, a known force has the factor 1."""
+        known = int(self.base.form.known)
+        free = self.base.columns - known
+        bounds = [parameter.bounds(self.scales) for _, parameter in self.amplitudes]
+        low = np.concatenate([np.zeros(free), np.ones(known), [item[0] for item in bounds]])
+        return low, np.concatenate([np.full(free, np.inf), np.ones(known), [item[1] for item in bounds]])
 
     def values(self, theta: FloatArray) -> list[dict[str, float]]:
         """Return parameter -> value, for the base first and then for each term; amplitudes are 1."""
