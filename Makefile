@@ -12,7 +12,7 @@ RUN_STAMP := $(VENV)/.installed
 TEST_STAMP := $(VENV)/.installed-test
 DOCS_STAMP := $(VENV)/.installed-docs
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
-# a run imports a small part of what is installed: its modules are compiled to bytecode when they are first imported
+# a small part of what is installed is imported: modules are compiled to bytecode when they are first imported
 KEEP_BYTECODE := PYTHONDONTWRITEBYTECODE=
 
 .DEFAULT_GOAL := help
@@ -29,7 +29,7 @@ $(RUN_STAMP): pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@
 
 $(TEST_STAMP): pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) -e '.[test]'
+	$(PIP) --no-compile -e '.[test]'
 	@touch $@ $(RUN_STAMP) $(DOCS_STAMP)
 
 $(DOCS_STAMP): pyproject.toml constraints.txt | $(BIN)/python
@@ -46,7 +46,8 @@ lint: $(TEST_STAMP)  ## style, types and import rules
 	$(BIN)/lint-imports
 
 suite: $(TEST_STAMP)
-	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist worksteal
+	$(KEEP_BYTECODE) $(BIN)/python -m tests.compiled
+	$(ONE_THREAD) $(KEEP_BYTECODE) $(BIN)/python -m pytest -n auto --dist worksteal
 
 # the type checker works in one process, so it runs while the tests do
 test: $(TEST_STAMP)  ## linters and the whole test suite

@@ -36,6 +36,7 @@ from mrpipe.thesis.gains import THESIS_GAINS
 from mrpipe.tracing.bench.identified import compared_with_identified
 from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.loop import band
 from mrpipe.tracing.options import TracingOptions, tracing_options
 from tests.tracing.bench.rig import campaign
 
@@ -92,6 +93,12 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {"identify-frame": folder / "frame.h5", "calibrate": folder / "control.h5"}
 
 
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coarse response curves: what is tested is what is done with them."""
+    monkeypatch.setattr(band, "OPTIONS", replace(band.OPTIONS, points=5, tolerance=0.05, frequency_tolerance=0.05))
+
+
 @pytest.fixture(scope="module")
 def tests() -> list[PreparedTest]:
     # a few of them do: what is tested is what becomes of a verdict
@@ -101,7 +108,8 @@ def tests() -> list[PreparedTest]:
 @pytest.fixture(scope="module")
 def traced(tests: list[PreparedTest]) -> Tracing:
     library = {name: damper_effects()[name] for name in ("accumulator",)}
-    options = TracingOptions(refits=1, bootstrap_draws=50, most_effects=1, observation_filter=False)
+    few = ("bouc-wen", "dahl")
+    options = TracingOptions(base_forms=few, refits=1, bootstrap_draws=50, most_effects=1, observation_filter=False)
     return trace_campaign(tests, library, [], options, rng=np.random.default_rng(1))
 
 

@@ -29,7 +29,7 @@ FORMS = ("bouc-wen", "dahl", "hyperbolic-tangent")
 def traced(effect: str) -> Tracing:
     options = TracingOptions(base_forms=FORMS, refits=2, bootstrap_draws=100, most_effects=1 + effect.count("+"))
     single = ("accumulator", "backlash", "channel-skew", "heating", "inertia", "remanence", "stribeck")
-    names = ("accumulator", "backlash", "remanence", "stribeck") if "+" in effect else single
+    names = ("accumulator", "backlash", "stribeck") if "+" in effect else single
     library = {name: damper_effects()[name] for name in names}
     return trace_campaign(campaign(effect), library, [], options, rng=np.random.default_rng(1))
 
@@ -64,8 +64,8 @@ def test_a_clean_rig_lacks_nothing() -> None:
 
 @pytest.mark.planted
 def test_both_of_a_pair_are_named() -> None:
-    summary = traced("accumulator+remanence").summary
-    assert {item["name"] for item in summary["effects"]} == {"accumulator", "remanence"}
+    summary = traced("accumulator+backlash").summary
+    assert {item["name"] for item in summary["effects"]} == {"accumulator", "backlash"}
     assert summary["further_terms"] == []
     assert summary["after"]["nrmse"] < 0.4 * summary["before"]["nrmse"]
 
