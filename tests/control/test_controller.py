@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mrpipe.artifacts import load_parameter_set
-from mrpipe.control import COMMAND_SIZE, ControllerOptions, Gains, build_controller, controller_step, inverse_table
+from mrpipe.control import ControllerOptions, Gains, build_controller, inverse_table
 from mrpipe.control.kalman import continuous_kalman_gains, kalman_gains
 from mrpipe.control.kernel import (
     COMMAND_AMPLITUDE,
@@ -27,19 +27,16 @@ from mrpipe.errors import UserError
 from mrpipe.networks.network import averaged, lagged
 from mrpipe.thesis.gains import THESIS_GAINS
 from tests.control.conftest import random_network
+from tests.control.stepped import commands_of
 
 SET_C = inverse_table(damper_from_parameter_set(load_parameter_set("dampers", "set-c")))
 
 
 def run(controller, displacement, acceleration, velocity=None):
-    state = controller.new_state()
-    commands = np.zeros((len(displacement), COMMAND_SIZE))
-    measured = np.zeros(controller.measured_size)
-    for index, command in enumerate(commands):
-        measured[0], measured[1] = displacement[index], acceleration[index]
-        measured[2] = 0.0 if velocity is None else velocity[index]
-        controller_step(*controller.arguments, state, measured, command)
-    return commands
+    measured = np.zeros((len(displacement), controller.measured_size))
+    measured[:, 0], measured[:, 1] = displacement, acceleration
+    measured[:, 2] = 0.0 if velocity is None else velocity
+    return commands_of(controller, measured)
 
 
 def motion(rate, seconds, noise=None, omega=8.0, amplitude=0.009):

@@ -15,14 +15,13 @@ from mrpipe.control.kernel import (
     COMMAND_DRIVE,
     COMMAND_FAULT,
     COMMAND_INVERSE,
-    COMMAND_SIZE,
     COMMAND_VELOCITY,
-    controller_step,
 )
 from mrpipe.control.laws import all_laws, law_names
 from mrpipe.control.lqg import Weights
 from mrpipe.exports.controller import controller_files
 from tests.control.conftest import random_network
+from tests.control.stepped import commands_of
 from tests.exports.test_controller import recorded_signal
 
 LIMIT = 0.3
@@ -83,15 +82,6 @@ def built(thesis_frame, floor_one, set_c):
     return build
 
 
-def run(controller: Controller, signal: np.ndarray) -> np.ndarray:
-    state = controller.new_state()
-    commands = np.zeros((len(signal), COMMAND_SIZE))
-    for row, command in zip(signal, commands, strict=True):
-        controller_step(*controller.arguments, state, np.ascontiguousarray(row), command)
-        assert np.all(np.isfinite(state))
-    return commands
-
-
 def with_faults(controller: Controller, seed: int, seconds: float = 6.0) -> np.ndarray:
     """Motion with single bad readings, short and long gaps in every channel, and a bad start."""
     rng = np.random.default_rng(seed)
@@ -111,13 +101,13 @@ def test_one_bad_reading_is_forgotten(law, built):
     """A single bad reading in any channel: the command is the same again soon after, and the flag says when."""
     controller = built(law)
     clean = recorded_signal(controller.measured_size, 200.0)[:900]
-    wanted = run(controller, clean)
+    wanted = commands_of(controller, clean)
     for channel in range(controller.measured_size):
         read = controller.numbers[controller.layout[16] + channel] > 0.0
         for value in (np.nan, np.inf, -1e308):
             signal = clean.copy()
             signal[400, channel] = value
-            found = run(controller, signal)
+            found = commands_of(controller, signal)
             assert list(np.flatnonzero(found[:, COMMAND_FAULT])) == ([400] if read else [])
             assert np.max(np.abs(found[600:, COMMAND_DRIVE] - wanted[600:, COMMAND_DRIVE])) < 0.02 * LIMIT
 
@@ -127,16 +117,16 @@ def test_one_bad_reading_is_forgotten(law, built):
 def test_a_long_gap_leads_to_the_safe_drive_and_back(law, built):
     controller = built(law, safe_drive=0.25)
     signal = recorded_signal(controller.measured_size, 200.0)[:1100]
-    clean = run(controller, signal)
+    clean = commands_of(controller, signal)
     signal[400:500, 0] = np.nan
-    found = run(controller, signal)
+    found = commands_of(controller, signal)
     flags = found[:, COMMAND_FAULT]
     # 20 ms are four samples at 200 Hz
     assert np.all(flags[400:404] == 1.0) and np.all(flags[404:500] == 2.0) and not flags[500:].any()
     assert np.all(found[404:500, COMMAND_DRIVE] == 0.25)
     assert np.max(np.abs(found[900:, COMMAND_VELOCITY] - clean[900:, COMMAND_VELOCITY])) < 2e-3
     # the memory starts anew: what comes after is what a fresh controller would do
-    np.testing.assert_array_equal(found[500:], run(controller, signal[500:]))
+    np.testing.assert_array_equal(found[500:], commands_of(controller, signal[500:]))
 
 
 @pytest.mark.property
@@ -144,7 +134,7 @@ def test_nothing_is_commanded_before_the_first_good_sample(built):
     controller = built("vd")
     signal = recorded_signal(controller.measured_size, 200.0)
     signal[:3, 1] = np.inf
-    flags = run(controller, signal)[:, COMMAND_FAULT]
+    flags = commands_of(controller, signal)[:, COMMAND_FAULT]
     assert list(flags[:5]) == [2.0, 2.0, 2.0, 0.0, 0.0]
 
 
@@ -152,8 +142,10 @@ def test_nothing_is_commanded_before_the_first_good_sample(built):
 def test_limits_are_those_given_or_of_the_sensors(built):
     signal = recorded_signal(5, 200.0)
     signal[500, 0] = 0.03
-    assert not run(built("vd"), signal)[:, COMMAND_FAULT].any()
-    assert list(np.flatnonzero(run(built("vd", largest_displacement_m=0.02), signal)[:, COMMAND_FAULT])) == [500]
+    assert not commands_of(built("vd"), signal)[:, COMMAND_FAULT].any()
+    assert list(np.flatnonzero(commands_of(built("vd", largest_displacement_m=0.02), signal)[:, COMMAND_FAULT])) == [
+        500
+    ]
     controller = built("vd")
     assert controller.numbers[controller.layout[16]] == pytest.approx(DYNAMIC_RANGE * 20e-6)
 
@@ -163,7 +155,7 @@ def test_limits_are_those_given_or_of_the_sensors(built):
 @pytest.mark.parametrize("kind", ["network", "table"])
 def test_the_drive_stays_within_its_limit(law, kind, built):
     controller = built(law, kind, low_pass_hz=None)
-    commands = run(controller, with_faults(controller, 1))
+    commands = commands_of(controller, with_faults(controller, 1))
     assert np.all((commands[:, COMMAND_DRIVE] >= 0.0) & (commands[:, COMMAND_DRIVE] <= LIMIT))
 
 
@@ -177,7 +169,7 @@ def test_c_survives_the_same_faults_bit_for_bit(law, kind, built, tmp_path):
         pytest.skip("no C compiler here")
     controller = built(law, kind, fault_hold_s=0.015)
     signal = with_faults(controller, 2)
-    python = run(controller, signal)
+    python = commands_of(controller, signal)
     for name, text in controller_files(controller, "rig", {}).items():
         (tmp_path / name).write_text(text)
     (tmp_path / "main.c").write_text(MAIN)

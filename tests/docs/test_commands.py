@@ -17,6 +17,7 @@ from mrpipe.cli.app import app
 from mrpipe.config.loader import load_config
 from mrpipe.control.laws import law_names
 from tests.campaigns.proposal.rigs import bench_folder, frame_folder
+from tests.coarse_curves import take_coarse_curves
 from tests.docs.shown import ROOT, Shown, pages, shown
 from tests.small_project import MAIN_JOB
 
@@ -127,10 +128,6 @@ RUNS = {
     "simulate --law LAW --resonance": "simulate --law vd --resonance",
     "simulate --law fdns --resonance --json": "simulate --law fdns --resonance --json",
     "design": "design --jobs 1",
-    "design --set design.weights={rms_drift_m: 1, max_base_shear_n: 0.5} --set design.stroke_limit_m=0.01": (
-        "design --jobs 1 --set 'design.weights={rms_drift_m: 1, max_base_shear_n: 0.5}' "
-        "--set design.stroke_limit_m=0.01"
-    ),
     "simulate --law fdns --gains design": "simulate --law fdns --gains design",
     "export controller --law fdns --gains design": "export controller --law fdns --gains design",
     "export controller --law fdns": "export controller --law fdns",
@@ -138,6 +135,10 @@ RUNS = {
     "export controller --law LAW": "export controller --law vd",
     "export damper --damper traced --format c --format matlab": (
         "export damper --damper traced --format c --format matlab"
+    ),
+    "design --set design.weights={rms_drift_m: 1, max_base_shear_n: 0.5} --set design.stroke_limit_m=0.01": (
+        "design --jobs 1 --set 'design.weights={rms_drift_m: 1, max_base_shear_n: 0.5}' "
+        "--set design.stroke_limit_m=0.01"
     ),
     "export WHAT": "export damper",
     "export frame": "export frame",
@@ -210,6 +211,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def here(project: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in the project; `--config NAME` takes the small configurations."""
     monkeypatch.chdir(project)
+    take_coarse_curves(monkeypatch)
     monkeypatch.setattr("mrpipe.config.loader.config_directory", lambda: project / "bundled")
     monkeypatch.setattr("mrpipe.artifacts.config_directory", lambda: project / "bundled")
     if not (project / RUN).is_dir():

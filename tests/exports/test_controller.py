@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrpipe.control import COMMAND_SIZE, ControllerOptions, Gains, build_controller, controller_step, inverse_table
+from mrpipe.control import ControllerOptions, Gains, build_controller, inverse_table
 from mrpipe.control.calibration import CalibrationOptions, plant_of
 from mrpipe.control.controller import Controller
 from mrpipe.control.kernel import (
@@ -25,6 +25,7 @@ from mrpipe.control.laws import law_named, law_names
 from mrpipe.control.lqg import Weights
 from mrpipe.exports.controller import controller_files
 from tests.control.conftest import random_network
+from tests.control.stepped import commands_of
 from tests.exports.building import self_test
 
 MAIN = """
@@ -57,14 +58,6 @@ def recorded_signal(width: int, rate_hz: float) -> np.ndarray:
     for place in (MEASURED_ACCELERATION, *range(MEASURED_FLOORS, width)):
         signal[:, place] += -64.0 * x
     return signal
-
-
-def in_python(controller: Controller, signal: np.ndarray) -> np.ndarray:
-    state = controller.new_state()
-    commands = np.zeros((len(signal), COMMAND_SIZE))
-    for row, command in zip(signal, commands, strict=True):
-        controller_step(*controller.arguments, state, np.ascontiguousarray(row), command)
-    return commands
 
 
 def in_c(controller: Controller, signal: np.ndarray, folder: Path) -> np.ndarray:
@@ -119,7 +112,7 @@ def controller_of(law: str, kind: str, frame, position, damper) -> Controller:
 def test_c_equals_python(law, kind, tmp_path, thesis_frame, floor_one, set_c):
     controller = controller_of(law, kind, thesis_frame, floor_one, set_c)
     signal = recorded_signal(controller.measured_size, controller.options.rate_hz)
-    python, c = in_python(controller, signal), in_c(controller, signal, tmp_path)
+    python, c = commands_of(controller, signal), in_c(controller, signal, tmp_path)
     self_test(tmp_path, "controller", "RIG")
     assert python.shape == c.shape
     assert np.ptp(python[:, COMMAND_DRIVE]) > 0.5 or law.startswith("passive")

@@ -30,6 +30,7 @@ from mrpipe.simulation.response_curve import response_curve
 from mrpipe.simulation.rig import Rig
 from mrpipe.simulation.steady_state import CurveOptions
 from mrpipe.structures import frame_from_parameter_set, natural_modes
+from tests.coarse_curves import take_coarse_curves
 
 LAWS = tuple(law_named(name) for name in ("vd", "vdns", "fdns"))
 UNCERTAIN = (
@@ -105,7 +106,10 @@ def test_better_gains_stay_better_at_half_the_step_with_other_noise(rig: Rig) ->
 
 
 @pytest.mark.property
-def test_a_design_says_what_it_would_lose_without_the_tracing(rig: Rig, plant: Plant) -> None:
+def test_a_design_says_what_it_would_lose_without_the_tracing(
+    rig: Rig, plant: Plant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take_coarse_curves(monkeypatch)
     # a residual force that nobody knew of: the traced damper is half as strong again as the identified one
     traced = replace(rig, damper=scaled_force(rig.damper, 1.5))
     settings = DesignSettings(laws=("fdns",), amplitude_factors=(1.0,), draws=0, grid=4, evaluations=4)

@@ -15,6 +15,7 @@ from mrpipe.cli import run
 from mrpipe.config.loader import load_config
 from mrpipe.stages.registry import stages_for
 from mrpipe.structures import frame_from_parameter_set, read_frame
+from tests.coarse_curves import take_coarse_curves
 
 SMALL = {
     "campaigns": {"bench": None, "frame": None, "closed_loop": None},
@@ -43,7 +44,10 @@ SMALL = {
 
 
 @pytest.mark.property
-def test_the_gains_of_a_design_are_simulated_and_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_gains_of_a_design_are_simulated_and_exported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take_coarse_curves(monkeypatch)
     path = tmp_path / "small.yaml"
     path.write_text(yaml.safe_dump(SMALL), encoding="utf-8")
     where = ["--config", str(path), "--run", str(tmp_path / "run")]
