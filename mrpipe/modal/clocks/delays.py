@@ -84,7 +84,7 @@ class _SensorFit:
         samples = test.responses.shape[0]
         self.time = np.arange(samples) / test.sampling_rate_hz
         centred = test.responses[:, column] - test.responses[:, column].mean()
-        self.spline = between_samples(centred, test.sampling_rate_hz)
+        self.record = between_samples(centred, test.sampling_rate_hz)
         self.lines = np.round(spectrum.omega * samples * spectrum.dt / (2.0 * np.pi)).astype(np.int64)
         self.weight = np.concatenate([line_weight, line_weight])[:, None]
         weighted = basis * self.weight
@@ -104,8 +104,8 @@ class _SensorFit:
     def linearised(self, delay: FloatArray, changes: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the residual at a delay, shape (2 lines,), and its derivative for each change of the delay."""
         moved = np.clip(self.time + delay, self.time[0], self.time[-1])
-        slope = self.spline(moved, 1)
-        histories = [self.spline(moved), *(slope * change for change in changes)]
+        value, slope = self.record.with_slope(moved)
+        histories = [value, *(slope * change for change in changes)]
         values = np.column_stack([np.fft.rfft(item)[self.lines] for item in histories])
         columns = stack(values) * self.weight
         columns = columns - self.q @ (self.q.T @ columns)

@@ -30,3 +30,16 @@ def test_samples_and_ends_stay():
         values = np.cumsum(rng.standard_normal(size))
         found = between_samples(values, 20.0)(np.arange(size) / 20.0)
         assert found == pytest.approx(values, abs=2e-3 * np.ptp(values) + 1e-12)
+
+
+@pytest.mark.oracle
+def test_values_and_slopes_are_those_of_the_spline_of_scipy():
+    rng = np.random.default_rng(2)
+    found = between_samples(np.cumsum(rng.standard_normal(300)), 20.0)
+    # samples, instants between them, the ends, and instants outside the record
+    time = np.concatenate(
+        [np.arange(300) / 20.0, rng.uniform(0.0, 299.0 / 20.0, 500), [0.0, 299.0 / 20.0, -0.02, 15.0]]
+    )
+    value, slope = found.with_slope(time)
+    np.testing.assert_allclose(value, found.spline(time), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(slope, found.spline(time, 1), rtol=1e-7, atol=1e-7)
