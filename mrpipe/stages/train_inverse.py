@@ -41,12 +41,11 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     )
     judged = judge(trained.network, training, validation)
     signed = _signed(context, plan) if settings.compare_signed and plan.spec.absolute else None
-    unit = training.drive_unit
     with context.write("inverse.h5") as artifact:
         write_network(artifact, "network", trained.network)
         artifact.put_json("held_out", list(trained.held_out))
         artifact.put("path", trained.path, unit="1", dims=("iteration",), description="training NRMSE")
-        artifact.put("drive_range", span, unit=unit)
+        artifact.put("drive_range", span, unit=training.drive_unit)
         if signed is not None:
             artifact.put_json("signed", _compared(signed))
     tracking = None
@@ -60,17 +59,23 @@ def _run(context: StageContext) -> Mapping[str, Any]:
             context.warn(finding)
     compared = signed["signed"] if signed else None
     section.describe(context.report, section.TrainedInverse(trained, judged, validation, span, compared, tracking))
-    varying = judged.varying_regimes
     return {
         **training_summary(trained, judged, plan),
+        **_drive_errors(judged, training.drive_unit, span),
+        **({"negative_drive_share_signed": signed["signed"].negative_share} if signed else {}),
+        **(tracking.summary() if tracking else {}),
+    }
+
+
+def _drive_errors(judged: Judgement, unit: str, span: float) -> dict[str, Any]:
+    """Return the errors of the drive over its range in the training tests."""
+    return {
         "drive_unit": unit,
         f"drive_range_{unit.lower()}": span,
-        "varying_drive_error_over_range": {name: item.rms / span for name, item in varying.items()},
+        "varying_drive_error_over_range": {name: item.rms / span for name, item in judged.varying_regimes.items()},
         "error_over_range": judged.pooled.rms / span,
         "linear_baseline_error_over_range": judged.linear.rms / span,
         "negative_drive_share": judged.negative_share,
-        **({"negative_drive_share_signed": signed["signed"].negative_share} if signed else {}),
-        **(tracking.summary() if tracking else {}),
     }
 
 

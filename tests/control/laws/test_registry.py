@@ -13,7 +13,8 @@ from mrpipe.control import laws
 from mrpipe.control.gains import Gains
 from mrpipe.control.laws import all_laws, law_names
 from mrpipe.errors import UserError
-from tests.exports.test_controller import in_c, in_python, recorded_signal
+from tests.control.stepped import commands_of
+from tests.exports.test_controller import in_c, recorded_signal
 from tests.simulation.test_stages import SMALL, run  # noqa: F401
 
 NEW_LAW = '''
@@ -130,6 +131,6 @@ def test_the_c_code_of_a_new_law_does_the_same(new_law, tmp_path, set_c):
     options = ControllerOptions(drive_limit=4.0)
     controller = build_controller(new_law, Gains(drag_n_s2_m2=10000.0), options, inverse=inverse_table(set_c))
     signal = recorded_signal(controller.measured_size, 200.0)
-    python, c = in_python(controller, signal), in_c(controller, signal, tmp_path)
+    python, c = commands_of(controller, signal), in_c(controller, signal, tmp_path)
     assert np.ptp(python[:, 0]) > 0.1
     np.testing.assert_allclose(c, python, rtol=1e-11, atol=1e-12)
