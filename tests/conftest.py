@@ -8,12 +8,19 @@ import hypothesis
 import pytest
 
 from mrpipe.artifacts import public_data_directory
+from mrpipe.reporting import style
 
 # The suite asks the same questions on every machine, however slow: a change is judged by what it changed. New examples
 # are looked for with `pytest --hypothesis-profile explore`.
 hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)
 hypothesis.settings.register_profile("explore", max_examples=1000, deadline=None)
 hypothesis.settings.load_profile("suite")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def simple_figures() -> None:
+    """Draw figures without keeping their texts apart, which takes half of the time: nobody looks at them here."""
+    style.LAYOUT = None
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
@@ -23,6 +23,9 @@ AFTER = "#0072b2"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
 """Colours of several curves, in order."""
 
+LAYOUT: Literal["constrained"] | None = "constrained"
+"""How the axes of a figure are placed. `constrained` keeps texts apart, and takes half of the time of a figure."""
+
 _SVG = {"svg.fonttype": "none", "svg.hashsalt": "mrpipe", "path.simplify_threshold": 0.5}
 
 
@@ -37,7 +40,7 @@ class ShownFigure(Figure):
 
 def figure_with_axes(rows: int = 1, columns: int = 1, *, width: float = 9.0, height: float = 3.4) -> tuple[Figure, Any]:
     """Return a figure and an object array (rows, columns) of axes; `height` is that of one row, in inches."""
-    figure = ShownFigure(figsize=(width, height * rows), layout="constrained")
+    figure = ShownFigure(figsize=(width, height * rows), layout=LAYOUT)
     axes = figure.subplots(rows, columns, squeeze=False)
     for axis in axes.ravel():
         polish(axis)
