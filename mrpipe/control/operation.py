@@ -1,4 +1,4 @@
-"""Operation of one of several dampers: its expected amplitude, its forces at this amplitude, its weights, warnings."""
+"""Operation of a damper at its expected amplitude: forces, and for one of several dampers weights and warnings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from mrpipe.control.calibration import balanced_weights
 from mrpipe.control.calibration_settings import RegulatorSettings
-from mrpipe.control.limits import placement_warning
+from mrpipe.control.limits import LimitingModes, placement_warning
 from mrpipe.control.lqg import Weights
 from mrpipe.control.placed import PlacedCalibration, placed_warnings
 from mrpipe.control.placed_storage import damper_as_json
@@ -33,6 +33,23 @@ class PlacedOperation:
     summary: Mapping[str, Any]
     weights: Weights
     warnings: tuple[str, ...]
+
+
+def forces_at(damper: DamperModel, amplitude_m: float, modes: LimitingModes) -> tuple[float, float]:
+    """Return the forces at the peak speed of an amplitude [N]: without drive (the residual force) and the largest one.
+
+    Parameters
+    ----------
+    damper
+        Model of the damper.
+    amplitude_m
+        Amplitude of the damper [m].
+    modes
+        Of the target; the damper moves at the frequency of the free mode.
+    """
+    speed = amplitude_m * modes.omega_0
+    residual, largest = (float(damper.quasi_static_force(speed, drive)) for drive in (0.0, damper.drive_limit))
+    return residual, largest
 
 
 def operation_of(
@@ -65,7 +82,7 @@ def operation_of(
         Settings of clipped LQG.
     """
     name, speed = item.damper.name, amplitude_m * item.modes.omega_0
-    residual, largest = (float(model.quasi_static_force(speed, drive)) for drive in (0.0, model.drive_limit))
+    residual, largest = forces_at(model, amplitude_m, item.modes)
     warnings = []
     if item.damper.mode != wanted_mode:
         warnings.append(

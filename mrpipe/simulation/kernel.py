@@ -99,6 +99,153 @@ def _damper_force(
     return wire[FORCE]
 
 
+@njit(inline="always")
+def _plain_chain(track: int, parameters: FloatArray, dt: float) -> tuple[float, ...]:
+    """Return the numbers of the plain chain: share of the lag, both polynomials, and the shape of the hysteresis."""
+    if track != TRACK_BOUC_WEN:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.5, 2.0
+    return (
+        parameters[P_ETA] * dt,
+        parameters[P_YIELD], parameters[P_YIELD + 1], parameters[P_YIELD + 2], parameters[P_YIELD + 3],
+        parameters[P_VISCOSITY], parameters[P_VISCOSITY + 1], parameters[P_VISCOSITY + 2], parameters[P_VISCOSITY + 3],
+        parameters[P_YIELD_DISPLACEMENT], parameters[P_GAMMA_SHARE], parameters[P_EXPONENT],
+    )  # fmt: skip
+
+
+@njit(inline="always")
+def _start_motion(z: FloatArray, w: FloatArray, M: FloatArray) -> tuple[float, float, float]:
+    """Return displacement and velocity of the damper and the sum 1'M x at the start."""
+    n = w.shape[0]
+    x, v, pushed = 0.0, 0.0, 0.0
+    for floor in range(n):
+        x += w[floor] * z[floor]
+        v += w[floor] * z[n + floor]
+        for column in range(n):
+            pushed += M[floor, column] * z[column]
+    return x, v, pushed
+
+
+@njit(inline="always")
+def _first_force(track: int, run: FloatArray, chain: Any, motion: tuple[float, ...], wanted: float) -> float:
+    """Return the force before the first step, and bring the state of the damper to it.
+
+    `chain` holds the arguments of :func:`_force_at_end` from `functions` to `wire`; `motion` holds displacement,
+    velocity, acceleration, drive and step.
+    """
+    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire = chain
+    x, v, a, drive, dt = motion
+    if track == TRACK_LAW:
+        return ideal_force(run, x, v)
+    if track == TRACK_SAMPLED:
+        return wanted
+    wire[FIRST] = 1.0
+    force = _damper_force(
+        functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, v, a, drive, dt
+    )
+    wire[FIRST] = 0.0
+    for index in range(damper.shape[0]):
+        damper[index] = trial[index]
+    return force
+
+
+@njit(inline="always")
+def _force_at_end(
+    track: int, run: FloatArray, functions: Any, parameters: FloatArray, parameter_offsets: IntArray,
+    state_offsets: IntArray, damper: FloatArray, trial: FloatArray, wire: FloatArray, hysteresis: tuple[float, ...],
+    motion: tuple[float, ...], wanted: float, guess: float, slope: float,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Return the force at the end of the step with the motion there: a secant, and bisection where a law jumps.
+
+    Parameters
+    ----------
+    track, run
+        How the desired force becomes a force, and numbers of the run.
+    functions, parameters, parameter_offsets, state_offsets
+        The chain. It is not given as a tuple, because counting the references to its arrays takes time.
+    damper, trial, wire
+        State of the chain at the start of the step and at its end, and its signals.
+    hysteresis
+        Of the plain chain: yield force, viscosity, hysteretic variable, displacement and velocity of the rod at the
+        start of the step, yield displacement, share of gamma, exponent.
+    motion
+        Displacement, velocity and acceleration without the force, what one newton adds to each, time, drive, step.
+    wanted
+        Desired force [N].
+    guess, slope
+        First guess of the force, and change of the answer of the damper with the force in the step before.
+
+    Returns
+    -------
+    tuple
+        Force, slope, and of the plain chain the hysteretic variable, displacement and velocity of the rod.
+    """
+    yielding, viscous, hysteretic, rod, rod_speed, yield_displacement, gamma_share, exponent = hysteresis
+    x_free, v_free, a_free, end_x, end_v, end_a, time, drive, dt = motion
+    real = track in (TRACK_DAMPER, TRACK_BOUC_WEN)
+    zeta, x_end, v_end = 0.0, 0.0, 0.0
+    found = guess
+    last_guess, last_found = 0.0, 0.0
+    converged = False
+    low, high = -math.inf, math.inf
+    for iteration in range(60):
+        x_end, v_end = x_free + end_x * guess, v_free + end_v * guess
+        if track == TRACK_BOUC_WEN:
+            zeta = follow_hysteresis(
+                hysteretic, rod, rod_speed, x_end, v_end, dt, yield_displacement, gamma_share, exponent
+            )
+            found = yielding * zeta + viscous * v_end
+        elif track == TRACK_DAMPER:
+            found = _damper_force(
+                functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, time, x_end, v_end,
+                a_free + end_a * guess, drive, dt,
+            )  # fmt: skip
+        elif track == TRACK_LAW:
+            found = ideal_force(run, x_end, v_end)
+        else:
+            found = wanted
+        difference = found - guess
+        if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
+            converged = True
+            break
+        if real and abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
+            # so close that a correction with the slope of the step before leaves a negligible error
+            found = guess + difference / (1.0 - slope)
+            converged = True
+            break
+        # the force of the damper grows with the motion, and the motion falls with the force: the root is bracketed
+        if difference > 0.0:
+            low = max(low, guess)
+            high = min(high, found)
+        else:
+            high = min(high, guess)
+            low = max(low, found)
+        if iteration < PLAIN_ITERATIONS:
+            # the slope hardly changes from step to step: a secant with the stored slope
+            if iteration > 0 and guess != last_guess:
+                slope = min(max((found - last_found) / (guess - last_guess), -0.9), 0.9)
+            last_guess, last_found = guess, found
+            guess += difference / (1.0 - slope)
+        elif low < high:
+            guess = 0.5 * (low + high)
+        else:
+            break
+    if not converged:
+        # a jump: any force within the bracket satisfies the law, and with the one found the damper sticks
+        found = guess
+    return found, slope, zeta, x_end, v_end
+
+
+@njit(inline="always")
+def _note_row(
+    row: FloatArray, n: int, force: float, drive: float, desired: float, ground: float, work_in: float,
+    work_damper: float, work_frame: float,
+) -> None:  # fmt: skip
+    """Write force, commands, ground acceleration and work into a row of the record."""
+    tail = row[3 * n :]
+    tail[T_FORCE], tail[T_DRIVE], tail[T_DESIRED], tail[T_GROUND] = force, drive, desired, ground
+    tail[T_WORK_IN], tail[T_WORK_DAMPER], tail[T_WORK_FRAME] = work_in, work_damper, work_frame
+
+
 @njit(
     void(
         int64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1],
@@ -155,32 +302,18 @@ def run_loop(
     end_x, end_v, end_a = at_end[size], at_end[size + 1], at_end[size + 2]
     wire = np.zeros(WIRE_SIZE)
     measured = np.zeros(MEASURED_FLOORS + n)
-    trial = np.zeros(damper.shape[0])
-    before = np.zeros(size + 3)
-    after = np.zeros(size + 4)
+    trial, before, after = np.zeros(damper.shape[0]), np.zeros(size + 3), np.zeros(size + 4)
     velocities = after[n:size]
     drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
     # the plain chain in separate variables: reading arrays through function pointers takes longer than the arithmetic
-    u, yielding, viscous, zeta, hysteretic = 0.0, 0.0, 0.0, 0.0, 0.0
-    rod, rod_end, rod_speed, speed_end = 0.0, 0.0, 0.0, 0.0
-    eta_dt, yield_displacement, gamma_share, exponent = 0.0, 1.0, 0.5, 2.0
-    y0, y1, y2, y3, v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if track == TRACK_BOUC_WEN:
-        eta_dt = parameters[P_ETA] * dt
-        y0, y1, y2, y3 = parameters[P_YIELD], parameters[P_YIELD + 1], parameters[P_YIELD + 2], parameters[P_YIELD + 3]
-        v0, v1 = parameters[P_VISCOSITY], parameters[P_VISCOSITY + 1]
-        v2, v3 = parameters[P_VISCOSITY + 2], parameters[P_VISCOSITY + 3]
-        yield_displacement, gamma_share = parameters[P_YIELD_DISPLACEMENT], parameters[P_GAMMA_SHARE]
-        exponent = parameters[P_EXPONENT]
+    eta_dt, y0, y1, y2, y3, v0, v1, v2, v3, yield_displacement, gamma_share, exponent = _plain_chain(
+        track, parameters, dt
+    )
+    u, yielding, viscous, hysteretic, rod, rod_speed = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     work_in, work_damper, work_frame = 0.0, 0.0, 0.0
     loss = quadratic(C, z[n:])
-    x, v, pushed = 0.0, 0.0, 0.0
-    for floor in range(n):
-        before[floor], before[n + floor] = z[floor], z[n + floor]
-        x += w[floor] * z[floor]
-        v += w[floor] * z[n + floor]
-        for column in range(n):
-            pushed += M[floor, column] * z[column]
+    x, v, pushed = _start_motion(z, w, M)
+    before[:size] = z
     state = before[:size]
     sample, active, written = -1, -1, 0
     to_sample, to_output, to_record = 0, 0, 0
@@ -205,21 +338,10 @@ def run_loop(
         if step == 0:
             # all lags start in equilibrium with the first command
             drive = asked
-            wire[FIRST] = 1.0
-            if real:
-                force = _damper_force(
-                    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, v,
-                    measured[MEASURED_ACCELERATION] - noise[0, MEASURED_ACCELERATION], drive, dt,
-                )  # fmt: skip
-                for index in range(damper.shape[0]):
-                    damper[index] = trial[index]
-                rod, rod_speed, hysteretic = x, v, 0.0
-            elif track == TRACK_LAW:
-                force = ideal_force(run, x, v)
-            else:
-                force = wanted
-            force_before = force
-            wire[FIRST] = 0.0
+            acceleration = measured[MEASURED_ACCELERATION] - noise[0, MEASURED_ACCELERATION]
+            chain = (functions, parameters, parameter_offsets, state_offsets, damper, trial, wire)
+            force = _first_force(track, run, chain, (x, v, acceleration, drive, dt), wanted)
+            rod, rod_speed, force_before = x, v, force
         if jumped and step > 0:
             # the controller holds its output: it changes now, and not along the step
             if track == TRACK_SAMPLED:
@@ -232,13 +354,8 @@ def run_loop(
             row = record[written]
             written += 1
             note(lower, gain, M, K, state, force, row)
-            row[3 * n + T_FORCE] = force
-            row[3 * n + T_DRIVE] = drive
-            row[3 * n + T_DESIRED] = wanted if track != TRACK_LAW else force
-            row[3 * n + T_GROUND] = ground[step]
-            row[3 * n + T_WORK_IN] = work_in
-            row[3 * n + T_WORK_DAMPER] = work_damper
-            row[3 * n + T_WORK_FRAME] = work_frame
+            desired = force if track == TRACK_LAW else wanted
+            _note_row(row, n, force, drive, desired, ground[step], work_in, work_damper, work_frame)
         to_record -= 1
         if step == counts[I_STEPS]:
             break
@@ -256,56 +373,12 @@ def run_loop(
             yielding = y0 + u * (y1 + u * (y2 + u * y3))
             viscous = v0 + u * (v1 + u * (v2 + u * v3))
             damper[D_CURRENT], damper[D_COMMAND] = u, drive
-        found = guess
-        last_guess, last_found = 0.0, 0.0
-        converged = False
-        low, high = -math.inf, math.inf
-        for iteration in range(60):
-            x_end, v_end = x_free + end_x * guess, v_free + end_v * guess
-            if track == TRACK_BOUC_WEN:
-                zeta = follow_hysteresis(
-                    hysteretic, rod, rod_speed, x_end, v_end, dt, yield_displacement, gamma_share, exponent
-                )
-                found = yielding * zeta + viscous * v_end
-                rod_end, speed_end = x_end, v_end
-            elif track == TRACK_DAMPER:
-                found = _damper_force(
-                    functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, time, x_end, v_end,
-                    a_free + end_a * guess, drive, dt,
-                )  # fmt: skip
-            elif track == TRACK_LAW:
-                found = ideal_force(run, x_end, v_end)
-            else:
-                found = wanted
-            difference = found - guess
-            if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
-                converged = True
-                break
-            if real and abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
-                # so close that a correction with the slope of the step before leaves a negligible error
-                found = guess + difference / (1.0 - slope)
-                converged = True
-                break
-            # the force of the damper grows with the motion, and the motion falls with the force: the root is bracketed
-            if difference > 0.0:
-                low = max(low, guess)
-                high = min(high, found)
-            else:
-                high = min(high, guess)
-                low = max(low, found)
-            if iteration < PLAIN_ITERATIONS:
-                # the slope hardly changes from step to step: a secant with the stored slope
-                if iteration > 0 and guess != last_guess:
-                    slope = min(max((found - last_found) / (guess - last_guess), -0.9), 0.9)
-                last_guess, last_found = guess, found
-                guess += difference / (1.0 - slope)
-            elif low < high:
-                guess = 0.5 * (low + high)
-            else:
-                break
-        if not converged:
-            # a jump: any force within the bracket satisfies the law, and with the one found the damper sticks
-            found = guess
+        hysteresis = (yielding, viscous, hysteretic, rod, rod_speed, yield_displacement, gamma_share, exponent)
+        motion = (x_free, v_free, a_free, end_x, end_v, end_a, time, drive, dt)
+        found, slope, zeta, rod_end, speed_end = _force_at_end(
+            track, run, functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, hysteresis,
+            motion, wanted, guess, slope,
+        )  # fmt: skip
         for row_index in range(size + 4):
             after[row_index] += at_end[row_index] * found
         # --- energy

@@ -29,13 +29,14 @@ from mrpipe.control.laws import is_linear
 from mrpipe.dampers.drive import command_place
 from mrpipe.dampers.plant import Chain, build_chain, new_state
 from mrpipe.errors import DivergedError, UserError
-from mrpipe.simulation import several_kernel as kernel
+from mrpipe.simulation import several_parts as parts
 from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import clock_of
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.inputs import Inputs, inputs_of
 from mrpipe.simulation.loop import LoopOptions, Response, base_shear
 from mrpipe.simulation.sensors import add_fault, sensor_noise
+from mrpipe.simulation.several_kernel import compiled
 from mrpipe.structures import Frame, discretise_first_order, state_space
 
 
@@ -143,24 +144,24 @@ def simulate_dampers(
     dt, samples = clock.dt, clock.samples
     inputs = inputs_of(frame, excitation)
     positions = np.ascontiguousarray([item.position for item in dampers], dtype=np.float64)
-    counts = np.zeros(kernel.I_SIZE, dtype=np.int64)
-    counts[kernel.I_STEPS], counts[kernel.I_PER_SAMPLE], counts[kernel.I_RECORD] = (
+    counts = np.zeros(parts.I_SIZE, dtype=np.int64)
+    counts[parts.I_STEPS], counts[parts.I_PER_SAMPLE], counts[parts.I_RECORD] = (
         clock.steps,
         clock.per_sample,
         clock.every,
     )
-    counts[kernel.I_DELAY] = round(options.delay_s / dt)
-    counts[kernel.I_TRACK] = {"damper": kernel.TRACK_DAMPER, "ideal": kernel.TRACK_SAMPLED}.get(
-        options.tracking, kernel.TRACK_LAW
+    counts[parts.I_DELAY] = round(options.delay_s / dt)
+    counts[parts.I_TRACK] = {"damper": parts.TRACK_DAMPER, "ideal": parts.TRACK_SAMPLED}.get(
+        options.tracking, parts.TRACK_LAW
     )
     chains = [item.chain or build_chain([]) for item in dampers]
     for chain in chains:
         chain.check_interval(dt)
     commands = np.zeros((k, samples, COMMAND_SIZE))
-    record = np.zeros((clock.records, 3 * n + k * kernel.T_DEVICE + kernel.T_INPUTS + inputs.count))
+    record = np.zeros((clock.records, 3 * n + k * parts.T_DEVICE + parts.T_INPUTS + inputs.count))
     z = np.zeros(2 * n) if initial_state is None else np.array(initial_state, dtype=np.float64)
     began = time.perf_counter()
-    kernel.compiled(k)(
+    compiled(k)(
         counts, dt, _plant(frame, inputs, positions, dt), positions, _devices(dampers, chains, options, dt),
         clock.inputs(excitation), z,
         *_packed_chains(chains), *_packed_controllers(dampers), *_packed_regulator(frame, dampers, regulator),
@@ -216,13 +217,13 @@ def _plant(frame: Frame, inputs: Inputs, positions: FloatArray, dt: float) -> tu
 
 def _devices(dampers: Sequence[LoopDamper], chains: Sequence[Chain], options: LoopOptions, dt: float) -> FloatArray:
     lag = options.driver_time_constant_s
-    rows = np.zeros((len(dampers), kernel.D_SIZE))
+    rows = np.zeros((len(dampers), parts.D_SIZE))
     for row, item, chain in zip(rows, dampers, chains, strict=True):
-        row[kernel.D_C], row[kernel.D_K] = item.controller.gains.c_n_s_m, item.controller.gains.k_n_m
-        row[kernel.D_CLIPPED] = 0.0 if options.tracking == "unclipped" else 1.0
-        row[kernel.D_FLEXIBILITY] = 1.0 / item.brace_n_m
-        row[kernel.D_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
-        row[kernel.D_COMMAND] = command_place(chain)
+        row[parts.D_C], row[parts.D_K] = item.controller.gains.c_n_s_m, item.controller.gains.k_n_m
+        row[parts.D_CLIPPED] = 0.0 if options.tracking == "unclipped" else 1.0
+        row[parts.D_FLEXIBILITY] = 1.0 / item.brace_n_m
+        row[parts.D_LAG] = 1.0 if lag <= 0.0 else -math.expm1(-dt / lag)
+        row[parts.D_COMMAND] = command_place(chain)
     return rows
 
 
@@ -254,9 +255,9 @@ def _padded(chains: Sequence[Chain]) -> list[Chain]:
 def _packed_controllers(dampers: Sequence[LoopDamper]) -> tuple[Any, ...]:
     controllers = [item.controller for item in dampers]
     memories = [item.new_state() for item in controllers]
-    parts = ([item.numbers for item in controllers], [item.layout for item in controllers], memories)
-    places = np.column_stack([_starts([len(array) for array in arrays]) for arrays in parts])
-    numbers, layouts, states = (np.concatenate(arrays) for arrays in parts)
+    packed = ([item.numbers for item in controllers], [item.layout for item in controllers], memories)
+    places = np.column_stack([_starts([len(array) for array in arrays]) for arrays in packed])
+    numbers, layouts, states = (np.concatenate(arrays) for arrays in packed)
     return tuple(item.force for item in controllers), numbers, layouts, np.ascontiguousarray(places), states
 
 
@@ -303,31 +304,31 @@ def _response(
     seconds: float,
 ) -> DampersResponse:
     n, k = frame.floors, len(dampers)
-    tail = record[:, 3 * n + k * kernel.T_DEVICE :]
-    histories = tail[:, kernel.T_INPUTS :]
+    tail = record[:, 3 * n + k * parts.T_DEVICE :]
+    histories = tail[:, parts.T_INPUTS :]
     absolute = record[:, 2 * n : 3 * n]
     shear = base_shear(frame, absolute) - np.einsum("ti,i->t", histories, inputs.pushed(frame))
     moved = np.einsum("ti,fi->tf", histories, inputs.influence)
     found: dict[str, Response] = {}
     for place, item in enumerate(dampers):
-        own = record[:, 3 * n + place * kernel.T_DEVICE :]
+        own = record[:, 3 * n + place * parts.T_DEVICE :]
         found[item.name] = Response(
             time_s=dt * np.arange(len(record), dtype=np.float64),
             displacement=record[:, :n],
             velocity=record[:, n : 2 * n],
             acceleration=absolute - moved,
             absolute_acceleration=absolute,
-            damper_displacement=own[:, kernel.T_X],
-            damper_velocity=own[:, kernel.T_V],
-            force=own[:, kernel.T_FORCE],
-            drive=own[:, kernel.T_DRIVE],
-            desired_force=own[:, kernel.T_DESIRED],
+            damper_displacement=own[:, parts.T_X],
+            damper_velocity=own[:, parts.T_V],
+            force=own[:, parts.T_FORCE],
+            drive=own[:, parts.T_DRIVE],
+            desired_force=own[:, parts.T_DESIRED],
             ground_acceleration=histories[:, 0],
             base_shear=shear,
-            work_in=tail[:, kernel.T_WORK_IN],
-            work_damper=own[:, kernel.T_WORK],
-            work_frame=tail[:, kernel.T_WORK_FRAME],
-            energy=tail[:, kernel.T_ENERGY],
+            work_in=tail[:, parts.T_WORK_IN],
+            work_damper=own[:, parts.T_WORK],
+            work_frame=tail[:, parts.T_WORK_FRAME],
+            energy=tail[:, parts.T_ENERGY],
             commands=commands[place],
             command_time_s=command_dt * np.arange(commands.shape[1], dtype=np.float64),
             seconds=seconds,

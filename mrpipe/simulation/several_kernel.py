@@ -8,7 +8,6 @@ resolve.
 
 from __future__ import annotations
 
-import math
 from functools import cache
 from typing import Any
 
@@ -20,12 +19,7 @@ from mrpipe.control.kernel import (
     COMMAND_DRIVE,
     COMMAND_FORCE,
     LAW_FUNCTION,
-    MEASURED_ACCELERATION,
-    MEASURED_DISPLACEMENT,
     MEASURED_FLOORS,
-    MEASURED_FORCE,
-    MEASURED_GROUND,
-    MEASURED_VELOCITY,
     S_REQUEST,
     controller_step,
 )
@@ -42,346 +36,327 @@ from mrpipe.dampers.plant import (
     advance,
 )
 from mrpipe.simulation.parts import multiply, quadratic
+from mrpipe.simulation.several_parts import (
+    CURRENT,
+    D_COMMAND,
+    D_FLEXIBILITY,
+    D_LAG,
+    I_DELAY,
+    I_PER_SAMPLE,
+    I_RECORD,
+    I_STEPS,
+    I_TRACK,
+    SETTLED,
+    SETTLED_LAW,
+    SLOPE,
+    STATE_SIZE,
+    SWEEPS,
+    T_DESIRED,
+    T_DEVICE,
+    T_DRIVE,
+    T_ENERGY,
+    T_FORCE,
+    T_INPUTS,
+    T_V,
+    T_WORK,
+    T_WORK_FRAME,
+    T_WORK_IN,
+    T_X,
+    TRACK_DAMPER,
+    TRACK_LAW,
+    TRACK_SAMPLED,
+    Central,
+    Controllers,
+    Devices,
+    F,
+    Motion,
+    Structure,
+    V,
+    X,
+    accelerations_of,
+    chain_force,
+    compiled_inside,
+    law_force,
+    read_sensors,
+    regulate,
+)
 
-TRACK_DAMPER, TRACK_LAW, TRACK_SAMPLED = 0, 1, 2
-SWEEPS, ITERATIONS = 40, 60
-TOLERANCE_N, CORRECTED_N = 1e-5, 2e-3
-SETTLED, SETTLED_LAW = 1e-6, 1e-10
-"""Relative change of the forces between iterations at which a step ends, with dampers and with linear laws."""
 
-# --- integers of the run ---
-I_STEPS, I_PER_SAMPLE, I_DELAY, I_TRACK, I_RECORD, I_SIZE = 0, 1, 2, 3, 4, 5
-# --- columns of `devices`, one row per damper ---
-D_C, D_K, D_CLIPPED, D_FLEXIBILITY, D_LAG, D_COMMAND, D_CENTRAL, D_SIZE = 0, 1, 2, 3, 4, 5, 6, 8
-# --- columns of the record after [z, absolute accelerations]: these of each damper, then those of the run ---
-T_X, T_V, T_FORCE, T_DRIVE, T_DESIRED, T_WORK, T_DEVICE = 0, 1, 2, 3, 4, 5, 6
-T_WORK_IN, T_WORK_FRAME, T_ENERGY, T_INPUTS = 0, 1, 2, 3
-"""After the energy follow the inputs; the first of them is the ground acceleration."""
-# --- what is known of each damper from step to step ---
-X, V, F, SLOPE, CURRENT, STATE_SIZE = 0, 1, 2, 3, 4, 5
+@compiled_inside
+def _motion_at_start(structure: Structure, state: FloatArray) -> Motion:
+    """Return the motion of the dampers at the start, without forces, and what their forces add to it in a step."""
+    k, n = structure.positions.shape
+    known, added, accelerations = np.zeros((k, STATE_SIZE)), np.zeros((3, k, k)), np.zeros(n)
+    for e in range(k):
+        at_end = structure.at_end[e]
+        multiply(structure.lower, at_end, accelerations)
+        for d in range(k):
+            for floor in range(n):
+                position = structure.positions[d, floor]
+                added[0, d, e] += position * at_end[floor]
+                added[1, d, e] += position * at_end[n + floor]
+                added[2, d, e] += position * (accelerations[floor] + structure.gains[e, floor])
+    for d in range(k):
+        for floor in range(n):
+            known[d, X] += structure.positions[d, floor] * state[floor]
+            known[d, V] += structure.positions[d, floor] * state[n + floor]
+    return Motion(
+        known, np.zeros(k), np.zeros(k), np.zeros((k, 3)), np.zeros(k), np.zeros(k), added, np.zeros((k, 3)),
+        np.zeros((k, 8)),
+    )  # fmt: skip
 
 
-@njit(cache=True)
-def _law_force(device: FloatArray, x_free: float, v_free: float, end_x: float, end_v: float) -> float:
-    """Return c v + k x at the end of the step, clipped where it would be active; the motion is linear in the force."""
-    c, k = device[D_C], device[D_K]
-    force = (c * v_free + k * x_free) / (1.0 - c * end_v - k * end_x)
-    return force if device[D_CLIPPED] == 0.0 or force * (v_free + end_v * force) >= 0.0 else 0.0
+@compiled_inside
+def _control(
+    positions: FloatArray, motion: Motion, controllers: Controllers, central: Central, noise: FloatArray, sample: int,
+    accelerations: FloatArray, moved: FloatArray, ground: float,
+) -> None:  # fmt: skip
+    """Read the sensors and compute the commands of one sample."""
+    places, members = controllers.places, central.members
+    for d in range(places.shape[0] - 1):
+        read_sensors(
+            accelerations, moved, positions[d], motion.known[d], ground, motion.rod[d], noise[d, sample],
+            controllers.measured[d],
+        )  # fmt: skip
+    if members.shape[0] > 0:
+        for index in range(members.shape[0]):
+            central.forces[index] = controllers.commands[members[index], max(sample - 1, 0), COMMAND_FORCE]
+        regulate(central.regulator, central.estimate, controllers.measured, central.forces, central.wanted)
+        for index in range(members.shape[0]):
+            controllers.memories[places[members[index], 2] + S_REQUEST] = central.wanted[index]
+    for d in range(places.shape[0] - 1):
+        controller_step(
+            controllers.laws[d], controllers.numbers[places[d, 0] : places[d + 1, 0]],
+            controllers.layouts[places[d, 1] : places[d + 1, 1]],
+            controllers.memories[places[d, 2] : places[d + 1, 2]], controllers.measured[d],
+            controllers.commands[d, sample],
+        )  # fmt: skip
 
 
-@njit(cache=True)
-def _chain_force(
-    functions: Any, parameters: FloatArray, parameter_offsets: IntArray, state_offsets: IntArray, before: FloatArray,
-    trial: FloatArray, wire: FloatArray, motion: FloatArray, device: FloatArray, dt: float,
-) -> float:  # fmt: skip
-    """Return the force of a damper at the end of a step, by a secant within a bracket; `trial` becomes its state.
-
-    `motion` holds displacement, velocity and acceleration without the force, what one newton adds to each, the first
-    guess of the force, and the slope of the damper's answer that the step before ended with.
-    """
-    guess, slope = motion[6], motion[7]
-    found, last_guess, last_found = guess, 0.0, 0.0
-    low, high = -math.inf, math.inf
-    for iteration in range(ITERATIONS):
-        for index in range(before.shape[0]):
-            trial[index] = before[index]
-        wire[DISPLACEMENT] = motion[0] + motion[3] * guess
-        wire[VELOCITY] = motion[1] + motion[4] * guess
-        wire[ACCELERATION] = motion[2] + motion[5] * guess
-        wire[DRIVE] = device[CURRENT]
-        advance(functions, parameters, parameter_offsets, state_offsets, trial, wire, dt)
-        found = wire[FORCE]
-        difference = found - guess
-        if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
-            break
-        if iteration > 0 and guess != last_guess:
-            slope = min((found - last_found) / (guess - last_guess), 0.9)
-        if abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
-            # so near that the slope leaves an error far below what matters
-            guess += difference / (1.0 - slope)
-            found = guess
-            break
-        last_guess, last_found = guess, found
-        # the answer falls with the force that slows the motion, so that the solution is bracketed
-        if difference > 0.0:
-            low = max(low, guess)
+@compiled_inside
+def _start_forces(devices: Devices, motion: Motion, controllers: Controllers, track: int, dt: float) -> None:
+    """Set the forces of the first step; all lags start in equilibrium with the first command."""
+    wire, starts, states = devices.wire, devices.parameter_starts, devices.state_starts
+    for d in range(motion.forces.shape[0]):
+        known = motion.known[d]
+        known[CURRENT] = controllers.asked[d]
+        if track == TRACK_DAMPER:
+            wire[FIRST], wire[TIME] = 1.0, 0.0
+            wire[DISPLACEMENT], wire[VELOCITY], wire[ACCELERATION] = known[X], known[V], 0.0
+            wire[DRIVE] = controllers.asked[d]
+            advance(
+                devices.chains[d], devices.parameters[starts[d] : starts[d + 1]], devices.parameter_offsets[d],
+                devices.state_offsets[d], devices.states[states[d] : states[d + 1]], wire, dt,
+            )  # fmt: skip
+            force = wire[FORCE]
+        elif track == TRACK_LAW:
+            force = law_force(devices.settings[d], known[X], known[V], 0.0, 0.0)
         else:
-            high = min(high, guess)
-        following = guess + difference / (1.0 - slope)
-        if low < high and not low < following < high:
-            inside = low > -math.inf and high < math.inf
-            following = 0.5 * (low + high) if inside else guess + difference
-        if following == guess:
+            force = controllers.wanted[d]
+        motion.forces[d], motion.previous[d], known[F] = force, force, force
+        motion.braces[d, 0] = motion.braces[d, 1] = devices.settings[d, D_FLEXIBILITY] * force
+    wire[FIRST] = 0.0
+
+
+@compiled_inside
+def _hold(devices: Devices, motion: Motion, controllers: Controllers, track: int) -> None:
+    """Let new commands act: a controller holds its output, so that it changes now and not along the step."""
+    for d in range(motion.forces.shape[0]):
+        settings = devices.settings[d]
+        if track == TRACK_SAMPLED:
+            motion.forces[d] = controllers.wanted[d]
+        elif track == TRACK_DAMPER and settings[D_LAG] == 1.0 and settings[D_COMMAND] >= 0.0:
+            devices.states[devices.state_starts[d] + int(settings[D_COMMAND])] = controllers.asked[d]
+
+
+@compiled_inside
+def _record(
+    structure: Structure, settings: FloatArray, motion: Motion, wanted: FloatArray, state: FloatArray,
+    accelerations: FloatArray, inputs: FloatArray, work_in: float, work_frame: float, row: FloatArray,
+) -> None:  # fmt: skip
+    """Write the state, the accelerations, the signals of each damper and the energies into a row of the record."""
+    k, n = structure.positions.shape
+    row[: 2 * n], row[2 * n : 3 * n] = state, accelerations
+    stored = 0.5 * (quadratic(structure.M, state[n:]) + quadratic(structure.K, state[:n]))
+    for d in range(k):
+        known, force = motion.known[d], motion.forces[d]
+        stored += 0.5 * settings[d, D_FLEXIBILITY] * force**2
+        own = row[3 * n + d * T_DEVICE : 3 * n + (d + 1) * T_DEVICE]
+        own[T_X], own[T_V], own[T_FORCE], own[T_DRIVE] = known[X], known[V], force, known[CURRENT]
+        own[T_DESIRED] = wanted[d]
+        own[T_WORK] = motion.works[d]
+    tail = row[3 * n + k * T_DEVICE :]
+    tail[T_WORK_IN], tail[T_WORK_FRAME], tail[T_ENERGY] = work_in, work_frame, stored
+    tail[T_INPUTS:] = inputs
+
+
+@compiled_inside
+def _move_freely(
+    positions: FloatArray, settings: FloatArray, motion: Motion, track: int, free: FloatArray,
+    accelerations: FloatArray, moved: FloatArray, dt: float,
+) -> None:  # fmt: skip
+    """Fill the motion of each damper at the end of the step without the forces there, and guess its force."""
+    k, n = positions.shape
+    for d in range(k):
+        flexibility, answer, part = settings[d, D_FLEXIBILITY], motion.answer[d], motion.free[d]
+        part[0], part[1], part[2] = 0.0, 0.0, 0.0
+        for floor in range(n):
+            part[0] += positions[d, floor] * free[floor]
+            part[1] += positions[d, floor] * free[n + floor]
+            part[2] += positions[d, floor] * (accelerations[floor] - moved[floor])
+        # deformation of the brace at the end of the step: its rate is (3 b - 4 b1 + b2)/(2 dt)
+        part[1] += (4.0 * motion.braces[d, 0] - motion.braces[d, 1]) / (2.0 * dt)
+        answer[3] = motion.added[0, d, d] - flexibility
+        answer[4] = motion.added[1, d, d] - 1.5 * flexibility / dt
+        answer[5] = motion.added[2, d, d]
+        answer[6] = 2.0 * motion.forces[d] - motion.previous[d] if track == TRACK_DAMPER else motion.forces[d]
+        answer[7] = motion.known[d, SLOPE]
+
+
+@compiled_inside
+def _find_forces(devices: Devices, motion: Motion, controllers: Controllers, track: int, dt: float) -> None:
+    """Find the forces at the end of the step, damper by damper, until no force changes; they are in `answer[:, 6]`."""
+    k = motion.forces.shape[0]
+    answer, starts, states = motion.answer, devices.parameter_starts, devices.state_starts
+    settled = SETTLED_LAW if track == TRACK_LAW else SETTLED
+    for _ in range(SWEEPS):
+        change = 0.0
+        for d in range(k):
+            for part in range(3):
+                answer[d, part] = motion.free[d, part]
+            for e in range(k):
+                if e != d:
+                    for part in range(3):
+                        answer[d, part] += motion.added[part, d, e] * answer[e, 6]
+            if track == TRACK_LAW:
+                found = law_force(devices.settings[d], answer[d, 0], answer[d, 1], answer[d, 3], answer[d, 4])
+            elif track == TRACK_SAMPLED:
+                found = controllers.wanted[d]
+            else:
+                found = chain_force(
+                    devices.chains[d], devices.parameters[starts[d] : starts[d + 1]], devices.parameter_offsets[d],
+                    devices.state_offsets[d], devices.states[states[d] : states[d + 1]],
+                    devices.trial[states[d] : states[d + 1]], devices.wire, answer[d], motion.known[d], dt,
+                )  # fmt: skip
+                motion.known[d, SLOPE] = answer[d, 7]
+            change = max(change, abs(found - answer[d, 6]) / (1.0 + abs(found)))
+            answer[d, 6] = found
+        if k == 1 or change < settled:
             break
-        guess = following
-    motion[7] = slope
-    return found if abs(found - guess) <= 1e-3 * (1.0 + abs(found)) else guess
 
 
-@njit(cache=True)
-def _sense(
-    accelerations: FloatArray, moved: FloatArray, w: FloatArray, device: FloatArray, ground: float, rod: float,
-    noise: FloatArray, measured: FloatArray,
-) -> None:  # fmt: skip
-    """Fill the readings of one damper's sensors; `moved` is the acceleration of each place by the ground alone.
-
-    In the noise, plus infinity marks a reading that repeats the last one, and minus infinity a reading of 0.
-    """
-    before = measured.copy()
-    relative = rod
-    for floor in range(w.shape[0]):
-        measured[MEASURED_FLOORS + floor] = accelerations[floor] + noise[MEASURED_FLOORS + floor]
-        relative += w[floor] * (accelerations[floor] - moved[floor])
-    measured[MEASURED_GROUND] = ground + noise[MEASURED_GROUND]
-    measured[MEASURED_DISPLACEMENT] = device[X] + noise[MEASURED_DISPLACEMENT]
-    measured[MEASURED_VELOCITY] = device[V] + noise[MEASURED_VELOCITY]
-    measured[MEASURED_FORCE] = device[F] + noise[MEASURED_FORCE]
-    measured[MEASURED_ACCELERATION] = relative + noise[MEASURED_ACCELERATION]
-    for channel in range(noise.shape[0]):
-        if noise[channel] == math.inf:
-            measured[channel] = before[channel]
-        elif noise[channel] == -math.inf:
-            measured[channel] = 0.0
+@compiled_inside
+def _finish_step(
+    positions: FloatArray, at_end: FloatArray, settings: FloatArray, motion: Motion, free: FloatArray, dt: float
+) -> None:
+    """Add the forces at the end of the step to the state `free`, and update braces, work and motion of the dampers."""
+    k, n = positions.shape
+    for d in range(k):
+        motion.previous[d], motion.forces[d] = motion.forces[d], motion.answer[d, 6]
+        for index in range(2 * n):
+            free[index] += at_end[d, index] * motion.forces[d]
+    for d in range(k):
+        known, braces = motion.known[d], motion.braces[d]
+        deformation = settings[d, D_FLEXIBILITY] * motion.forces[d]
+        rate = (3.0 * deformation - 4.0 * braces[0] + braces[1]) / (2.0 * dt)
+        motion.rod[d] = -(rate - braces[2]) / dt
+        braces[1], braces[0], braces[2] = braces[0], deformation, rate
+        x, v = -deformation, -rate
+        for floor in range(n):
+            x += positions[d, floor] * free[floor]
+            v += positions[d, floor] * free[n + floor]
+        motion.works[d] += 0.5 * (motion.previous[d] + motion.forces[d]) * (x - known[X])
+        known[X], known[V], known[F] = x, v, motion.forces[d]
 
 
-@njit(cache=True)
-def _add_inputs(
-    direct: FloatArray, influence: FloatArray, inputs: FloatArray, accelerations: FloatArray, moved: FloatArray
-) -> None:  # fmt: skip
-    """Add the accelerations of the inputs that act as forces, and put those of the ground at each place in `moved`."""
-    for floor in range(moved.shape[0]):
-        moved[floor] = 0.0
-        for i in range(inputs.shape[0]):
-            accelerations[floor] += direct[i, floor] * inputs[i]
-            moved[floor] += influence[i, floor] * inputs[i]
-
-
-@njit(cache=True)
-def _central(
-    regulator: Any, estimate: FloatArray, measured: FloatArray, forces: FloatArray, wanted: FloatArray
-) -> None:  # fmt: skip
-    """Advance the observer of the central regulator and put the forces for the coming sample into `wanted`.
-
-    `regulator` holds F, G, H, K and the sensors: the number of the damper (of all dampers) and the channel of each.
-    """
-    F, G, H, K, sensors = regulator
-    following = F @ estimate + G @ forces
-    for row in range(sensors.shape[0]):
-        reading = measured[int(sensors[row, 0]), int(sensors[row, 1])]
-        if math.isfinite(reading):
-            for index in range(following.shape[0]):
-                following[index] += H[index, row] * reading
-    estimate[:] = following
-    wanted[:] = -(K @ estimate)
+@compiled_inside
+def _momenta(pull: FloatArray, state: FloatArray, result: FloatArray) -> None:
+    """Fill the sums, one for each input, whose change times the input is the work that the input takes out."""
+    for i in range(result.shape[0]):
+        result[i] = 0.0
+        for floor in range(pull.shape[1]):
+            result[i] += pull[i, floor] * state[floor]
 
 
 def _run(
-    counts: IntArray, dt: float, plant: Any, positions: FloatArray, devices: FloatArray, inputs: FloatArray,
+    counts: IntArray, dt: float, plant: Any, positions: FloatArray, settings: FloatArray, inputs: FloatArray,
     z: FloatArray, chains: Any, parameters: FloatArray, offsets: Any, damper_states: FloatArray, laws: Any,
     numbers: FloatArray, layouts: IntArray, places: IntArray, memories: FloatArray, regulator: Any, members: IntArray,
     noise: FloatArray, commands: FloatArray, record: FloatArray,
 ) -> None:  # fmt: skip
-    """Run the loop; see :mod:`mrpipe.simulation.several` for the arrays.
+    """Run the loop; see :mod:`mrpipe.simulation.several` and :mod:`mrpipe.simulation.several_parts` for the arrays.
 
-    `plant` holds the transposed step matrix (2n + 2m + k, 2n), what one newton of each damper at the end of the step
-    adds to the state (k, 2n), the transposed lower half of A, accelerations of one newton (k, n), M, C, K, and three
-    rows for each of the m inputs, (3m, n): displacement of each place per metre of the ground, minus the force of one
-    unit, and acceleration by it that is not in the lower half of A.
+    `plant` holds the first seven arrays of :class:`Structure`, and the rows of `influence`, `pull` and `direct` one
+    after another, shape (3m, n). `z` is the initial state; it is overwritten by the final state.
     """
     step_matrix, at_end, lower, gains, M, C, K, columns = plant
     k, n = positions.shape
     m = inputs.shape[1]
     size = 2 * n
-    track, per_sample, every = counts[I_TRACK], counts[I_PER_SAMPLE], counts[I_RECORD]
+    track, per_sample = counts[I_TRACK], counts[I_PER_SAMPLE]
+    structure = Structure(
+        step_matrix, at_end, lower, gains, M, C, K, columns[:m], columns[m : 2 * m], columns[2 * m :], positions
+    )
     parameter_offsets, state_offsets, parameter_starts, state_starts = offsets
-    settled = SETTLED_LAW if track == TRACK_LAW else SETTLED
-    influence, pull, direct = columns[:m], columns[m : 2 * m], columns[2 * m :]
-    before, free = np.zeros(size + 2 * m + k), np.zeros(size)
-    moved, pushed, pushed_end = np.zeros(n), np.zeros(m), np.zeros(m)
-    known, accelerations = np.zeros((k, STATE_SIZE)), np.zeros(n)
-    braces = np.zeros((k, 3))  # deformation now and two steps back, with the rate in the last column
-    measured = np.zeros((k, MEASURED_FLOORS + n))
-    trial = np.zeros(damper_states.shape[0])
-    motion = np.zeros((k, 8))
-    free_motion = np.zeros((k, 3))
-    cross_x, cross_v, cross_a = np.zeros((k, k)), np.zeros((k, k)), np.zeros((k, k))
-    wire, wanted, asked = np.zeros(WIRE_SIZE), np.zeros(k), np.zeros(k)
-    central, central_forces = np.zeros(members.shape[0]), np.zeros(members.shape[0])
-    estimate = np.zeros(regulator[0].shape[0])
-    forces, previous, works = np.zeros(k), np.zeros(k), np.zeros(k)
-    rod = np.zeros(k)
-    for e in range(k):
-        multiply(lower, at_end[e], accelerations)
-        for d in range(k):
-            for floor in range(n):
-                cross_x[d, e] += positions[d, floor] * at_end[e, floor]
-                cross_v[d, e] += positions[d, floor] * at_end[e, n + floor]
-                cross_a[d, e] += positions[d, floor] * (accelerations[floor] + gains[e, floor])
+    devices = Devices(
+        settings, chains, parameters, parameter_offsets, state_offsets, parameter_starts, state_starts, damper_states,
+        np.zeros(damper_states.shape[0]), np.zeros(WIRE_SIZE),
+    )  # fmt: skip
+    controllers = Controllers(
+        laws, numbers, layouts, memories, places, np.zeros((k, MEASURED_FLOORS + n)), commands, np.zeros(k), np.zeros(k)
+    )
+    estimate, both = np.zeros(regulator[0].shape[0]), np.zeros((2, members.shape[0]))
+    central = Central(regulator, members, estimate, both[0], both[1])
+    before, free, no_forces = np.zeros(size + 2 * m + k), np.zeros(size), np.zeros(0)
+    accelerations, moved, pushed, pushed_end = np.zeros(n), np.zeros(n), np.zeros(m), np.zeros(m)
     before[:size] = z
     state = before[:size]
+    motion = _motion_at_start(structure, state)
     loss, work_in, work_frame = quadratic(C, state[n:]), 0.0, 0.0
-    for floor in range(n):
-        for i in range(m):
-            pushed[i] += pull[i, floor] * state[floor]
-        for d in range(k):
-            known[d, X] += positions[d, floor] * state[floor]
-            known[d, V] += positions[d, floor] * state[n + floor]
+    _momenta(structure.pull, state, pushed)
     sample, active, written = -1, -1, 0
     for step in range(counts[I_STEPS] + 1):
         if step % per_sample == 0:
             sample += 1
-            multiply(lower, state, accelerations)
-            _add_inputs(direct, influence, inputs[step], accelerations, moved)
-            for d in range(k):
-                for floor in range(n):
-                    accelerations[floor] += gains[d, floor] * forces[d]
-            for d in range(k):
-                _sense(
-                    accelerations, moved, positions[d], known[d], inputs[step, 0], rod[d], noise[d, sample], measured[d]
-                )  # fmt: skip
-            if members.shape[0] > 0:
-                for index in range(members.shape[0]):
-                    central_forces[index] = commands[members[index], max(sample - 1, 0), COMMAND_FORCE]
-                _central(regulator, estimate, measured, central_forces, central)
-                for index in range(members.shape[0]):
-                    memories[places[members[index], 2] + S_REQUEST] = central[index]
-            for d in range(k):
-                controller_step(
-                    laws[d], numbers[places[d, 0] : places[d + 1, 0]], layouts[places[d, 1] : places[d + 1, 1]],
-                    memories[places[d, 2] : places[d + 1, 2]], measured[d], commands[d, sample],
-                )  # fmt: skip
-        jumped = False
-        if step >= counts[I_DELAY] and (step - counts[I_DELAY]) % per_sample == 0:
+            accelerations_of(structure, state, inputs[step], motion.forces, accelerations, moved)
+            _control(positions, motion, controllers, central, noise, sample, accelerations, moved, inputs[step, 0])
+        jumped = step >= counts[I_DELAY] and (step - counts[I_DELAY]) % per_sample == 0
+        if jumped:
             active += 1
-            jumped = True
-            for d in range(k):
-                wanted[d], asked[d] = commands[d, active, COMMAND_FORCE], commands[d, active, COMMAND_DRIVE]
-        elif step == 0:
-            for d in range(k):
-                asked[d] = commands[d, 0, COMMAND_DRIVE]
+            controllers.wanted[:] = commands[:, active, COMMAND_FORCE]
+        if jumped or step == 0:
+            controllers.asked[:] = commands[:, max(active, 0), COMMAND_DRIVE]
         if step == 0:
-            for d in range(k):
-                known[d, CURRENT] = asked[d]
-                if track == TRACK_DAMPER:
-                    wire[FIRST], wire[TIME] = 1.0, 0.0
-                    wire[DISPLACEMENT], wire[VELOCITY], wire[ACCELERATION] = known[d, X], known[d, V], 0.0
-                    wire[DRIVE] = asked[d]
-                    advance(
-                        chains[d], parameters[parameter_starts[d] : parameter_starts[d + 1]], parameter_offsets[d],
-                        state_offsets[d], damper_states[state_starts[d] : state_starts[d + 1]], wire, dt,
-                    )  # fmt: skip
-                    forces[d] = wire[FORCE]
-                elif track == TRACK_LAW:
-                    forces[d] = _law_force(devices[d], known[d, X], known[d, V], 0.0, 0.0)
-                else:
-                    forces[d] = wanted[d]
-                previous[d], known[d, F] = forces[d], forces[d]
-                braces[d, 0] = braces[d, 1] = devices[d, D_FLEXIBILITY] * forces[d]
-            wire[FIRST] = 0.0
+            _start_forces(devices, motion, controllers, track, dt)
         elif jumped:
-            # the controller holds its output: it changes now, and not along the step
-            for d in range(k):
-                if track == TRACK_SAMPLED:
-                    forces[d] = wanted[d]
-                elif track == TRACK_DAMPER and devices[d, D_LAG] == 1.0 and devices[d, D_COMMAND] >= 0.0:
-                    damper_states[state_starts[d] + int(devices[d, D_COMMAND])] = asked[d]
-        if step % every == 0:
-            row = record[written]
+            _hold(devices, motion, controllers, track)
+        if step % counts[I_RECORD] == 0:
+            accelerations_of(structure, state, inputs[step], motion.forces, accelerations, moved)
+            _record(
+                structure, settings, motion, motion.forces if track == TRACK_LAW else controllers.wanted, state,
+                accelerations, inputs[step], work_in, work_frame, record[written],
+            )  # fmt: skip
             written += 1
-            row[:size] = state
-            multiply(lower, state, accelerations)
-            _add_inputs(direct, influence, inputs[step], accelerations, moved)
-            stored = 0.5 * (quadratic(M, state[n:]) + quadratic(K, state[:n]))
-            for d in range(k):
-                stored += 0.5 * devices[d, D_FLEXIBILITY] * forces[d] ** 2
-                for floor in range(n):
-                    accelerations[floor] += gains[d, floor] * forces[d]
-                own = row[3 * n + d * T_DEVICE : 3 * n + (d + 1) * T_DEVICE]
-                own[T_X], own[T_V], own[T_FORCE], own[T_DRIVE] = known[d, X], known[d, V], forces[d], known[d, CURRENT]
-                own[T_DESIRED] = forces[d] if track == TRACK_LAW else wanted[d]
-                own[T_WORK] = works[d]
-            row[size : 3 * n] = accelerations
-            tail = row[3 * n + k * T_DEVICE :]
-            tail[T_WORK_IN], tail[T_WORK_FRAME], tail[T_ENERGY] = work_in, work_frame, stored
-            tail[T_INPUTS:] = inputs[step]
         if step == counts[I_STEPS]:
             break
-        # --- the structure without the forces at the end of the step
-        for i in range(m):
-            before[size + i], before[size + m + i] = inputs[step, i], inputs[step + 1, i]
+        before[size : size + m], before[size + m : size + 2 * m] = inputs[step], inputs[step + 1]
+        before[size + 2 * m :] = motion.forces
         for d in range(k):
-            before[size + 2 * m + d] = forces[d]
-            known[d, CURRENT] += devices[d, D_LAG] * (asked[d] - known[d, CURRENT])
+            motion.known[d, CURRENT] += settings[d, D_LAG] * (controllers.asked[d] - motion.known[d, CURRENT])
         multiply(step_matrix, before, free)
-        multiply(lower, free, accelerations)
-        _add_inputs(direct, influence, inputs[step + 1], accelerations, moved)
-        for d in range(k):
-            flexibility = devices[d, D_FLEXIBILITY]
-            free_motion[d, 0], free_motion[d, 1], free_motion[d, 2] = 0.0, 0.0, 0.0
-            for floor in range(n):
-                free_motion[d, 0] += positions[d, floor] * free[floor]
-                free_motion[d, 1] += positions[d, floor] * free[n + floor]
-                free_motion[d, 2] += positions[d, floor] * (accelerations[floor] - moved[floor])
-            # deformation of the brace at the end of the step: its rate is (3 b - 4 b1 + b2)/(2 dt)
-            free_motion[d, 1] += (4.0 * braces[d, 0] - braces[d, 1]) / (2.0 * dt)
-            motion[d, 3] = cross_x[d, d] - flexibility
-            motion[d, 4] = cross_v[d, d] - 1.5 * flexibility / dt
-            motion[d, 5] = cross_a[d, d]
-            motion[d, 6] = 2.0 * forces[d] - previous[d] if track == TRACK_DAMPER else forces[d]
-            motion[d, 7] = known[d, SLOPE]
-        # --- forces at the end of the step, damper by damper
-        wire[TIME] = (step + 1) * dt
-        for _ in range(SWEEPS):
-            change = 0.0
-            for d in range(k):
-                for part in range(3):
-                    motion[d, part] = free_motion[d, part]
-                for e in range(k):
-                    if e != d:
-                        motion[d, 0] += cross_x[d, e] * motion[e, 6]
-                        motion[d, 1] += cross_v[d, e] * motion[e, 6]
-                        motion[d, 2] += cross_a[d, e] * motion[e, 6]
-                if track == TRACK_LAW:
-                    found = _law_force(devices[d], motion[d, 0], motion[d, 1], motion[d, 3], motion[d, 4])
-                elif track == TRACK_SAMPLED:
-                    found = wanted[d]
-                else:
-                    found = _chain_force(
-                        chains[d], parameters[parameter_starts[d] : parameter_starts[d + 1]], parameter_offsets[d],
-                        state_offsets[d], damper_states[state_starts[d] : state_starts[d + 1]],
-                        trial[state_starts[d] : state_starts[d + 1]], wire, motion[d], known[d], dt,
-                    )  # fmt: skip
-                    known[d, SLOPE] = motion[d, 7]
-                change = max(change, abs(found - motion[d, 6]) / (1.0 + abs(found)))
-                motion[d, 6] = found
-            if k == 1 or change < settled:
-                break
-        damper_states[:] = trial
-        for d in range(k):
-            previous[d], forces[d] = forces[d], motion[d, 6]
-            for index in range(size):
-                free[index] += at_end[d, index] * forces[d]
-        # --- energy and motion at the end of the step
+        accelerations_of(structure, free, inputs[step + 1], no_forces, accelerations, moved)
+        _move_freely(positions, settings, motion, track, free, accelerations, moved, dt)
+        devices.wire[TIME] = (step + 1) * dt
+        _find_forces(devices, motion, controllers, track, dt)
+        devices.states[:] = devices.trial
+        _finish_step(positions, at_end, settings, motion, free, dt)
         loss_end = quadratic(C, free[n:])
+        _momenta(structure.pull, free, pushed_end)
         for i in range(m):
-            pushed_end[i] = 0.0
-            for floor in range(n):
-                pushed_end[i] += pull[i, floor] * free[floor]
             work_in -= 0.5 * (inputs[step, i] + inputs[step + 1, i]) * (pushed_end[i] - pushed[i])
-            pushed[i] = pushed_end[i]
         work_frame += 0.5 * (loss + loss_end) * dt
         loss = loss_end
-        for d in range(k):
-            deformation = devices[d, D_FLEXIBILITY] * forces[d]
-            rate = (3.0 * deformation - 4.0 * braces[d, 0] + braces[d, 1]) / (2.0 * dt)
-            rod[d] = -(rate - braces[d, 2]) / dt
-            braces[d, 1], braces[d, 0], braces[d, 2] = braces[d, 0], deformation, rate
-            x, v = -deformation, -rate
-            for floor in range(n):
-                x += positions[d, floor] * free[floor]
-                v += positions[d, floor] * free[n + floor]
-            works[d] += 0.5 * (previous[d] + forces[d]) * (x - known[d, X])
-            known[d, X], known[d, V], known[d, F] = x, v, forces[d]
+        pushed[:] = pushed_end
         before[:size] = free
     z[:] = before[:size]
 

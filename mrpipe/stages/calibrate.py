@@ -27,11 +27,10 @@ INPUT_NOISE = (0.002, 0.04)
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
-    import numpy as np
-
     from mrpipe.control.assembly import expected_amplitude
     from mrpipe.control.calibration import balanced_weights, calibrate, validity_warnings
     from mrpipe.control.limits import limiting_modes, placement_warning
+    from mrpipe.control.operation import forces_at
     from mrpipe.control.storage import calibration_to_json, write_calibration
     from mrpipe.dampers.model import read_tested
     from mrpipe.effects.damper import damper_named
@@ -49,30 +48,29 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     if amplitude is None:
         tested = read_tested(context.artifact("identify-damper")) if "identify-damper" in context.inputs else {}
         amplitude = expected_amplitude(damper, tested, modes)
-    speed = amplitude * modes.omega_0
-    weights = balanced_weights(modes, float(damper.quasi_static_force(speed, 0.0)), **settings.regulator.known())
+    residual, largest = forces_at(damper, amplitude, modes)
+    weights = balanced_weights(modes, residual, **settings.regulator.known())
     calibration = calibrate(frame, position, _options(settings, weights))
     if hardly := placement_warning(frame, modes):
         context.warn(hardly)
     for law, reason in calibration.skipped.items():
         context.warn(f"law {law} was skipped: {reason}")
     context.progress(0.3, "laws")
-    forces = damper.quasi_static_force(speed, np.array([0.0, damper.drive_limit]))
     for line in validity_warnings(
-        calibration, amplitude_m=amplitude, residual_force_n=float(forces[0]), largest_force_n=float(forces[1])
+        calibration, amplitude_m=amplitude, residual_force_n=residual, largest_force_n=largest
     ):
         context.warn(line)
-    rounding = settings.friction_rounding_share * speed
+    rounding = settings.friction_rounding_share * (amplitude * modes.omega_0)
     reference = _train_reference(context, calibration, frame, amplitude, rounding) if _networks(calibration) else None
     with context.write("control.h5") as artifact:
-        write_calibration(artifact, calibration, position, weights, reference, rounding, amplitude, float(forces[0]))
+        write_calibration(artifact, calibration, position, weights, reference, rounding, amplitude, residual)
     summary = calibration_to_json(calibration)
     if reference is not None:
         summary["laws"]["nnc"] |= _neural_summary(calibration, reference, amplitude)
     summary |= {
         "expected_amplitude_m": amplitude,
-        "residual_force_n": float(forces[0]),
-        "largest_force_n": float(forces[1]),
+        "residual_force_n": residual,
+        "largest_force_n": largest,
     }
     report.describe(context.report, frame, calibration, summary, amplitude, settings.map_points)
     return summary

@@ -1,93 +1,71 @@
-"""Parts of the compiled loop of several dampers: implicit force of a linear law, and what the sensors read."""
+"""Steps of the compiled loop of several dampers, called as Python: what forces add to the motion, and the brace."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import pytest
 
-from mrpipe.control.kernel import (
-    MEASURED_ACCELERATION,
-    MEASURED_DISPLACEMENT,
-    MEASURED_FLOORS,
-    MEASURED_FORCE,
-    MEASURED_GROUND,
-    MEASURED_VELOCITY,
-)
-from mrpipe.simulation.several_kernel import (
-    D_C,
-    D_CLIPPED,
-    D_K,
-    D_SIZE,
-    STATE_SIZE,
-    F,
-    V,
-    X,
-    _central,
-    _law_force,
-    _sense,
-)
+from mrpipe.simulation.several_kernel import _finish_step, _motion_at_start
+from mrpipe.simulation.several_parts import D_FLEXIBILITY, D_SIZE, F, Motion, Structure, V, X
 
 pytestmark = pytest.mark.property
 
-
-def _device(c: float, k: float, clipped: float) -> np.ndarray:
-    device = np.zeros(D_SIZE)
-    device[D_C], device[D_K], device[D_CLIPPED] = c, k, clipped
-    return device
+FLOORS, DAMPERS = 3, 2
 
 
-@pytest.mark.parametrize(("x", "v"), [(0.01, 0.2), (-0.01, 0.2), (0.02, -0.001)])
-def test_the_force_of_a_law_belongs_to_the_motion_that_it_leaves(x: float, v: float) -> None:
-    end_x, end_v = -1e-8, -2e-5
-    force = _law_force(_device(300.0, -4000.0, 0.0), x, v, end_x, end_v)
-    assert force == pytest.approx(300.0 * (v + end_v * force) - 4000.0 * (x + end_x * force))
-    clipped = _law_force(_device(300.0, -4000.0, 1.0), x, v, end_x, end_v)
-    assert clipped == (force if force * (v + end_v * force) >= 0.0 else 0.0)
-
-
-def _read(noise: np.ndarray, before: np.ndarray) -> np.ndarray:
-    known = np.zeros(STATE_SIZE)
-    known[X], known[V], known[F] = 0.003, 0.05, 40.0
-    accelerations, influence, w = np.array([1.0, 2.0]), np.ones(2), np.array([-1.0, 1.0])
-    measured = before.copy()
-    _sense(accelerations, influence, w, known, 0.5, 0.25, noise, measured)
-    return measured
-
-
-def test_sensors_read_the_motion_of_the_damper_and_of_the_floors() -> None:
-    measured = _read(np.zeros(MEASURED_FLOORS + 2), np.zeros(MEASURED_FLOORS + 2))
-    assert (measured[MEASURED_DISPLACEMENT], measured[MEASURED_VELOCITY]) == (0.003, 0.05)
-    assert (measured[MEASURED_FORCE], measured[MEASURED_GROUND]) == (40.0, 0.5)
-    # absolute accelerations of the floors; relative acceleration across the damper, with that of the brace
-    assert measured[MEASURED_FLOORS:].tolist() == [1.0, 2.0]
-    assert measured[MEASURED_ACCELERATION] == pytest.approx(0.25 + 2.0 - 1.0)
-
-
-def test_faulty_readings_repeat_or_vanish() -> None:
-    noise, before = np.zeros(MEASURED_FLOORS + 2), np.full(MEASURED_FLOORS + 2, 7.0)
-    noise[MEASURED_FORCE], noise[MEASURED_GROUND], noise[MEASURED_VELOCITY] = math.inf, -math.inf, math.nan
-    measured = _read(noise, before)
-    assert measured[MEASURED_FORCE] == 7.0 and measured[MEASURED_GROUND] == 0.0
-    assert math.isnan(measured[MEASURED_VELOCITY]) and measured[MEASURED_DISPLACEMENT] == 0.003
-
-
-def test_the_central_observer_is_its_equation_and_skips_missing_readings() -> None:
-    rng = np.random.default_rng(2)
-    F_, G, H, K = (rng.standard_normal(shape) for shape in ((4, 4), (4, 2), (4, 2), (2, 4)))
-    sensors = np.array([[0.0, MEASURED_DISPLACEMENT], [1.0, MEASURED_FLOORS + 1.0]])
-    measured, forces, before = (
-        rng.standard_normal((2, MEASURED_FLOORS + 2)),
-        rng.standard_normal(2),
-        rng.standard_normal(4),
+def structure(rng: np.random.Generator) -> Structure:
+    square, rows = (FLOORS, FLOORS), (DAMPERS, FLOORS)
+    return Structure(
+        step_matrix=rng.standard_normal((2 * FLOORS + 2 + DAMPERS, 2 * FLOORS)),
+        at_end=rng.standard_normal((DAMPERS, 2 * FLOORS)),
+        lower=rng.standard_normal((2 * FLOORS, FLOORS)),
+        gains=rng.standard_normal(rows),
+        M=rng.standard_normal(square),
+        C=rng.standard_normal(square),
+        K=rng.standard_normal(square),
+        influence=np.ones((1, FLOORS)),
+        pull=np.ones((1, FLOORS)),
+        direct=np.zeros((1, FLOORS)),
+        positions=rng.standard_normal(rows),
     )
-    readings = np.array([measured[0, MEASURED_DISPLACEMENT], measured[1, MEASURED_FLOORS + 1]])
-    for missing in (False, True):
-        if missing:
-            measured[1, MEASURED_FLOORS + 1], readings[1] = math.nan, 0.0
-        estimate, wanted = before.copy(), np.zeros(2)
-        _central((F_, G, H, K, sensors), estimate, measured, forces, wanted)
-        expected = F_ @ before + G @ forces + H @ readings
-        assert estimate == pytest.approx(expected)
-        assert wanted == pytest.approx(-K @ expected)
+
+
+def started(given: Structure, state: np.ndarray) -> Motion:
+    return _motion_at_start.py_func(given, state)
+
+
+def test_a_newton_of_each_damper_moves_every_damper_as_the_matrices_say() -> None:
+    rng = np.random.default_rng(4)
+    given, state = structure(rng), rng.standard_normal(2 * FLOORS)
+    motion = started(given, state)
+    accelerations = given.at_end @ given.lower + given.gains
+    for found, by_force in zip(
+        motion.added, (given.at_end[:, :FLOORS], given.at_end[:, FLOORS:], accelerations), strict=True
+    ):
+        assert found == pytest.approx(given.positions @ by_force.T)
+    assert motion.known[:, X] == pytest.approx(given.positions @ state[:FLOORS])
+    assert motion.known[:, V] == pytest.approx(given.positions @ state[FLOORS:])
+
+
+def test_the_rate_of_a_brace_is_exact_for_a_parabola_and_is_taken_from_the_damper() -> None:
+    rng = np.random.default_rng(5)
+    given = structure(rng)
+    motion = started(given, np.zeros(2 * FLOORS))
+    settings, dt, stiffness = np.zeros((DAMPERS, D_SIZE)), 0.01, np.array([2e4, 5e4])
+    settings[:, D_FLEXIBILITY] = 1.0 / stiffness
+
+    def deformation(time: float) -> np.ndarray:
+        return np.array([0.003, 0.001]) + np.array([0.2, -0.1]) * time + np.array([1.5, 4.0]) * time**2
+
+    # two steps in the past, one step in the past, now
+    motion.braces[:, 1], motion.braces[:, 0] = deformation(-2.0 * dt), deformation(-dt)
+    before = stiffness * deformation(-dt)
+    motion.forces[:], motion.answer[:, 6] = before, stiffness * deformation(0.0)
+    free = np.zeros(2 * FLOORS)
+    _finish_step.py_func(given.positions, given.at_end, settings, motion, free, dt)
+    assert motion.braces[:, 2] == pytest.approx([0.2, -0.1])
+    assert free == pytest.approx(motion.forces @ given.at_end)
+    assert motion.known[:, X] == pytest.approx(given.positions @ free[:FLOORS] - deformation(0.0))
+    assert motion.known[:, V] == pytest.approx(given.positions @ free[FLOORS:] - np.array([0.2, -0.1]))
+    assert motion.known[:, F] == pytest.approx(stiffness * deformation(0.0))
+    assert motion.works == pytest.approx(0.5 * (before + motion.forces) * motion.known[:, X])
