@@ -98,6 +98,41 @@ def _advance(
         out[i] = total
 
 
+@njit(cache=True)
+def _motion(
+    A: FloatArray, B: FloatArray, w: FloatArray, z: FloatArray, u: FloatArray, absolute: FloatArray
+) -> tuple[float, float]:
+    """Fill the absolute accelerations of the floors, and return speed and acceleration of the damper."""
+    size, floors = w.shape[0], absolute.shape[0]
+    speed, rod_acceleration = 0.0, 0.0
+    for i in range(size):
+        speed += w[i] * z[size + i]
+        total = 0.0
+        for j in range(2 * size):
+            total += A[size + i, j] * z[j]
+        for j in range(size + 1):
+            total += B[size + i, j] * u[j]
+        rod_acceleration += w[i] * total
+        if i < floors:
+            absolute[i] = total + u[0]
+    return speed, rod_acceleration
+
+
+@njit(cache=True)
+def _read_sensors(
+    measured: FloatArray, noise: FloatArray, drift: float, speed: float, force: float, ground: float,
+    absolute: FloatArray,
+) -> None:  # fmt: skip
+    """Fill the readings of the controller's sensors."""
+    measured[MEASURED_VELOCITY] = speed
+    measured[MEASURED_DISPLACEMENT] = drift + noise[0]
+    measured[MEASURED_ACCELERATION] = absolute[0] - ground + noise[1]
+    measured[MEASURED_GROUND] = ground + noise[3]
+    measured[MEASURED_FORCE] = force
+    for i in range(absolute.shape[0]):
+        measured[MEASURED_FLOORS + i] = absolute[i] + noise[_SENSED + i]
+
+
 _ROWS = float64[:, ::1]
 _ROW = float64[::1]
 
@@ -218,26 +253,9 @@ def run_structure(
             u0[:] = u1
         else:
             u0[0] = ground[0]
-        speed, rod_acceleration = 0.0, 0.0
-        for i in range(size):
-            speed += w[i] * z[size + i]
-            total = 0.0
-            for j in range(2 * size):
-                total += A[size + i, j] * z[j]
-            for j in range(size + 1):
-                total += B[size + i, j] * u0[j]
-            rod_acceleration += w[i] * total
-            if i < floors:
-                absolute[i] = total + u0[0]
+        speed, rod_acceleration = _motion(A, B, w, z, u0, absolute)
         if control_every > 0 and k % control_every == 0:
-            tick = k // control_every
-            measured[MEASURED_VELOCITY] = speed
-            measured[MEASURED_DISPLACEMENT] = z[0] + sensor_noise[tick, 0]
-            measured[MEASURED_ACCELERATION] = absolute[0] - u0[0] + sensor_noise[tick, 1]
-            measured[MEASURED_GROUND] = u0[0] + sensor_noise[tick, 3]
-            measured[MEASURED_FORCE] = force
-            for i in range(floors):
-                measured[MEASURED_FLOORS + i] = absolute[i] + sensor_noise[tick, _SENSED + i]
+            _read_sensors(measured, sensor_noise[k // control_every], z[0], speed, force, u0[0], absolute)
             controller_step(law, numbers, layout, memory_of_controller, measured, command)
         waiting[k % (delay_steps + 1)] = command[COMMAND_DRIVE]
         drive = waiting[(k + 1) % (delay_steps + 1)]
