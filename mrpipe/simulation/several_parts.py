@@ -30,13 +30,13 @@ SETTLED, SETTLED_LAW = 1e-6, 1e-10
 
 # --- integers of the run ---
 I_STEPS, I_PER_SAMPLE, I_DELAY, I_TRACK, I_RECORD, I_SIZE = 0, 1, 2, 3, 4, 5
-# --- columns of `devices`, one row per damper ---
+# --- columns of `Devices.settings`, one row per damper ---
 D_C, D_K, D_CLIPPED, D_FLEXIBILITY, D_LAG, D_COMMAND, D_CENTRAL, D_SIZE = 0, 1, 2, 3, 4, 5, 6, 8
 # --- columns of the record after [z, absolute accelerations]: these of each damper, then those of the run ---
 T_X, T_V, T_FORCE, T_DRIVE, T_DESIRED, T_WORK, T_DEVICE = 0, 1, 2, 3, 4, 5, 6
 T_WORK_IN, T_WORK_FRAME, T_ENERGY, T_INPUTS = 0, 1, 2, 3
 """After the energy follow the inputs; the first of them is the ground acceleration."""
-# --- what is known of each damper from step to step ---
+# --- columns of `Motion.known`, one row per damper ---
 X, V, F, SLOPE, CURRENT, STATE_SIZE = 0, 1, 2, 3, 4, 5
 
 
