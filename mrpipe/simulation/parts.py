@@ -85,6 +85,19 @@ def quadratic(A: FloatArray, z: FloatArray) -> float:
     return total
 
 
+@njit(void(float64[::1], float64[::1], float64[::1]), cache=True)
+def apply_faults(noise: FloatArray, before: FloatArray, measured: FloatArray) -> None:
+    """Replace the readings of faulty sensors.
+
+    In the noise, plus infinity marks a reading that repeats the last one (`before`), and minus infinity a reading of 0.
+    """
+    for channel in range(noise.shape[0]):
+        if noise[channel] == math.inf:
+            measured[channel] = before[channel]
+        elif noise[channel] == -math.inf:
+            measured[channel] = 0.0
+
+
 @njit(
     void(
         float64[:, ::1], float64[::1], float64[::1], float64[::1], float64, float64, float64[::1], float64[::1],
@@ -95,10 +108,7 @@ def sense(
     lower: FloatArray, gain: FloatArray, w: FloatArray, z: FloatArray, force: float, ground: float,
     noise: FloatArray, measured: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill the readings of the sensors; `lower` is the transposed lower half of A, `gain` the accelerations of 1 N.
-
-    In the noise, plus infinity marks a reading that repeats the last one, and minus infinity a reading of 0.
-    """
+    """Fill the readings of the sensors; `lower` is the transposed lower half of A, `gain` the accelerations of 1 N."""
     before = measured.copy()
     n = w.shape[0]
     floors = measured[MEASURED_FLOORS:]
@@ -116,11 +126,7 @@ def sense(
     measured[MEASURED_VELOCITY] = v + noise[MEASURED_VELOCITY]
     measured[MEASURED_FORCE] = force + noise[MEASURED_FORCE]
     measured[MEASURED_ACCELERATION] = a + noise[MEASURED_ACCELERATION]
-    for channel in range(noise.shape[0]):
-        if noise[channel] == math.inf:
-            measured[channel] = before[channel]
-        elif noise[channel] == -math.inf:
-            measured[channel] = 0.0
+    apply_faults(noise, before, measured)
 
 
 @njit(

@@ -17,7 +17,7 @@ from mrpipe.control.kernel import (
     MEASURED_VELOCITY,
 )
 from mrpipe.dampers.plant import ACCELERATION, DISPLACEMENT, DRIVE, FORCE, VELOCITY, advance
-from mrpipe.simulation.parts import multiply
+from mrpipe.simulation.parts import apply_faults, multiply
 
 compiled_inside = njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """For functions that are called by compiled functions only: without entry points from Python they compile faster."""
@@ -31,7 +31,7 @@ SETTLED, SETTLED_LAW = 1e-6, 1e-10
 # --- integers of the run ---
 I_STEPS, I_PER_SAMPLE, I_DELAY, I_TRACK, I_RECORD, I_SIZE = 0, 1, 2, 3, 4, 5
 # --- columns of `Devices.settings`, one row per damper ---
-D_C, D_K, D_CLIPPED, D_FLEXIBILITY, D_LAG, D_COMMAND, D_CENTRAL, D_SIZE = 0, 1, 2, 3, 4, 5, 6, 8
+D_C, D_K, D_CLIPPED, D_FLEXIBILITY, D_LAG, D_COMMAND, D_SIZE = 0, 1, 2, 3, 4, 5, 6
 # --- columns of the record after [z, absolute accelerations]: these of each damper, then those of the run ---
 T_X, T_V, T_FORCE, T_DRIVE, T_DESIRED, T_WORK, T_DEVICE = 0, 1, 2, 3, 4, 5, 6
 T_WORK_IN, T_WORK_FRAME, T_ENERGY, T_INPUTS = 0, 1, 2, 3
@@ -259,10 +259,7 @@ def read_sensors(
     accelerations: FloatArray, moved: FloatArray, w: FloatArray, device: FloatArray, ground: float, rod: float,
     noise: FloatArray, measured: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill the readings of one damper's sensors; `moved` is the acceleration of each place by the ground alone.
-
-    In the noise, plus infinity marks a reading that repeats the last one, and minus infinity a reading of 0.
-    """
+    """Fill the readings of one damper's sensors; `moved` is the acceleration of each place by the ground alone."""
     before = measured.copy()
     relative = rod
     for floor in range(w.shape[0]):
@@ -273,11 +270,7 @@ def read_sensors(
     measured[MEASURED_VELOCITY] = device[V] + noise[MEASURED_VELOCITY]
     measured[MEASURED_FORCE] = device[F] + noise[MEASURED_FORCE]
     measured[MEASURED_ACCELERATION] = relative + noise[MEASURED_ACCELERATION]
-    for channel in range(noise.shape[0]):
-        if noise[channel] == math.inf:
-            measured[channel] = before[channel]
-        elif noise[channel] == -math.inf:
-            measured[channel] = 0.0
+    apply_faults(noise, before, measured)
 
 
 @njit(cache=True)
