@@ -51,7 +51,7 @@ WORK = 14  # energy dissipated since the start [J]
 SLIP = 15  # path since the last reversal [m]
 SINCE_REVERSAL = 16  # time since the last reversal [s]
 PAST_CURRENT = 17  # largest |effective current| so far in this run [A]
-RATE_YIELD = 18  # factor 0..1 of YIELD_FORCE from rate-dependent base forms (1 where unused)
+RATE_YIELD = 18  # factor of YIELD_FORCE that does not change when the damper yields: rate, effects (1 where unused)
 PART_FORCE = 19  # force of a second yielding part [N], from its own law of the drive (0 where a form has none)
 PART = 20  # normalised force of the second yielding part, -1..1
 SUM_VELOCITY = 21  # velocity that the sum of (2.1) used: that of the inner element where a form has one [m/s]
@@ -181,6 +181,15 @@ def change_yield_force(wire: FloatArray, factor: float) -> None:
     """
     wire[YIELD_FORCE] *= factor
     wire[YIELD_LOSS] = 1.0 - (1.0 - wire[YIELD_LOSS]) * factor
+
+
+@njit(void(float64[::1], float64), cache=True)
+def change_yielded_force(wire: FloatArray, factor: float) -> None:
+    """Multiply the yield force by a factor that does not change when the damper yields.
+
+    The stiffness before the yield then changes with the yield force, and the yield displacement does not.
+    """
+    wire[RATE_YIELD] *= factor
 
 
 @njit(STEP_SIGNATURE, cache=True)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
+from numba import float64, njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
@@ -23,6 +23,9 @@ from mrpipe.dampers.plant import (
     change_yield_force,
 )
 from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, amplitude, shape, strength
+
+SQUARE_ROOT = 2.0
+"""Sharpness of the transition between the directions with which it is v/sqrt(v^2 + v_t^2)."""
 
 
 @njit(STEP_SIGNATURE, cache=True)
@@ -51,33 +54,45 @@ def rounded_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
     wire[FORCE] += parameters[0] * (math.sqrt(force * force + parameters[1] * parameters[1]) - parameters[1])
 
 
+@njit(float64(float64, float64, float64), cache=True)
+def direction_of(velocity: float, transition_velocity: float, sharpness: float) -> float:
+    """Return the direction of motion, -1 to 1: v/(|v|^m + v_t^m)^(1/m), with velocities in m/s and the sharpness m."""
+    ratio = abs(velocity) / transition_velocity
+    if sharpness == SQUARE_ROOT:
+        size = ratio / math.sqrt(1.0 + ratio * ratio)
+    elif ratio > 1.0:
+        size = (1.0 + ratio**-sharpness) ** (-1.0 / sharpness)
+    else:
+        size = ratio * (1.0 + ratio**sharpness) ** (-1.0 / sharpness)
+    return math.copysign(size, velocity)
+
+
 @njit(STEP_SIGNATURE, cache=True)
 def direction_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: amplitude, transition velocity [m/s], kind (0 yield, 1 both).
+    """Parameters: amplitude, transition velocity [m/s], kind (0 yield, 1 both), sharpness of the transition.
 
     The direction of the flow decides, not that of the force: after a reversal the two differ until the damper yields.
     """
-    v = wire[VELOCITY]
-    direction = v / math.sqrt(v * v + parameters[1] * parameters[1])
+    direction = direction_of(wire[VELOCITY], parameters[1], parameters[3])
     force = wire[HYSTERETIC_FORCE] if parameters[2] == 0.0 else wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]
     wire[FORCE] += parameters[0] * force * direction
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def yield_force_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: share, transition velocity [m/s]. The yield force itself differs between the directions."""
-    v = wire[VELOCITY]
-    change_yield_force(wire, 1.0 + parameters[0] * v / math.sqrt(v * v + parameters[1] * parameters[1]))
+    """Parameters: share, transition velocity [m/s], sharpness. The yield force differs between the directions."""
+    change_yield_force(wire, 1.0 + parameters[0] * direction_of(wire[VELOCITY], parameters[1], parameters[2]))
 
 
 def _yield_force(values: Values) -> list[Step]:
-    numbers = np.array([values["share"], values["transition_velocity"]])
+    numbers = np.array([values["share"], values["transition_velocity"], values.get("sharpness", SQUARE_ROOT)])
     return [Step("asymmetry", Phase.COEFFICIENT_EFFECT, yield_force_step, numbers)]
 
 
 def _direction(kind: float) -> Callable[[Values], list[Step]]:
     def steps(values: Values) -> list[Step]:
-        numbers = np.array([values["share"], values["transition_velocity"], kind])
+        sharpness = values.get("sharpness", SQUARE_ROOT)
+        numbers = np.array([values["share"], values["transition_velocity"], kind, sharpness])
         return [Step("asymmetry", Phase.FORCE_EFFECT, direction_step, numbers)]
 
     return steps
@@ -112,6 +127,7 @@ _SHARE = amplitude("share", "1", "half the difference of the two directions over
 _TRANSITION = shape(
     "transition_velocity", "m/s", "speed over which the direction changes", "speed", 1e-4, 0.5, (0.004, 0.06)
 )
+_SHARPNESS = shape("sharpness", "1", "m: 2 is the square root, about 3 a hyperbolic tangent", "one", 0.7, 12.0, (2.5,))
 
 EFFECT = Effect(
     name="asymmetry",
@@ -178,13 +194,21 @@ EFFECT = Effect(
             {"share": 0},
         ),
         EffectForm(
+            "yield-by-sharp-direction",
+            "F + s alpha z v/(|v|^m + v_t^m)^(1/m)",
+            (_SHARE, _TRANSITION, _SHARPNESS),
+            _direction(0.0),
+            {"share": 0},
+        ),
+        EffectForm(
             "yield-force",
-            "F_y (1 + s v/sqrt(v^2 + v_t^2)) before the damper yields",
+            "F_y (1 + s v/(|v|^m + v_t^m)^(1/m)) before the damper yields",
             (
                 strength(
                     "share", "1", "half the difference of the two directions over their mean", "one", -0.9, 0.9, 0.05
                 ),
                 _TRANSITION,
+                _SHARPNESS,
             ),
             _yield_force,
         ),

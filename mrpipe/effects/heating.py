@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numba import float64, njit, void
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.plant import FIRST, STEP_SIGNATURE, VISCOSITY, WORK, Phase, Step, change_yield_force
+from mrpipe.dampers.plant import (
+    FIRST,
+    STEP_SIGNATURE,
+    VISCOSITY,
+    WORK,
+    Phase,
+    Step,
+    change_yield_force,
+    change_yielded_force,
+)
 from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
 
 
@@ -39,10 +49,11 @@ def heating_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
 
 @njit(STEP_SIGNATURE, cache=True)
 def warming_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: loss for each joule, cooling rate [1/s], curvature p, exponent of the viscosity n.
+    """Parameters: loss for each joule, cooling rate [1/s], curvature p, exponent of the viscosity n, place (0, 1).
 
     State: heat [J], last work [J]. The yield force falls by (1 - p b Q)^(1/p), linearly at p = 1 and exponentially at
-    p = 0; the viscosity by the same factor to the power n.
+    p = 0; the viscosity by the same factor to the power n. Place 0: the yield force falls before the damper yields;
+    1: the yield displacement does not change.
     """
     _warm(wire, state, parameters[1], dt)
     loss = min(max(parameters[0] * state[0], -5.0), 20.0)
@@ -50,7 +61,10 @@ def warming_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
     flat = abs(curvature) < 1e-3
     factor = math.exp(-loss) if flat else max(1.0 - curvature * loss, 0.02) ** (1.0 / curvature)
     factor = min(max(factor, 1e-3), 1e3)
-    change_yield_force(wire, factor)
+    if parameters[4] == 0.0:
+        change_yield_force(wire, factor)
+    else:
+        change_yielded_force(wire, factor)
     wire[VISCOSITY] *= factor ** parameters[3]
 
 
@@ -78,15 +92,24 @@ def _rational(values: Values) -> list[Step]:
     return _step(values["loss"], 0.0, 1.0, 1.0)
 
 
-def _warming(values: Values) -> list[Step]:
-    numbers = np.array(
-        [values["loss"], 1.0 / values["cooling_time"], values["curvature"], values["viscosity_exponent"]]
-    )
-    return [Step("heating", Phase.COEFFICIENT_EFFECT, warming_step, numbers, 2)]
+def _warming(place: float) -> Callable[[Values], list[Step]]:
+    def steps(values: Values) -> list[Step]:
+        rate, power = 1.0 / values["cooling_time"], values["viscosity_exponent"]
+        numbers = np.array([values["loss"], rate, values["curvature"], power, place])
+        return [Step("heating", Phase.COEFFICIENT_EFFECT, warming_step, numbers, 2)]
+
+    return steps
 
 
 _LOSS = strength("loss", "1/J", "share of the force lost for each joule", "one/force/speed/time", 0.0, 8.0, 0.03)
 _TIME = shape("cooling_time", "s", "time constant of cooling", "time", 0.1, 30.0, (0.6, 4.0))
+
+_WARMING = (
+    _LOSS,
+    shape("cooling_time", "s", "time constant of cooling", "time", 0.1, 100.0, (4.0,)),
+    Parameter("curvature", "1", "1: linear, 0: exponential", "one", -3.0, 2.0, (0.3,)),
+    Parameter("viscosity_exponent", "1", "1: viscosity falls as the yield force", "one", 0.0, 5.0, (1.5,)),
+)
 
 EFFECT = Effect(
     name="heating",
@@ -110,16 +133,12 @@ EFFECT = Effect(
         "migration": Separation("a long run with a pause for cooling", ("long",)),
     },
     refinements=(
+        EffectForm("curved", "alpha g, c g^n, g = (1 - p b Q)^(1/p), Q' = P - Q/tau", _WARMING, _warming(0.0)),
         EffectForm(
-            "curved",
-            "alpha g, c g^n, g = (1 - p b Q)^(1/p), Q' = P - Q/tau",
-            (
-                _LOSS,
-                shape("cooling_time", "s", "time constant of cooling", "time", 0.1, 100.0, (4.0,)),
-                Parameter("curvature", "1", "1: linear, 0: exponential", "one", -3.0, 2.0, (0.3,)),
-                Parameter("viscosity_exponent", "1", "1: viscosity falls as the yield force", "one", 0.0, 5.0, (1.5,)),
-            ),
-            _warming,
+            "curved-yielded",
+            "g (alpha z), c g^n with g as in curved; the yield displacement does not change",
+            _WARMING,
+            _warming(1.0),
         ),
     ),
 )

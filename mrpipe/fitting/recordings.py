@@ -31,8 +31,10 @@ MOST_SAMPLES = 50_000
 MOST_JUDGED = 200_000
 """Largest number of samples of validation tests; it is larger, because these are simulated once and not fitted."""
 
-JUMP_RATE_HZ = 500.0
-"""Least sampling rate of a test with steps of the drive: linear interpolation of the drive smears steps."""
+JUMP_RATE_HZ = 1000.0
+"""Least sampling rate of a test with jumps of the drive. Linear interpolation of the drive makes a jump as long as a
+sampling interval, and the lag of a driver can be as short as 4 ms.
+"""
 
 FILTER_ORDER = 4
 """Order of the low-pass of the displacement in each direction. A lower order attenuates random motion near the edge of
@@ -203,7 +205,7 @@ def record_tests(
         Prepared tests; their raw displacement and force are used.
     rate_hz
         Tests are decimated to about this rate after the displacement has been filtered. Forces are picked and never
-        filtered. A test with steps of the drive keeps a higher rate.
+        filtered. A test with jumps of the drive has a higher rate, and its drive is not filtered either.
     cutoff_hz
         Cut-off frequency of the displacement; 0: chosen for each test from its spectrum. A displacement from which the
         noise was removed is not filtered again.
@@ -225,7 +227,8 @@ def record_tests(
     rows = [
         _one_test(
             test,
-            max(rate_hz, JUMP_RATE_HZ) if drive_jumps(test, largest) else rate_hz,
+            rate_hz,
+            drive_jumps(test, largest),
             _cutoff(test, cutoff_hz, highest_cutoff_hz),
             shared if one else test.displacement_offset_m,
             longest_s,
@@ -268,7 +271,7 @@ def record_tests(
 
 def drive_jumps(test: PreparedTest, largest: float) -> bool:
     """Return whether the drive of a test changes by 10 % of `largest` from one sample to the next."""
-    return float(np.max(np.abs(np.diff(test.drive)))) > 0.1 * largest > 0.0
+    return float(np.max(np.abs(np.diff(test.recorded_drive)))) > 0.1 * largest > 0.0
 
 
 def spread_tests(tests: Sequence[PreparedTest], most: int = MOST_TESTS) -> list[PreparedTest]:
@@ -295,7 +298,7 @@ def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[Prepare
                 name: getattr(test, name)[piece]
                 for name in (
                     "time_s", "displacement_m", "velocity_m_s", "acceleration_m_s2", "drive", "force_n",
-                    "displacement_raw_m", "force_raw_n",
+                    "displacement_raw_m", "force_raw_n", "drive_raw",
                 )
             }  # fmt: skip
             inside = test.cycles[
@@ -305,8 +308,12 @@ def enough_tests(tests: Sequence[PreparedTest], fewest: int = 4) -> list[Prepare
     return found
 
 
-def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, longest_s: float) -> dict[str, Any]:
+def _one_test(
+    test: PreparedTest, rate_hz: float, jumps: bool, cutoff: float, offset: float, longest_s: float
+) -> dict[str, Any]:
     rate = test.sampling_rate_hz
+    if jumps:
+        rate_hz = max(rate_hz, JUMP_RATE_HZ)
     raw = test.displacement_raw_m + (test.displacement_offset_m - offset)
     smooth = raw if test.motion_band_hz > 0.0 else butterworth_lowpass(raw, cutoff, rate, order=FILTER_ORDER)
     velocity, acceleration = spline_derivatives(smooth, 1.0 / rate)
@@ -329,7 +336,7 @@ def _one_test(test: PreparedTest, rate_hz: float, cutoff: float, offset: float, 
         "displacement": smooth[chosen],
         "velocity": velocity[chosen],
         "acceleration": acceleration[chosen],
-        "drive": test.drive[chosen],
+        "drive": (test.recorded_drive if jumps else test.drive)[chosen],
         "force": (test.force_raw_n + test.force_offset_n)[chosen],
         "used": used,
         "dt": stride / rate,

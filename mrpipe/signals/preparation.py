@@ -307,6 +307,7 @@ def _finish(work: _Work, options: PreparationOptions, campaign: Campaign) -> Pre
         force_n=work.filtered["force"] - force_offset,
         displacement_raw_m=work.channels["displacement"] - displacement_offset,
         force_raw_n=work.channels["force"] - force_offset,
+        drive_raw=work.channels["drive"],
         cycles=cycles,
         drive_unit=campaign.drive_unit,
         excitation="periodic" if work.cycles.periodic else "random",

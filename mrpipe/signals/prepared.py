@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +35,8 @@ class PreparedTest:
         Filtered, without offset, shape (n,).
     force_raw_n, displacement_raw_m
         Offset-free but unfiltered, for estimators with a separate noise model.
+    drive_raw
+        The drive before the low-pass; empty: `drive` was not filtered.
     cycles
         Start indices of the steady cycles at upward zero crossings of displacement, with the end of the last one;
         empty where the motion is not periodic.
@@ -83,11 +85,17 @@ class PreparedTest:
     motion_band_hz: float = 0.0
     recorded_step_m: float = 0.0
     recorded_dither_m: float = 0.0
+    drive_raw: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def dt(self) -> float:
         """Sampling interval [s]."""
         return 1.0 / self.sampling_rate_hz
+
+    @property
+    def recorded_drive(self) -> FloatArray:
+        """The drive without a low-pass, which makes a jump several milliseconds long, shape (n,)."""
+        return self.drive_raw if self.drive_raw.size else self.drive
 
     # spectra of whole records are cached, because an estimator that compares filters or rates reads them repeatedly
 
@@ -144,6 +152,7 @@ _CHANNELS = {
     "force": ("force_n", "N"),
     "displacement_raw": ("displacement_raw_m", "m"),
     "force_raw": ("force_raw_n", "N"),
+    "drive_raw": ("drive_raw", ""),
 }
 
 
@@ -173,7 +182,13 @@ def read_prepared(artifact: Artifact) -> list[PreparedTest]:
     for name in artifact.members("tests"):
         group = f"tests/{name}"
         notes = artifact.attributes(group)
-        channels = {attribute: artifact.array(f"{group}/{key}") for key, (attribute, _) in _CHANNELS.items()}
+        present = set(artifact.members(group))
+        channels = {
+            attribute: artifact.array(f"{group}/{key}")
+            for key, (attribute, _) in _CHANNELS.items()
+            # a run of an earlier version holds no unfiltered drive
+            if key in present or key != "drive_raw"
+        }
         tests.append(
             PreparedTest(
                 name=name,

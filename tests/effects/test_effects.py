@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from mrpipe.dampers.drive import driver_lag, polynomial_coefficients
 from mrpipe.dampers.hysteresis import hysteresis
 from mrpipe.dampers.library import base_form
 from mrpipe.dampers.plant import CURRENT, FORCE, HYSTERESIS, YIELD_FORCE, build_chain, run_chain
+from mrpipe.effects.asymmetry import direction_of
 from mrpipe.effects.checks import checks_of
 from mrpipe.effects.contract import EffectForm, EffectScales
 from mrpipe.effects.library import all_effects, damper_effects, effects_named, load_effect_file
@@ -118,6 +120,26 @@ LIMITS = [
         "stretched-time",
         {"share": 0.3, "rise_time": 0.1, "exponent": 0.8},
     ),
+    *(
+        (
+            "asymmetry",
+            "yield-by-sharp-direction",
+            {"share": 0.2, "transition_velocity": 0.01, "sharpness": sharpness},
+            "yield-by-direction",
+            {"share": 0.2, "transition_velocity": 0.01},
+        )
+        for sharpness in (2.0, 2.001)
+    ),
+    *(
+        (
+            "heating",
+            form,
+            {"loss": 0.02, "cooling_time": 2.0, "curvature": 0.0, "viscosity_exponent": 1.0},
+            "cooling",
+            {"loss": 0.02, "cooling_time": 2.0},
+        )
+        for form in ("curved", "curved-yielded")
+    ),
     ("saturation", "soft-driver", {"inverse_limit": 0.4, "exponent": 200.0}, "driver", {"inverse_limit": 0.4}),
     (
         "delay",
@@ -161,6 +183,43 @@ def test_a_slider_behind_a_spring_yields_at_the_changed_force(name: str) -> None
     chain = build_chain([polynomial_coefficients([100.0], [0.0]), *form.steps(values), *steps])
     force = run_chain(chain, x, v, a, np.zeros_like(x), dt)[:, FORCE]
     assert (np.max(force), np.min(force)) == pytest.approx((120.0, -80.0), rel=0.01)
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(("heated", "stiffness"), [("curved", 1e6), ("curved-yielded", 0.5e6)])
+def test_heat_lowers_the_yield_force_before_the_yield_or_the_stiffness_as_well(heated: str, stiffness: float) -> None:
+    form = base_form("bouc-wen-stiffness")
+    warm = {"loss": 1.0, "cooling_time": 1e9, "curvature": 0.0, "viscosity_exponent": 0.0}
+    # the force falls as 100 N/(1 + 100 x), so that it is halved after 10 mm; then the motion turns
+    dt, half, slow = 1e-4, 10_000, 1e-2
+    v = np.concatenate([np.full(half, slow), np.full(400, -slow)])
+    x, zero = np.cumsum(v) * dt, np.zeros_like(v)
+    chain = build_chain(
+        [
+            polynomial_coefficients([100.0], [0.0]),
+            *form.steps({"initial_stiffness": 1e6, "gamma_share": 0.5}),
+            *all_effects()["heating"].form(heated).steps(warm),
+        ]
+    )
+    force = run_chain(chain, x, v, zero, zero, dt)[:, FORCE]
+    yielded = force[half - 1]
+    assert yielded == pytest.approx(50.0, rel=0.02)
+    # beta = gamma: the force falls with the initial stiffness until it passes zero
+    below = np.flatnonzero((force[half:] > 0.2 * yielded) & (force[half:] < 0.8 * yielded)) + half
+    slope = np.polyfit(x[below], force[below], 1)[0]
+    assert slope == pytest.approx(stiffness, rel=0.05)
+
+
+@pytest.mark.property
+def test_the_direction_is_odd_bounded_and_sharper_with_its_sharpness() -> None:
+    ratios = np.array([0.0, 0.1, 0.5, 1.0, 3.0, 50.0])
+    soft, root, hard = (np.array([direction_of(r, 1.0, m) for r in ratios]) for m in (1.0, 2.0, 12.0))
+    np.testing.assert_allclose(soft, ratios / (1.0 + ratios))
+    np.testing.assert_allclose(root, ratios / np.hypot(1.0, ratios))
+    np.testing.assert_allclose(hard, np.minimum(ratios, 1.0), atol=0.06)
+    assert [direction_of(-r, 1.0, 3.0) for r in ratios] == [-direction_of(r, 1.0, 3.0) for r in ratios]
+    # a sharpness of three is close to a hyperbolic tangent
+    assert max(abs(direction_of(r, 1.0, 3.0) - math.tanh(r)) for r in np.linspace(0.0, 5.0, 200)) < 0.035
 
 
 @pytest.mark.property

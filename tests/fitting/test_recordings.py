@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrpipe.fitting.recordings import Recordings, record_tests
+from mrpipe.fitting.recordings import Recordings, enough_tests, record_tests
+from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.prepared import PreparedTest
 
 pytestmark = pytest.mark.property
@@ -63,3 +64,32 @@ def test_a_channel_without_motion_still_has_a_cut_off() -> None:
     still = replace(still, displacement_m=zero, velocity_m_s=zero, displacement_raw_m=zero)
     assert still.displacement_cutoff_hz == 0.25 * RATE
     assert np.all(np.isfinite(record_tests([still]).displacement))
+
+
+def stepped(filtered: bool) -> PreparedTest:
+    """Return a sine whose recorded drive jumps at 10 s; `drive` is what a low-pass makes of it."""
+    test = sine("stepped", 1.0)
+    drive = np.where(test.time_s < 10.0, 0.0, 2.0)
+    return replace(test, drive=butterworth_lowpass(drive, 20.0, RATE) if filtered else drive, drive_raw=drive)
+
+
+def test_a_jump_of_the_drive_is_not_filtered() -> None:
+    found = record_tests([stepped(filtered=True)], rate_hz=250.0)
+    # the test keeps its rate, because interpolation between samples makes a jump as long as an interval
+    assert found.dt[0] == pytest.approx(1.0 / RATE)
+    np.testing.assert_array_equal(found.drive, np.where(found.time < 10.0 - 1e-9, 0.0, 2.0))
+
+
+def test_a_smooth_drive_is_the_filtered_one() -> None:
+    test = stepped(filtered=False)
+    smooth = 1.0 + np.sin(np.pi * test.time_s)
+    noisy = smooth + 0.01 * np.random.default_rng(2).standard_normal(len(smooth))
+    found = record_tests([replace(test, drive=smooth, drive_raw=noisy)], rate_hz=250.0)
+    assert found.dt[0] == pytest.approx(1.0 / 250.0)
+    np.testing.assert_array_equal(found.drive, smooth[::2])
+
+
+def test_a_test_cut_into_pieces_keeps_its_recorded_drive() -> None:
+    pieces = enough_tests([stepped(filtered=True)])
+    joined = np.concatenate([piece.recorded_drive for piece in pieces])
+    np.testing.assert_array_equal(joined, stepped(filtered=True).drive_raw)
