@@ -24,6 +24,7 @@ from mrpipe.tracing.bench.validation import compare, training_agreements
 from mrpipe.tracing.bench.verdict import Named, calibrated
 from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import ValidationRules
+from mrpipe.words import listed
 
 
 def validated(
@@ -146,12 +147,23 @@ def judged(
     session = session_of(
         found.recorded, found.measured, found.after, selection.chosen, training, rules.nuisances, rules.validation
     )
-    return judge(
+    found_out = judge(
         found, selection.base, selection.chosen, training, options.rules.validation,
         names=[item.effect.name for item in causes], base_taken=taken,
         structured=missing or bool(causes), reason=reason, faults=ordered.faults, folds=options.folds,
         session=session, jobs=jobs,
     )  # fmt: skip
+    words = not_separated(causes)
+    if not words:
+        return found_out
+    verdict = found_out.verdict
+    return replace(found_out, verdict=replace(verdict, sentence=f"{verdict.sentence}; {words}"))
+
+
+def not_separated(causes: Sequence[Named]) -> str:
+    """Return which other effects the tests do not separate from the named ones; empty if they separate all."""
+    parts = [f"{item.effect.name} from {listed(item.tied_with)}" for item in causes if item.tied_with]
+    return f"these tests do not separate {', nor '.join(parts)}" if parts else ""
 
 
 def structured(

@@ -9,9 +9,11 @@ import pytest
 from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.recordings import record_tests
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.gates import held, never_yields, refusal_of, validated
+from mrpipe.tracing.bench.gates import held, judged, never_yields, not_separated, refusal_of, validated
 from mrpipe.tracing.bench.judgement import Evidence
+from mrpipe.tracing.bench.odd_tests import sort_tests
 from mrpipe.tracing.bench.on_validation import Judgement
+from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.verdict import Named
 from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import ValidationRules
@@ -67,3 +69,27 @@ def test_an_effect_that_explains_a_part_is_less_probable() -> None:
     # offsets are measured test by test: nothing else can be taken for them
     assert confidence("partly explained", chosen=False) > 0.9
     assert confidence("explained", several=True) < 0.8
+
+
+def test_the_verdict_says_which_effects_the_tests_do_not_separate() -> None:
+    effects = damper_effects()
+    late = Named(effects["channel-skew"], "shift", {}, 0.5, ("inertia", "accumulator"))
+    dry = Named(effects["stribeck"], "gaussian", {}, 0.5, ("backlash",))
+    alone = Named(effects["heating"], "cooling", {}, 0.9)
+    assert not_separated([alone]) == ""
+    assert not_separated([late, alone]) == "these tests do not separate channel-skew from inertia and accumulator"
+    assert not_separated([late, dry]).endswith("inertia and accumulator, nor stribeck from backlash")
+
+
+def test_a_tie_is_part_of_the_sentence() -> None:
+    """The dyke record was said to have a late force, and the inertia that it cannot exclude stood only in the JSON."""
+    tests = campaign("rounded")
+    training = record_tests([test for test in tests if test.role != "validation"], rate_hz=250.0)
+    validation = record_tests([test for test in tests if test.role == "validation"], rate_hz=250.0)
+    first = fit_baseline(training, declared_base(training, "rounded-yield", 2, 1))
+    options = TracingOptions()
+    found = validated(first.fit, first.fit, first, training, validation, options)
+    selection = Selection(first.fit, first.noise, (), first.fit, nothing_missing=0.0)
+    late = Named(damper_effects()["channel-skew"], "shift", {}, 0.5, ("inertia",))
+    judgement = judged(found, selection, training, options, [late], True, "", sort_tests(tests), 1)
+    assert judgement.verdict.sentence.endswith("; these tests do not separate channel-skew from inertia")
