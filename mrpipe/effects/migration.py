@@ -28,6 +28,18 @@ from mrpipe.effects.contract import Effect, EffectForm, Separation, Values, ampl
 from mrpipe.effects.profiles import PATH, RISING, SINCE, free_profile
 
 
+@njit(float64(float64, float64, float64), cache=True)
+def _power_law_rise(slip: float, length: float, power: float) -> float:
+    """Return 1 - (1 + s/(p L))^-p: a rational rise at p = 1, an exponential one at large p."""
+    return 1.0 - (1.0 + slip / (power * length)) ** (-power)
+
+
+@njit(float64(float64, float64, float64), cache=True)
+def _stretched_rise(way: float, scale: float, exponent: float) -> float:
+    """Return 1 - exp(-(w/S)^p) for a slip or a time since the reversal: many lengths or times at once."""
+    return 1.0 - math.exp(-((way / scale) ** exponent))
+
+
 @njit(STEP_SIGNATURE, cache=True)
 def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: amplitude, length [m] or time [s], kind of rise (0..6), of amplitude (0 yield, 1, 2 with drive), p.
@@ -42,12 +54,10 @@ def migration_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     elif kind == 2.0:
         rise = wire[SLIP] / (wire[SLIP] + parameters[1])
     elif kind == 4.0 or kind == 5.0:
-        # stretched: many lengths or times at once
         way = wire[SLIP] if kind == 4.0 else wire[SINCE_REVERSAL]
-        rise = 1.0 - math.exp(-((way / parameters[1]) ** parameters[4]))
+        rise = _stretched_rise(way, parameters[1], parameters[4])
     elif kind == 6.0:
-        # from a rational rise at p = 1 to an exponential one at large p
-        rise = 1.0 - (1.0 + wire[SLIP] / (parameters[4] * parameters[1])) ** (-parameters[4])
+        rise = _power_law_rise(wire[SLIP], parameters[1], parameters[4])
     else:
         # a second, slow hysteretic variable: it follows the direction of motion along the path
         if wire[FIRST] > 0.5:
@@ -80,9 +90,9 @@ def _rise_of_fast_reversals(wire: FloatArray, state: FloatArray, parameters: Flo
         state[1] = state[0]
         state[2] = 0.0
     if parameters[3] == 0.0:
-        rise = 1.0 - (1.0 + wire[SLIP] / (parameters[2] * parameters[1])) ** (-parameters[2])
+        rise = _power_law_rise(wire[SLIP], parameters[1], parameters[2])
     else:
-        rise = 1.0 - math.exp(-((wire[SINCE_REVERSAL] / parameters[1]) ** parameters[2]))
+        rise = _stretched_rise(wire[SINCE_REVERSAL], parameters[1], parameters[2])
     fast = (wire[VELOCITY] / parameters[4]) ** 4
     state[2] = max(state[2], fast / (1.0 + fast))
     state[0] = state[1] + (rise - state[1]) * state[2]
