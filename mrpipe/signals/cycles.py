@@ -11,6 +11,11 @@ from mrpipe.artifacts import FloatArray, IntArray
 
 PERIOD_TOLERANCE = 0.05
 AMPLITUDE_TOLERANCE = 0.05
+DRIFT_TOLERANCE = 0.2
+"""Largest difference between the middles of two consecutive steady cycles, as a share of their amplitude. The middle of
+a machine without position control drifts by up to a tenth from cycle to cycle.
+"""
+
 STEADY_SHARE = 0.33
 SHARE_OF_A_PAIR = 0.6
 SINE_TOLERANCE = 0.03
@@ -86,8 +91,12 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
     if crossings.size < fewest + 1:
         return none
     periods = np.diff(crossings).astype(np.float64)
-    heights = np.array([0.5 * np.ptp(displacement[begin:end]) for begin, end in pairwise(crossings)])
-    begin, end = _longest_steady_run(periods, heights)
+    tops, bottoms = (
+        np.array([extreme(displacement[begin:end]) for begin, end in pairwise(crossings)])
+        for extreme in (np.max, np.min)
+    )
+    heights = 0.5 * (tops - bottoms)
+    begin, end = _longest_steady_run(periods, heights, 0.5 * (tops + bottoms))
     # a slow sweep and a random motion have steady parts as well, but these are not periodic tests
     share = SHARE_OF_A_PAIR if end - begin == 2 else STEADY_SHARE
     if end - begin < fewest or np.sum(periods[begin:end]) < share * np.sum(periods):
@@ -97,8 +106,11 @@ def find_steady_cycles(displacement: FloatArray, sampling_rate_hz: float, *, few
     return SteadyCycles(starts, (end - begin) * sampling_rate_hz / span, float(np.median(heights[begin:end])))
 
 
-def _longest_steady_run(periods: FloatArray, heights: FloatArray) -> tuple[int, int]:
-    """Return the half-open range of the longest run whose cycles lie within the tolerances of their median."""
+def _longest_steady_run(periods: FloatArray, heights: FloatArray, levels: FloatArray) -> tuple[int, int]:
+    """Return the half-open range of the longest run whose cycles lie within the tolerances of one of them.
+
+    The middle of a cycle is compared with that of the cycle before, because it may drift.
+    """
     best = (0, 0)
     # one sample of period is always allowed: fast tests have few samples a cycle
     allowed = np.maximum(PERIOD_TOLERANCE * periods, 1.0)
@@ -108,11 +120,12 @@ def _longest_steady_run(periods: FloatArray, heights: FloatArray) -> tuple[int, 
         good = (np.abs(periods - periods[seed]) <= allowed) & (
             np.abs(heights - heights[seed]) <= AMPLITUDE_TOLERANCE * heights[seed]
         )
+        joined = np.abs(np.diff(levels)) <= DRIFT_TOLERANCE * heights[seed]
         begin = seed
-        while begin > 0 and good[begin - 1]:
+        while begin > 0 and good[begin - 1] and joined[begin - 1]:
             begin -= 1
         end = seed
-        while end < periods.size and good[end]:
+        while end < periods.size and good[end] and (end == seed or joined[end - 1]):
             end += 1
         if end - begin > best[1] - best[0]:
             best = (begin, end)
