@@ -41,7 +41,7 @@ class Estimate:
         The quantile is that of Student's t with `freedom` degrees of freedom, because a standard error from a few
         groups is itself uncertain.
         """
-        # a standard error that says nothing gives an interval from zero to infinity
+        # a very large standard error gives an interval from zero to infinity
         with np.errstate(over="ignore"):
             factor = float(np.exp(stats.t.ppf(0.975, freedom) * standard_error))
         return Estimate(value, value / factor, value * factor)
