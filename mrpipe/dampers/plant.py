@@ -183,15 +183,6 @@ def change_yield_force(wire: FloatArray, factor: float) -> None:
     wire[YIELD_LOSS] = 1.0 - (1.0 - wire[YIELD_LOSS]) * factor
 
 
-@njit(void(float64[::1], float64), cache=True)
-def change_yielded_force(wire: FloatArray, factor: float) -> None:
-    """Multiply the yield force by a factor that does not change when the damper yields.
-
-    The stiffness before the yield then changes with the yield force, and the yield displacement does not.
-    """
-    wire[RATE_YIELD] *= factor
-
-
 @njit(STEP_SIGNATURE, cache=True)
 def idle_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Do nothing: padding of short chains."""

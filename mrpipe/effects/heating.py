@@ -11,13 +11,13 @@ from numba import float64, njit, void
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
     FIRST,
+    RATE_YIELD,
     STEP_SIGNATURE,
     VISCOSITY,
     WORK,
     Phase,
     Step,
     change_yield_force,
-    change_yielded_force,
 )
 from mrpipe.effects.contract import Effect, EffectForm, Parameter, Separation, Values, shape, strength
 
@@ -64,7 +64,8 @@ def warming_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt
     if parameters[4] == 0.0:
         change_yield_force(wire, factor)
     else:
-        change_yielded_force(wire, factor)
+        # the stiffness before the yield then falls with the yield force
+        wire[RATE_YIELD] *= factor
     wire[VISCOSITY] *= factor ** parameters[3]
 
 
