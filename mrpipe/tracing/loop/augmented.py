@@ -197,7 +197,9 @@ def simulated_history(
     made = []
     for test in spread(tests):
         for name, drive in (("", test.drive), ("-worked", worked_drive(test, drive_limit, rng))):
-            made.append(replace(test, name=f"{test.name}{name}", drive=drive, force_n=force_over(chain, test, drive)))
+            force = force_over(chain, test, drive)
+            # the recorded drive is not that of the simulation
+            made.append(replace(test, name=f"{test.name}{name}", drive=drive, drive_raw=np.zeros(0), force_n=force))
     return join(made, cycles=CYCLES, sampling_rate_hz=rate_hz)
 
 
