@@ -5,9 +5,10 @@ not take. With the deformation e of the spring and the velocity q of the valve,
 
     k e = H(q; F_y, c0),    e' = v - q,
 
-where H is the Herschel-Bulkley law F_y q/s + c0 q (s/v_ref)^(n - 1), s = sqrt(q^2 + v0^2), or Eyring's law
-F_y asinh(q/v0)/asinh(v_ref/v0) + c0 q. Source: Sims, Peel, Stanway, Johnson, Bullough 2000, J. Sound Vib. 229, 207-227
-(a quasi-steady valve in series with a spring).
+where H is the Herschel-Bulkley law F_y (q/v0)/(1 + |q/v0|^m)^(1/m) + c0 q (s/v_ref)^(n - 1), s = sqrt(q^2 + v0^2), or
+Eyring's law F_y asinh(q/v0)/asinh(v_ref/v0) + c0 q. The sharpness m of the yield point is free, because another
+rounding than that of the damper leaves an error that is similar to friction at low speed. Source: Sims, Peel, Stanway,
+Johnson, Bullough 2000, J. Sound Vib. 229, 207-227 (a quasi-steady valve in series with a spring).
 
 The equation is stiff, because the valve hardly moves below the yield force. The two-stage diagonally implicit
 Runge-Kutta method of second order (Alexander 1977, SIAM J. Numer. Anal. 14, 1006-1021) is L-stable. Each stage is one
@@ -35,6 +36,7 @@ from mrpipe.dampers.plant import (
     Phase,
     Step,
 )
+from mrpipe.dampers.viscoplastic import knee
 
 HERSCHEL_BULKLEY = 0
 EYRING = 1
@@ -49,12 +51,14 @@ _LAST_STEP = 1e-4
 """Numerical technique: last step of the iterations, relative to the velocity plus the velocity scale."""
 
 
-@njit(float64(int64, float64, float64, float64), cache=True)
-def yield_share(law: int, q: float, scale: float, reference: float) -> float:
+@njit(float64(int64, float64, float64, float64, float64), cache=True)
+def yield_share(law: int, q: float, scale: float, reference: float, sharpness: float) -> float:
     """Return the factor of F_y in the force of the valve at the velocity `q` [m/s]."""
     if law == EYRING:
         return math.asinh(q / scale) / math.asinh(reference / scale)
-    return q / math.sqrt(q * q + scale * scale)
+    if sharpness == 2.0:
+        return q / math.sqrt(q * q + scale * scale)
+    return knee(q / scale, sharpness)
 
 
 @njit(float64(int64, float64, float64, float64, float64), cache=True)
@@ -65,7 +69,7 @@ def viscous_velocity(law: int, q: float, scale: float, reference: float, power: 
     return q * (math.sqrt(q * q + scale * scale) / reference) ** (power - 1.0)
 
 
-@njit(float64(int64, float64, float64, float64, float64, float64, float64, float64, float64), cache=True)
+@njit(float64(int64, float64, float64, float64, float64, float64, float64, float64, float64, float64), cache=True)
 def flow_velocity(
     law: int,
     load: float,
@@ -76,12 +80,13 @@ def flow_velocity(
     scale: float,
     reference: float,
     power: float,
+    sharpness: float,
 ) -> float:
     """Return q of H(q) + weight q = load; Newton's method within an interval that always holds the solution.
 
     Parameters
     ----------
-    law, strength, viscosity, scale, reference, power
+    law, strength, viscosity, scale, reference, power, sharpness
         The valve; `strength` is F_y, for Eyring's law F_y/asinh(v_ref/v0) [N].
     load
         Right side [N].
@@ -102,8 +107,13 @@ def flow_velocity(
             slope = strength / rounded + viscosity
         else:
             thinning = viscosity if power == 1.0 else viscosity * (rounded / reference) ** (power - 1.0)
-            force = (strength / rounded + thinning) * q
-            slope = strength * scale * scale / (square * rounded) + thinning * (1.0 + (power - 1.0) * q * q / square)
+            if sharpness == 2.0:
+                plastic, rise = q / rounded, scale * scale / (square * rounded)
+            else:
+                plastic = knee(q / scale, sharpness)
+                rise = (plastic * scale / q) ** (sharpness + 1.0) / scale if q > 0.0 else 1.0 / scale
+            force = strength * plastic + thinning * q
+            slope = strength * rise + thinning * (1.0 + (power - 1.0) * q * q / square)
         excess = force + weight * q - load
         if excess > 0.0:
             high = q
@@ -111,10 +121,12 @@ def flow_velocity(
             low = q
         after = q - excess / (slope + weight)
         if after < low or after > high:
-            after = 0.5 * (low + high)
+            q = 0.5 * (low + high)
+            continue
         change = abs(after - q)
         q = after
-        # the error after a step of Newton's method is the square of the step, relative to the scale of the law
+        # the error after a step of Newton's method is the square of the step, relative to the scale of the law; a
+        # bisection leaves an error as large as its step
         if change <= _LAST_STEP * (q + scale):
             break
     return sign * q
@@ -122,9 +134,9 @@ def flow_velocity(
 
 @njit(STEP_SIGNATURE, cache=True)
 def series_valve_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: law, stiffness [N/m], velocity scale [m/s], reference velocity [m/s], exponent. State: last
-    displacement [m], deformation of the spring [m], last velocity [m/s], last yield force [N], last viscosity [N s/m],
-    last velocity of the valve [m/s].
+    """Parameters: law, stiffness [N/m], velocity scale [m/s], reference velocity [m/s], exponent, sharpness. State:
+    last displacement [m], deformation of the spring [m], last velocity [m/s], last yield force [N], last viscosity
+    [N s/m], last velocity of the valve [m/s].
 
     The velocity of the valve, raised to its exponent, replaces that of the rod. A long interval is divided, because the
     yield force can change while the spring is strained.
@@ -132,7 +144,7 @@ def series_valve_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
     x, v = wire[DISPLACEMENT], wire[VELOCITY]
     wire[OUTER_VELOCITY] = v
     law, stiffness = int(parameters[0]), parameters[1]
-    scale, reference, power = parameters[2], parameters[3], parameters[4]
+    scale, reference, power, sharpness = parameters[2], parameters[3], parameters[4], parameters[5]
     strength, viscosity = max(wire[YIELD_FORCE], 0.0), max(wire[VISCOSITY], 0.0)
     if wire[FIRST] > 0.5:
         state[0] = x
@@ -155,12 +167,12 @@ def series_valve_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
         limit = norm * (state[3] + middle * (strength - state[3]))
         thick = state[4] + middle * (viscosity - state[4])
         first = flow_velocity(
-            law, stiffness * (e + _SDIRK * h * speed), weight, q, limit, thick, scale, reference, power
+            law, stiffness * (e + _SDIRK * h * speed), weight, q, limit, thick, scale, reference, power, sharpness
         )
         limit = norm * (state[3] + end * (strength - state[3]))
         thick = state[4] + end * (viscosity - state[4])
         load = e + after - place - (1.0 - _SDIRK) * h * first
-        q = flow_velocity(law, stiffness * load, weight, first, limit, thick, scale, reference, power)
+        q = flow_velocity(law, stiffness * load, weight, first, limit, thick, scale, reference, power, sharpness)
         e = load - _SDIRK * h * q
         place = after
     state[0] = x
@@ -169,12 +181,17 @@ def series_valve_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
     state[3] = strength
     state[4] = viscosity
     state[5] = q
-    wire[HYSTERESIS] = yield_share(law, q, scale, reference)
+    wire[HYSTERESIS] = yield_share(law, q, scale, reference, sharpness)
     wire[VELOCITY] = viscous_velocity(law, q, scale, reference, power)
 
 
 def series_valve(
-    law: int, stiffness: float, velocity_scale: float, reference_velocity: float, exponent: float = 1.0
+    law: int,
+    stiffness: float,
+    velocity_scale: float,
+    reference_velocity: float,
+    exponent: float = 1.0,
+    sharpness: float = 2.0,
 ) -> Step:
     """Return the spring in series with a valve as a step.
 
@@ -190,6 +207,8 @@ def series_valve(
         v_ref [m/s]: velocity for which F_y (Eyring) or c0 (Herschel-Bulkley) is given.
     exponent
         n of Herschel and Bulkley; 1 is Bingham's law.
+    sharpness
+        m of the yield point of Herschel and Bulkley; 2 is a square root.
     """
-    numbers = np.array([law, stiffness, velocity_scale, reference_velocity, exponent], dtype=np.float64)
+    numbers = np.array([law, stiffness, velocity_scale, reference_velocity, exponent, sharpness], dtype=np.float64)
     return Step("series-valve", Phase.HYSTERESIS, series_valve_step, numbers, state_size=6)

@@ -47,6 +47,17 @@ def sign_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
     wire[HYSTERESIS] = rounded_sign(wire[VELOCITY], parameters[0])
 
 
+@njit(float64(float64, float64), cache=True)
+def knee(ratio: float, sharpness: float) -> float:
+    """Return r/(1 + |r|^n)^(1/n): a square root for n = 2, close to a hyperbolic tangent for n = 2.7, a sharp knee for
+    large n (Ramberg and Osgood 1943)."""
+    size = abs(ratio)
+    # both branches are the same function; each avoids an overflow of the power
+    if size <= 1.0:
+        return ratio / (1.0 + size**sharpness) ** (1.0 / sharpness)
+    return math.copysign(1.0 / (1.0 + size ** (-sharpness)) ** (1.0 / sharpness), ratio)
+
+
 def velocity_sign(transition_velocity: float = 0.0) -> Step:
     """Return the sign of the velocity in (6.1); with a transition velocity [m/s] above 0 it is a tanh."""
     return Step("velocity-sign", Phase.HYSTERESIS, sign_step, np.array([float(transition_velocity)]))

@@ -40,9 +40,10 @@ NUMBERS: dict[str, dict[str, float]] = {
     "bingham": {"transition_velocity": 0.01},
     "bingham-spring": {"spring_stiffness": 6e4},
     "herschel-bulkley-spring": {
-        "spring_stiffness": 6e4, "velocity_scale": 4e-3, "velocity_exponent": 0.7, "reference_velocity": 0.08,
+        "spring_stiffness": 6e4, "velocity_scale": 4e-3, "velocity_exponent": 0.7, "sharpness": 3.0,
+        "reference_velocity": 0.08,
     },
-    "iwan": {"initial_stiffness": 8e4, "spread": 1.5},
+    "iwan": {"initial_stiffness": 8e4, "spread": 1.5, "least_share": 0.2},
     "eyring-spring": {"spring_stiffness": 6e4, "velocity_scale": 4e-3, "reference_velocity": 0.08},
     "biviscous": {"yield_velocity": 0.02, "rest_share": 0.4, "bend": 1.0, "largest_drive": 2.0},
     "hysteretic-biviscous": {
@@ -109,7 +110,8 @@ def integrated(rate, start, t):
 def iwan_loop(x: np.ndarray, p: dict[str, float]) -> np.ndarray:
     """Return the force of 400 elements over the yield force; each follows the motion as a play does."""
     shares = (np.arange(400) + 0.5) / 400
-    limits = shares ** p["spread"] * YIELD / p["initial_stiffness"] / np.mean(shares ** p["spread"])
+    relative = p["least_share"] + (1.0 - p["least_share"]) * shares ** p["spread"] * (p["spread"] + 1.0)
+    limits = relative * YIELD / p["initial_stiffness"]
     centre = np.full(400, x[0])
     force = np.empty_like(x)
     for place, here in enumerate(x):
@@ -127,7 +129,8 @@ def valve_velocity(name: str, force: float) -> float:
         if name == "eyring-spring":
             return YIELD * math.asinh(q / scale) / math.asinh(reference / scale) + VISCOSITY * q - force
         rounded = math.hypot(q, scale)
-        return q * (YIELD / rounded + VISCOSITY * (rounded / reference) ** (p["velocity_exponent"] - 1.0)) - force
+        plastic = YIELD / (abs(q) ** p["sharpness"] + scale ** p["sharpness"]) ** (1.0 / p["sharpness"])
+        return q * (plastic + VISCOSITY * (rounded / reference) ** (p["velocity_exponent"] - 1.0)) - force
 
     return float(brentq(excess, -5.0, 5.0, xtol=1e-13))
 

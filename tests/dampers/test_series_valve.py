@@ -14,6 +14,7 @@ from mrpipe.dampers.form import Strength
 from mrpipe.dampers.library import base_form
 from mrpipe.dampers.plant import FORCE, build_chain, run_chain
 from mrpipe.dampers.series_valve import EYRING, HERSCHEL_BULKLEY, flow_velocity, viscous_velocity, yield_share
+from mrpipe.dampers.viscoplastic import knee
 from tests.dampers.test_forms import DRIVE, VISCOSITY, YIELD, motion
 
 
@@ -27,14 +28,18 @@ from tests.dampers.test_forms import DRIVE, VISCOSITY, YIELD, motion
     viscosity=st.floats(0.0, 1e5),
     scale=st.floats(1e-5, 1.0),
     power=st.floats(0.1, 2.0),
+    sharpness=st.one_of(st.just(2.0), st.floats(1.0, 12.0)),
 )
-def test_the_velocity_of_the_valve_solves_its_equation(law, load, weight, start, strength, viscosity, scale, power):
+def test_the_velocity_of_the_valve_solves_its_equation(
+    law, load, weight, start, strength, viscosity, scale, power, sharpness
+):
     reference = 0.3
     norm = 1.0 / math.asinh(reference / scale) if law == EYRING else 1.0
-    q = flow_velocity(law, load, weight, start, norm * strength, viscosity, scale, reference, power)
+    q = flow_velocity(law, load, weight, start, norm * strength, viscosity, scale, reference, power, sharpness)
     viscous = viscosity * viscous_velocity(law, q, scale, reference, power)
-    left = strength * yield_share(law, q, scale, reference) + viscous + weight * q - load
-    assert abs(left) <= 1e-5 * max(abs(load), 1e-9)
+    left = strength * yield_share(law, q, scale, reference, sharpness) + viscous + weight * q - load
+    # below a hundredth of the yield force the error relative to the yield force counts
+    assert abs(left) <= 1e-5 * max(abs(load), 0.01 * strength, 1e-6)
 
 
 @pytest.mark.property
@@ -46,14 +51,20 @@ def test_the_velocity_of_the_valve_solves_its_equation(law, load, weight, start,
     power=st.floats(0.1, 2.0),
     strength=st.floats(0.0, 1e5),
     viscosity=st.floats(0.0, 1e5),
+    sharpness=st.one_of(st.just(2.0), st.floats(1.0, 12.0)),
 )
 def test_post_yield_force_of_an_inverse_is_that_of_the_valve(
-    form, law, speed, scale, reference, power, strength, viscosity
+    form, law, speed, scale, reference, power, strength, viscosity, sharpness
 ):
-    values = {"velocity_scale": scale, "velocity_exponent": power, "reference_velocity": reference}
+    values = {
+        "velocity_scale": scale,
+        "velocity_exponent": power,
+        "reference_velocity": reference,
+        "sharpness": sharpness,
+    }
     zero = np.zeros(1)
     at = Strength(zero + speed, zero, zero + strength, zero + viscosity, zero)
-    plastic = strength * yield_share(law, speed, scale, reference)
+    plastic = strength * yield_share(law, speed, scale, reference, sharpness)
     viscous = viscosity * viscous_velocity(law, speed, scale, reference, power)
     assert base_form(form).post_yield(values, at)[0] == pytest.approx(plastic + viscous, rel=1e-12)
 
@@ -93,3 +104,11 @@ def test_with_a_rigid_spring_the_force_is_that_of_the_valve(form: str) -> None:
         rounded = np.hypot(v, 4e-3)
         truth = YIELD * v / rounded + VISCOSITY * v * (rounded / 0.08) ** -0.4
     assert relative_error(found[1:], truth[1:]) < 1e-3
+
+
+@pytest.mark.property
+def test_a_sharpness_of_2_7_is_close_to_a_hyperbolic_tangent_and_12_to_a_sharp_yield_point() -> None:
+    ratio = np.linspace(0.0, 6.0, 601)
+    smooth, sharp = (np.array([knee(value, sharpness) for value in ratio]) for sharpness in (2.7, 12.0))
+    np.testing.assert_allclose(smooth, np.tanh(ratio), atol=0.02)
+    np.testing.assert_allclose(sharp, np.minimum(ratio, 1.0), atol=0.06)

@@ -3,8 +3,6 @@
 # ruff: noqa: ARG001 - all steps share one signature, used in full or not
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
@@ -12,18 +10,14 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
 from mrpipe.dampers.parameters import Parameter, Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.viscoplastic import knee
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def algebraic_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: velocity scale [m/s], frequency [1/s] that weights the displacement, sharpness of the knee."""
     ratio = (wire[VELOCITY] + parameters[1] * wire[DISPLACEMENT]) / parameters[0]
-    size, sharpness = abs(ratio), parameters[2]
-    # both branches are the same function; each avoids an overflow of the power
-    if size <= 1.0:
-        wire[HYSTERESIS] = ratio / (1.0 + size**sharpness) ** (1.0 / sharpness)
-    else:
-        wire[HYSTERESIS] = math.copysign(1.0 / (1.0 + size ** (-sharpness)) ** (1.0 / sharpness), ratio)
+    wire[HYSTERESIS] = knee(ratio, parameters[2])
 
 
 def _steps(values: Values) -> list[Step]:

@@ -20,25 +20,31 @@ def _steps(values: Values) -> list[Step]:
         values["velocity_scale"],
         values["reference_velocity"],
         values["velocity_exponent"],
+        values.get("sharpness", 2.0),
     )
     return [valve, outer_velocity()]
 
 
 def _post_yield(values: Values, at: Strength) -> FloatArray:
+    sharpness = values.get("sharpness", 2.0)
     rounded = np.sqrt(at.speed**2 + values["velocity_scale"] ** 2)
     thinning = (rounded / values["reference_velocity"]) ** (values["velocity_exponent"] - 1.0)
-    return np.asarray(at.yield_force * at.speed / rounded + at.viscosity * at.speed * thinning, dtype=np.float64)
+    ratio = at.speed / values["velocity_scale"]
+    share = ratio / (1.0 + ratio**sharpness) ** (1.0 / sharpness)
+    return np.asarray(at.yield_force * share + at.viscosity * at.speed * thinning, dtype=np.float64)
 
 
 FORM = BaseForm(
     name="herschel-bulkley-spring",
-    summary="Herschel-Bulkley valve F_y sign(w') + c0 v_ref (|w'|/v_ref)^n sign(w') with a spring in series",
+    summary="Herschel-Bulkley valve F_y sign(w') + c0 v_ref (|w'|/v_ref)^n sign(w') with a rounded yield point, and a "
+    "spring in series",
     source="Sims, Peel, Stanway, Johnson, Bullough 2000, J. Sound Vib. 229, 207-227; Lee and Wereley 1999, J. Intell. "
-    "Mater. Syst. Struct. 10, 761-769 (Herschel-Bulkley flow in a valve)",
+    "Mater. Syst. Struct. 10, 761-769 (Herschel-Bulkley flow in a valve); Ramberg, Osgood 1943 (sharpness)",
     parameters=(
         SPRING_STIFFNESS,
         shape("velocity_scale", "m/s", "velocity at which the valve yields", "speed", 1e-4, 1.0, (0.01, 0.1)),
         shape("velocity_exponent", "1", "power of the velocity in the viscous force", "one", 0.1, 2.0, (0.7,)),
+        shape("sharpness", "1", "m: 2 is a square root, infinity a sharp yield point", "one", 1.0, 12.0, (2.0,)),
         constant("reference_velocity", "m/s", "speed for which the viscosity is given", "speed"),
     ),
     steps=_steps,

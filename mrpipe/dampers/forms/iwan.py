@@ -1,9 +1,11 @@
 """Parallel elastic-plastic elements with a distribution of yield displacements.
 
 Each element is a spring with a slider. All springs together have the constant stiffness k, and all sliders together the
-yield force F_y(u). A share s of the stiffness belongs to elements whose yield displacement is at most proportional to
-s^spread: 0 is one elastic-plastic element, and 1/(chi + 1) gives the density phi^chi of Segalman without its delta
-function. Discrete elements at equal steps of s represent the distribution.
+yield force F_y(u). A share s of the stiffness belongs to elements whose yield displacement over the mean one is at most
+r + (1 - r) g(s), where g is proportional to s^a. Iwan's distribution is uniform between two limits (a = 1). A damper
+that is elastic up to its first slip has a least share r above 0. With r = 0, a = 0 is one elastic-plastic element, and
+a = 1/(chi + 1) gives the density phi^chi of Segalman without its delta function. Discrete elements at equal steps of s
+represent the distribution.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from numba import float64, njit, void
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.hysteresis import INITIAL_STIFFNESS, displacement_between, parts_of, turning_share
-from mrpipe.dampers.parameters import Values, shape
+from mrpipe.dampers.parameters import Parameter, Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
 
 ELEMENTS = 24
@@ -70,25 +72,28 @@ def iwan_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
     wire[HYSTERESIS] = stiffness * total / (ELEMENTS * strength)
 
 
-def yield_displacements(spread: float) -> FloatArray:
+def yield_displacements(spread: float, least_share: float = 0.0) -> FloatArray:
     """Return the yield displacement of each element over the mean one, shape (`ELEMENTS`,)."""
     shares = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
     relative = shares**spread
-    return np.asarray(relative / np.mean(relative), dtype=np.float64)
+    return np.asarray(least_share + (1.0 - least_share) * relative / np.mean(relative), dtype=np.float64)
 
 
 def _steps(values: Values) -> list[Step]:
-    numbers = np.array([values["initial_stiffness"], *yield_displacements(values["spread"])])
+    relative = yield_displacements(values["spread"], values.get("least_share", 0.0))
+    numbers = np.array([values["initial_stiffness"], *relative])
     return [Step("iwan", Phase.HYSTERESIS, iwan_step, numbers, state_size=_HEAD + ELEMENTS)]
 
 
 FORM = BaseForm(
     name="iwan",
-    summary="Elastic-plastic elements in parallel, their yield displacements proportional to s^a for s from 0 to 1",
+    summary="Elastic-plastic elements in parallel, their yield displacements proportional to r + (1 - r) (a + 1) s^a "
+    "for s from 0 to 1",
     source="Iwan 1966, J. Appl. Mech. 33, 893-900; Segalman 2005, J. Appl. Mech. 72, 752-760",
     parameters=(
         INITIAL_STIFFNESS,
         shape("spread", "1", "exponent of the distribution of the yield displacements", "one", 1e-3, 6.0, (1.0, 0.1)),
+        Parameter("least_share", "1", "r: least yield displacement over the mean one", "one", 0.0, 1.0, (0.0, 0.3)),
     ),
     steps=_steps,
     coupled=True,

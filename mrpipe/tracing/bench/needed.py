@@ -12,6 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.reference import with_own_laws
+from mrpipe.tracing.bench.crossvalidation import Gain
 from mrpipe.tracing.bench.race import Race, on_all_tests
 from mrpipe.tracing.bench.refine import with_best_forms
 from mrpipe.tracing.bench.rivals import Orders, best_rival, taken
@@ -64,6 +66,49 @@ def without_superfluous(
     return kept
 
 
+def without_idle(
+    selection: Selection, gains: Sequence[Gain | None], declared: int, *, lead: float
+) -> tuple[Selection, list[Gain | None], str]:
+    """Return the selection, its gains, and why no effect is named if the model fits as well without its effects.
+
+    A fit with an effect may end in a better minimum of the other parameters than any fit without the effect has found.
+    Then these parameters lower the error, and not the effect. Each effect is therefore left out once, and the other
+    parameters are fitted again from where they ended. The reason is empty if effects remain.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit, without further terms.
+    gains
+        Gains of the named effects on tests that were left out.
+    declared
+        Number of terms that the campaign declares; they are part of every model.
+    lead
+        An effect is dropped if the fit without it has at most this multiple of the chi-square of the fit with it.
+    """
+    kept, left = selection, list(gains)
+    while kept.proven > 0 and len(named := _named(kept, declared)) > 0:
+        fits = [(with_own_laws(in_order(kept.chosen, _others(kept.chosen, place))), place) for place in named]
+        best, place = min(fits, key=lambda item: item[0].chi_square)
+        if best.chi_square > lead * kept.chosen.chi_square:
+            break
+        name, number = kept.chosen.problem.terms[place].effect.name, place - declared
+        rest = tuple(item for k, item in enumerate(kept.rounds) if k != number)
+        alone = len(best.problem.terms) == declared
+        kept = replace(
+            kept,
+            chosen=best,
+            ground=best if alone else kept.ground,
+            proven=len(named) - 1,
+            rounds=rest or kept.rounds[:1],
+            extension=None,
+        )
+        left = [gain for k, gain in enumerate(left) if k != number]
+        if alone:
+            return kept, left, f"no effect is named: the base form fits as well without {name}"
+    return kept, left, ""
+
+
 def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: int) -> Selection | None:
     """Return the selection without one of its named effects, under the same base form; None if each is needed."""
     small = draft(kept.chosen)
@@ -81,14 +126,13 @@ def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: 
     full, best = (on_all_tests(item, kept.chosen.problem) for item in (full, best))
     if best.chi_square > lead * full.chi_square:
         return None
-    others = [k for k in range(len(full.problem.terms)) if k != place]
     return replace(
         kept,
         chosen=best,
         proven=kept.proven - 1,
         # a round that compares the remaining effects with their rivals; the first round even if its winner was dropped
         rounds=kept.rounds[: place - declared] or kept.rounds[:1],
-        extension=in_order(full, [*others, place]),
+        extension=in_order(full, [*_others(full, place), place]),
     )
 
 
@@ -105,7 +149,7 @@ def _with_rival(
     if race is None:
         return None
     small, named = draft(kept.chosen), _named(kept, declared)
-    sets = [[k for k in range(len(small.problem.terms)) if k != place] for place in named]
+    sets = [_others(small, place) for place in named]
     limit = (1.0 + worth_a_try) * kept.noise
     # the best forms only lower the error, and they take long
     full = with_best_forms(small, named, jobs=jobs) if small.chi_square > limit else None
@@ -124,10 +168,13 @@ def _named(kept: Selection, declared: int) -> range:
     return range(declared, min(declared + kept.proven, len(kept.chosen.problem.terms)))
 
 
+def _others(found: Fit, place: int) -> list[int]:
+    return [k for k in range(len(found.problem.terms)) if k != place]
+
+
 def _without(found: Fit, place: int, named: range, orders: Orders) -> Fit:
     """Return the fit without one term, with adequate laws of the drive and the best forms of the other named terms."""
-    others = [k for k in range(len(found.problem.terms)) if k != place]
-    start = orders.adequate(in_order(found, others))
+    start = orders.adequate(in_order(found, _others(found, place)))
     return with_best_forms(start, range(named.start, named.stop - 1))
 
 

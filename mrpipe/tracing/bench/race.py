@@ -231,6 +231,10 @@ def race(
     def searched(name: str) -> None:
         progress(0.25 + 0.1 * len(searches), f"effects with the base form {name}")
         searches[name] = search(singles[name])
+        if searches[name].base is not singles[name]:
+            # an effect led to a better optimum of the base form
+            singles[name] = searches[name].base
+            fits.append(singles[name])
         fits.extend(item.fit for candidates in searches[name].rounds for item in candidates)
         fits.append(searches[name].chosen)
 

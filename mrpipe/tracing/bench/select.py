@@ -317,8 +317,9 @@ def forward_selection(
 ) -> Selection:
     """Add effects one after another, while each recovers a sufficient share.
 
-    A further term counts as a separate cause only if it recovers a large share of the remaining residual and is clearly
-    better than the other families. Otherwise it, and every later term, may only correct the form of an earlier effect.
+    The base of the result differs from `base` if an effect led to a better optimum of its parameters. A further term
+    counts as a separate cause only if it recovers a large share of the remaining residual and is clearly better than
+    the other families. Otherwise it, and every later term, may only correct the form of an earlier effect.
     """
     rules = rules or SelectionRules()
     rounds: list[tuple[Candidate, ...]] = []
@@ -342,6 +343,12 @@ def forward_selection(
             jobs=jobs,
             progress=progress,
         )
+        nearer = chosen if rounds else _nearer(chosen, found[0].fit, rules.better_optimum)
+        if nearer is not chosen:
+            # an effect has only led to a better optimum of the base: what is missing is judged from there
+            return forward_selection(
+                nearer, noise, terms, most=most, refits=refits, rules=rules, jobs=jobs, progress=progress
+            )
         able = [item for item in found if admissible(item.fit, rules.main_part)]
         if rounds and rules.lead > 1.0:
             # with other effects present, a parameter at its bound corrects a form, and it extrapolates badly

@@ -22,7 +22,7 @@ from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residua
 from mrpipe.tracing.bench.drive_again import with_final_laws
 from mrpipe.tracing.bench.gates import judged, refusal_of, validated
 from mrpipe.tracing.bench.law_rival import without_laws_of_drive
-from mrpipe.tracing.bench.needed import without_superfluous
+from mrpipe.tracing.bench.needed import without_idle, without_superfluous
 from mrpipe.tracing.bench.nuisances import observation_window
 from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
 from mrpipe.tracing.bench.offsets import offset_between_tests
@@ -138,6 +138,8 @@ def _named_on_training(
     else:
         compared = Unseen(options.folds, options.bootstrap_draws, rng)
         selection = _refined(selection, declared, baseline.model_error, options, rng, jobs)
+        selection, gains, reason = without_idle(selection, gains, declared, lead=_lead(baseline, options))
+    if not reason and selection.proven:
         selection, gains, reason = without_laws_of_drive(selection, gains, declared, compared, jobs)
     selection = with_final_laws(selection, options.rules.refinement.least_gain)
     selection = with_further_terms(
@@ -185,12 +187,10 @@ def _needed(
     """Return the selection without superfluous effects, with the base form that fits best with the remaining ones."""
     rules = options.rules
     orders = Orders(options.yield_order, options.viscosity_order)
-    by_force = choice.baseline.model_error
-    lead = (rules.selection_by_force if by_force else rules.selection).lead
     kept = without_superfluous(
         selection,
         declared,
-        lead=lead,
+        lead=_lead(choice.baseline, options),
         orders=orders,
         worth_a_try=rules.refinement.worth_a_try,
         race=choice.race,
@@ -201,12 +201,17 @@ def _needed(
         declared,
         orders,
         choice.race,
-        model_error=by_force,
+        model_error=choice.baseline.model_error,
         worth_a_try=rules.refinement.worth_a_try,
         lead=rules.race.form_lead,
         unseen=Unseen(options.folds, options.bootstrap_draws, rng),
         jobs=jobs,
     )
+
+
+def _lead(baseline: Baseline, options: TracingOptions) -> float:
+    """Return the multiple of the chi-square with an effect up to which a model without it is as good."""
+    return (options.rules.selection_by_force if baseline.model_error else options.rules.selection).lead
 
 
 def _refined(

@@ -9,7 +9,7 @@ import pytest
 from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
-from mrpipe.tracing.bench.needed import without_superfluous
+from mrpipe.tracing.bench.needed import without_idle, without_superfluous
 from mrpipe.tracing.bench.rivals import Orders
 from mrpipe.tracing.bench.select import Selection
 from tests.tracing.bench.fits import plain_fit
@@ -63,3 +63,32 @@ def test_what_is_dropped_is_offered_as_a_further_term() -> None:
     kept = without_superfluous(selection, 0, lead=1.25, orders=Orders(3, 1), worth_a_try=0.1)
     assert kept.extension is not None
     assert [term.effect.name for term in kept.extension.problem.terms] == ["end-stop", "accumulator"]
+
+
+def test_an_effect_that_had_only_led_to_a_better_optimum_of_the_base_form_is_not_named() -> None:
+    plain = plain_fit("")
+    # another search of the same base form that has ended far from the optimum
+    poor = fit(plain.problem, plain.theta + 0.7, iterations=0)
+    chosen = _with_terms("", ("backlash", "lost-motion"))
+    assert chosen.chi_square < 0.2 * poor.chi_square
+    selection = Selection(plain, 1.0, (), chosen, proven=1, ground=poor)
+    kept, gains, reason = without_idle(selection, [None], 0, lead=1.25)
+    assert kept.proven == 0
+    assert kept.chosen.problem.terms == ()
+    assert kept.without_effects.chi_square < 1.25 * chosen.chi_square
+    assert gains == []
+    assert reason == "no effect is named: the base form fits as well without backlash"
+
+
+def test_an_effect_that_is_there_stays_where_its_base_form_is_fitted_again() -> None:
+    chosen = _with_terms("accumulator", ("accumulator", "linear"))
+    selection = Selection(plain_fit("accumulator"), 1.0, (), chosen, proven=1)
+    assert without_idle(selection, [None], 0, lead=1.25) == (selection, [None], "")
+
+
+def test_of_two_effects_only_the_idle_one_is_dropped() -> None:
+    chosen = _with_terms("accumulator", ("backlash", "lost-motion"), ("accumulator", "linear"))
+    selection = Selection(plain_fit("accumulator"), 1.0, (), chosen, proven=2)
+    kept, _, reason = without_idle(selection, [None, None], 0, lead=1.25)
+    assert [term.effect.name for term in kept.chosen.problem.terms] == ["accumulator"]
+    assert (kept.proven, reason) == (1, "")

@@ -132,3 +132,16 @@ def test_a_large_first_effect_does_not_hide_a_second_one_that_is_clear(monkeypat
     assert found.proven == 2
     # at two noise floors the rest may be an error of the form of the first effect
     assert selection_of(monkeypatch, 350.0, 3.5, 1.1).chosen.chi_square == 3.5
+
+
+@pytest.mark.planted
+def test_an_effect_that_leads_to_a_better_optimum_of_the_base_form_is_not_chosen() -> None:
+    """A clean Iwan damper was called backlash with a gap of zero: its base form had been fitted badly."""
+    plain = plain_fit("")
+    poor = fit(plain.problem, plain.theta + 0.7, iterations=0)
+    backlash = damper_effects()["backlash"]
+    terms = [Term(backlash, form) for form in backlash.forms]
+    found = forward_selection(poor, plain.chi_square, terms)
+    assert found.chosen.problem.terms == ()
+    assert found.base is not poor
+    assert found.base.chi_square < 1.05 * plain.chi_square

@@ -27,7 +27,9 @@ FORMS = ("bouc-wen", "dahl", "hyperbolic-tangent")
 
 @functools.cache
 def traced(effect: str) -> Tracing:
-    options = TracingOptions(base_forms=FORMS, refits=2, bootstrap_draws=100, most_effects=1 + effect.count("+"))
+    # each base form is combined with every form of remanence, which takes most of the time of this test
+    forms = FORMS[:2] if effect == "remanence" else FORMS
+    options = TracingOptions(base_forms=forms, refits=2, bootstrap_draws=100, most_effects=1 + effect.count("+"))
     single = ("accumulator", "backlash", "channel-skew", "heating", "inertia", "remanence", "stribeck")
     names = ("accumulator", "backlash", "stribeck") if "+" in effect else single
     library = {name: damper_effects()[name] for name in names}
@@ -118,14 +120,14 @@ def test_offsets_of_tests_are_told_beside_an_unknown_rest() -> None:
 @pytest.mark.planted
 def test_play_under_a_rounded_yield_is_named_and_the_yield_is_the_base_form() -> None:
     options = TracingOptions(
-        base_forms=("bouc-wen", "rounded-yield", "yielding-part"), refits=2, bootstrap_draws=50, most_effects=2,
+        base_forms=("bouc-wen", "rounded-yield"), refits=2, bootstrap_draws=50, most_effects=2,
         model_error_share=0.1, fit_rate_hz=125.0,
     )  # fmt: skip
     library = {"backlash": damper_effects()["backlash"]}
     tests = campaign("rounded+wide-backlash")[1:13:2] + campaign("rounded+wide-backlash")[11:13]
     summary = trace_campaign(tests, library, [], options, rng=np.random.default_rng(1)).summary
     assert [item["name"] for item in summary["effects"]] == ["backlash"]
-    assert summary["base_form"]["taken"] in ("rounded-yield", "yielding-part")
+    assert summary["base_form"]["taken"] == "rounded-yield"
     # play and roundness of the yield trade off, so the gap is known less well than the name
     assert summary["effects"][0]["parameters"]["gap"]["value"] == pytest.approx(6e-4, rel=0.25)
 
