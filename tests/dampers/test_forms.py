@@ -33,7 +33,7 @@ NUMBERS: dict[str, dict[str, float]] = {
     "bouc-wen-free": {
         "yield_displacement": 8e-4, "gamma_share": 0.7, "exponent": 1.4, "growth": 0.6, "reference_force": 60.0,
     },
-    "elastic-plastic": {"initial_stiffness": 8e4, "exponent": 6.0},
+    "elastic-plastic": {"initial_stiffness": 8e4, "exponent": 6.0, "gamma_share": 0.7},
     "dahl": {"yield_displacement": 8e-4},
     "duhem": {"yield_displacement": 8e-4, "power": 1.6, "tilt": 0.5, "curvature": -0.3},
     "dahl-stiffness": {"initial_stiffness": 8e4},
@@ -314,7 +314,8 @@ def test_the_general_loop_contains_those_of_dahl_and_nearly_those_of_bouc_and_we
     "name", ["bingham-spring", "elastic-plastic", "gamota-filisko", "herschel-bulkley-spring", "eyring-spring"]
 )
 def test_a_yield_force_that_changes_with_the_direction_is_followed_at_250_hz(name: str) -> None:
-    stiff = {key: 5.0 * number for key, number in NUMBERS[name].items() if key != "exponent"}
+    shapes = ("exponent", "gamma_share", "velocity_exponent", "sharpness")
+    stiff = {key: 5.0 * number for key, number in NUMBERS[name].items() if key not in shapes}
     changing = all_effects()["asymmetry"].form("yield-force").steps({"share": 0.2, "transition_velocity": 0.006})
     steps = [polynomial_coefficients([YIELD], [VISCOSITY]), *base_form(name).steps(NUMBERS[name] | stiff), *changing]
 
@@ -404,3 +405,22 @@ def test_a_faulty_file_is_reported_in_one_line(tmp_path: Path) -> None:
         form_of_file(path)
     with pytest.raises(UserError, match="did you mean bingham"):
         base_form("binghamm")
+
+
+@pytest.mark.property
+@pytest.mark.parametrize(("exponent", "gamma_share"), [(1.0, 1.0), (6.0, 0.5)])
+def test_the_force_of_an_elastic_plastic_element_at_rest_follows_only_a_yield_force_that_falls(
+    exponent: float, gamma_share: float
+) -> None:
+    """Dahl's state is the force; a normalised state would let the force grow with the current at rest."""
+    values = {"initial_stiffness": 8e4, "exponent": exponent, "gamma_share": gamma_share}
+    t = np.arange(0.0, 3.0, 1e-3)
+    x = 0.01 * np.minimum(t, 1.0)
+    drive = np.interp(t, [0.0, 1.0, 2.0, 3.0], [1.0, 1.0, 0.2, 1.0])
+    laws = polynomial_coefficients([0.0, 100.0], [0.0])
+    chain = build_chain([laws, *base_form("elastic-plastic").steps(values)])
+    force = run_chain(chain, x, np.gradient(x, t), np.zeros_like(t), drive, 1e-3)[:, FORCE]
+    assert force[999] == pytest.approx(100.0, rel=0.01)
+    assert force[1500] == pytest.approx(60.0, rel=0.02)
+    np.testing.assert_allclose(force[2010:], force[2000], rtol=1e-3)
+    assert force[2000] == pytest.approx(20.0, rel=0.02)

@@ -177,7 +177,7 @@ LIMITS = [
 @pytest.mark.parametrize("name", ["elastic-plastic", "bingham-spring", "gamota-filisko"])
 def test_a_slider_behind_a_spring_yields_at_the_changed_force(name: str) -> None:
     form = base_form(name)
-    values = {p.name: 1e6 for p in form.parameters} | {"exponent": 20.0, "solid_viscosity": 1e6}
+    values = {p.name: 1e6 for p in form.parameters} | {"exponent": 20.0, "gamma_share": 0.5}
     steps = all_effects()["asymmetry"].form("yield-force").steps({"share": 0.2, "transition_velocity": 1e-4})
     x, v, a, _, dt = motion()
     chain = build_chain([polynomial_coefficients([100.0], [0.0]), *form.steps(values), *steps])

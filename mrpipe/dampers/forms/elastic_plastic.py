@@ -7,15 +7,15 @@ from numba import njit
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import INITIAL_STIFFNESS, displacement_between, follow_hysteresis, parts_of
+from mrpipe.dampers.hysteresis import GAMMA_SHARE, INITIAL_STIFFNESS, displacement_between, follow_hysteresis, parts_of
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def elastic_plastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: stiffness [N/m], exponent. State: last displacement [m], force of the element [N], last
-    velocity [m/s], last yield force [N].
+    """Parameters: stiffness [N/m], exponent, gamma share. State: last displacement [m], force of the element [N],
+    last velocity [m/s], last yield force [N].
 
     The force is the state. When the yield force rises, the element first has to be strained to the new yield force.
     When the yield force falls below the force, the element slips until its force is the yield force. A long interval is
@@ -38,7 +38,7 @@ def elastic_plastic_step(wire: FloatArray, state: FloatArray, parameters: FloatA
         held = state[3] + end * (limit - state[3])
         share = min(max(state[1] / held, -1.0), 1.0)
         share = follow_hysteresis(
-            share, place, speed, after, speed_after, dt / count, held / parameters[0], 0.5, parameters[1]
+            share, place, speed, after, speed_after, dt / count, held / parameters[0], parameters[2], parameters[1]
         )
         state[1] = share * held
         place, speed = after, speed_after
@@ -49,17 +49,19 @@ def elastic_plastic_step(wire: FloatArray, state: FloatArray, parameters: FloatA
 
 
 def _steps(values: Values) -> list[Step]:
-    numbers = np.array([values["initial_stiffness"], values["exponent"]])
+    numbers = np.array([values["initial_stiffness"], values["exponent"], values.get("gamma_share", 0.5)])
     return [Step("elastic-plastic", Phase.HYSTERESIS, elastic_plastic_step, numbers, state_size=4)]
 
 
 FORM = BaseForm(
     name="elastic-plastic",
-    summary="F' = k v (1 - |F/F_y(u)|^n) while loading, F' = k v while unloading; F does not jump with the current",
-    source="Prandtl 1928, Z. angew. Math. Mech. 8, 85-106 (n without limit); Ozdemir 1976, PhD thesis, Berkeley",
+    summary="F' = k v (1 - |F/F_y(u)|^n (g + (1 - g) sign(F v))); F does not jump with the current",
+    source="Prandtl 1928, Z. angew. Math. Mech. 8, 85-106 (n without limit); Dahl 1968, TOR-158(3107-18) (g = n = 1); "
+    "Ozdemir 1976, PhD thesis, Berkeley (g = 1)",
     parameters=(
         INITIAL_STIFFNESS,
         shape("exponent", "1", "sharpness of the change from elastic to plastic", "one", 1.0, 50.0, (4.0, 20.0)),
+        GAMMA_SHARE,
     ),
     steps=_steps,
     coupled=True,
