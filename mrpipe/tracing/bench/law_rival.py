@@ -15,6 +15,7 @@ from mrpipe.fitting.drive_laws import YIELD_LAWS
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.crossvalidation import Gain
+from mrpipe.tracing.bench.needed import without_one
 from mrpipe.tracing.bench.rivals import ITERATIONS, Unseen
 from mrpipe.tracing.bench.select import Selection
 
@@ -53,17 +54,8 @@ def without_laws_of_drive(
     if unseen.better(rival, chosen, jobs):
         return selection, kept, ""
     name = chosen.problem.terms[place].effect.name
-    number = place - declared
-    rest = tuple(item for k, item in enumerate(selection.rounds) if k != number)
-    found = replace(
-        selection,
-        chosen=rival,
-        ground=rival if last - declared == 1 else selection.ground,
-        proven=last - declared - 1,
-        rounds=rest or selection.rounds[:1],
-    )
-    kept = [gain for k, gain in enumerate(kept) if k != number]
-    if last - declared > 1:
+    found, kept = without_one(selection, kept, place, declared, rival)
+    if found.proven:
         return found, kept, ""
     return (
         found,

@@ -92,21 +92,40 @@ def without_idle(
         best, place = min(fits, key=lambda item: item[0].chi_square)
         if best.chi_square > lead * kept.chosen.chi_square:
             break
-        name, number = kept.chosen.problem.terms[place].effect.name, place - declared
-        rest = tuple(item for k, item in enumerate(kept.rounds) if k != number)
-        alone = len(best.problem.terms) == declared
-        kept = replace(
-            kept,
-            chosen=best,
-            ground=best if alone else kept.ground,
-            proven=len(named) - 1,
-            rounds=rest or kept.rounds[:1],
-            extension=None,
-        )
-        left = [gain for k, gain in enumerate(left) if k != number]
-        if alone:
+        name = kept.chosen.problem.terms[place].effect.name
+        kept, left = without_one(kept, left, place, declared, best)
+        if not kept.proven:
             return kept, left, f"no effect is named: the base form fits as well without {name}"
     return kept, left, ""
+
+
+def without_one(
+    selection: Selection, gains: Sequence[Gain | None], place: int, declared: int, chosen: Fit
+) -> tuple[Selection, list[Gain | None]]:
+    """Return the selection and its gains without one of its named effects.
+
+    Parameters
+    ----------
+    selection, gains
+        Named effects with their fit, without further terms, and their gains on tests that were left out.
+    place
+        Which term of the model is dropped.
+    declared
+        Number of terms that the campaign declares.
+    chosen
+        The fit without this term.
+    """
+    number = place - declared
+    proven = len(_named(selection, declared)) - 1
+    rest = tuple(item for k, item in enumerate(selection.rounds) if k != number)
+    found = replace(
+        selection,
+        chosen=chosen,
+        ground=selection.ground if proven else chosen,
+        proven=proven,
+        rounds=rest or selection.rounds[:1],
+    )
+    return found, [gain for k, gain in enumerate(gains) if k != number]
 
 
 def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: int) -> Selection | None:

@@ -265,7 +265,8 @@ def _with_window(
         jobs=jobs,
     )
     if selection.ground is not None:
-        again = replace(again, base=base, ground=ground).with_floor(noise)
+        # an effect may have led to a better optimum of the base form
+        again = replace(again, base=base, ground=again.base).with_floor(noise)
     if noise < selection.noise:
         again = judged_by_trees(again, options.rules.model_error)
     known = {term.effect.name for term in selection.chosen.problem.terms}

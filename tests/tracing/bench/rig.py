@@ -93,7 +93,7 @@ def campaign(effect: str, seed: int = 0) -> list[PreparedTest]:
         ("validation", "half-sine", 8, 1.4, 2.5), ("validation", "triangle", 7, 0.8, 2.0),
     ]  # fmt: skip
     tests = []
-    t = np.arange(int(4.0 * RATE)) / RATE
+    t = np.arange(int(3.0 * RATE)) / RATE
     for number, (role, kind, amplitude, frequency, current) in enumerate(plans):
         phase = 2 * np.pi * frequency * t
         wave = np.sin(phase)
@@ -110,7 +110,7 @@ def campaign(effect: str, seed: int = 0) -> list[PreparedTest]:
         force = force_of(x, v, a, drive, t, effect) + 0.5 * rng.standard_normal(len(t))
         measured = x + 4e-6 * rng.standard_normal(len(t))
         period = RATE / frequency
-        cycles = np.round(np.arange(1, 4.0 * frequency) * period).astype(np.int64)
+        cycles = np.round(np.arange(1, 3.0 * frequency) * period).astype(np.int64)
         tests.append(
             PreparedTest(
                 f"{number:02d}-{kind}", role, RATE, t, x, v, a, drive, force, measured, force, cycles, "A", "periodic"
