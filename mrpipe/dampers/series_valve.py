@@ -109,9 +109,16 @@ def flow_velocity(
             thinning = viscosity if power == 1.0 else viscosity * (rounded / reference) ** (power - 1.0)
             if sharpness == 2.0:
                 plastic, rise = q / rounded, scale * scale / (square * rounded)
+            elif q <= scale:
+                # both branches are the function `knee` and its slope; each avoids an overflow of the power
+                growing = 1.0 + (q / scale) ** sharpness
+                rise = growing ** (-1.0 / sharpness) / scale
+                plastic = rise * q
+                rise /= growing
             else:
-                plastic = knee(q / scale, sharpness)
-                rise = (plastic * scale / q) ** (sharpness + 1.0) / scale if q > 0.0 else 1.0 / scale
+                falling = (scale / q) ** sharpness
+                plastic = (1.0 + falling) ** (-1.0 / sharpness)
+                rise = plastic * falling / (q * (1.0 + falling))
             force = strength * plastic + thinning * q
             slope = strength * rise + thinning * (1.0 + (power - 1.0) * q * q / square)
         excess = force + weight * q - load
