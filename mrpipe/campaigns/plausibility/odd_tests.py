@@ -176,9 +176,22 @@ def _score(
     if gains.size < 3 or not np.isfinite(error) or not _covered(index, _all_but(items, index), tests):
         # too little to judge a gain, but decades show in any case
         error = 1.0
-    by = abs(item.log_gain - float(np.median(gains)))
+    usual = float(np.median([items[other].correlation for other in related]))
+    by = _apart(item, float(np.median(gains)), usual)
     error = float(np.hypot(error, POWERS * _beyond(index, _all_but(items, index), tests)))
     return by / limit_of(gains, GAIN_SCATTER, len(items), error)
+
+
+def _apart(item: Agreement, middle: float, usual: float) -> float:
+    """Return the distance between the logarithms of a test's gain and of the gains of the others.
+
+    An error of the prediction, such as a lag of the drive that the map does not contain, lowers both the correlation
+    and the gain that least squares give. The gain therefore lies between this regression and the reverse one, whose
+    logarithm is larger by -2 log(correlation) (Frisch 1934, Statistical Confluence Analysis). The part of this that the
+    other tests have as well, at their `usual` correlation, does not separate the test from them.
+    """
+    upper = item.log_gain + 2.0 * max(float(np.log(usual / item.correlation)), 0.0)
+    return max(item.log_gain - middle, middle - upper, 0.0)
 
 
 def _all_but(items: Mapping[int, Agreement], index: int) -> list[int]:

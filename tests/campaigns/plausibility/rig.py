@@ -11,7 +11,7 @@ RATE = 1000.0
 
 
 def hysteretic_force(
-    displacement: np.ndarray, velocity: np.ndarray, drive: float, rng: np.random.Generator
+    displacement: np.ndarray, velocity: np.ndarray, drive: float | np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
     """Return the force [N] of a Bouc-Wen element with a yield force that grows with the drive, and viscous damping."""
     element, elements = 0.0, []

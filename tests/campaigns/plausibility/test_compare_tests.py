@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from mrpipe.campaigns import load_campaign
 from mrpipe.campaigns.plausibility import Finding, TestArrays, arrays_of, compare_tests
 from mrpipe.campaigns.plausibility.odd_tests import find_odd_tests, limit_of
-from tests.campaigns.plausibility.rig import hysteretic_force, sound_tests
+from tests.campaigns.plausibility.rig import RATE, hysteretic_force, sound_tests
 
 Fault = Callable[[TestArrays], TestArrays]
 
@@ -149,6 +150,21 @@ def test_a_test_slower_than_all_others_is_not_called_odd(random: bool) -> None:
         item.line
         for item in find_odd_tests([*tests, replace(tests[3], name="slow", displacement_m=slow, force_n=force)])
     ] == []
+
+
+@pytest.mark.property
+def test_a_drive_that_only_one_test_varies_quickly_is_no_gain() -> None:
+    """The lag of the drive, which the map does not contain, lowered the correlation to 0.85 and the gain to 0.78."""
+    rng = np.random.default_rng(51)
+    tests = sound_tests(10, random=True)
+    time, displacement = tests[5].time_s, tests[5].displacement_m
+    band = butter(2, [0.3, 4.0], "bandpass", fs=RATE, output="sos")
+    noise = sosfiltfilt(band, rng.standard_normal(time.size))
+    drive = np.clip(0.75 + 0.5 * noise / np.std(noise), 0.0, 1.5)
+    late = np.concatenate([np.full(120, drive[0]), drive[:-120]])
+    force = hysteretic_force(displacement, np.gradient(displacement, time), late, rng)
+    tests[5] = replace(tests[5], drive=drive, force_n=force)
+    assert find_odd_tests(tests) == []
 
 
 @pytest.mark.planted
