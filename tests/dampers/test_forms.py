@@ -343,6 +343,36 @@ def test_a_form_stays_stable_and_dissipative_at_coarse_steps(name: str) -> None:
         assert np.sum((force * v)[last]) > 0.0
 
 
+def drawn(form: BaseForm, scales: Scales, rng: np.random.Generator) -> dict[str, float]:
+    """Return numbers anywhere within the bounds of the search."""
+    numbers = {}
+    for item in form.parameters:
+        low, high = item.bounds(scales)
+        numbers[item.name] = float(np.exp(rng.uniform(np.log(low), np.log(high))) if item.logarithmic else
+                                   rng.uniform(low, high))  # fmt: skip
+    return numbers
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", sorted(NUMBERS))
+def test_a_form_stays_finite_within_the_bounds_of_its_search(name: str) -> None:
+    """The search tries such numbers, and a draft may hold no test on which they become unstable."""
+    rng = np.random.default_rng(5)
+    form = base_form(name)
+    for draw in range(60):
+        stroke, frequency, dt = 10.0 ** rng.uniform(-3, -1), 10.0 ** rng.uniform(-0.5, 1.3), 4e-3 / (1 + draw % 4)
+        t = np.arange(0.0, 1.0, dt)
+        triangle = np.arcsin(np.sin(2.0 * np.pi * frequency * t)) / (0.5 * np.pi)
+        wander = np.cumsum(rng.normal(size=len(t)))
+        x = stroke * (triangle if draw % 2 else wander / np.max(np.abs(wander)))
+        v = np.gradient(x, t)
+        scales = Scales(stroke, 2.0 * float(np.std(v)), float(np.std(np.gradient(v, t))), DRIVE, YIELD, 1.0)
+        numbers = drawn(form, scales, rng)
+        chain = build_chain([polynomial_coefficients([YIELD], [VISCOSITY]), *form.steps(numbers)])
+        force = run_chain(chain, x, v, np.gradient(v, t), np.full_like(t, DRIVE), dt)[:, FORCE]
+        assert np.max(np.abs(force)) < 1e8, (numbers, dt, stroke, frequency)
+
+
 @pytest.mark.property
 @pytest.mark.parametrize("name", sorted(NUMBERS))
 def test_the_post_yield_force_is_what_the_chain_settles_at(name: str) -> None:

@@ -43,9 +43,12 @@ def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
     rate, flow, power = parameters[0], parameters[1], parameters[2]
     first, change = state[1], wire[VELOCITY] - state[1]
     speed = max(abs(first), abs(wire[VELOCITY]))
-    stiff = flow * power * (speed / flow) ** (1.0 - 1.0 / power)
-    parts = parts_of_step(rate * (speed + stiff), dt)
+    steady = (speed / flow) ** (1.0 / power)
+    parts = parts_of_step(rate * (speed + flow * power * steady ** (power - 1.0)), dt)
     h, z = dt / parts, state[0]
+    # the overstress of steady flow at the largest speed is never exceeded; the method itself oversteps it, and can
+    # become unstable, if a long step begins before yielding
+    most = max(abs(z), max(limit, state[2]) * (1.0 + steady))
     for k in range(parts):
         v0, v1 = first + change * k / parts, first + change * (k + 1) / parts
         before = state[2] + (limit - state[2]) * k / parts
@@ -55,7 +58,7 @@ def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
         factor = damping_factor(h, slope)
         k1 = factor * overstress_rate(z, v0, before, parameters)
         k2 = factor * (overstress_rate(z + h * k1, v1, after, parameters) - 2.0 * k1)
-        z += h * (1.5 * k1 + 0.5 * k2)
+        z = min(max(z + h * (1.5 * k1 + 0.5 * k2), -most), most)
     state[0] = z
     state[1] = wire[VELOCITY]
     state[2] = limit

@@ -35,6 +35,9 @@ SCREENED = 8
 COMPARED = 60
 """Numerical technique: number of models, the best ones on the draft, that are compared on all training tests."""
 
+UNSTABLE = 1e100
+"""Weighted squared error of a model on a test on which its simulation is unstable: larger than that of every other."""
+
 Search = Callable[[Fit], Selection]
 
 
@@ -390,4 +393,5 @@ def _squares(found: Fit, problem: Problem) -> FloatArray:
     error = problem.recordings.force - found.linear @ regressors(whole, found.theta)
     residual = centred(error[None], w)[0][0]
     sums = np.bincount(problem.recordings.test[w.at], weights=residual**2, minlength=problem.recordings.tests)
-    return np.asarray(sums, dtype=np.float64)
+    # a model can be unstable on a test that is not part of the draft
+    return np.where(np.isfinite(sums), sums, UNSTABLE)

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.library import base_form
 from mrpipe.effects.library import damper_effects
-from mrpipe.fitting.engine import fit, start_of
-from mrpipe.fitting.problem import Term
-from mrpipe.tracing.bench.race import Model, Race, _held, alone, with_effects_of
+from mrpipe.fitting.engine import Fit, fit, regressors, start_of
+from mrpipe.fitting.problem import Problem, Term
+from mrpipe.tracing.bench.race import Model, Race, _compared, _held, alone, with_effects_of
+from mrpipe.tracing.rules import RaceRules
 from tests.tracing.bench.fits import plain_fit
 
 LEAD = 0.3
@@ -30,6 +32,10 @@ class FakeModel(Model):
         )
         squares = 100.0 * np.broadcast_to(np.asarray(chi_square, dtype=np.float64), TESTS)
         super().__init__(SimpleNamespace(problem=problem), squares)  # type: ignore[arg-type]
+
+
+def race_of_fits(fits: list[Fit], base: Fit) -> Race:
+    return _compared(fits, base, {}, 1.0, frozenset(), RaceRules(), 1)
 
 
 def race_of(*models: Model) -> Race:
@@ -90,6 +96,20 @@ def test_support_is_the_share_of_resamples_that_need_the_effect() -> None:
     assert lone.support("end-stop", LEAD, draws=400, rng=rng) == pytest.approx(
         1.0 - (1.0 - 1.0 / TESTS) ** TESTS, abs=0.08
     )
+
+
+@pytest.mark.property
+def test_a_model_that_is_unstable_on_a_test_outside_the_draft_loses(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = plain_fit("accumulator")
+    unstable = replace(plain, theta=plain.theta.copy())
+
+    def simulated(problem: Problem, theta: FloatArray) -> FloatArray:
+        rows = regressors(problem, theta)
+        return np.where(problem.recordings.test == 1, np.nan, rows) if theta is unstable.theta else rows
+
+    monkeypatch.setattr("mrpipe.tracing.bench.race.regressors", simulated)
+    models = race_of_fits([unstable, plain], plain)
+    assert models.winner(LEAD).fit is plain
 
 
 @pytest.mark.property
