@@ -36,7 +36,7 @@ COMPARED = 60
 """Numerical technique: number of models, the best ones on the draft, that are compared on all training tests."""
 
 UNSTABLE = 1e100
-"""Weighted squared error of a model on a test on which its simulation is unstable: larger than that of every other."""
+"""Numerical technique: weighted squared error of a model on a test on which its simulation is unstable."""
 
 Search = Callable[[Fit], Selection]
 
