@@ -6,15 +6,20 @@ from collections.abc import Sequence
 from functools import cache
 
 from mrpipe.fitting.engine import Fit
-from mrpipe.fitting.recordings import record_tests
+from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
 from tests.tracing.bench.rig import campaign
 
 
+def recorded(tests: Sequence[PreparedTest], *, validation: bool = False) -> Recordings:
+    """Return the training tests with the repeats, or the validation tests."""
+    return record_tests([test for test in tests if (test.role == "validation") == validation], rate_hz=250.0)
+
+
 def fit_of(tests: Sequence[PreparedTest]) -> Fit:
     """Return the weighted fit of the declared model to the training tests and repeats."""
-    recordings = record_tests([test for test in tests if test.role != "validation"], rate_hz=250.0)
+    recordings = recorded(tests)
     return fit_baseline(recordings, declared_base(recordings, "bouc-wen", 2, 1)).fit
 
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
 
 from mrpipe.effects.library import damper_effects
-from mrpipe.fitting.recordings import Recordings, record_tests
-from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
 from mrpipe.tracing.bench.gates import held, judged, never_yields, not_separated, refusal_of, validated
 from mrpipe.tracing.bench.judgement import Evidence
@@ -20,16 +17,10 @@ from mrpipe.tracing.bench.verdict import Named
 from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Verdict, VerdictClass
-from tests.tracing.bench.fits import plain_fit
+from tests.tracing.bench.fits import plain_fit, recorded
 from tests.tracing.bench.rig import campaign
 
 pytestmark = pytest.mark.planted
-
-
-def recorded(tests: Sequence[PreparedTest]) -> tuple[Recordings, Recordings]:
-    """Return the training tests with the repeats, and the validation tests."""
-    training = record_tests([test for test in tests if test.role != "validation"], rate_hz=250.0)
-    return training, record_tests([test for test in tests if test.role == "validation"], rate_hz=250.0)
 
 
 def test_a_damper_that_stays_elastic_in_all_tests_is_recognised() -> None:
@@ -42,7 +33,8 @@ def test_a_damper_that_stays_elastic_in_all_tests_is_recognised() -> None:
 
 def test_a_declared_form_that_fails_is_no_reason_to_trace_nothing() -> None:
     """A damper whose force follows the speed at once left 0.56 under Bouc-Wen, and nothing was traced."""
-    training, validation = recorded(campaign("rounded"))
+    tests = campaign("rounded")
+    training, validation = recorded(tests), recorded(tests, validation=True)
     first = fit_baseline(training, declared_base(training, "bouc-wen", 2, 1))
     options = TracingOptions(base_forms=("bouc-wen", "rounded-yield"))
     found = validated(first.fit, first.fit, first, training, validation, options)
@@ -90,7 +82,7 @@ def test_the_verdict_says_which_effects_the_tests_do_not_separate() -> None:
 def test_a_tie_is_part_of_the_sentence() -> None:
     """The dyke record was said to have a late force, and the inertia that it cannot exclude stood only in the JSON."""
     tests = campaign("rounded")
-    training, validation = recorded(tests)
+    training, validation = recorded(tests), recorded(tests, validation=True)
     first = fit_baseline(training, declared_base(training, "rounded-yield", 2, 1))
     options = TracingOptions()
     found = validated(first.fit, first.fit, first, training, validation, options)

@@ -12,7 +12,7 @@ import pytest
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.library import base_form
 from mrpipe.effects.library import damper_effects
-from mrpipe.fitting.engine import Fit, fit, regressors, start_of
+from mrpipe.fitting.engine import fit, regressors, start_of
 from mrpipe.fitting.problem import Problem, Term
 from mrpipe.tracing.bench.race import Model, Race, _compared, _held, alone, with_effects_of
 from mrpipe.tracing.rules import RaceRules
@@ -32,10 +32,6 @@ class FakeModel(Model):
         )
         squares = 100.0 * np.broadcast_to(np.asarray(chi_square, dtype=np.float64), TESTS)
         super().__init__(SimpleNamespace(problem=problem), squares)  # type: ignore[arg-type]
-
-
-def race_of_fits(fits: list[Fit], base: Fit) -> Race:
-    return _compared(fits, base, {}, 1.0, frozenset(), RaceRules(), 1)
 
 
 def race_of(*models: Model) -> Race:
@@ -108,8 +104,8 @@ def test_a_model_that_is_unstable_on_a_test_outside_the_draft_loses(monkeypatch:
         return np.where(problem.recordings.test == 1, np.nan, rows) if theta is unstable.theta else rows
 
     monkeypatch.setattr("mrpipe.tracing.bench.race.regressors", simulated)
-    models = race_of_fits([unstable, plain], plain)
-    assert models.winner(LEAD).fit is plain
+    race = _compared([unstable, plain], plain, {}, 1.0, frozenset(), RaceRules(), 1)
+    assert race.winner(LEAD).fit is plain
 
 
 @pytest.mark.property
