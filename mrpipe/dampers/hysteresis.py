@@ -24,8 +24,18 @@ from mrpipe.dampers.parameters import Parameter, Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
 
 SUB_STEP = 0.05
-"""Longest sub-step of other exponents, in yield displacements; the update is then accurate to about 1e-7."""
+"""Longest sub-step of other exponents while unloading, in yield displacements; the update is then accurate to about
+1e-7.
+"""
 
+LOADING_STEP = 0.1
+"""Longest sub-step while loading far from yield, as a change of -log(1 - y), for the same accuracy."""
+
+LONGEST_LOADING_STEP = 4.0
+"""Longest sub-step of the same kind close to yield."""
+
+YIELDED = 20.0
+"""The damper counts as yielded if this is -log(1 - y)."""
 
 LONGEST_PART_S = 1e-3
 """Longest part of an interval [s] over which the yield force of a form with a spring in series is taken as constant."""
@@ -64,19 +74,41 @@ def _slope(y: float, exponent: float, unloading: float) -> float:
     return 1.0 - unloading * (-y) ** exponent
 
 
+@njit(float64(float64, float64), cache=True)
+def _loading_rate(w: float, exponent: float) -> float:
+    """Return dw/ds for w = -log(1 - y) and y >= 0."""
+    rest = math.exp(-w)
+    return (1.0 - max(1.0 - rest, 0.0) ** exponent) / rest
+
+
 @njit(float64(float64, float64, float64, float64), cache=True)
 def _advance_general(y: float, path: float, exponent: float, unloading: float) -> float:
-    count = math.ceil(path / SUB_STEP)
-    step = path / max(count, 1)
-    for _ in range(count):
+    """Return y after a path by the Runge-Kutta method of order 4.
+
+    While loading, the variable is w = -log(1 - y). Its rate changes slowly, also for a large exponent, where the rate
+    of y changes within a small part of the path.
+    """
+    while y < 0.0 and path > 0.0:
+        step = min(path, SUB_STEP)
         k1 = _slope(y, exponent, unloading)
         k2 = _slope(y + 0.5 * step * k1, exponent, unloading)
         k3 = _slope(y + 0.5 * step * k2, exponent, unloading)
         k4 = _slope(y + step * k3, exponent, unloading)
-        y = min(y + step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0, 1.0)
-        if y > 1.0 - 1e-9:
-            break
-    return y
+        y += step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
+        path -= step
+    if path <= 0.0:
+        return y
+    w = -math.log(max(1.0 - y, 1e-300))
+    while path > 0.0 and w < YIELDED:
+        k1 = _loading_rate(w, exponent)
+        # close to yield the rate tends to the exponent, so that the steps can be long
+        step = min(path, min(LOADING_STEP * (1.0 + math.exp(w) / exponent), LONGEST_LOADING_STEP) / k1)
+        k2 = _loading_rate(w + 0.5 * step * k1, exponent)
+        k3 = _loading_rate(w + 0.5 * step * k2, exponent)
+        k4 = _loading_rate(w + step * k3, exponent)
+        w += step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
+        path -= step
+    return 1.0 - math.exp(-w)
 
 
 @njit(float64(float64, float64, float64), cache=True)

@@ -31,6 +31,12 @@ from mrpipe.dampers.plant import (
     Step,
 )
 
+MOST_ITERATIONS = 80
+"""Numerical technique: most iterations for the motion of the inner element; usually about four are needed."""
+
+LAST_STEP = 1e-5
+"""Numerical technique: last step of the iterations, relative to the yield displacement."""
+
 
 @njit(
     float64(float64, float64, float64, float64, float64, float64, float64, float64, float64, float64, float64),
@@ -66,7 +72,7 @@ def inner_increment(
     start = (1.0 - y**exponent if y >= 0.0 else 1.0 - (1.0 - 2.0 * gamma_share) * (-y) ** exponent) / yield_displacement
     slope = total + 0.5 * dt * (yield_force * max(start, 0.0) + stiffness)
     change = min(max((impulse - dt * (yield_force * zeta + stiffness * w)) / slope, low), high)
-    for _ in range(80):
+    for _ in range(MOST_ITERATIONS):
         moved = advance_hysteresis(zeta, change, yield_displacement, gamma_share, exponent)
         residual = total * change - impulse + dt * (yield_force * 0.5 * (zeta + moved) + stiffness * (w + 0.5 * change))
         if residual > 0.0:
@@ -80,11 +86,14 @@ def inner_increment(
         ) / yield_displacement
         slope = total + 0.5 * dt * (yield_force * max(slope_zeta, 0.0) + stiffness)
         trial = change - residual / slope
-        if trial <= low or trial >= high:
-            trial = 0.5 * (low + high)
-        if abs(trial - change) <= 1e-11 * (abs(increment) + yield_displacement):
-            return trial
+        if trial < low or trial > high:
+            change = 0.5 * (low + high)
+            continue
+        moved_by = abs(trial - change)
         change = trial
+        # the error after a step of Newton's method is the square of the step, relative to the yield displacement
+        if moved_by <= LAST_STEP * yield_displacement:
+            break
     return change
 
 

@@ -28,6 +28,9 @@ from mrpipe.dampers.plant import (
 
 _SDIRK = 1.0 - math.sqrt(0.5)
 
+_LAST_STEP = 1e-5
+"""Numerical technique: last step of the iterations for theta."""
+
 
 @njit(float64(float64, float64), cache=True)
 def rounded_sign(velocity: float, scale: float) -> float:
@@ -109,7 +112,8 @@ def _solve_stage(weight: float, right: float, start: float) -> float:
         limit = 1.0 + abs(theta)
         change = min(max(change, -limit), limit)
         theta -= change
-        if abs(change) < 1e-12 * (1.0 + abs(theta)):
+        # the error after a step of Newton's method is the square of the step
+        if abs(change) < _LAST_STEP:
             break
     return theta
 

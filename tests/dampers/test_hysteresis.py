@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from mrpipe.dampers.drive import polynomial_coefficients
+from mrpipe.dampers.forms import duhem
 from mrpipe.dampers.forms.elastic_plastic import FORM as ELASTIC_PLASTIC
 from mrpipe.dampers.hysteresis import (
     advance_hysteresis,
@@ -35,6 +36,32 @@ def test_one_long_step_equals_many_short_ones(zeta, path, share, exponent, piece
     for _ in range(pieces):
         parts = advance_hysteresis(parts, path / pieces, 1.0, share, exponent)
     assert parts == pytest.approx(whole, abs=1e-9)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("exponent", [1.3, 3.0, 8.0, 50.0])
+@pytest.mark.parametrize("start", [-0.9, 0.0, 0.6])
+def test_any_exponent_agrees_with_an_adaptive_integrator(exponent, start):
+    share, path = 0.7, 2.5
+
+    def rate(s, y):
+        unloading = 1.0 - 2.0 * share
+        return [1.0 - y[0] ** exponent if y[0] >= 0.0 else 1.0 - unloading * (-y[0]) ** exponent]
+
+    answer = solve_ivp(rate, (0.0, path), [start], rtol=1e-10, atol=1e-12, max_step=1e-3)
+    assert advance_hysteresis(start, path, 1.0, share, exponent) == pytest.approx(answer.y[0, -1], abs=1e-5)
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize(("power", "tilt", "curvature"), [(0.4, -1.0, 0.5), (1.2, 0.3, 0.0), (4.0, 2.0, -1.0)])
+@pytest.mark.parametrize("path", [0.1, 0.8, 4.0])
+def test_duhem_agrees_with_an_adaptive_integrator(power, tilt, curvature, path):
+    def rate(s, y):
+        return [max(1.0 - y[0], 0.0) ** power * np.exp(y[0] * (tilt + curvature * y[0]))]
+
+    answer = solve_ivp(rate, (0.0, path), [-0.95], rtol=1e-10, atol=1e-12, max_step=1e-3)
+    numbers = np.array([1.0, power, tilt, curvature])
+    assert duhem._advanced(-0.95, path, numbers) == pytest.approx(answer.y[0, -1], abs=1e-5)
 
 
 @pytest.mark.property

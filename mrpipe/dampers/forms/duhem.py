@@ -13,38 +13,44 @@ from mrpipe.dampers.hysteresis import YIELD_DISPLACEMENT, displacement_between, 
 from mrpipe.dampers.parameters import Parameter, Values, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
 
-SUB_STEP = 0.05
-"""Longest sub-step of the integration, in yield displacements."""
+LONGEST = 0.2
+"""Longest step of the integration, as a change of w and of the logarithm of its rate together."""
 
-YIELDED = 1e-7
-"""The damper counts as yielded if its force is within this share of the yield force."""
+YIELDED = 16.0
+"""The damper counts as yielded if this is w: its force is then within 1e-7 of the yield force."""
 
 
 @njit(float64(float64, float64, float64, float64), cache=True)
-def _slope(y: float, power: float, tilt: float, curvature: float) -> float:
-    return max(1.0 - y, 0.0) ** power * math.exp(y * (tilt + curvature * y))
+def _rate(w: float, power: float, tilt: float, curvature: float) -> float:
+    """Return dw/ds for w = -log(1 - y)."""
+    y = 1.0 - math.exp(-w)
+    return math.exp(y * (tilt + curvature * y) - (power - 1.0) * w)
 
 
 @njit(float64(float64, float64, float64[::1]), cache=True)
 def _advanced(zeta: float, increment: float, parameters: FloatArray) -> float:
-    """Return the normalised force after a motion by `increment` [m] without reversal (Runge-Kutta, order 4)."""
+    """Return the normalised force after a motion by `increment` [m] without reversal (Runge-Kutta, order 4).
+
+    The variable is w = -log(1 - y). Its rate changes slowly where y approaches 1, so that few steps are sufficient.
+    """
     if increment == 0.0:
         return zeta
     sign = 1.0 if increment > 0.0 else -1.0
     y = sign * zeta
     power, tilt, curvature = parameters[1], parameters[2], parameters[3]
     path = abs(increment) / parameters[0]
-    count = math.ceil(path / SUB_STEP)
-    step = path / max(count, 1)
-    for _ in range(count):
-        if y > 1.0 - YIELDED:
-            break
-        k1 = _slope(y, power, tilt, curvature)
-        k2 = _slope(y + 0.5 * step * k1, power, tilt, curvature)
-        k3 = _slope(y + 0.5 * step * k2, power, tilt, curvature)
-        k4 = _slope(y + step * k3, power, tilt, curvature)
-        y = min(y + step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0, 1.0)
-    return sign * y
+    w = -math.log(max(1.0 - y, 1e-300))
+    while path > 0.0 and w < YIELDED:
+        k1 = _rate(w, power, tilt, curvature)
+        rest = math.exp(-w)
+        bend = (tilt + 2.0 * curvature * (1.0 - rest)) * rest - (power - 1.0)
+        step = min(path, LONGEST / (k1 * (1.0 + abs(bend))))
+        k2 = _rate(w + 0.5 * step * k1, power, tilt, curvature)
+        k3 = _rate(w + 0.5 * step * k2, power, tilt, curvature)
+        k4 = _rate(w + step * k3, power, tilt, curvature)
+        w += step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
+        path -= step
+    return sign * (1.0 - math.exp(-w))
 
 
 @njit(STEP_SIGNATURE, cache=True)

@@ -44,7 +44,9 @@ def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
     first, change = state[1], wire[VELOCITY] - state[1]
     speed = max(abs(first), abs(wire[VELOCITY]))
     steady = (speed / flow) ** (1.0 / power)
-    parts = parts_of_step(rate * (speed + flow * power * steady ** (power - 1.0)), dt)
+    # flow steady^(power - 1) is the speed over the steady overstress
+    fastest = speed + power * speed / steady if steady > 0.0 else 0.0
+    parts = parts_of_step(rate * fastest, dt)
     h, z = dt / parts, state[0]
     # the overstress of steady flow at the largest speed is never exceeded; the method itself oversteps it, and can
     # become unstable, if a long step begins before yielding
@@ -54,9 +56,9 @@ def viscoplastic_step(wire: FloatArray, state: FloatArray, parameters: FloatArra
         before = state[2] + (limit - state[2]) * k / parts
         after = state[2] + (limit - state[2]) * (k + 1) / parts
         over = abs(z) / before - 1.0
-        slope = -rate * flow * power * over ** (power - 1.0) / before if over > 0.0 else 0.0
-        factor = damping_factor(h, slope)
-        k1 = factor * overstress_rate(z, v0, before, parameters)
+        bent = flow * over ** (power - 1.0) if over > 0.0 else 0.0
+        factor = damping_factor(h, -rate * power * bent / before)
+        k1 = factor * rate * (v0 - bent * over * (1.0 if z > 0.0 else -1.0))
         k2 = factor * (overstress_rate(z + h * k1, v1, after, parameters) - 2.0 * k1)
         z = min(max(z + h * (1.5 * k1 + 0.5 * k2), -most), most)
     state[0] = z
