@@ -25,9 +25,10 @@ from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.drive_again import with_laws_again, with_laws_of_leaders
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.pairs import with_play
-from mrpipe.tracing.bench.race import Model, Race, alone_of, on_all_tests, race
+from mrpipe.tracing.bench.promotion import extension_of, promoted, with_candidates
+from mrpipe.tracing.bench.race import Race, alone_of, on_all_tests, race
 from mrpipe.tracing.bench.refine import with_richer_forms
-from mrpipe.tracing.bench.select import Candidate, Selection, draft, forward_selection, share_of
+from mrpipe.tracing.bench.select import Selection, draft, forward_selection
 from mrpipe.tracing.bench.weights import NoiseScale, force_deviation, noise_scale, noise_variances
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
@@ -35,12 +36,6 @@ from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
 ROUNDED_FORM = "yielding-part"
 """Base form with which a moving average by the recorder is judged. Its yield is rounded, so that the average is found
 only if it explains more than a rounded yield does: both round the loops of force over displacement."""
-
-PROMOTED = 3
-"""Numerical technique: candidates of each round that are fitted to all training tests, not only to the draft ..."""
-
-PROMOTED_STEPS = 6
-"""Numerical technique: ... and largest number of iterations of these fits."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +102,7 @@ def choose_model(
     if floor > 0.0:
         baseline = _without_nuisances(baseline, options, known)
     while True:
-        choice, extension = _raced(baseline, effects, options, known, floor > 0.0, weighed, jobs, progress)
+        choice, completed = _raced(baseline, effects, options, known, floor > 0.0, weighed, jobs, progress)
         selection = choice.selection
         quieter = None if weighed or floor > 0.0 or choice.race is None else _quieter(choice, options.rules)
         if quieter is not None:
@@ -118,12 +113,12 @@ def choose_model(
             selection = with_laws_again(selection, options.yield_order, options.viscosity_order)
         if floor > 0.0:
             selection = judged_by_trees(selection, options.rules.model_error)
-            return replace(choice, selection=replace(selection, extension=extension()))
+            return replace(choice, selection=completed(selection))
         if choice.race is None:
             return choice
         if _near_the_noise(selection, baseline.noise, len(declared), options, rng, jobs):
             baseline, selection = _with_noise_of(selection.chosen, baseline, selection, options.rules.noise)
-            return replace(choice, baseline=baseline, selection=replace(selection, extension=extension()))
+            return replace(choice, baseline=baseline, selection=completed(selection))
         # a second race judges by the error relative to the force
         chosen = selection.chosen
         used = chosen.problem.root_weight > 0.0
@@ -167,17 +162,17 @@ def _raced(
     weighed: bool,
     jobs: int,
     progress: Progress,
-) -> tuple[Choice, Callable[[], Fit | None]]:
+) -> tuple[Choice, Callable[[Selection], Selection]]:
     """Run the race and fit its winner to all training tests; `weighed`: the weights follow from an earlier winner.
 
-    The function that is returned with the choice fits the winner with further terms. It takes long, and it is called
-    only if the race is not repeated.
+    The function that is returned with the choice adds the candidates and the winner with further terms to the
+    selection. It takes long, and it is called only if the race is not repeated.
     """
     rules = options.rules.selection_by_force if model_error else options.rules.selection
     least = options.rules.selection.nothing_missing
     nothing = Selection(baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=least)
     if not nothing.structured and not _noise_of_motion(baseline):
-        return Choice(baseline, nothing), lambda: None
+        return Choice(baseline, nothing), lambda selection: selection
     progress(0.1, "base forms")
     singles = with_laws_of_leaders(
         alone_of(baseline.fit, options, known=known, jobs=jobs),
@@ -191,7 +186,7 @@ def _raced(
         baseline, singles = _with_noise_of_best(baseline, singles, options.rules)
         nothing = replace(nothing, base=baseline.fit, noise=baseline.noise, chosen=baseline.fit)
     if not nothing.structured:
-        return Choice(baseline, nothing), lambda: None
+        return Choice(baseline, nothing), lambda selection: selection
     base, noise = baseline.fit, baseline.noise
     search = partial(
         forward_selection,
@@ -207,76 +202,18 @@ def _raced(
     winner = found.winner(options.lead)
     progress(0.7, "fit to all tests")
     selection = promoted(found, winner, base)
-    extension = partial(_extension, found, winner, selection, search, options.rules)
     selection = replace(
         selection,
         proven=len(winner.effects) - len(found.own),
         tied_forms=found.tied_forms(winner, options.lead),
         nothing_missing=least,
     )
-    return Choice(baseline, selection, found), extension
+    extension = partial(extension_of, found, winner, selection.chosen, base.problem, search, options.rules.refinement)
 
+    def completed(kept: Selection) -> Selection:
+        return replace(with_candidates(kept, found), extension=extension())
 
-def _extension(
-    found: Race, winner: Model, selection: Selection, search: Callable[[Fit], Selection], rules: TracingRules
-) -> Fit | None:
-    """Return the winner with further terms, fitted to all training tests; None if there are none.
-
-    Further terms improve the model although their cause is not proven.
-    """
-    if selection.chosen.chi_square < (1.0 + rules.refinement.worth_a_try) * found.noise:
-        return None
-    model = found.extended(winner)
-    further = model.fit
-    if model is winner and winner.form not in found.searches:
-        further = search(winner.fit).chosen
-    if len(further.problem.terms) == len(winner.effects):
-        return None
-    return on_all_tests(further, selection.base.problem, found.coupled)
-
-
-def promoted(found: Race, winner: Model, base: Fit) -> Selection:
-    """Return the winner of a race with its candidates, fitted to all training tests.
-
-    Parameters
-    ----------
-    found
-        The race.
-    winner
-        Model that won the race.
-    base
-        Fit of the declared form to all training tests.
-    """
-    problem, noise = base.problem, found.noise
-    count = len(found.own)
-    ground = None
-    if winner.form != found.declared:
-        ground = on_all_tests(found.plain(winner.form).fit, problem, found.coupled)
-    chosen = ground or base
-    if len(winner.effects) > count:
-        chosen = on_all_tests(winner.fit, problem, found.coupled)
-    rounds: list[tuple[Candidate, ...]] = []
-    search = found.searches.get(winner.form, found.searches.get(found.declared))
-    for place, candidates in enumerate((search.rounds if search else ())[: max(1, len(winner.effects) - count)]):
-        names = winner.effects[: count + place]
-        if any(tuple(term.effect.name for term in c.fit.problem.terms[:-1]) != names for c in candidates[:1]):
-            break
-        rounds.append(_on_all(candidates, found, winner, chosen, base, count + place))
-    return Selection(base, noise, tuple(rounds), chosen, ground=ground)
-
-
-def _on_all(
-    candidates: tuple[Candidate, ...], found: Race, winner: Model, chosen: Fit, base: Fit, place: int
-) -> tuple[Candidate, ...]:
-    """Return the candidates of a round fitted to all training tests, the chosen effect first."""
-    result = []
-    own = winner.effects[place] if place < len(winner.effects) else ""
-    for rank, item in enumerate(candidates):
-        last = item.name == own and place == len(winner.effects) - 1
-        steps = PROMOTED_STEPS if rank < PROMOTED else 0
-        fitted = chosen if last else on_all_tests(item.fit, base.problem, found.coupled, iterations=steps)
-        result.append(replace(item, fit=fitted, share=share_of(base, fitted, found.noise)))
-    return tuple(sorted(result, key=lambda item: (item.name != own, item.fit.chi_square)))
+    return Choice(baseline, selection, found), completed
 
 
 def _with_noise_of(

@@ -14,6 +14,7 @@ from dataclasses import replace
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.crossvalidation import Gain
+from mrpipe.tracing.bench.promotion import with_candidates
 from mrpipe.tracing.bench.race import Race, on_all_tests
 from mrpipe.tracing.bench.refine import with_best_forms
 from mrpipe.tracing.bench.rivals import Orders, best_rival, taken
@@ -180,7 +181,7 @@ def _with_rival(
     if best.chi_square > lead * (full or with_best_forms(small, named, jobs=jobs)).chi_square:
         return None
     again = taken(kept, race, rival, best)
-    return again if again.chosen.chi_square <= lead * kept.chosen.chi_square else None
+    return with_candidates(again, race) if again.chosen.chi_square <= lead * kept.chosen.chi_square else None
 
 
 def _named(kept: Selection, declared: int) -> range:

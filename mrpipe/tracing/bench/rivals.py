@@ -16,9 +16,9 @@ import numpy as np
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.reference import with_own_laws
-from mrpipe.tracing.bench.choose import promoted
 from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.drive_again import with_adequate_laws
+from mrpipe.tracing.bench.promotion import promoted, with_candidates
 from mrpipe.tracing.bench.race import Model, Race, on_all_tests, with_effects_of
 from mrpipe.tracing.bench.refine import starts_of, with_best_forms
 from mrpipe.tracing.bench.select import Selection, draft
@@ -164,7 +164,7 @@ def with_best_base(
     if own.chi_square <= (1.0 + lead) * again.chosen.chi_square:
         return selection
     # a form with more freedom can fit the training tests better and predict other motions worse
-    return again if unseen.better(own, again.chosen, jobs) else selection
+    return with_candidates(again, race) if unseen.better(own, again.chosen, jobs) else selection
 
 
 def with_base_of(rival: Model, small: Fit, places: Sequence[int], declared: int, orders: Orders) -> Fit:
@@ -285,7 +285,7 @@ def _before_yielding(full: Fit, places: Sequence[int], declared: int) -> Iterato
 
 
 def taken(selection: Selection, race: Race, rival: Model, found: Fit) -> Selection:
-    """Return the selection with a rival in place of the chosen fit, fitted to all training tests.
+    """Return the selection with a rival in place of the chosen fit, fitted to all training tests, without candidates.
 
     Parameters
     ----------
