@@ -62,6 +62,7 @@ NUMBERS: dict[str, dict[str, float]] = {
     "modified-bouc-wen": {
         "yield_displacement": 8e-4, "gamma_share": 0.7, "c1_a": 4e3, "c1_b": 1e3, "k0": 800.0, "k1": 300.0,
     },
+    "maxwell": {"relaxation_time": 0.012, "velocity_scale": 0.02, "sharpness": 1.4},
     "rounded-yield": {
         "yield_displacement": 8e-4, "gamma_share": 0.7, "velocity_scale": 0.03, "rounded_force_a": PART,
     },
@@ -210,6 +211,16 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
             return [rate / length * slope]
 
         return YIELD * integrated(loop, [0.0], t)[0] + viscous
+    if name == "maxwell":
+
+        def at_once(v):
+            ratio = v / p["velocity_scale"]
+            return YIELD * ratio / (1.0 + np.abs(ratio) ** p["sharpness"]) ** (1.0 / p["sharpness"]) + VISCOSITY * v
+
+        def relaxed(time, state):
+            return [(at_once(speed(time)) - state[0]) / p["relaxation_time"]]
+
+        return integrated(relaxed, [float(at_once(v[0]))], t)[0]
     if name == "viscoplastic":
 
         def flow(time, state):
