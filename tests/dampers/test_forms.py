@@ -43,7 +43,10 @@ NUMBERS: dict[str, dict[str, float]] = {
         "spring_stiffness": 6e4, "velocity_scale": 4e-3, "velocity_exponent": 0.7, "sharpness": 3.0,
         "reference_velocity": 0.08,
     },
-    "iwan": {"initial_stiffness": 8e4, "spread": 1.5, "least_share": 0.2},
+    "iwan": {
+        "yield_displacement": 1.2e-3, "density_exponent": -0.7, "least_share": 0.1, "growth": 0.5,
+        "reference_force": 60.0,
+    },
     "eyring-spring": {"spring_stiffness": 6e4, "velocity_scale": 4e-3, "reference_velocity": 0.08},
     "biviscous": {"yield_velocity": 0.02, "rest_share": 0.4, "bend": 1.0, "largest_drive": 2.0},
     "hysteretic-biviscous": {
@@ -109,15 +112,18 @@ def integrated(rate, start, t):
 
 
 def iwan_loop(x: np.ndarray, p: dict[str, float]) -> np.ndarray:
-    """Return the force of 400 elements over the yield force; each follows the motion as a play does."""
-    shares = (np.arange(400) + 0.5) / 400
-    relative = p["least_share"] + (1.0 - p["least_share"]) * shares ** p["spread"] * (p["spread"] + 1.0)
-    limits = relative * YIELD / p["initial_stiffness"]
-    centre = np.full(400, x[0])
+    """Return the force of 4000 elements over the yield force; each follows the motion as a play does."""
+    power, least = p["density_exponent"] + 1.0, p["least_share"]
+    # elements of equal stiffness: the inverse of the distribution function
+    shares = (np.arange(4000) + 0.5) / 4000
+    relative = (least**power + shares * (1.0 - least**power)) ** (1.0 / power)
+    mean = p["yield_displacement"] * (YIELD / p["reference_force"]) ** p["growth"]
+    limits = relative / np.mean(relative) * mean
+    centre = np.full(4000, x[0])
     force = np.empty_like(x)
     for place, here in enumerate(x):
         centre = np.clip(centre, here - limits, here + limits)
-        force[place] = np.mean(here - centre) * p["initial_stiffness"] / YIELD
+        force[place] = np.mean(here - centre) / mean
     return force
 
 

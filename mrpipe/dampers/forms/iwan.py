@@ -1,61 +1,67 @@
 """Parallel elastic-plastic elements with a distribution of yield displacements.
 
-Each element is a spring with a slider. All springs together have the constant stiffness k, and all sliders together the
-yield force F_y(u). A share s of the stiffness belongs to elements whose yield displacement over the mean one is at most
-r + (1 - r) g(s), where g is proportional to s^a. Iwan's distribution is uniform between two limits (a = 1). A damper
-that is elastic up to its first slip has a least share r above 0. With r = 0, a = 0 is one elastic-plastic element, and
-a = 1/(chi + 1) gives the density phi^chi of Segalman without its delta function. Discrete elements at equal steps of s
+Each element is a spring with a slider, which keeps the deformation of the spring within the yield displacement of the
+element. The stiffness of the elements whose yield displacement is y, relative to the largest one, is distributed as
+y^chi between r and 1. chi = 0 is Iwan's uniform distribution between two limits, r = 0 gives the density of Segalman
+without its delta function, and r = 1 is one elastic-plastic element. The yield displacements are constant (p = 0), grow
+in proportion to the yield force, so that the stiffness is constant (p = 1), or lie in between. Discrete elements
 represent the distribution.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import float64, njit, void
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.hysteresis import INITIAL_STIFFNESS, displacement_between, parts_of, turning_share
-from mrpipe.dampers.parameters import Parameter, Values, shape
+from mrpipe.dampers.hysteresis import YIELD_DISPLACEMENT, displacement_between, parts_of, turning_share
+from mrpipe.dampers.parameters import Parameter, Values, constant, shape
 from mrpipe.dampers.plant import DISPLACEMENT, FIRST, HYSTERESIS, STEP_SIGNATURE, VELOCITY, YIELD_FORCE, Phase, Step
 
 ELEMENTS = 24
 """Number of elements, which brings the force within 0.2 % of that of many elements."""
 
+_GRID = 241
+"""Numerical technique: points at which the density of the distribution is integrated."""
+
 _HEAD = 3
-"""Number of states before the deformations of the elements."""
+"""Number of states before the deformations of the elements, and of parameters before their numbers."""
 
 
 @njit(void(float64[::1], float64[::1], float64, float64), cache=True)
 def _move(state: FloatArray, parameters: FloatArray, increment: float, scale: float) -> None:
     # a slider keeps the deformation of its spring within the yield displacement
     for place in range(ELEMENTS):
-        limit = scale * parameters[1 + place]
+        limit = scale * parameters[_HEAD + place]
         state[_HEAD + place] = min(max(state[_HEAD + place] + increment, -limit), limit)
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def iwan_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: stiffness of all elements [N/m], then the yield displacement of each over the mean one. State: last
-    displacement [m], last velocity [m/s], last yield force [N], deformation of the spring of each element [m].
+    """Parameters: mean yield displacement [m] at the reference force, growth, reference force [N], then the yield
+    displacement of each element over the mean one, and its share of the stiffness. State: last displacement [m], last
+    velocity [m/s], last mean yield displacement [m], deformation of the spring of each element [m].
 
-    A long interval is divided, because the yield force can change while the elements are strained.
+    A long interval is divided if the yield displacements change while the elements are strained.
     """
     x, v = wire[DISPLACEMENT], wire[VELOCITY]
-    strength = max(wire[YIELD_FORCE], 1e-9)
-    stiffness = parameters[0]
+    ratio = max(wire[YIELD_FORCE] / parameters[2], 1e-9)
+    mean = max(parameters[0] * ratio ** parameters[1], 1e-15)
     if wire[FIRST] > 0.5:
         for place in range(_HEAD + ELEMENTS):
             state[place] = 0.0
         state[0] = x
         state[1] = v
-        state[2] = strength
+        state[2] = mean
     turn = turning_share(state[0], state[1], x, v, dt)
-    parts = parts_of(dt)
+    parts = 1 if mean == state[2] else parts_of(dt)
     begin, position = 0.0, state[0]
     for part in range(parts):
         end = (part + 1.0) / parts
-        scale = (state[2] + end * (strength - state[2])) / stiffness
+        scale = state[2] + end * (mean - state[2])
         # at most two pieces: before and after the turning point of the motion
         for _ in range(2):
             until = turn if begin < turn < end else end
@@ -65,35 +71,69 @@ def iwan_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: f
             begin, position = until, after
     state[0] = x
     state[1] = v
-    state[2] = strength
+    state[2] = mean
     total = 0.0
     for place in range(ELEMENTS):
-        total += state[_HEAD + place]
-    wire[HYSTERESIS] = stiffness * total / (ELEMENTS * strength)
+        total += parameters[_HEAD + ELEMENTS + place] * state[_HEAD + place]
+    wire[HYSTERESIS] = total / mean
 
 
-def yield_displacements(spread: float, least_share: float = 0.0) -> FloatArray:
-    """Return the yield displacement of each element over the mean one, shape (`ELEMENTS`,)."""
-    shares = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-    relative = shares**spread
-    return np.asarray(least_share + (1.0 - least_share) * relative / np.mean(relative), dtype=np.float64)
+def elements(exponent: float, least_share: float) -> tuple[FloatArray, FloatArray]:
+    """Return the yield displacement of each element over the mean one, and its share of the stiffness.
+
+    The elements divide the mean of the cumulative stiffness and of the cumulative yield force into equal parts, because
+    few stiff elements with a large yield displacement can hold most of the force. Both sums are exact.
+
+    Parameters
+    ----------
+    exponent
+        Exponent chi of the density of the stiffness.
+    least_share
+        Least yield displacement over the largest one.
+
+    Returns
+    -------
+    Two arrays of shape (`ELEMENTS`,).
+    """
+    if least_share > 1.0 - 1e-6:
+        return np.ones(ELEMENTS), np.full(ELEMENTS, 1.0 / ELEMENTS)
+    logarithm = np.linspace(math.log(least_share), 0.0, _GRID)
+    sums = []
+    for power in (exponent + 1.0, exponent + 2.0):
+        density = np.exp(power * (logarithm - logarithm[-1 if power > 0.0 else 0]))
+        total = np.concatenate([[0.0], np.cumsum(density[1:] + density[:-1])])
+        sums.append(total / total[-1])
+    mixed = 0.5 * (sums[0] + sums[1])
+    at = np.linspace(0.0, 1.0, ELEMENTS + 1)
+    stiffness, force = (np.diff(np.interp(at, mixed, total)) for total in sums)
+    return np.asarray(force / stiffness, dtype=np.float64), np.asarray(stiffness, dtype=np.float64)
 
 
 def _steps(values: Values) -> list[Step]:
-    relative = yield_displacements(values["spread"], values.get("least_share", 0.0))
-    numbers = np.array([values["initial_stiffness"], *relative])
+    head = [values["yield_displacement"], values["growth"], values["reference_force"]]
+    numbers = np.concatenate([head, *elements(values["density_exponent"], values["least_share"])])
     return [Step("iwan", Phase.HYSTERESIS, iwan_step, numbers, state_size=_HEAD + ELEMENTS)]
 
 
 FORM = BaseForm(
     name="iwan",
-    summary="Elastic-plastic elements in parallel, their yield displacements proportional to r + (1 - r) (a + 1) s^a "
-    "for s from 0 to 1",
+    summary="Elastic-plastic elements in parallel, their stiffness distributed as y^chi over the yield displacement y "
+    "between r and 1, with the mean x_ref (F_y(u)/F_ref)^p",
     source="Iwan 1966, J. Appl. Mech. 33, 893-900; Segalman 2005, J. Appl. Mech. 72, 752-760",
     parameters=(
-        INITIAL_STIFFNESS,
-        shape("spread", "1", "exponent of the distribution of the yield displacements", "one", 1e-3, 6.0, (1.0, 0.1)),
-        Parameter("least_share", "1", "r: least yield displacement over the mean one", "one", 0.0, 1.0, (0.0, 0.3)),
+        YIELD_DISPLACEMENT,
+        Parameter("density_exponent", "1", "chi of the density of the stiffness", "one", -4.0, 4.0, (0.0, -1.8)),
+        shape("least_share", "1", "r: least yield displacement over the largest one", "one", 5e-3, 0.999, (0.1,)),
+        Parameter(
+            "growth",
+            "1",
+            "exponent with which the yield displacements grow with the yield force",
+            "one",
+            -0.2,
+            1.5,
+            (0.1, 1.0),
+        ),
+        constant("reference_force", "N", "yield force for which the yield displacement is given", "force"),
     ),
     steps=_steps,
     coupled=True,
