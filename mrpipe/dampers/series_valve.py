@@ -47,7 +47,7 @@ _SDIRK = 1.0 - math.sqrt(0.5)
 _MOST_ITERATIONS = 60
 """Numerical technique: most iterations for the velocity of the valve; usually about four are needed."""
 
-_LAST_STEP = 1e-3
+_LAST_STEP = 1e-4
 """Numerical technique: last step of the iterations, relative to the velocity plus the velocity scale."""
 
 

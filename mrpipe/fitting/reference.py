@@ -20,6 +20,12 @@ PASSES = 3
 SAME = 0.01
 """Numerical technique: difference, as a share of the largest value, up to which laws agree."""
 
+MOST_SETTLING = 6
+"""Numerical technique: largest number of further fits until the error no longer falls ..."""
+
+SETTLED = 0.02
+"""Numerical technique: ... by this share."""
+
 LEVELS = 20
 """Numerical technique: levels of the drive at which laws are compared."""
 
@@ -53,6 +59,30 @@ def with_own_laws(found: Fit, *, iterations: int = 6) -> Fit:
         if _alike(laws, found.problem.reference, found.problem.scales.drive):
             break
         found = fit(problem, found.theta, iterations=iterations)
+    return found
+
+
+def with_settled_laws(found: Fit, *, iterations: int = 6) -> Fit:
+    """Return a fit whose effects are proportional to the fitted laws, repeated until the error no longer falls.
+
+    With a large effect, laws that change by one percent can still lower the error by half in each repetition, because
+    the other parameters follow them.
+
+    Parameters
+    ----------
+    found
+        Fit with or without effects.
+    iterations
+        Largest number of iterations of each search.
+    """
+    if found.problem.base.form.coupled or not found.problem.terms:
+        return found
+    found = fit(replace(found.problem, reference=own_laws(found)), found.theta, iterations=iterations)
+    for _ in range(MOST_SETTLING):
+        again = fit(replace(found.problem, reference=own_laws(found)), found.theta, iterations=iterations)
+        if again.chi_square > (1.0 - SETTLED) * found.chi_square:
+            break
+        found = again
     return found
 
 

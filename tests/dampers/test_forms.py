@@ -60,7 +60,7 @@ NUMBERS: dict[str, dict[str, float]] = {
     "hyperbolic-tangent": {"velocity_scale": 0.015, "shift": 0.6, "displacement_scale": 1e-3, "stiffness": 900.0},
     "hysteretic-sigmoid": {"velocity_scale": 0.02, "hysteresis_velocity": 0.008, "acceleration_scale": 0.02},
     "algebraic": {"velocity_scale": 0.015, "frequency": 1.5, "sharpness": 3.0},
-    "lugre": {"yield_displacement": 8e-4, "sigma_1": 200.0, "sigma_1_rate": 60.0},
+    "lugre": {"yield_displacement": 8e-4, "reference_velocity": 0.08, "bristle_force_a": PART},
     "gamota-filisko": {"solid_stiffness": 8e4, "solid_viscosity": 600.0, "spring_stiffness": 6e4},
     "modified-bouc-wen": {
         "yield_displacement": 8e-4, "gamma_share": 0.7, "c1_a": 4e3, "c1_b": 1e3, "k0": 800.0, "k1": 300.0,
@@ -258,7 +258,7 @@ def expected(name: str, t: np.ndarray) -> np.ndarray:
     z = integrated(lambda s, z: [bouc_wen_rate(z[0], speed(s), length, share, exponent)], [0.0], t)[0]
     force = YIELD * z + viscous
     if name == "lugre":
-        force = force + (p["sigma_1"] + p["sigma_1_rate"] * DRIVE) * (v - np.abs(v) * z)
+        force = force + PART / p["reference_velocity"] * (v - np.abs(v) * z)
     if name == "rounded-yield":
         force = force + PART * np.tanh(v / p["velocity_scale"])
     if name == "power-yield":

@@ -14,7 +14,7 @@ from mrpipe.fitting.engine import Fit, fit, predict, start_of
 from mrpipe.fitting.kernel import FORCE_AT, run_recordings
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import record_tests
-from mrpipe.fitting.reference import with_own_laws
+from mrpipe.fitting.reference import with_own_laws, with_settled_laws
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from tests.tracing.bench.rig import campaign
 
@@ -58,3 +58,16 @@ def test_without_effects_only_the_reference_changes(misled: Fit) -> None:
     own = with_own_laws(bare)
     assert own.theta is bare.theta
     assert own.problem.reference[0](1.0) == pytest.approx(own.laws[0](1.0))
+
+
+def test_laws_that_have_settled_do_not_change_in_a_further_fit(misled: Fit) -> None:
+    settled = with_settled_laws(misled)
+    assert settled.cost < 1.02 * with_own_laws(misled).cost
+    again = with_settled_laws(settled)
+    assert again.cost == pytest.approx(settled.cost, rel=0.02)
+    assert _differ(settled) < 0.002
+
+
+def test_laws_settle_only_if_an_effect_depends_on_them(misled: Fit) -> None:
+    bare = fit(replace(misled.problem, terms=()), misled.theta[:-1], iterations=1)
+    assert with_settled_laws(bare) is bare

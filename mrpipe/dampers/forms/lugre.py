@@ -9,41 +9,31 @@ from numba import njit
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.hysteresis import YIELD_DISPLACEMENT, hysteresis
-from mrpipe.dampers.parameters import Values, amplitude
-from mrpipe.dampers.plant import CURRENT, FORCE, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
+from mrpipe.dampers.parameters import Values, constant
+from mrpipe.dampers.plant import HYSTERESIS, PART, STEP_SIGNATURE, VELOCITY, Phase, Step
 
 
 @njit(STEP_SIGNATURE, cache=True)
 def bristle_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
-    """Parameters: damping of the bristles [N s/m], and whether it is per unit of the drive."""
+    """Parameters: reference velocity [m/s]."""
     speed = wire[VELOCITY]
-    damping = parameters[0] * wire[CURRENT] if parameters[1] > 0.0 else parameters[0]
-    wire[FORCE] += damping * (speed - abs(speed) * wire[HYSTERESIS])
-
-
-def _numbers(values: Values) -> tuple[float, float, float]:
-    return values["yield_displacement"], 1.0, 1.0
+    wire[PART] = (speed - abs(speed) * wire[HYSTERESIS]) / parameters[0]
 
 
 def _steps(values: Values) -> list[Step]:
-    bristles = [
-        Step("bristle-damping", Phase.FORCE_EFFECT, bristle_step, np.array([values.get(name, 0.0), kind]))
-        for name, kind in (("sigma_1", 0.0), ("sigma_1_rate", 1.0))
-    ]
-    return [hysteresis(*_numbers(values)), *bristles]
+    bristles = Step("bristle-damping", Phase.HYSTERESIS, bristle_step, np.array([values["reference_velocity"]]))
+    return [hysteresis(values["yield_displacement"], 1.0, 1.0), bristles]
 
 
 FORM = BaseForm(
     name="lugre",
-    summary="bristles z' = v - |v| z/x_y with internal damping: F_y z/x_y + (sigma_1 + sigma_1u u) z' + c0 v",
-    source="Jimenez and Alvarez-Icaza 2005, Struct. Control Health Monit. 12, 91-116; Canudas de Wit et al. 1995",
+    summary="bristles z' = v - |v| z/x_y with internal damping: F_y(u) z/x_y + F_b(u) z'/v_ref + c0 v",
+    source="Jimenez and Alvarez-Icaza 2005, Struct. Control Health Monit. 12, 91-116 (constant damping); Canudas de "
+    "Wit et al. 1995; in models of MR dampers the damping is constant or grows with the yield force",
     parameters=(
         YIELD_DISPLACEMENT,
-        amplitude("sigma_1", "N*s/m", "damping of the bristles", "force/speed", 0.0, 50.0),
-        amplitude(
-            "sigma_1_rate", "N*s/m/drive", "change of the damping with the drive", "force/speed/drive", 0.0, 50.0
-        ),
+        constant("reference_velocity", "m/s", "velocity of the bristles for which F_b is given", "speed"),
     ),
     steps=_steps,
-    amplitude_steps={"sigma_1": 1, "sigma_1_rate": 2},
+    part="bristle_force",
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,12 +11,13 @@ from typing import TypeVar
 import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
-from mrpipe.fitting.engine import Fit, fit, solve, start_of
+from mrpipe.fitting.engine import Fit, fit
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.reference import with_settled_laws
 from mrpipe.fitting.start import tests_of_varying_drive
-from mrpipe.fitting.weighting import weighting
 from mrpipe.tracing.bench.crossvalidation import folds_of
+from mrpipe.tracing.bench.refit import on_all, refit
 from mrpipe.tracing.bench.screen import Screened, screen
 from mrpipe.tracing.rules import SelectionRules
 
@@ -32,8 +33,8 @@ BEGUN_STEPS = 3
 CONTINUED = 8
 """Numerical technique: ... and number of forms that are then fitted further."""
 
-DISTANT_STEPS = 6
-"""Numerical technique: number of iterations of a refit from a distant start of a strength, before it is judged."""
+LAWS_AGAIN = 6
+"""Numerical technique: number of candidates of a round whose effects take the laws of their own fit."""
 
 _Item = TypeVar("_Item")
 
@@ -162,38 +163,6 @@ def draft(found: Fit) -> Fit:
     within = np.isin(recordings.test, keep)
     problem = replace(found.problem, recordings=recordings.subset(keep), root_weight=found.problem.root_weight[within])
     return fit(problem, found.theta, iterations=4)
-
-
-def refit(before: Fit, screened: Screened, *, iterations: int = 7) -> Fit:
-    """Fit the terms of `before` and a screened one jointly, from the best of the starts of its strengths."""
-    problem = replace(before.problem, terms=(*before.problem.terms, screened.term))
-
-    def begun(values: Mapping[str, float], most: int) -> Fit:
-        start = start_of(problem, before.base_values, [*before.term_values, values])
-        start[: len(before.theta)] = before.theta
-        return fit(problem, start, iterations=most, tolerance=2e-3)
-
-    near = begun(screened.values, iterations)
-    distant = [
-        begun({**screened.values, item.name: value}, max(iterations, DISTANT_STEPS))
-        for item in screened.term.form.searched
-        if item.role == "strength"
-        for value in item.start_values(problem.scales)[1:]
-    ]
-    return min([near, *distant], key=lambda item: item.chi_square)
-
-
-def on_all(before: Fit, drafted: Fit, *, iterations: int) -> Fit:
-    """Fit the terms of a draft on all tests of `before`, starting from the values of the draft.
-
-    Parameters that both have start from the draft or from `before`, whichever gives the smaller error, because a fit to
-    a share of the tests may have ended far from the optimum of all tests.
-    """
-    problem = replace(before.problem, terms=(*before.problem.terms, drafted.problem.terms[-1]))
-    both = [drafted.theta, np.concatenate([before.theta, drafted.theta[len(before.theta) :]])]
-    w = weighting(problem)
-    start = min(both, key=lambda theta: solve(problem, theta, w).cost)
-    return fit(problem, start, iterations=iterations)
 
 
 def candidates_after(
@@ -349,6 +318,7 @@ def forward_selection(
             return forward_selection(
                 nearer, noise, terms, most=most, refits=refits, rules=rules, jobs=jobs, progress=progress
             )
+        found = _with_laws_of_their_own(found, base, noise, jobs)
         able = [item for item in found if admissible(item.fit, rules.main_part)]
         if rounds and rules.lead > 1.0:
             # with other effects present, a parameter at its bound corrects a form, and it extrapolates badly
@@ -374,6 +344,17 @@ def forward_selection(
         if chosen.chi_square - noise < max(rules.nothing_missing * noise, enough):
             break
     return Selection(base, noise, tuple(rounds), chosen, proven, nothing_missing=rules.nothing_missing)
+
+
+def _with_laws_of_their_own(found: Sequence[Candidate], base: Fit, noise: float, jobs: int) -> list[Candidate]:
+    """Return the candidates, the best ones with effects proportional to the laws of the drive of their own fit.
+
+    All were fitted with the laws of the fit before. A large effect changes the laws, and an error in one effect hides
+    the next one.
+    """
+    fits = _each(lambda item: with_settled_laws(item.fit), found[:LAWS_AGAIN], jobs)
+    again = [_with_fit(item, item.fit, new, base, noise) for item, new in zip(found, fits, strict=False)]
+    return sorted([*again, *found[LAWS_AGAIN:]], key=lambda item: item.fit.chi_square)
 
 
 def _nearer(chosen: Fit, best: Fit, share: float) -> Fit:

@@ -14,8 +14,9 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import Fit, fit, predict, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench import select
+from mrpipe.tracing.bench.refit import refit
 from mrpipe.tracing.bench.screen import Screened
-from mrpipe.tracing.bench.select import Candidate, Selection, admissible, draft_tests, forward_selection, refit
+from mrpipe.tracing.bench.select import Candidate, Selection, admissible, draft_tests, forward_selection
 from mrpipe.tracing.bench.verdict import unnamed_reason
 from mrpipe.tracing.options import NamingRules
 from tests.tracing.bench.fits import plain_fit
@@ -108,6 +109,7 @@ def selection_of(monkeypatch: pytest.MonkeyPatch, base: float, *left: float) -> 
         count = len(before.problem.terms) + 1
         return [Candidate(f"effect-{count}", after(left[count - 1], count), 0.9, {})]
 
+    monkeypatch.setattr(select, "with_settled_laws", lambda item: item)
     monkeypatch.setattr(select, "candidates_after", candidates)
     monkeypatch.setattr(select, "_nothing_more", lambda *_: True)
     monkeypatch.setattr(select, "_nearer", lambda chosen, *_: chosen)
