@@ -141,6 +141,10 @@ def test_every_form_finds_itself(form):
     fit = fit_form(problem_of(planted_tests(form), form, orders=(1, 1), maximum_samples=4000, raw_force=True))
     assert fit.training_nrmse < 3e-3
     for name, value in NUMBERS[form].items():
+        if name == "yield_displacement" and "growth" in NUMBERS[form]:
+            # the fit gives it at another reference force, which follows from the tests
+            ratio = fit.model.parameters["reference_force"] / NUMBERS[form]["reference_force"]
+            value *= ratio ** NUMBERS[form]["growth"]
         if name in fit.names:
             assert fit.model.parameters[name] == pytest.approx(value, rel=0.05), name
     for name, value in LAWS.items():
