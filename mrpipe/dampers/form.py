@@ -128,6 +128,12 @@ class BaseForm(Parametrised):
         return next((item.unit for item in self.parameters if item.name == name), None)
 
 
+def rounded_share(speed: FloatArray, velocity_scale: float, sharpness: float) -> FloatArray:
+    """Return r/(1 + r^m)^(1/m) for r = speed/velocity_scale: the share of the yield force that is reached."""
+    ratio = speed / velocity_scale
+    return np.asarray(ratio / (1.0 + ratio**sharpness) ** (1.0 / sharpness), dtype=np.float64)
+
+
 def rounded_sum(share: FloatArray, at: Strength) -> FloatArray:
     """Return F_y times a share, plus c0 v [N]: the post-yield force of forms without an inner element."""
     return np.asarray(at.yield_force * share + at.viscosity * at.speed, dtype=np.float64)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.form import BaseForm, Strength
+from mrpipe.dampers.form import BaseForm, Strength, rounded_share
 from mrpipe.dampers.hysteresis import SPRING_STIFFNESS
 from mrpipe.dampers.parameters import Values, constant, shape
 from mrpipe.dampers.plant import Step
@@ -26,11 +26,9 @@ def _steps(values: Values) -> list[Step]:
 
 
 def _post_yield(values: Values, at: Strength) -> FloatArray:
-    sharpness = values.get("sharpness", 2.0)
     rounded = np.sqrt(at.speed**2 + values["velocity_scale"] ** 2)
     thinning = (rounded / values["reference_velocity"]) ** (values["velocity_exponent"] - 1.0)
-    ratio = at.speed / values["velocity_scale"]
-    share = ratio / (1.0 + ratio**sharpness) ** (1.0 / sharpness)
+    share = rounded_share(at.speed, values["velocity_scale"], values.get("sharpness", 2.0))
     return np.asarray(at.yield_force * share + at.viscosity * at.speed * thinning, dtype=np.float64)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.dampers.form import BaseForm, Strength, rounded_sum
+from mrpipe.dampers.form import BaseForm, Strength, rounded_share, rounded_sum
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import FIRST, FORCE, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
 from mrpipe.dampers.viscoplastic import knee
@@ -46,8 +46,7 @@ def _steps(values: Values) -> list[Step]:
 
 
 def _post_yield(values: Values, at: Strength) -> FloatArray:
-    ratio, sharpness = at.speed / values["velocity_scale"], values["sharpness"]
-    return rounded_sum(np.asarray(ratio / (1.0 + ratio**sharpness) ** (1.0 / sharpness)), at)
+    return rounded_sum(rounded_share(at.speed, values["velocity_scale"], values["sharpness"]), at)
 
 
 FORM = BaseForm(
