@@ -77,13 +77,17 @@ def with_settled_laws(found: Fit, *, iterations: int = 6) -> Fit:
     """
     if found.problem.base.form.coupled or not found.problem.terms:
         return found
-    found = fit(replace(found.problem, reference=own_laws(found)), found.theta, iterations=iterations)
+    found = _once_more(found, iterations)
     for _ in range(MOST_SETTLING):
-        again = fit(replace(found.problem, reference=own_laws(found)), found.theta, iterations=iterations)
+        again = _once_more(found, iterations)
         if again.chi_square > (1.0 - SETTLED) * found.chi_square:
             break
         found = again
     return found
+
+
+def _once_more(found: Fit, iterations: int) -> Fit:
+    return fit(replace(found.problem, reference=own_laws(found)), found.theta, iterations=iterations)
 
 
 def _alike(laws: tuple[Law, ...], others: tuple[Law, ...], limit: float) -> bool:

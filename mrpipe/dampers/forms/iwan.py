@@ -82,7 +82,7 @@ def elements(exponent: float, least_share: float) -> tuple[FloatArray, FloatArra
     """Return the yield displacement of each element over the mean one, and its share of the stiffness.
 
     The elements divide the mean of the cumulative stiffness and of the cumulative yield force into equal parts, because
-    few stiff elements with a large yield displacement can hold most of the force. Both sums are exact.
+    elements with a large yield displacement and little stiffness can hold most of the force.
 
     Parameters
     ----------

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.dampers.drive import advance_lag
 from mrpipe.dampers.form import BaseForm, Strength, rounded_share, rounded_sum
 from mrpipe.dampers.parameters import Values, shape
 from mrpipe.dampers.plant import FIRST, FORCE, HYSTERESIS, STEP_SIGNATURE, VELOCITY, Phase, Step
@@ -30,8 +29,7 @@ def relaxing_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, d
     if wire[FIRST] > 0.5:
         state[0] = force
     else:
-        lag = parameters[0] * (force - state[1]) / dt
-        state[0] = force - lag + (state[0] - state[1] + lag) * math.exp(-dt / parameters[0])
+        state[0] = advance_lag(state[0], state[1], force, dt / parameters[0])
     state[1] = force
     wire[FORCE] = state[0]
 

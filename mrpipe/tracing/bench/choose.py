@@ -208,10 +208,10 @@ def _raced(
         tied_forms=found.tied_forms(winner, options.lead),
         nothing_missing=least,
     )
-    extension = partial(extension_of, found, winner, selection.chosen, base.problem, search, options.rules.refinement)
 
     def completed(kept: Selection) -> Selection:
-        return replace(with_candidates(kept, found), extension=extension())
+        further = extension_of(found, winner, selection.chosen, base.problem, search, options.rules.refinement)
+        return replace(with_candidates(kept, found), extension=further)
 
     return Choice(baseline, selection, found), completed
 

@@ -52,7 +52,7 @@ def test_the_winner_is_fitted_to_all_tests_and_its_candidates_are_added_later(ba
     assert first.share > second.share
 
 
-def test_candidates_of_another_path_are_not_added(base: Fit, found: Race) -> None:
+def test_the_effect_of_the_winner_comes_first_although_another_fits_better(base: Fit, found: Race) -> None:
     other = next(model for model in found.models if model.effects == ("inertia",))
     complete = with_candidates(promoted(found, other, base), found)
     assert complete.rounds[0][0].name == "inertia"
