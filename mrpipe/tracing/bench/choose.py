@@ -26,10 +26,12 @@ from mrpipe.tracing.bench.drive_again import with_laws_again, with_laws_of_leade
 from mrpipe.tracing.bench.nuisances import observation_window, with_lag_apart
 from mrpipe.tracing.bench.pairs import with_play
 from mrpipe.tracing.bench.promotion import extension_of, promoted, with_candidates
-from mrpipe.tracing.bench.race import Race, alone_of, on_all_tests, race
+from mrpipe.tracing.bench.race import Race, race
 from mrpipe.tracing.bench.refine import with_richer_forms
 from mrpipe.tracing.bench.select import Selection, draft, forward_selection
+from mrpipe.tracing.bench.sufficient import nrmse_of_noise, sufficient_chi_square
 from mrpipe.tracing.bench.weights import NoiseScale, force_deviation, noise_scale, noise_variances
+from mrpipe.tracing.bench.with_base_forms import alone_of, on_all_tests
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
 
@@ -178,7 +180,7 @@ def _raced(
         alone_of(baseline.fit, options, known=known, jobs=jobs),
         options.yield_order,
         options.viscosity_order,
-        enough=options.rules.race.sufficient**2 * baseline.noise,
+        enough=sufficient_chi_square(baseline.noise, nrmse_of_noise(baseline.fit, baseline.noise), options.rules.race),
         least=least * baseline.noise,
         jobs=jobs,
     )

@@ -17,11 +17,11 @@ from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.nuisances import session_of
 from mrpipe.tracing.bench.odd_tests import SortedTests
 from mrpipe.tracing.bench.on_validation import Judgement, OnValidation, judge, on_validation
-from mrpipe.tracing.bench.race import alone_of, on_all_tests
 from mrpipe.tracing.bench.residual_structure import states_of, structure_p_value
 from mrpipe.tracing.bench.select import Selection
 from mrpipe.tracing.bench.validation import compare, training_agreements
 from mrpipe.tracing.bench.verdict import Named, calibrated
+from mrpipe.tracing.bench.with_base_forms import alone_of, on_all_tests
 from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.words import listed

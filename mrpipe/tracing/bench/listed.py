@@ -7,7 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.start import fit_with_form
-from mrpipe.tracing.bench.race import Race, on_all_tests
+from mrpipe.tracing.bench.race import Race
+from mrpipe.tracing.bench.with_base_forms import on_all_tests
 
 COMMON_FORMS = ("bouc-wen", "bouc-wen-n", "dahl", "yielding-part")
 """Base forms that are always listed, also if there was no race."""

@@ -15,10 +15,11 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.crossvalidation import Gain
 from mrpipe.tracing.bench.promotion import with_candidates
-from mrpipe.tracing.bench.race import Race, on_all_tests
+from mrpipe.tracing.bench.race import Race
 from mrpipe.tracing.bench.refine import with_best_forms
 from mrpipe.tracing.bench.rivals import Orders, best_rival, taken
 from mrpipe.tracing.bench.select import Selection, draft
+from mrpipe.tracing.bench.with_base_forms import on_all_tests
 
 ITERATIONS = 15
 """Numerical technique: largest number of steps of a fit without one of the effects."""

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.problem import Problem
-from mrpipe.tracing.bench.race import Model, Race, on_all_tests
+from mrpipe.tracing.bench.race import Model, Race
 from mrpipe.tracing.bench.select import Candidate, Selection, share_of
+from mrpipe.tracing.bench.with_base_forms import on_all_tests
 from mrpipe.tracing.rules import RefinementRules
 
 PROMOTED = 3

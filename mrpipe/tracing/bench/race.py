@@ -14,16 +14,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
-from mrpipe.dampers.form import BaseForm
-from mrpipe.dampers.library import forms_named
 from mrpipe.fitting.engine import Fit, fit, regressors, start_of
-from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Problem
-from mrpipe.fitting.reference import with_own_laws
-from mrpipe.fitting.start import fit_with_form, own_start
 from mrpipe.fitting.weighting import centred, weighting
-from mrpipe.tracing.bench.select import Selection, draft, left_of
-from mrpipe.tracing.options import TracingOptions
+from mrpipe.tracing.bench.select import Selection, left_of
+from mrpipe.tracing.bench.sufficient import nrmse_of_noise, sufficient_chi_square
+from mrpipe.tracing.bench.with_base_forms import with_effects_of
 from mrpipe.tracing.rules import RaceRules
 
 SEARCHED_FORMS = 3
@@ -100,6 +96,8 @@ class Race:
         coefficients of the laws. These laws are kept fixed during the race.
     rules
         Decision thresholds.
+    noise_nrmse
+        The noise as a share of the RMS force.
     """
 
     models: tuple[Model, ...]
@@ -110,6 +108,7 @@ class Race:
     noise: float
     coupled: frozenset[str] = frozenset()
     rules: RaceRules = field(default_factory=RaceRules)
+    noise_nrmse: float = 0.0
 
     def costs(self, weights: FloatArray | None = None) -> FloatArray:
         """Return the cost of each model, shape (models,): excess of its squared error over noise, times a penalty.
@@ -125,7 +124,8 @@ class Race:
         w = np.ones(len(self.counts)) if weights is None else weights
         squares = np.stack([model.squares for model in self.models])
         chi_square = squares @ w / max(float(self.counts @ w), 1.0)
-        left = np.maximum(chi_square - self.rules.sufficient**2 * self.noise, 0.0) + self.rules.noise_share * self.noise
+        enough = sufficient_chi_square(self.noise, self.noise_nrmse, self.rules)
+        left = np.maximum(chi_square - enough, 0.0) + self.rules.noise_share * self.noise
         return np.asarray(left * (1.0 + self.rules.claim_cost * np.array([model.claims for model in self.models])))
 
     def winner(self, lead: float, weights: FloatArray | None = None) -> Model:
@@ -224,7 +224,7 @@ def race(
     coupled = frozenset(name for name, item in singles.items() if item.problem.base.form.coupled)
     singles = {name: _held(item) if name in coupled else item for name, item in singles.items()}
     fits = list(singles.values())
-    if min(item.chi_square for item in fits) <= rules.sufficient**2 * noise:
+    if min(item.chi_square for item in fits) <= sufficient_chi_square(noise, nrmse_of_noise(base, noise), rules):
         # the error of a base form without effects is that of noise, so no effect is needed
         return _compared(fits, base, {}, noise, coupled, rules, jobs)
     ordered = sorted(singles, key=lambda name: _draft_cost(singles[name], noise, rules))
@@ -296,83 +296,7 @@ def _compared(
     # noise cannot exceed the residual of the best model: differences of repeats may be a missing effect
     noise = min(noise, min(float(np.sum(model.squares)) for model in models) / max(float(np.sum(counts)), 1.0))
     own = tuple(term.effect.name for term in problem.terms)
-    return Race(models, problem.base.name, own, searches, counts, noise, coupled, rules)
-
-
-def alone(small: Fit, forms: Mapping[str, BaseForm], *, known: Known | None = None, jobs: int = 1) -> dict[str, Fit]:
-    """Return name -> fit of all base forms to the tests of a draft; the form of the draft is not fitted again.
-
-    Parameters
-    ----------
-    small
-        Fit of the declared form to the draft.
-    forms
-        Base forms by name.
-    known
-        Base forms as they were fitted to the same tests before: where the search of each begins.
-    jobs
-        Threads.
-    """
-    own = small.problem.base.name
-    names = [name for name in forms if name != own]
-
-    def fitted(name: str) -> Fit:
-        # effects are proportional to the laws of the form that they are added to, not to those of the declared form
-        return with_own_laws(fit_with_form(small, forms[name], starts=1, iterations=8, known=known))
-
-    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        fits = pool.map(fitted, names)
-        return {own: small, **dict(zip(names, fits, strict=True))}
-
-
-def alone_of(found: Fit, options: TracingOptions, *, known: Known | None = None, jobs: int = 1) -> dict[str, Fit]:
-    """Return all base forms that are compared, fitted without effects to the draft of a fit; `known` as in `alone`.
-
-    Springs of base forms are left to the effect `accumulator`.
-    """
-    forms = forms_named(options.base_forms, options.form_files)
-    return alone(draft(found), {name: form.without_springs() for name, form in forms.items()}, known=known, jobs=jobs)
-
-
-def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, iterations: int = 8, jobs: int = 1) -> list[Fit]:
-    """Return fits of other base forms with the effects of a fit, on the same tests.
-
-    The forms were fitted without effects before. The laws of the drive that their steps read are fitted again, because
-    without the effect they imitate it. For the same reason a fit also begins at the starts of the form.
-    """
-
-    def one(drafted: Fit) -> Fit:
-        problem = replace(drafted.problem, terms=chosen.problem.terms)
-        starts = [start_of(problem, drafted.base_values, chosen.term_values)]
-        if not problem.base.form.coupled:
-            starts.append(own_start(problem, chosen))
-        fits = [fit(problem, start, iterations=iterations, tolerance=1e-3) for start in starts]
-        found = min(fits, key=lambda item: item.chi_square)
-        return with_own_laws(found, iterations=iterations // 2)
-
-    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
-        return list(pool.map(one, singles))
-
-
-def on_all_tests(drafted: Fit, problem: Problem, coupled: frozenset[str] = frozenset(), *, iterations: int = 10) -> Fit:
-    """Return a model of the race, fitted to all training tests.
-
-    Parameters
-    ----------
-    drafted
-        Fit on the draft.
-    problem
-        Problem of the baseline, which gives recordings and weights.
-    coupled
-        See :class:`Race`; for these forms the laws that the steps read are fitted again.
-    iterations
-        Iterations of the search.
-    """
-    base = drafted.problem.base
-    if base.name in coupled:
-        base = replace(base, form=replace(base.form, coupled=True))
-    whole = replace(drafted.problem, base=base).on_samples_of(problem)
-    return with_own_laws(fit(whole, drafted.theta, iterations=iterations))
+    return Race(models, problem.base.name, own, searches, counts, noise, coupled, rules, nrmse_of_noise(base, noise))
 
 
 def _without(found: Fit, place: int) -> Fit:

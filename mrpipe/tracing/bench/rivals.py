@@ -19,9 +19,10 @@ from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.drive_again import with_adequate_laws
 from mrpipe.tracing.bench.promotion import promoted, with_candidates
-from mrpipe.tracing.bench.race import Model, Race, on_all_tests, with_effects_of
+from mrpipe.tracing.bench.race import Model, Race
 from mrpipe.tracing.bench.refine import starts_of, with_best_forms
 from mrpipe.tracing.bench.select import Selection, draft
+from mrpipe.tracing.bench.with_base_forms import on_all_tests, with_effects_of
 
 RIVALS = 3
 """Numerical technique: base forms, in addition to the chosen one, that are compared again."""

@@ -31,6 +31,12 @@ class RaceRules(Section):
         description="A model whose error is at most this multiple of the noise floor needs nothing more; the floor is "
         "known to within a quarter.",
     )
+    sufficient_share: float = Field(
+        0.015,
+        gt=0.0,
+        description="The part of such an error that is not noise must also be at most this share of the RMS force. If "
+        "the noise is large, its multiple alone would hide an effect.",
+    )
     listed_lead: float = Field(
         0.05,
         ge=0.0,

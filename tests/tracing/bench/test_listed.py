@@ -10,8 +10,9 @@ import pytest
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import Fit
 from mrpipe.tracing.bench.listed import COMMON_FORMS, forms_alone
-from mrpipe.tracing.bench.race import Race, alone
+from mrpipe.tracing.bench.race import Race
 from mrpipe.tracing.bench.select import draft
+from mrpipe.tracing.bench.with_base_forms import alone
 from tests.tracing.bench.fits import plain_fit
 
 pytestmark = pytest.mark.planted

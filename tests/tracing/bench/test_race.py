@@ -14,7 +14,8 @@ from mrpipe.dampers.library import base_form
 from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import fit, regressors, start_of
 from mrpipe.fitting.problem import Problem, Term
-from mrpipe.tracing.bench.race import Model, Race, _compared, _held, alone, with_effects_of
+from mrpipe.tracing.bench.race import Model, Race, _compared, _held
+from mrpipe.tracing.bench.with_base_forms import alone, with_effects_of
 from mrpipe.tracing.rules import RaceRules
 from tests.tracing.bench.fits import plain_fit
 
@@ -59,6 +60,17 @@ def test_an_effect_that_every_form_needs_is_named() -> None:
 def test_a_form_within_the_noise_needs_nothing_more() -> None:
     enough = FakeModel("dahl", (), 1.5)
     assert race_of(enough, FakeModel("dahl", ("channel-skew",), 0.8)).winner(LEAD) is enough
+
+
+@pytest.mark.property
+def test_an_effect_smaller_than_a_large_noise_is_named() -> None:
+    # the excess of 0.5 is within 1.25 floors, but at noise of 6 % of the force it is 4 % of the force
+    models = [FakeModel(form, (), 1.5) for form in ("bouc-wen", "dahl", "lugre")]
+    right = FakeModel("dahl", ("backlash",), 1.0)
+    quiet = race_of(*models, right)
+    assert quiet.winner(LEAD).effects == ()
+    assert replace(quiet, noise_nrmse=0.01).winner(LEAD).effects == ()
+    assert replace(quiet, noise_nrmse=0.06).winner(LEAD) is right
 
 
 @pytest.mark.property

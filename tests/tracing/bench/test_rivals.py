@@ -13,9 +13,10 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.needed import without_superfluous
-from mrpipe.tracing.bench.race import Race, _compared, alone, on_all_tests, with_effects_of
+from mrpipe.tracing.bench.race import Race, _compared
 from mrpipe.tracing.bench.rivals import Orders, Unseen, _before_yielding, rivals_of, with_best_base
 from mrpipe.tracing.bench.select import Selection, draft
+from mrpipe.tracing.bench.with_base_forms import alone, on_all_tests, with_effects_of
 from mrpipe.tracing.rules import RaceRules
 from tests.tracing.bench.fits import plain_fit
 
