@@ -32,8 +32,14 @@ HOPELESS = 5.0
 fit.
 """
 
-RANKED_STEPS = 3
-"""Numerical technique: number of steps of the fits that rank all base forms with the named effects."""
+RANKED_STEPS = 1
+"""Numerical technique: number of steps of the fits that rank all base forms with the named effects ..."""
+
+CONTINUED = 10
+"""Numerical technique: ... number of the best ones that are fitted further ..."""
+
+CONTINUED_STEPS = 3
+"""Numerical technique: ... and number of their further steps."""
 
 ITERATIONS = 15
 """Numerical technique: largest number of steps of a fit with another base form ..."""
@@ -260,7 +266,14 @@ def _ranked(
             for found in with_effects_of(shorter, singles, iterations=RANKED_STEPS, jobs=jobs):
                 trials.append((plain[found.problem.base.name], found, range(len(places))))
     trials.sort(key=lambda item: item[1].chi_square)
-    return [(replace(model, fit=found), found, places) for model, found, places in trials[:RIVALS]]
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        nearer = pool.map(lambda item: (item[0], _further(item[1]), item[2]), trials[:CONTINUED])
+        best = sorted(nearer, key=lambda item: item[1].chi_square)[:RIVALS]
+    return [(replace(model, fit=found), found, places) for model, found, places in best]
+
+
+def _further(begun: Fit) -> Fit:
+    return with_own_laws(fit(begun.problem, begun.theta, iterations=CONTINUED_STEPS, tolerance=TOLERANCE))
 
 
 def _before_yielding(full: Fit, places: Sequence[int], declared: int) -> Iterator[Fit]:
