@@ -12,6 +12,7 @@ from numba import float64, njit
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.plant import (
     CURRENT,
+    EXTRA_FORCE,
     FORCE,
     HYSTERESIS,
     HYSTERETIC_FORCE,
@@ -37,7 +38,7 @@ def asymmetry_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
     elif kind == 1.0:
         force = abs(wire[VISCOUS_FORCE])
     elif kind == 2.0:
-        force = abs(wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE])
+        force = abs(wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE] + wire[EXTRA_FORCE])
     elif kind == 3.0:
         force = abs(wire[HYSTERESIS])
     elif kind == 4.0:
@@ -50,7 +51,7 @@ def asymmetry_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, 
 @njit(STEP_SIGNATURE, cache=True)
 def rounded_step(wire: FloatArray, state: FloatArray, parameters: FloatArray, dt: float) -> None:
     """Parameters: amplitude, force [N] below which the difference between the directions fades."""
-    force = wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE]
+    force = wire[HYSTERETIC_FORCE] + wire[VISCOUS_FORCE] + wire[EXTRA_FORCE]
     wire[FORCE] += parameters[0] * (math.sqrt(force * force + parameters[1] * parameters[1]) - parameters[1])
 
 

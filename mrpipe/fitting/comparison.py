@@ -15,13 +15,14 @@ from mrpipe.dampers.laws import LawShape
 from mrpipe.dampers.model import DamperModel
 from mrpipe.fitting.damper import damper_model
 from mrpipe.fitting.drive_laws import LawChoice, choose_laws
-from mrpipe.fitting.engine import Fit, fit, regressors
+from mrpipe.fitting.engine import Fit, fit
 from mrpipe.fitting.form_fit import FitMethod, FormFit, fit_form, form_problem, nrmse_of
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import bench_recordings, blocks_of, thinned
 from mrpipe.fitting.scoring import PooledScore, TestScore, pool, score_tests
 from mrpipe.fitting.settings import DamperFitSettings
+from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.start import base_of, best_fit, distinct_levels, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
 from mrpipe.dampers.laws import LawShape
-from mrpipe.fitting.engine import Fit, regressors
+from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.kernel import CURRENT_AT, run_recordings
+from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.start import LEVEL_SHARE, drive_varies, mean_levels
 from mrpipe.fitting.weighting import centred, weighting
 

@@ -21,7 +21,8 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.laws import Law, LawShape, for_blocks
 from mrpipe.fitting.drive_cells import Cells, cells_of
-from mrpipe.fitting.engine import Fit, bounded_solution
+from mrpipe.fitting.engine import Fit
+from mrpipe.fitting.solution import bounded_solution
 
 SCALE_SHARES = (0.1, 0.15, 0.22, 0.33, 0.5, 0.75, 1.1, 1.7, 2.5, 5.0)
 """Scales of saturating laws that are tried first, as shares of the largest drive."""

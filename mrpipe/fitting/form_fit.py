@@ -14,11 +14,12 @@ from mrpipe.dampers.laws import law_names
 from mrpipe.dampers.model import DamperModel
 from mrpipe.errors import DivergedError
 from mrpipe.fitting.damper import damper_model
-from mrpipe.fitting.engine import Fit, finish, fit, regressors, solve, start_of
+from mrpipe.fitting.engine import Fit, derivatives, finish, fit, start_of
 from mrpipe.fitting.problem import Base, Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import blocks_of
 from mrpipe.fitting.settings import DamperFitSettings
+from mrpipe.fitting.solution import regressors, solve
 from mrpipe.fitting.start import BEGUN_STEPS, MORE_POINTS, best_starts, first_problem, followed
 from mrpipe.fitting.weighting import centred, weighting
 
@@ -259,7 +260,7 @@ def _nelder_mead(problem: Problem, begin: FloatArray) -> Fit:
             break
         best = found.fun
     theta = low + np.asarray(end) * (high - low)
-    return finish(problem, theta, w, solve(problem, theta, w))
+    return finish(problem, theta, w)
 
 
 def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -280,9 +281,9 @@ def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray
         theta = problem.encode([*values[:place], value + step, *values[place + 1 :]])
         moved = centred(regressors(problem, theta), w)[0]
         slopes.append((found.linear @ moved - calculated) / step)
-    free = columns
+    free = -derivatives(found)[1]
     if problem.base.form.known:
-        free = np.delete(columns, problem.base.columns - 1, axis=0)
+        free = np.delete(free, problem.base.columns - 1, axis=0)
     # the rows are derivatives of the model force, not of the residual: the sign cancels in both products below
     jacobian = np.linalg.inv(matrix).T @ np.vstack([*slopes, free])
     size = np.linalg.norm(jacobian, axis=1)

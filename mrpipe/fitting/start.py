@@ -13,10 +13,11 @@ from mrpipe.dampers.form import BaseForm
 from mrpipe.dampers.forms import DEFAULT_FORM
 from mrpipe.dampers.laws import Law, LawShape, constant_law, for_blocks
 from mrpipe.dampers.library import base_form
-from mrpipe.fitting.engine import Fit, fit, solve, start_of
+from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.known import Known, known_start
 from mrpipe.fitting.problem import Base, Problem
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.solution import solve
 from mrpipe.fitting.weighting import weighting
 
 VARYING_SHARE = 0.05

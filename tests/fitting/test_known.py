@@ -11,7 +11,7 @@ import pytest
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.dampers.library import base_form
 from mrpipe.dampers.model import write_damper
-from mrpipe.fitting import engine
+from mrpipe.fitting import engine, solution
 from mrpipe.fitting.damper import damper_model
 from mrpipe.fitting.known import known_start, read_known
 from mrpipe.fitting.start import fit_with_form, with_form
@@ -22,8 +22,8 @@ from tests.tracing.bench.fits import plain_fit
 @pytest.mark.parametrize("form", ["dahl", "bouc-wen-stiffness"])
 def test_a_known_start_changes_nothing_but_the_speed(form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     solved = []
-    plain = engine.solve
-    monkeypatch.setattr(engine, "solve", lambda *given: solved.append(1) or plain(*given))
+    plain = solution.run_recordings
+    monkeypatch.setattr(solution, "run_recordings", lambda *given: solved.append(1) or plain(*given))
     found = plain_fit("accumulator")
     # an earlier fit with other weights, as identify-damper makes it
     flat = replace(found.problem, root_weight=(found.problem.root_weight > 0.0) / found.problem.scales.force)

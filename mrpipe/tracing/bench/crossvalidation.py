@@ -10,10 +10,10 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
-from mrpipe.fitting.engine import Fit, fit, jacobian_of, predict, regressors
+from mrpipe.fitting.engine import Fit, derivatives, fit, predict
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.fitting.weighting import centred, weighting
+from mrpipe.fitting.weighting import weighting
 from mrpipe.tracing.bench.residual_structure import BLOCK
 
 BEYOND = 0.01
@@ -144,13 +144,11 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
     """
     problem = found.problem
     w = weighting(problem)
-    low, high = problem.bounds()
     residual = found.residual[w.at]
-    # the Jacobian of the projected residual gives the searched values; amplitudes are differentiated with them
-    searched = jacobian_of(problem, found.theta, residual, w, low, high)
-    linear = centred(regressors(problem, found.theta), w)[0]
+    # the derivative of the projected residual gives the searched values; amplitudes are differentiated with them
+    rows = np.concatenate(derivatives(found))
     first = problem.base.columns
-    deviation, tests = _jackknife(np.concatenate([-searched, linear]), residual, problem.recordings.test[w.at])
+    deviation, tests = _jackknife(-rows, residual, problem.recordings.test[w.at])
     factor = float(stats.t.ppf(0.975, max(tests - 1, 1)))
     result: list[dict[str, tuple[float, float]]] = [{} for _ in problem.terms]
     for k, (index, parameter) in enumerate(problem.searched):

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from mrpipe.campaigns.plausibility import Finding
-from mrpipe.fitting.engine import Fit, chain_of
+from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.kernel import HYSTERESIS_AT, run_recordings
 from mrpipe.fitting.known import Known
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.solution import chain_of
 from mrpipe.tracing.bench.baseline import Baseline
 from mrpipe.tracing.bench.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.nuisances import session_of

@@ -14,8 +14,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
-from mrpipe.fitting.engine import Fit, fit, regressors, start_of
+from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Problem
+from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.weighting import centred, weighting
 from mrpipe.tracing.bench.select import Selection, left_of
 from mrpipe.tracing.bench.sufficient import nrmse_of_noise, sufficient_chi_square

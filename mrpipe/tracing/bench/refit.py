@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrpipe.fitting.engine import Fit, fit, solve, start_of
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.solution import solve
 from mrpipe.fitting.weighting import weighting
 from mrpipe.tracing.bench.screen import Screened
 

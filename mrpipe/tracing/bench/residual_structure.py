@@ -8,9 +8,10 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
-from mrpipe.fitting.engine import Fit, chain_of
+from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.kernel import CURRENT_AT, HYSTERESIS_AT, WORK_AT, run_recordings
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.solution import chain_of
 from mrpipe.tracing.rules import LocationRules
 
 BLOCK = 0.6

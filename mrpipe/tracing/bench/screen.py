@@ -10,13 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.fitting.engine import (
-    Fit,
-    bounded_solution,
-    jacobian_of,
-    regressors,
-)
+from mrpipe.fitting.engine import Fit, derivatives
 from mrpipe.fitting.problem import Problem, Term
+from mrpipe.fitting.solution import bounded_solution, regressors
 from mrpipe.fitting.weighting import Weighting, centred, weighting
 
 
@@ -69,10 +65,9 @@ def tangent_of(found: Fit) -> Tangent:
     problem = found.problem
     w = weighting(problem)
     residual = found.residual[w.at]
-    low, high = problem.bounds()
-    searched = jacobian_of(problem, found.theta, residual, w, low, high)
+    searched, linear = derivatives(found)
     columns = regressors(problem, found.theta)
-    rows = np.concatenate([centred(columns, w)[0], searched])
+    rows = np.concatenate([linear, searched])
     norms = np.linalg.norm(rows, axis=1, keepdims=True)
     rows = rows[norms[:, 0] > 0] / norms[norms[:, 0] > 0]
     values, vectors = np.linalg.eigh(rows @ rows.T)

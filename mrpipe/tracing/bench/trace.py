@@ -21,6 +21,7 @@ from mrpipe.tracing.bench.chosen import Bench, Chosen, begin, choose, validation
 from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
 from mrpipe.tracing.bench.drive_again import with_final_laws
 from mrpipe.tracing.bench.gates import judged, refusal_of, validated
+from mrpipe.tracing.bench.inner_springs import with_inner_springs
 from mrpipe.tracing.bench.law_rival import without_laws_of_drive
 from mrpipe.tracing.bench.needed import without_idle, without_superfluous
 from mrpipe.tracing.bench.nuisances import observation_window
@@ -138,6 +139,9 @@ def _named_on_training(
     else:
         compared = Unseen(options.folds, options.bootstrap_draws, rng)
         selection = _refined(selection, declared, baseline.model_error, options, rng, jobs)
+        refinement = options.rules.refinement
+        limit = 0.0 if baseline.model_error else (1.0 + refinement.worth_a_try) * selection.noise
+        selection = with_inner_springs(selection, limit, refinement.least_gain, compared, jobs)
         selection, gains, reason = without_idle(selection, gains, declared, lead=_lead(baseline, options))
     if not reason and selection.proven:
         selection, gains, reason = without_laws_of_drive(selection, gains, declared, compared, jobs)

@@ -12,8 +12,9 @@ import pytest
 from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.library import base_form
 from mrpipe.effects.library import damper_effects
-from mrpipe.fitting.engine import fit, regressors, start_of
+from mrpipe.fitting.engine import fit, start_of
 from mrpipe.fitting.problem import Problem, Term
+from mrpipe.fitting.solution import regressors
 from mrpipe.tracing.bench.race import Model, Race, _compared, _held
 from mrpipe.tracing.bench.with_base_forms import alone, with_effects_of
 from mrpipe.tracing.rules import RaceRules
