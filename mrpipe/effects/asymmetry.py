@@ -143,7 +143,9 @@ EFFECT = Effect(
     forms=(
         EffectForm("yield", "F + s |alpha z|", (_SHARE,), _yield, {"share": 0}),
         EffectForm("viscous", "F + s |c v|", (_SHARE,), _viscous, {"share": 0}),
-        EffectForm("both", "F + s |alpha z + c v|", (_SHARE,), _both, {"share": 0}),
+        EffectForm(
+            "both", "F + s |alpha z + c v + k0 w|, with the spring k0 inside, if any", (_SHARE,), _both, {"share": 0}
+        ),
         EffectForm(
             "yield-by-direction",
             "F + s alpha z v/sqrt(v^2 + v_t^2)",

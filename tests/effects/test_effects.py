@@ -60,6 +60,17 @@ def test_the_names_of_the_contract_are_all_there() -> None:
 
 
 @pytest.mark.property
+@pytest.mark.parametrize(("form", "rest"), [("both", {}), ("rounded", {"knee_force": 1e-9})])
+def test_asymmetry_acts_on_the_spring_inside_the_damper_too(form: str, rest: dict[str, float]) -> None:
+    numbers = {"yield_displacement": 3.7e-4, "gamma_share": 0.5, "c1_a": 900.0, "k0": 4000.0}
+    steps = [*base_steps()[:2], *base_form("modified-bouc-wen").steps(numbers)]
+    asymmetry = all_effects()["asymmetry"].form(form).steps({"share": 0.2, **rest})
+    x, v, a, drive, dt = motion()
+    plain, changed = (run_chain(build_chain(item), x, v, a, drive, dt)[:, FORCE] for item in (steps, steps + asymmetry))
+    np.testing.assert_allclose(changed, plain + 0.2 * np.abs(plain), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.property
 @pytest.mark.parametrize("name", list(damper_effects()))
 def test_an_effect_meets_every_demand(name: str) -> None:
     effect = damper_effects()[name]
