@@ -38,7 +38,7 @@ MOST_FITTED = 5
 """Number of forms near the best that are fitted to all samples, in addition to the requested ones."""
 
 COUPLED_SAMPLES = 20_000
-"""Number of samples of the motion for coupled forms, whose fit is repeated several times."""
+"""Number of samples of the motion for coupled forms, whose fit searches the laws of the drive as well."""
 
 CONTENDER = 1.3
 """Forms whose error on the draft exceeds the least one by this factor are not fitted to all samples."""

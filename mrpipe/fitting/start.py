@@ -192,7 +192,7 @@ def followed(problem: Problem, points: Sequence[FloatArray], starts: int, iterat
     The error before the first step is a poor measure if two parts of a form can replace each other.
     """
     if problem.base.form.coupled:
-        # every step of a coupled form costs several searches
+        # a fit of a coupled form takes several times as long as one of another form
         points = points[:starts]
     begun = [fit(problem, point, iterations=BEGUN_STEPS) for point in points]
     begun.sort(key=lambda item: item.cost)
