@@ -35,7 +35,7 @@ def sufficient_chi_square(noise: float, noise_nrmse: float, rules: RaceRules) ->
     noise
         Mean squared weighted residual that noise leaves.
     noise_nrmse
-        The noise as a share of the RMS force; 0: the share of the force is no limit.
+        The noise as a share of the RMS force; 0 if it is not known, so that the force sets no limit.
     rules
         Decision thresholds.
     """
