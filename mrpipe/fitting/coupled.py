@@ -18,7 +18,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.dampers.laws import Law
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.search import Space
-from mrpipe.fitting.solution import Solved, bounded_solution, regressors, solve, unstable
+from mrpipe.fitting.solution import Solved, bounded_solution, regressors, solve_rows, unstable
 from mrpipe.fitting.weighting import Weighting, centred
 
 LEVELS = 21
@@ -101,11 +101,11 @@ def coupled(problem: Problem, theta: FloatArray, w: Weighting) -> tuple[Coupled,
         Samples and weights.
     """
     count = problem.base.columns - int(problem.base.form.known)
-    rows, means = centred(regressors(problem, theta)[:count], w)
+    rows, means = centred(regressors(problem, theta), w)
     force = float(np.linalg.norm(w.target))
-    response = np.linalg.norm(rows, axis=1) if np.all(np.isfinite(means)) else np.zeros(count)
+    response = np.linalg.norm(rows[:count], axis=1) if np.all(np.isfinite(means[:count])) else np.zeros(count)
     whole = Coupled(problem, w, force / np.maximum(response, LEAST_SIZE * force))
-    choices = [_coefficients_of(problem, theta), solve(problem, theta, w).linear[:count]]
+    choices = [_coefficients_of(problem, theta), solve_rows(problem, rows, means, w).linear[:count]]
     points = [np.concatenate([theta, item / whole.sizes]) for item in choices]
     return whole, min(points, key=lambda point: whole.solved(point).cost)
 

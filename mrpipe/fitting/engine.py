@@ -111,13 +111,6 @@ def fit(problem: Problem, start: FloatArray, *, iterations: int = 15, tolerance:
     return _result(problem, theta, w, found, done)
 
 
-def finish(problem: Problem, theta: FloatArray, w: Weighting) -> Fit:
-    """Return the fit at these searched parameters."""
-    if problem.base.form.coupled:
-        return _coupled_fit(problem, theta, w, 0, 0.0)
-    return _result(problem, theta, w, solve(problem, theta, w), 0)
-
-
 def _coupled_fit(problem: Problem, start: FloatArray, w: Weighting, iterations: int, tolerance: float) -> Fit:
     """Fit a coupled form: search with given laws, then search the laws as well, and repeat both within `iterations`."""
     theta = np.clip(start, *problem.bounds())
@@ -146,30 +139,39 @@ def _space(problem: Problem, w: Weighting) -> Space:
     return Space(lambda theta: solve(problem, theta, w), low, high, logarithmic)
 
 
-def derivatives(found: Fit) -> tuple[FloatArray, FloatArray]:
-    """Return how the weighted residual changes with all fitted numbers, at the samples that are compared.
+def searched_derivatives(found: Fit) -> FloatArray:
+    """Return how the weighted residual changes with the searched parameters, shape (p, m).
+
+    The linear coefficients are solved for at each value. In a coupled form only the amplitudes are.
+    """
+    problem = found.problem
+    w = weighting(problem)
+    if not problem.base.form.coupled:
+        return _space(problem, w).jacobian(found.theta, found.residual[w.at])
+    whole, point = coupled(problem, found.theta, w)
+    return whole.space.jacobian(point, whole.solved(point).residual, range(len(found.theta)))
+
+
+def linear_derivatives(found: Fit, columns: FloatArray) -> FloatArray:
+    """Return how the weighted residual changes with the linear coefficients, shape (c, m).
 
     Parameters
     ----------
     found
         The fit.
-
-    Returns
-    -------
-    Derivatives with respect to the searched parameters, shape (p, m), after the linear coefficients are solved for; and
-    with respect to the linear coefficients, shape (c, m). In a coupled form the laws are not solved for.
+    columns
+        Its regressors, shape (c, n). The steps of a coupled form read the laws, so that these regressors are only a
+        part of the derivative.
     """
     problem = found.problem
     w = weighting(problem)
-    rows = -centred(regressors(problem, found.theta), w)[0]
-    if not problem.base.form.coupled:
-        return _space(problem, w).jacobian(found.theta, found.residual[w.at]), rows
-    whole, point = coupled(problem, found.theta, w)
-    jacobian = whole.space.jacobian(point, whole.solved(point).residual)
-    count = len(found.theta)
-    laws = len(whole.sizes)
-    rows[:laws] = jacobian[count:] / whole.sizes[:, None]
-    return jacobian[:count], rows
+    rows = -centred(columns, w)[0]
+    if problem.base.form.coupled:
+        whole, point = coupled(problem, found.theta, w)
+        laws = len(whole.sizes)
+        changes = whole.space.jacobian(point, whole.solved(point).residual, range(len(found.theta), len(point)))
+        rows[:laws] = changes / whole.sizes[:, None]
+    return rows
 
 
 def _result(problem: Problem, theta: FloatArray, w: Weighting, found: Solved, iterations: int) -> Fit:

@@ -14,7 +14,7 @@ from mrpipe.dampers.laws import law_names
 from mrpipe.dampers.model import DamperModel
 from mrpipe.errors import DivergedError
 from mrpipe.fitting.damper import damper_model
-from mrpipe.fitting.engine import Fit, derivatives, finish, fit, start_of
+from mrpipe.fitting.engine import Fit, fit, linear_derivatives, start_of
 from mrpipe.fitting.problem import Base, Problem
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.samples import blocks_of
@@ -260,7 +260,7 @@ def _nelder_mead(problem: Problem, begin: FloatArray) -> Fit:
             break
         best = found.fun
     theta = low + np.asarray(end) * (high - low)
-    return finish(problem, theta, w)
+    return fit(problem, theta, iterations=0)
 
 
 def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -272,7 +272,8 @@ def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray
     problem = found.problem
     w = weighting(problem)
     residual = found.residual[w.at]
-    columns = centred(regressors(problem, found.theta), w)[0]
+    unweighted = regressors(problem, found.theta)
+    columns = centred(unweighted, w)[0]
     calculated = found.linear @ columns
     values = problem.decode(found.theta)
     slopes = []
@@ -281,7 +282,7 @@ def _uncertainty(found: Fit, matrix: FloatArray) -> tuple[FloatArray, FloatArray
         theta = problem.encode([*values[:place], value + step, *values[place + 1 :]])
         moved = centred(regressors(problem, theta), w)[0]
         slopes.append((found.linear @ moved - calculated) / step)
-    free = -derivatives(found)[1]
+    free = -linear_derivatives(found, unweighted)
     if problem.base.form.known:
         free = np.delete(free, problem.base.columns - 1, axis=0)
     # the rows are derivatives of the model force, not of the residual: the sign cancels in both products below

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,8 +33,8 @@ class Space:
     high: FloatArray
     logarithmic: BoolArray
 
-    def jacobian(self, point: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the derivative of the residual, shape (p, m), by finite differences.
+    def jacobian(self, point: FloatArray, residual: FloatArray, among: Sequence[int] | None = None) -> FloatArray:
+        """Return the derivative of the residual by finite differences, shape (p, m), or (k, m) for k coordinates.
 
         Parameters
         ----------
@@ -42,18 +42,22 @@ class Space:
             Coordinates, shape (p,).
         residual
             Residual there, shape (m,).
+        among
+            Indices of the coordinates; None: all.
         """
-        rows = np.zeros((len(point), len(residual)))
-        for k, (low, high) in enumerate(zip(self.low, self.high, strict=True)):
+        places = range(len(point)) if among is None else among
+        rows = np.zeros((len(places), len(residual)))
+        for row, k in zip(rows, places, strict=True):
+            low, high = self.low[k], self.high[k]
             width = 1e-3 * max(1.0, 0.02 * (high - low)) if self.logarithmic[k] else max(2e-5, 2e-3 * abs(point[k]))
             width = -width if point[k] + width > high else width
             # if the damper is unstable on both sides of a value, the value is kept
             for side in (width, -width):
                 moved = point.copy()
                 moved[k] += side
-                row = (self.solved(moved).residual - residual) / side
-                if np.isfinite(row @ row):
-                    rows[k] = row
+                slope = (self.solved(moved).residual - residual) / side
+                if np.isfinite(slope @ slope):
+                    row[:] = slope
                     break
         return rows
 

@@ -103,11 +103,24 @@ class Solved:
 
 def solve(problem: Problem, theta: FloatArray, w: Weighting) -> Solved:
     """Return the solution for the linear coefficients; a coupled form reads the laws of the problem's reference."""
-    rows, means = centred(regressors(problem, theta), w)
-    count = len(rows)
+    return solve_rows(problem, *centred(regressors(problem, theta), w), w)
+
+
+def solve_rows(problem: Problem, rows: FloatArray, means: FloatArray, w: Weighting) -> Solved:
+    """Return the solution for the linear coefficients.
+
+    Parameters
+    ----------
+    problem
+        Problem, which gives the bounds of the coefficients.
+    rows, means
+        Weighted regressors without their means in each test, and these means, as :func:`centred` returns them.
+    w
+        Samples and weights.
+    """
     # one value that is not finite would make the mean of its test not finite
     if not np.all(np.isfinite(means)):
-        return unstable(count, w)
+        return unstable(len(rows), w)
     low, high = problem.linear_bounds
     linear, at_bound = bounded_solution(rows @ rows.T, rows @ w.target, low, high)
     return Solved(w.target - linear @ rows, linear, w.target_means - linear @ means, at_bound)

@@ -9,7 +9,8 @@ import pytest
 
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.coupled import coupled
-from mrpipe.fitting.engine import Fit, derivatives, fit, predict
+from mrpipe.fitting.engine import Fit, fit, linear_derivatives, predict
+from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.start import fit_with_form
 from mrpipe.fitting.weighting import weighting
 from tests.fitting.spencer import NOISE, SERIES, YIELD_DISPLACEMENT, spencer_fit
@@ -68,7 +69,7 @@ def test_derivatives_with_respect_to_the_laws_include_what_the_steps_read() -> N
     found = _fitted()
     w = weighting(found.problem)
     whole, point = coupled(found.problem, found.theta, w)
-    rows = derivatives(found)[1]
+    rows = linear_derivatives(found, regressors(found.problem, found.theta))
     for place in range(len(whole.sizes)):
         moved = point.copy()
         moved[len(found.theta) + place] += 1e-4

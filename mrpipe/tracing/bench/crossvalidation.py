@@ -10,9 +10,10 @@ import numpy as np
 from scipy import stats
 
 from mrpipe.artifacts import BoolArray, FloatArray, IntArray
-from mrpipe.fitting.engine import Fit, derivatives, fit, predict
+from mrpipe.fitting.engine import Fit, fit, linear_derivatives, predict, searched_derivatives
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.recordings import Recordings
+from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.weighting import weighting
 from mrpipe.tracing.bench.residual_structure import BLOCK
 
@@ -146,7 +147,8 @@ def intervals(found: Fit) -> list[dict[str, tuple[float, float]]]:
     w = weighting(problem)
     residual = found.residual[w.at]
     # the derivative of the projected residual gives the searched values; amplitudes are differentiated with them
-    rows = np.concatenate(derivatives(found))
+    columns = regressors(problem, found.theta)
+    rows = np.concatenate([searched_derivatives(found), linear_derivatives(found, columns)])
     first = problem.base.columns
     deviation, tests = _jackknife(-rows, residual, problem.recordings.test[w.at])
     factor = float(stats.t.ppf(0.975, max(tests - 1, 1)))

@@ -151,7 +151,7 @@ def with_best_base(
     """
     chosen = selection.chosen
     named = range(declared, min(declared + selection.proven, len(chosen.problem.terms)))
-    limit = 0.0 if model_error else (1.0 + worth_a_try) * selection.noise
+    limit = selection.sufficient(worth_a_try, model_error=model_error)
     if race is None or not named or chosen.chi_square < limit:
         return selection
     small = draft(chosen)

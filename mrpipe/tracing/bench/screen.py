@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.fitting.engine import Fit, derivatives
+from mrpipe.fitting.engine import Fit, linear_derivatives, searched_derivatives
 from mrpipe.fitting.problem import Problem, Term
 from mrpipe.fitting.solution import bounded_solution, regressors
 from mrpipe.fitting.weighting import Weighting, centred, weighting
@@ -65,9 +65,8 @@ def tangent_of(found: Fit) -> Tangent:
     problem = found.problem
     w = weighting(problem)
     residual = found.residual[w.at]
-    searched, linear = derivatives(found)
     columns = regressors(problem, found.theta)
-    rows = np.concatenate([linear, searched])
+    rows = np.concatenate([linear_derivatives(found, columns), searched_derivatives(found)])
     norms = np.linalg.norm(rows, axis=1, keepdims=True)
     rows = rows[norms[:, 0] > 0] / norms[norms[:, 0] > 0]
     values, vectors = np.linalg.eigh(rows @ rows.T)

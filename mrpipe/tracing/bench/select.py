@@ -118,6 +118,18 @@ class Selection:
         """Whether anything is missing at all."""
         return self.recoverable > self.nothing_missing * self.noise
 
+    def sufficient(self, worth_a_try: float, *, model_error: bool) -> float:
+        """Return the chi-square up to which nothing more is tried; 0 if a model error takes the place of the noise.
+
+        Parameters
+        ----------
+        worth_a_try
+            Excess over the noise, in units of the noise, that is worth a try.
+        model_error
+            Whether weights follow from the error of a model, which may be that of a wrong base form.
+        """
+        return 0.0 if model_error else (1.0 + worth_a_try) * self.noise
+
     def with_floor(self, floor: float) -> Selection:
         """Return the selection with another estimate of the chi-square that cannot be recovered; shares are updated."""
         rounds = tuple(

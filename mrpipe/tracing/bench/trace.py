@@ -140,7 +140,7 @@ def _named_on_training(
         compared = Unseen(options.folds, options.bootstrap_draws, rng)
         selection = _refined(selection, declared, baseline.model_error, options, rng, jobs)
         refinement = options.rules.refinement
-        limit = 0.0 if baseline.model_error else (1.0 + refinement.worth_a_try) * selection.noise
+        limit = selection.sufficient(refinement.worth_a_try, model_error=baseline.model_error)
         selection = with_inner_springs(selection, limit, refinement.least_gain, compared, jobs)
         selection, gains, reason = without_idle(selection, gains, declared, lead=_lead(baseline, options))
     if not reason and selection.proven:
