@@ -66,32 +66,3 @@ def drive_favours_a_side(drive: FloatArray, cycles: IntArray) -> bool:
     early = drive[cycles[0] : cycles[-1] - half]
     late = drive[cycles[0] + half : cycles[-1]]
     return float(np.sqrt(np.mean((early - late) ** 2))) > 0.05 * float(np.max(np.abs(drive)))
-
-
-def acceleration_gain(displacement: FloatArray, acceleration: FloatArray, sampling_rate_hz: float) -> float:
-    """Return the ratio of acceleration to second derivative of displacement: 1 if sign and unit are right.
-
-    It is computed from the cross spectrum around the strongest frequency of the motion, where the noise of the
-    displacement is negligible.
-
-    Parameters
-    ----------
-    displacement, acceleration
-        Shape (n,).
-    sampling_rate_hz
-        Rate.
-
-    Returns
-    -------
-    float
-        Gain with sign; 0 without motion.
-    """
-    window = np.hanning(displacement.size)
-    frequencies = np.fft.rfftfreq(displacement.size, 1.0 / sampling_rate_hz)
-    motion = np.fft.rfft(window * (displacement - displacement.mean()))
-    measured = np.fft.rfft(window * (acceleration - acceleration.mean()))
-    square = (2.0 * np.pi * frequencies) ** 2
-    strongest = frequencies[2 + int(np.argmax(np.abs(motion[2:]) * frequencies[2:]))]
-    band = (frequencies > 0.7 * strongest) & (frequencies < 1.4 * strongest)
-    power = float(np.sum(square[band] * np.abs(motion[band]) ** 2))
-    return -float(np.sum(np.real(np.conj(motion[band]) * measured[band]))) / power if power > 0.0 else 0.0

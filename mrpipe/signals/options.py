@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.options import Section
@@ -12,6 +12,8 @@ from mrpipe.signals.faults import KnownFaults
 
 if TYPE_CHECKING:
     from mrpipe.signals.kalman import KalmanGains
+
+Motion = Literal["displacement", "displacement-and-acceleration"]
 
 _NO_FAULTS = KnownFaults()
 
@@ -46,6 +48,12 @@ class SensorCorrections(Section):
 class PreparationOptions(Section):
     """Options for filtering measured tests, removing offsets, and differentiation."""
 
+    motion: Motion = Field(
+        "displacement",
+        description="Sensors that give the motion. displacement-and-acceleration: the motion that agrees best with "
+        "both, which follows the displacement at low frequencies and the acceleration at high ones; delay and gain of "
+        "the accelerometer are estimated. It lowers the noise of the velocity if the displacement sensor is noisy.",
+    )
     working_rate_hz: float = Field(
         0.0,
         ge=0.0,
@@ -110,6 +118,12 @@ class PreparationOptions(Section):
     corrections: SensorCorrections = Field(
         SensorCorrections(), description="Known faults of sensors, which are corrected."
     )
+
+    @model_validator(mode="after")
+    def _check_motion(self) -> PreparationOptions:
+        if self.motion == "displacement-and-acceleration" and self.phase == "causal":
+            raise ValueError("motion: displacement-and-acceleration uses later samples; set phase to zero")
+        return self
 
     @property
     def faults(self) -> KnownFaults:

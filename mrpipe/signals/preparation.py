@@ -10,6 +10,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.campaigns import Campaign, Recording
 from mrpipe.errors import UserError
+from mrpipe.signals.accelerometer import with_accelerometer
 from mrpipe.signals.cycles import SteadyCycles, choose_cycles, find_steady_cycles, is_sine
 from mrpipe.signals.differentiation import backward_difference, central_difference, savitzky_golay
 from mrpipe.signals.faults import require_known
@@ -23,7 +24,6 @@ from mrpipe.signals.filters import (
 )
 from mrpipe.signals.kalman import kinematic_kalman, kinematic_smoother
 from mrpipe.signals.offsets import (
-    acceleration_gain,
     balanced_extremes,
     drive_favours_a_side,
     force_intercept,
@@ -123,7 +123,7 @@ def prepare_campaign(
             _require_length(work, options, source)
             works.append(work)
     require_known(options.faults, [work.name for work in works])
-    findings = _check_acceleration(works)
+    findings = with_accelerometer({work.name: work.channels for work in works}, rate, options.motion, source)
     for work in works:
         _filter(work, options)
         _measure_offsets(work)
@@ -208,32 +208,6 @@ def _filter(work: _Work, options: PreparationOptions) -> None:
             f"no low-pass at {options.cutoff_hz:g} Hz, because data at {work.rate:g} Hz hold almost nothing above it"
         )
     work.cycles = find_steady_cycles(work.filtered["displacement"], work.rate)
-
-
-def _check_acceleration(works: Sequence[_Work]) -> list[str]:
-    """Invert an acceleration whose sign contradicts that of the displacement, and report a doubtful unit."""
-    gains = [
-        acceleration_gain(work.channels["displacement"], work.channels["acceleration"], work.rate)
-        for work in works
-        if "acceleration" in work.channels
-    ]
-    if not gains:
-        return []
-    gain = float(np.median(gains))
-    findings = []
-    if gain < -0.2:
-        findings.append(
-            "acceleration has the opposite sign of the displacement's second derivative: its sign was reversed"
-        )
-        for work in works:
-            if "acceleration" in work.channels:
-                work.channels["acceleration"] = -work.channels["acceleration"]
-    if not 0.7 < abs(gain) < 1.4:
-        findings.append(
-            f"acceleration is {abs(gain):.3g} times the second derivative of displacement: check unit, scale and "
-            "place of the accelerometer"
-        )
-    return findings
 
 
 def _measure_offsets(work: _Work) -> None:

@@ -111,7 +111,7 @@ def signal_end(values: FloatArray, sampling_rate_hz: float) -> float:
         values - np.mean(values), fs=sampling_rate_hz, nperseg=length, window="blackmanharris", detrend="linear"
     )
     floor = noise_floor(frequencies, density) / MEDIAN_OF_FEW
-    smooth, count = _averaged(frequencies, density, 0.12, 2)
+    smooth, count = averaged(frequencies, density, 0.12, 2)
     above = np.flatnonzero(smooth > (1.0 + np.maximum(1.0, 4.0 / np.sqrt(0.5 * count))) * floor)
     above = above[frequencies[above] <= 0.35 * sampling_rate_hz]
     if above.size == 0:
@@ -121,10 +121,10 @@ def signal_end(values: FloatArray, sampling_rate_hz: float) -> float:
 
 
 def _smooth_over_octave(frequencies: FloatArray, density: FloatArray) -> FloatArray:
-    return _averaged(frequencies, density, 0.06, 1)[0]
+    return averaged(frequencies, density, 0.06, 1)[0]
 
 
-def _averaged(frequencies: FloatArray, density: FloatArray, share: float, least: int) -> tuple[FloatArray, FloatArray]:
+def averaged(frequencies: FloatArray, density: FloatArray, share: float, least: int) -> tuple[FloatArray, FloatArray]:
     """Return the density averaged over a share of its frequency to either side, and over how many bins."""
     total = np.concatenate(([0.0], np.cumsum(density)))
     step = frequencies[1] - frequencies[0]

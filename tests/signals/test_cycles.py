@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from mrpipe.signals.cycles import SteadyCycles, choose_cycles, find_steady_cycles, upward_crossings
 from mrpipe.signals.offsets import (
-    acceleration_gain,
     balanced_extremes,
     drive_favours_a_side,
     force_intercept,
@@ -110,17 +109,6 @@ def test_a_drive_that_favours_a_side() -> None:
     assert not drive_favours_a_side(2.0 * np.abs(np.sin(2 * np.pi * t + 1.0)) + noise, starts)
     assert drive_favours_a_side(2.0 * np.abs(np.sin(2 * np.pi * 0.3 * t)), starts)
     assert drive_favours_a_side(np.where(t % 1.0 < 0.5, 1.0, 2.0), starts)
-
-
-@pytest.mark.planted
-@pytest.mark.parametrize("gain", [1.0, -1.0, 9.81, -0.5])
-def test_sign_and_scale_of_an_accelerometer_show(gain: float) -> None:
-    rng = np.random.default_rng(1)
-    t = np.arange(9000) / RATE
-    omega = 2 * np.pi * 0.7
-    x = 5e-3 * np.sin(omega * t) + 20e-6 * rng.standard_normal(t.size) - 0.03
-    a = gain * (-(omega**2) * 5e-3 * np.sin(omega * t)) + 0.05 * rng.standard_normal(t.size) + 0.2
-    assert acceleration_gain(x, a, RATE) == pytest.approx(gain, rel=0.05)
 
 
 @pytest.mark.planted

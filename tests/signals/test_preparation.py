@@ -400,3 +400,21 @@ def test_a_rate_that_cannot_carry_the_velocity_is_refused() -> None:
     source = Campaign(name="c", directory=Path("c"), rig="damper-bench", drive_unit="A", recordings=())
     with pytest.raises(UserError, match=r"working_rate_hz: is 3, too slow .* give 50 Hz at least"):
         prepare_campaign(source, PreparationOptions(working_rate_hz=3.0))
+
+
+@pytest.mark.planted
+def test_motion_from_both_sensors() -> None:
+    plain, fused = (
+        prepare_campaign(campaign(recording("a")), PreparationOptions(motion=motion))
+        for motion in ("displacement", "displacement-and-acceleration")
+    )
+    raw = [item.tests[0].test.displacement_raw_m for item in (plain, fused)]
+    exact = truth(plain.tests[0].test.time_s)["displacement"]
+    assert rms(np.diff(raw[1] - exact)) < 0.1 * rms(np.diff(raw[0] - exact))
+    assert any("the motion follows the displacement below" in line for line in fused.findings)
+
+
+@pytest.mark.property
+def test_motion_from_both_sensors_is_not_causal() -> None:
+    with pytest.raises(ValueError, match="set phase to zero"):
+        PreparationOptions(motion="displacement-and-acceleration", phase="causal")
