@@ -11,7 +11,7 @@ mass of unknown acceleration: Hong, Kim, Lee and Lee 2010, Computer-Aided Civil 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,15 @@ EQUAL_AGREEMENT = 0.99
 
 NOISE_BAND_HZ = 100.0
 """Numerical technique: the noise is compared up to this frequency [Hz], or up to the highest one of the motion."""
+
+CHANCE = 3.0
+"""Numerical technique: coherence of independent noise, which is exceeded in one of 20 cases, times the averages."""
+
+START_MISMATCHES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)
+"""Numerical technique: shares of the motion, in the difference of the sensors, from which the search starts."""
+
+LOGARITHMS = ((-100.0, 100.0),) * 3
+"""Numerical technique: bounds of the logarithms of the two densities of noise and of this share."""
 
 LARGEST_COHERENCE = 0.999
 """Numerical technique: coherence above which all frequencies have the same weight."""
@@ -119,30 +128,32 @@ class _Spectra:
         Angular frequency, shape (f,) [rad/s].
     amplification
         Density of the second difference over that of the displacement, shape (f,) [1/s4].
+    response
+        Share of white noise that the acceleration keeps where it is compared with a second difference, shape (f,).
     motion, acceleration, cross
         Densities of the second difference of the displacement and of the acceleration, and their cross density (f,).
+    averages
+        Number of independent densities that were averaged, shape (f,).
     """
 
     omega: FloatArray
     amplification: FloatArray
+    response: FloatArray
     motion: FloatArray
     acceleration: FloatArray
     cross: NDArray[np.complex128]
+    averages: FloatArray
 
     def up_to(self, count: int) -> _Spectra:
         """Return the first `count` frequencies."""
-        return _Spectra(
-            self.omega[:count],
-            self.amplification[:count],
-            self.motion[:count],
-            self.acceleration[:count],
-            self.cross[:count],
-        )
+        return _Spectra(*(getattr(self, item.name)[:count] for item in fields(self)))
 
     @property
     def coherence(self) -> FloatArray:
-        """Squared coherence, shape (f,)."""
-        return np.asarray(np.abs(self.cross) ** 2 / np.maximum(self.motion * self.acceleration, 1e-300))
+        """Squared coherence, shape (f,), without the part that independent noise has in so few averages."""
+        raw = np.abs(self.cross) ** 2 / np.maximum(self.motion * self.acceleration, 1e-300)
+        chance = CHANCE / self.averages
+        return np.asarray(np.clip((raw - chance) / (1.0 - chance), 0.0, 1.0))
 
     @property
     def weight(self) -> FloatArray:
@@ -216,7 +227,7 @@ def sensor_agreement(pairs: Sequence[tuple[FloatArray, FloatArray]], sampling_ra
     crossover = (noise.acceleration / noise.displacement) ** 0.25 / (2.0 * np.pi)
     frequency = seen.omega / (2.0 * np.pi)
     crossover = float(np.clip(crossover, LOWEST_CROSSOVER_HZ, frequency[-1]))
-    velocity = np.abs(seen.cross) / seen.omega**2
+    velocity = seen.coherence * seen.motion / seen.omega**2
     share = float(np.sum(velocity[frequency > crossover]) / np.sum(velocity))
     return SensorAgreement(gain, late, crossover, share)
 
@@ -286,11 +297,14 @@ def _pooled(pairs: Sequence[tuple[FloatArray, FloatArray]], rate: float) -> _Spe
             # only the last one is complex
             sums[3] += np.imag(density)
     motion, acceleration, even, odd = (averaged(frequency, item, SMOOTHED, 2)[0] for item in sums)
+    averages = averaged(frequency, sums[0], SMOOTHED, 2)[1] * total / length
     # the first two bins hold the mean that was removed
     band = (np.arange(frequency.size) >= 2) & (frequency <= HIGHEST_SHARE * rate)
     omega = np.asarray(2.0 * np.pi * frequency[band], dtype=np.float64)
     amplification = np.asarray((2.0 * rate * np.sin(omega / (2.0 * rate))) ** 4, dtype=np.float64)
-    return _Spectra(omega, amplification, motion[band], acceleration[band], even[band] + 1j * odd[band])
+    response = np.asarray(((10.0 + 2.0 * np.cos(omega / rate)) / 12.0) ** 2, dtype=np.float64)
+    cross = even[band] + 1j * odd[band]
+    return _Spectra(omega, amplification, response, motion[band], acceleration[band], cross, averages[band])
 
 
 def _delay(spectra: _Spectra) -> float:
@@ -324,27 +338,31 @@ def _noise(seen: _Spectra, gain: float) -> _Noise:
     Where the motion is strong, each part contains the noise of both sensors; elsewhere it is that of its own sensor.
     """
     alone = np.maximum(1.0 - seen.coherence, 1e-300)
-    both = np.abs(seen.cross / gain)
+    both = np.sqrt(seen.coherence * seen.motion * seen.acceleration) / gain
     motion = seen.coherence * seen.acceleration / gain**2
-    white = np.ones_like(motion)
     # a regression leaves a part of the noise of its input: none where the input is noise alone
     of_displacement = np.minimum(both / seen.motion, 1.0)
     of_acceleration = np.minimum(both * gain**2 / seen.acceleration, 1.0)
     observed = np.concatenate([alone * seen.acceleration / gain**2, alone * seen.motion])
     parts = np.stack(
         [
-            np.concatenate([white, of_acceleration]),
-            np.concatenate([of_displacement, white]) * np.tile(seen.amplification, 2),
+            np.concatenate([np.ones_like(motion), of_acceleration]) * np.tile(seen.response, 2),
+            np.concatenate([of_displacement, np.ones_like(motion)]) * np.tile(seen.amplification, 2),
             np.tile(motion, 2),
         ]
     )
 
-    def shortfall(logarithms: FloatArray) -> float:
-        expected = np.exp(logarithms) @ parts
-        return float(np.sum(np.log(expected) + observed / expected))
+    def shortfall(logarithms: FloatArray) -> tuple[float, FloatArray]:
+        each = np.exp(logarithms)[:, None] * parts
+        expected = each.sum(axis=0)
+        value = np.sum(np.log(expected) + observed / expected)
+        return float(value), np.asarray(np.sum(each * (1.0 - observed / expected) / expected, axis=1))
 
-    start = np.log(np.median(observed / np.maximum(parts, 1e-300), axis=1))
-    found = optimize.minimize(shortfall, start, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6})
+    first, second = np.split(observed, 2)
+    levels = np.median(first), np.median(second / seen.amplification)
+    starts = [np.log([*levels, share]) for share in START_MISMATCHES]
+    ways = [optimize.minimize(shortfall, start, jac=True, bounds=LOGARITHMS) for start in starts]
+    found = min(ways, key=lambda way: float(way.fun))
     acceleration, displacement, share = np.exp(found.x)
     return _Noise(float(acceleration), float(displacement), share * motion)
 
@@ -356,7 +374,10 @@ def _gain(seen: _Spectra, start: float, noise: _Noise) -> float:
         return np.asarray(seen.acceleration + gain**2 * seen.motion - 2.0 * gain * np.real(seen.cross))
 
     def left(gain: float) -> float:
-        expected = start**2 * (noise.acceleration + noise.mismatch) + gain**2 * noise.displacement * seen.amplification
+        expected = (
+            start**2 * (noise.acceleration * seen.response + noise.mismatch)
+            + gain**2 * noise.displacement * seen.amplification
+        )
         return float(np.sum(difference(gain) / expected))
 
     ends = sorted((0.5 * start, 2.0 * start))
