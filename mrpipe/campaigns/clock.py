@@ -143,8 +143,10 @@ def lost_samples(time: FloatArray, rate: float) -> IntArray:
     return lost
 
 
-def longest_part(time_s: FloatArray, rate_hz: float, segments: Sequence[tuple[int, int]] = ()) -> tuple[int, int, bool]:
-    """Return begin and end of the longest part of a test without a gap, and whether there was a gap.
+def unbroken_parts(
+    time_s: FloatArray, rate_hz: float, segments: Sequence[tuple[int, int]] = ()
+) -> list[tuple[int, int]]:
+    """Return begin and end of each part of a test without a gap, in the order of time.
 
     Parameters
     ----------
@@ -153,14 +155,22 @@ def longest_part(time_s: FloatArray, rate_hz: float, segments: Sequence[tuple[in
     segments
         Half-open index ranges that are used; empty: all samples.
     """
-    used = segments or ((0, time_s.size),)
     parts: list[tuple[int, int]] = []
-    for begin, end in used:
+    for begin, end in segments or ((0, time_s.size),):
         lost = lost_samples(time_s[begin:end], rate_hz)
         gaps = begin + 1 + np.flatnonzero(lost >= SHORTEST_GAP)
         parts += pairwise([begin, *(int(gap) for gap in gaps), end])
+    return parts
+
+
+def longest_part(time_s: FloatArray, rate_hz: float, segments: Sequence[tuple[int, int]] = ()) -> tuple[int, int, bool]:
+    """Return begin and end of the longest part of a test without a gap, and whether there was a gap.
+
+    The parameters are those of :func:`unbroken_parts`.
+    """
+    parts = unbroken_parts(time_s, rate_hz, segments)
     begin, end = max(parts, key=lambda item: item[1] - item[0])
-    return begin, end, len(parts) > len(used)
+    return begin, end, len(parts) > max(1, len(segments))
 
 
 def _unrounded(time: FloatArray) -> FloatArray:

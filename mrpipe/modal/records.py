@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +13,9 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.clock import longest_part
 from mrpipe.campaigns.model import Campaign, Recording
+from mrpipe.campaigns.parts import in_unbroken_parts
 from mrpipe.errors import UserError
+from mrpipe.modal.declared import check_masses, floor_plan
 
 ACCELERATION = "floor_acceleration"
 DISPLACEMENT = "floor_displacement"
@@ -309,6 +311,8 @@ class FrameTests:
         Direction of a sensor -> its x and y on the floor [m]; empty where floors move in one direction only.
     inertias
         Shape (n,) [kg m^2]: moment of inertia of each floor about the origin of the positions; empty where unknown.
+    part_notes
+        What the user should know of tests that were divided at gaps of their clock, one line for each test.
     """
 
     forced: tuple[FrameTest, ...]
@@ -319,12 +323,13 @@ class FrameTests:
     with_added_masses: tuple[FrameTest, ...] = ()
     positions: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     inertias: FloatArray = field(default_factory=lambda: np.empty(0))
+    part_notes: tuple[str, ...] = ()
 
     @property
     def notes(self) -> list[str]:
         """What the user should know of the parts of the tests that are used."""
         every = (*self.forced, *self.ambient, *self.decays, *self.with_added_masses)
-        return [f"test {test.name}: {test.note}" for test in every if test.note]
+        return [*self.part_notes, *(f"test {test.name}: {test.note}" for test in every if test.note)]
 
 
 def frame_tests(campaign: Campaign) -> FrameTests:
@@ -338,13 +343,15 @@ def frame_tests(campaign: Campaign) -> FrameTests:
     source = campaign.file
     if campaign.rig != "shear-frame":
         raise UserError(source, "rig", f"is {campaign.rig!r}", "identify-frame needs a campaign of a shear-frame")
+    divided = in_unbroken_parts(campaign, {"sweep", "random", "ambient"})
+    campaign = divided.campaign
     used = [item for item in campaign.recordings if item.kind in {"sweep", "random", "ambient"}]
     if not used:
         raise UserError(source, "tests", "no test of kind sweep or random", "mode shapes need a forced or ambient test")
     masses = np.asarray(campaign.floor_masses_kg, dtype=np.float64)
     floors = masses.size or max(frame_test(item, source).floors for item in used)
     if masses.size:
-        _check_masses(masses, [frame_test(item, source) for item in used], source)
+        check_masses(masses, max(frame_test(item, source).floors for item in used), source)
     else:
         masses = np.full(floors, np.nan)
 
@@ -359,37 +366,9 @@ def frame_tests(campaign: Campaign) -> FrameTests:
         raise UserError(
             source, place, "all tests have added masses", "record a sweep, random or ambient test without them as well"
         )
-    positions, inertias = _plan(campaign, used, floors, source)
+    directions = {sensor.direction for item in used for sensor in _sensors(item)}
+    positions, inertias = floor_plan(campaign, directions, floors, source)
     return FrameTests(
         of_kind("sweep", "random"), of_kind("free-decay"), masses, source, of_kind("ambient"), changed, positions,
-        inertias,
+        inertias, divided.notes,
     )  # fmt: skip
-
-
-def _plan(
-    campaign: Campaign, used: Sequence[Recording], floors: int, source: Path
-) -> tuple[dict[str, tuple[float, float]], FloatArray]:
-    """Return positions of the sensors by direction, and moments of inertia of the floors."""
-    known = campaign.declared.get("frame") or {}
-    given = known.get("sensor_positions_m") or {}
-    positions = {str(name): (float(x), float(y)) for name, (x, y) in given.items()}
-    inertias = np.asarray(known.get("floor_inertias_kg_m2") or (), dtype=np.float64)
-    directions = {sensor.direction for item in used for sensor in _sensors(item)}
-    missing = sorted(directions - set(positions))
-    if positions and missing:
-        place = "frame.sensor_positions_m"
-        raise UserError(source, place, f"has no entry {missing[0]!r}", "give x and y of every sensor's suffix in m")
-    if inertias.size and inertias.size != floors:
-        place = "frame.floor_inertias_kg_m2"
-        raise UserError(source, place, f"has {inertias.size} entries", f"give one for each floor, {floors} in all")
-    return positions, inertias
-
-
-def _check_masses(masses: FloatArray, tests: Sequence[FrameTest], source: Path) -> None:
-    place = "frame.floor_masses_kg"
-    floors = max(test.floors for test in tests)
-    if masses.size < floors:
-        raise UserError(source, place, f"has {masses.size} entries", f"the channels are of {floors} floors")
-    for floor, mass in enumerate(masses, start=1):
-        if np.isinf(mass) or mass <= 0.0:
-            raise UserError(source, place, f"mass of floor {floor} is {mass:g} kg", "give a positive mass in kg")

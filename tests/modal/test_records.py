@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrpipe.campaigns import Recording
+from mrpipe.campaigns import Campaign, Recording
 from mrpipe.errors import UserError
-from mrpipe.modal.records import Place, frame_test
+from mrpipe.modal.records import Place, frame_test, frame_tests
 
 pytestmark = pytest.mark.property
 
@@ -95,3 +95,16 @@ def test_an_excitation_across_all_sensors_is_told() -> None:
     assert "acts along y and its sensors along x" in frame_test(replace(whole, channels=turned), SOURCE).note
     along = {f"{name}_x": item for name, item in whole.channels.items()}
     assert not frame_test(replace(whole, channels=along), SOURCE).note
+
+
+def test_parts_of_a_record_with_a_gap_are_all_used() -> None:
+    campaign = Campaign("c", "shear-frame", Path(), (with_gap(180, 30),), floor_masses_kg=(1.0, 1.0))
+    tests = frame_tests(campaign)
+    assert [(test.name, test.responses.shape[0]) for test in tests.forced] == [("one-1", 180), ("one-2", 190)]
+    assert tests.notes == ["test one: its clock has gaps; 2 parts without a gap, 3.7 of 3.7 s, are used"]
+
+
+def test_both_listed_segments_are_used() -> None:
+    part = replace(recording(), segments=((0, 150), (200, 380)))
+    tests = frame_tests(Campaign("c", "shear-frame", Path(), (part,), floor_masses_kg=(1.0, 1.0)))
+    assert [test.responses.shape[0] for test in tests.forced] == [150, 180] and not tests.notes

@@ -66,13 +66,15 @@ def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz:
     high = high_hz or min(spread * first, USABLE_BAND * rate, common_motion_ends_hz(tests[0], first))
     factor = max(1, int(rate / (2.6 * high)))
     sections = signal.butter(4, max(0.5 * low_hz, 0.2 * first), btype="highpass", fs=rate, output="sos")
-    per_test = max(2, round(_BLOCKS / len(tests)))
+    whole = sum(test.responses.shape[0] for test in tests)
     blocks: list[FloatArray] = []
     for test in tests:
         values = signal.sosfiltfilt(sections, test.responses - test.responses.mean(axis=0), axis=0)
+        # blocks of all tests have about the same length, because their statistics are averaged
+        count = max(-(-2 // len(tests)), round(_BLOCKS * values.shape[0] / whole))
         if factor > 1:
             values = signal.resample_poly(values, 1, factor, axis=0)
-        blocks += [np.ascontiguousarray(part.T) for part in np.array_split(values, per_test)]
+        blocks += [np.ascontiguousarray(part.T) for part in np.array_split(values, count)]
     own_rate = rate / factor
     rows = int(np.clip(round(_PERIODS * own_rate / first), _LEAST_BLOCK_ROWS, _MOST_BLOCK_ROWS))
     return Records(tuple(blocks), own_rate, rows, high)

@@ -13,6 +13,7 @@ from scipy import signal
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.clock import longest_part
 from mrpipe.campaigns.model import CAMPAIGN_FILE, Campaign, Recording
+from mrpipe.campaigns.parts import in_unbroken_parts
 from mrpipe.errors import UserError
 from mrpipe.modal.records import is_input, require_signal
 
@@ -89,7 +90,7 @@ class FrameRecord:
 class FrameData:
     """The tests that record all floors, and the closed-loop tests, which may lack some.
 
-    `source` is campaign.yaml, for messages.
+    `source` is campaign.yaml, for messages. `notes` says which tests were divided at gaps of their clock.
     """
 
     masses_kg: FloatArray
@@ -97,6 +98,7 @@ class FrameData:
     loops: tuple[Recording, ...]
     left_out: tuple[str, ...]
     source: Path = Path(CAMPAIGN_FILE)
+    notes: tuple[str, ...] = ()
 
     def with_role(self, *roles: str) -> list[FrameRecord]:
         """Return the records of these roles."""
@@ -124,6 +126,8 @@ def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
         If the masses are missing or do not fit the floors, no test records every floor, or there is no validation test.
     """
     source = campaign.file
+    divided = in_unbroken_parts(campaign, {"sweep", "random"})
+    campaign = divided.campaign
     floors = max((floor for item in campaign.recordings for floor in _floors_of(item)), default=0)
     loops = tuple(
         item
@@ -160,7 +164,7 @@ def frame_data(campaign: Campaign, rate_hz: float = FASTEST_HZ) -> FrameData:
     if not any(item.role == "validation" for item in (*whole, *loops)):
         raise UserError(source, "tests", "no validation test", "give one test the role validation")
     records = tuple(_record(item, rate_hz) for item in whole)
-    return FrameData(masses, records, loops, tuple(left_out), source)
+    return FrameData(masses, records, loops, tuple(left_out), source, divided.notes)
 
 
 def _floors_of(recording: Recording) -> list[int]:

@@ -100,6 +100,7 @@ def trace_structure(
     frames: dict[str, FrameTracing] = {}
     for axis, data in by_direction.items():
         findings += [f"test {name} does not record every floor: it is not used for the frame" for name in data.left_out]
+        findings += data.notes
         if all(item.role == "validation" for item in data.records):
             continue
         frame = trace_frame(
@@ -197,6 +198,7 @@ def joined_data(campaigns: Sequence[Campaign], rate_hz: float = FASTEST_HZ) -> F
         tuple(record for item in parts for record in item.loops),
         tuple(name for item in parts for name in item.left_out),
         parts[0].source,
+        tuple(line for item in parts for line in item.notes),
     )
 
 
