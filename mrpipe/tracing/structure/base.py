@@ -12,7 +12,8 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.fit import Base, Design, base_rows, coefficients, design_of, stacked
 from mrpipe.tracing.structure.records import FrameRecord
-from mrpipe.tracing.structure.spectra import Band, Spectra, motion_of, noise_of, spectra_of, storey_sums
+from mrpipe.tracing.structure.sensor_noise import noise_of, possible_colours
+from mrpipe.tracing.structure.spectra import Band, Spectra, motion_of, spectra_of, storey_sums
 
 OF_RATE = 0.4
 """Numerical technique: highest frequency in use, as a share of the sampling rate, because of anti-alias filters."""
@@ -23,6 +24,12 @@ POWER_SHARE = 0.002
 ABOVE_NOISE = 3.0
 """Numerical technique: power counts in the first band only if it exceeds the flat noise of the sensors by this factor.
 """
+
+LEAST_LEVEL = 0.7
+"""Numerical technique: the noise of a record is lowered if the residual is below this share of it."""
+
+BAND_PARTS = 6
+"""Numerical technique: number of parts of the band in which the residual is compared with the noise of a colour."""
 
 START_MARGINS = (0.5, 1.3, 4.0)
 """Numerical technique: factors on the lowest and the highest frequency with power, and least ratio of the two. The band
@@ -89,20 +96,91 @@ def frame_problem(
         storey, frequencies = shear_stiffness_of(design_of("shear-frame", spectra), masses)
         limits = [OF_RATE * item.rate_hz for item in training]
         band = Band(rules.band_below * float(frequencies[0]), min(rules.band_above * float(frequencies[-1]), *limits))
-    few_spectra = _spectra(few, masses, band, _matrix(storey), rules)
+    colour = _colour_of(few, masses, band, _matrix(storey), rules)
+    few_spectra = _spectra(few, masses, band, _matrix(storey), rules, colour)
     stiffness = coupled_stiffness(few_spectra, _matrix(storey), rules.coupling)
-    found, held = (tuple(_spectra(items, masses, band, stiffness, rules)) for items in (training, validation))
+    found, held = (_with_levels(items, masses, band, stiffness, rules, colour) for items in (training, validation))
     return FrameProblem(found, held, masses, band, storey, frequencies, rules)
 
 
 def _spectra(
-    records: Sequence[FrameRecord], masses: FloatArray, band: Band, stiffness: FloatArray, rules: FrameRules
+    records: Sequence[FrameRecord],
+    masses: FloatArray,
+    band: Band,
+    stiffness: FloatArray,
+    rules: FrameRules,
+    colour: float = 0.0,
 ) -> list[Spectra]:
+    return [_spectra_of(item, masses, band, stiffness, rules, colour) for item in records]
+
+
+def _spectra_of(
+    record: FrameRecord,
+    masses: FloatArray,
+    band: Band,
+    stiffness: FloatArray,
+    rules: FrameRules,
+    colour: float,
+    level: float = 1.0,
+) -> Spectra:
+    noise = noise_of(record, band.high_hz, rules, colour, level)
+    return spectra_of(record, masses, band, noise, stiffness, motion_of(record, band, noise, rules), rules)
+
+
+def _with_levels(
+    records: Sequence[FrameRecord],
+    masses: FloatArray,
+    band: Band,
+    stiffness: FloatArray,
+    rules: FrameRules,
+    colour: float,
+) -> tuple[Spectra, ...]:
+    """Return the spectra of records, with noise that does not exceed the residual of each record.
+
+    Above the band there may be excitation as well as noise. In the band, noise cannot exceed the residual of a linear
+    frame that is fitted to the record alone. The upper quartile over storeys and parts of the band is compared, so that
+    the residual of an effect that acts at few storeys does not count as noise.
+    """
     found = []
-    for item in records:
-        noise = noise_of(item, band, rules)
-        found.append(spectra_of(item, masses, band, noise, stiffness, motion_of(item, band, noise, rules), rules))
-    return found
+    for record in records:
+        spectra = _spectra_of(record, masses, band, stiffness, rules, colour)
+        level = float(np.quantile(_powers(design_of("linear-frame", [spectra])), 0.75))
+        if level < LEAST_LEVEL:
+            spectra = _spectra_of(record, masses, band, stiffness, rules, colour, level)
+        found.append(spectra)
+    return tuple(found)
+
+
+def _colour_of(
+    records: Sequence[FrameRecord], masses: FloatArray, band: Band, stiffness: FloatArray, rules: FrameRules
+) -> float:
+    """Return the colour of the sensors' noise with which the residual is noise at all frequencies alike.
+
+    The residual of a linear frame is noise at most storeys and frequencies, because an effect acts on few of them. In
+    each part of the band, the lower quartile over storeys and records is therefore compared with the noise. With the
+    right colour it is the same multiple of the noise in all parts.
+    """
+    spread = []
+    possible = possible_colours(records, band.high_hz)
+    for colour in possible if len(possible) > 1 else ():
+        powers = [_powers(design_of("linear-frame", [_spectra_of(item, masses, band, stiffness, rules, colour)]))
+                  for item in records]  # fmt: skip
+        relative = np.concatenate([np.maximum(item, 1e-300) / np.median(item) for item in powers])
+        spread.append(float(np.std(np.log(np.quantile(relative, 0.25, axis=0)))))
+    return possible[int(np.argmin(spread))] if spread else possible[0]
+
+
+def _powers(design: Design) -> FloatArray:
+    """Return the mean square of the weighted residual in parts of the band of equal ratio, shape (records n, parts)."""
+    widths = [2 * item.frequencies_hz.size for item in design.spectra]
+    rows = []
+    for item, residual in zip(design.spectra, np.split(design.residual, np.cumsum(widths)[:-1], axis=1), strict=True):
+        frequencies = np.tile(item.frequencies_hz, 2)
+        edges = np.geomspace(frequencies.min(), frequencies.max() * (1.0 + 1e-9), BAND_PARTS + 1)
+        place = np.searchsorted(edges, frequencies, side="right") - 1
+        count = np.maximum(np.bincount(place, minlength=BAND_PARTS), 1)
+        rows += [np.bincount(place, weights=own**2, minlength=BAND_PARTS) / count for own in residual]
+    return np.array(rows)
 
 
 def _few(records: Sequence[FrameRecord], most: int = 3) -> list[FrameRecord]:

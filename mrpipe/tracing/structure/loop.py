@@ -12,7 +12,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.model import Campaign, Recording
 from mrpipe.tracing.structure.delay import LoopSignals
 from mrpipe.tracing.structure.records import part_of
-from mrpipe.tracing.structure.spectra import noise_density
+from mrpipe.tracing.structure.sensor_noise import noise_density
 
 CROSSOVERS = (0.4, 12.0)
 """Numerical technique: bounds of the frequency above which the accelerometers replace the laser, in multiples of the

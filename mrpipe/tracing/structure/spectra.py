@@ -9,25 +9,19 @@ spectrum is weighted by the noise that the accelerometers cause in it; at low fr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from scipy import fft, signal, stats
+from scipy import fft, signal
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.structures.dynamics import ComplexArray
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.records import FrameRecord
+from mrpipe.tracing.structure.sensor_noise import Noise, laser_share
 
 INTEGRATION_SHARE = 0.6
 """Numerical technique: corner of the integration, in multiples of the lower edge of the band."""
-
-NOISE_BLOCKS = 14
-"""Numerical technique: least number of blocks over which the spectrum of a sensor's noise is averaged."""
-
-NOISE_PARTS, LEAST_PART, FEWEST_PARTS = 8, 250, 3
-"""Numerical technique: number of parts of a record whose noise is estimated separately, least number of samples of a
-part, and least number of parts."""
 
 STRONG_LINES = 0.1
 """Numerical technique: gains are compared on lines whose power exceeds this share of the strongest one."""
@@ -39,11 +33,6 @@ QUIET_SECOND = 0.01
 """Numerical technique: a record contains a time at rest if its quietest second has less than this share of its mean
 power; the mean of a laser signal is then taken there."""
 
-ABOVE_BAND, HIGHEST_START, HIGHEST = 1.25, 0.3, 0.45
-"""Numerical technique: sensor noise is measured between two frequencies. The lower one is the first number times the
-upper edge of the band, but at most the second number times the sampling rate; the upper one is the third number times
-the sampling rate."""
-
 
 @dataclass(frozen=True)
 class Band:
@@ -51,25 +40,6 @@ class Band:
 
     low_hz: float
     high_hz: float
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Power densities of a record's sensors.
-
-    Attributes
-    ----------
-    acceleration
-        Power density of ground and floor accelerometers, shape (1 + n,) [(m/s2)^2/Hz].
-    displacement
-        Floor -> power density of its laser [m2/Hz].
-    loads
-        Floor -> power density of the load cell there [N2/Hz].
-    """
-
-    acceleration: FloatArray
-    displacement: dict[int, float]
-    loads: dict[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -204,14 +174,6 @@ def motion_of(record: FrameRecord, band: Band, noise: Noise, rules: FrameRules |
     return Motion(displacement, velocity, filtered[:, :n], filtered[:, n], state, rate, drift, drift_rate)
 
 
-def laser_share(omega: FloatArray, noise: Noise, floor: int) -> FloatArray:
-    """Return the weight of a floor's laser relative to its integrated acceleration, 0 to 1, shape (f,)."""
-    if floor not in noise.displacement:
-        return np.zeros_like(omega)
-    accelerometer = noise.acceleration[floor] + noise.acceleration[0]
-    return np.asarray(accelerometer / (accelerometer + noise.displacement[floor] * omega**4))
-
-
 def _laser_lines(record: FrameRecord, floors: Sequence[int], pad: int) -> ComplexArray:
     seen = np.column_stack([record.measured_displacement[floor] for floor in floors])
     return _padded_lines(seen - np.mean(seen[_at_rest(record)], axis=0), pad, record.dt)[0]
@@ -270,70 +232,6 @@ def _at_rest(record: FrameRecord) -> slice:
     return slice(quiet * size, (quiet + 1) * size)
 
 
-def noise_density(values: FloatArray, rate_hz: float, above_hz: float, quietest: float | None = None) -> float:
-    """Return the power density of the noise on a channel, measured above the band [unit^2/Hz].
-
-    Slip and impact cause vibration far above the band, but not while a frame rests or moves little. The noise is
-    therefore estimated in the quieter parts of a record.
-
-    Parameters
-    ----------
-    values
-        The channel, shape (m,).
-    rate_hz
-        Sampling rate.
-    above_hz
-        Upper edge of the band.
-    quietest
-        Least share of the density of the whole record that is returned; the default of the rules if None.
-    """
-    quietest = FrameRules().quietest if quietest is None else quietest
-    whole = _density_above(values, rate_hz, above_hz)
-    parts = min(NOISE_PARTS, len(values) // LEAST_PART)
-    if parts < FEWEST_PARTS:
-        return whole
-    pieces = np.array_split(values, parts)
-    levels = sorted(_density_above(piece, rate_hz, above_hz) for piece in pieces)
-    # expected distance of the second smallest level from the mean, in standard deviations (Blom); the deviation of a
-    # level follows from its number of lines
-    below = -float(stats.norm.ppf((2.0 - 0.375) / (parts + 0.25)))
-    inside = len(pieces[0]) * max(0.9 - 2.0 * min(above_hz / rate_hz, 0.3), 0.1)
-    quiet = levels[1] / (1.0 - below * min(0.7, np.sqrt(3.5 / inside)))
-    return float(min(max(quiet, quietest * whole), whole))
-
-
-def _density_above(values: FloatArray, rate_hz: float, above_hz: float) -> float:
-    length = min(2048, max(64, len(values) // NOISE_BLOCKS), len(values))
-    frequencies, density = signal.welch(values - np.mean(values), rate_hz, nperseg=length)
-    high = (frequencies > min(above_hz, HIGHEST_START * rate_hz)) & (frequencies < HIGHEST * rate_hz)
-    # the lower quartile ignores resonances; its ratio to the mean depends on the number of averaged blocks (half
-    # overlapping Hann windows have 1.06 times the variance of separate ones)
-    freedom = 2.0 * max(1.0, 2.0 * len(values) / length - 1.0) / 1.06
-    return float(np.quantile(density[high], 0.25)) / float(stats.chi2.ppf(0.25, freedom) / freedom)
-
-
-def _of_all(densities: FloatArray, computed: Sequence[int]) -> FloatArray:
-    """Return densities, (floors + 1,); computed floors get the largest density of all floor sensors.
-
-    Above the band their computed motion vanishes, but in the band it contains the noise of their neighbours.
-    """
-    sensors = [floor for floor in range(1, densities.size) if floor not in computed]
-    densities = densities.copy()
-    densities[list(computed)] = densities[sensors].max(initial=0.0)
-    return densities
-
-
-def noise_of(record: FrameRecord, band: Band, rules: FrameRules | None = None) -> Noise:
-    """Return the noise of a record's sensors, measured above the band."""
-    above, rate, quietest = ABOVE_BAND * band.high_hz, record.rate_hz, (rules or FrameRules()).quietest
-    channels = (record.ground, *record.acceleration.T)
-    return Noise(
-        _of_all(np.array([noise_density(channel, rate, above, quietest) for channel in channels]), record.computed),
-        {floor: noise_density(x, rate, above, quietest) for floor, x in record.measured_displacement.items()},
-        {floor: noise_density(x, rate, above, quietest) for floor, x in record.known_loads.items()},
-    )
-
-
 def storey_sums(floors: int) -> FloatArray:
     """Return the matrix that sums floors from the top down to a storey, shape (n, n)."""
     return np.triu(np.ones((floors, floors)))
@@ -389,8 +287,9 @@ def spectra_of(
     inverse = (1.0 - lasers) / omega**2
     by_floor = sums[:, :, None] * masses[None, :, None] - stiffness[:, :, None] * inverse
     of_lasers = np.array([noise.displacement.get(floor, 0.0) for floor in range(1, n + 1)])[:, None] * lasers**2
-    variance = np.einsum("slb,l->sb", by_floor**2, noise.acceleration[1:])
-    variance += noise.acceleration[0] * np.einsum("sl,lb->sb", stiffness, inverse) ** 2
+    sensors = noise.of_accelerometers(frequencies)
+    variance = np.einsum("slb,lb->sb", by_floor**2, sensors[1:])
+    variance += sensors[0] * np.einsum("sl,lb->sb", stiffness, inverse) ** 2
     variance += np.einsum("sl,lb->sb", stiffness**2, of_lasers)
     # the noise of a load cell enters the equation of every storey below the load
     for floor, density in noise.loads.items():

@@ -9,7 +9,8 @@ from scipy import signal
 from mrpipe.tracing.structure.base import coupled_stiffness, frame_problem, ladder
 from mrpipe.tracing.structure.groups import Groups
 from mrpipe.tracing.structure.records import FrameRecord
-from mrpipe.tracing.structure.spectra import noise_density, storey_sums
+from mrpipe.tracing.structure.sensor_noise import noise_density
+from mrpipe.tracing.structure.spectra import storey_sums
 
 RATE = 250.0
 
