@@ -188,7 +188,9 @@ def noise_of(
     rules
         Decision thresholds; their defaults if None.
     colour
-        Colour of the noise of the accelerometers.
+        Coefficient of the autoregressive process of the accelerometers' noise; 0: white.
+    level
+        Density of this noise in the band over the one that the noise above the band predicts.
     """
     above, rate, quietest = ABOVE_BAND * band_high_hz, record.rate_hz, (rules or FrameRules()).quietest
     channels = (record.ground, *record.acceleration.T)
