@@ -199,7 +199,8 @@ def _drift_of(summary: Mapping[str, Any]) -> str:
     between = (summary.get("frame") or {}).get("between_tests") or {}
     if between.get("kind") not in ("drift", "step"):
         return ""
-    return f" The stiffness changes by {percent(between['stiffness_change'])} over the tests."
+    of = f" of storey {between['storey']}" if between.get("storey") else ""
+    return f" The stiffness{of} changes by {percent(between['stiffness_change'])} over the tests."
 
 
 def weak_spots(facts: RunFacts) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,15 +23,21 @@ MASSES = [6.0, 5.5, 5.0]
 STOREYS = np.array([9000.0, 8000.0, 7000.0])
 
 
-def _between(factors: list[float], levels: list[float], seed: int = 0) -> StiffnessBetweenTests:
-    """Tests of random ground motion on a frame whose stiffness has a factor of its own in each test."""
+def _between(
+    factors: list[float], levels: list[float], seed: int = 0, *, storey: int = 0, highest: Sequence[float] = ()
+) -> StiffnessBetweenTests:
+    """Tests of random ground motion on a frame whose stiffness, or that of one storey, has another factor in each test.
+
+    `highest` is the highest frequency of the ground motion in each test [Hz].
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(int(SECONDS * RATE)) / RATE
     recordings = []
     for number, (factor, level) in enumerate(zip(factors, levels, strict=True)):
-        frame = shear_frame(MASSES, STOREYS * factor, [0.01, 0.012, 0.015])
+        changed = np.where(np.arange(3) == storey - 1, factor, 1.0) if storey else factor
+        frame = shear_frame(MASSES, STOREYS * changed, [0.01, 0.012, 0.015])
         frame = replace(frame, damping=modal_damping_matrix(frame.mass, frame.stiffness, [0.01, 0.012, 0.015]))
-        tones = rng.uniform(0.8, 12.0, 80)
+        tones = rng.uniform(0.8, highest[number] if highest else 12.0, 80)
         motion = np.sum(np.sin(2 * np.pi * tones[:, None] * time + rng.uniform(0, 7, (80, 1))), axis=0) / 7.0
         ground = level * motion * np.clip(np.minimum(time, SECONDS - 5.0 - time), 0.0, 1.0)
         response = linear_response(frame, ground, 1 / RATE)
@@ -66,6 +73,23 @@ def test_a_bolt_that_comes_loose_is_a_step() -> None:
     assert found.kind == "step"
     assert found.step_before == "test-4"
     assert found.change == pytest.approx(-0.05, abs=0.008)
+
+
+@pytest.mark.planted
+def test_one_storey_that_loosens_is_named() -> None:
+    """Tests with different spectra weight the storeys differently: the change of all storeys together scattered."""
+    factors, highest = [1.0, 0.994, 0.988, 0.982, 0.976, 0.97], [3.0, 12.0, 4.0, 12.0, 3.0, 12.0]
+    found = _between(factors, [0.4, 0.3, 0.5, 0.4, 0.3, 0.5], storey=2, highest=highest)
+    assert (found.kind, found.storey) == ("drift", 2)
+    assert found.change == pytest.approx(-0.03, abs=0.006)
+    assert "the stiffness of storey 2 drifts from test test-1 to test-6 by -" in found.finding()
+
+
+@pytest.mark.planted
+def test_one_storey_with_a_loose_bolt_is_named() -> None:
+    found = _between([1.0, 1.0, 1.0, 0.94, 0.94, 0.94], [0.5, 0.3, 0.4, 0.4, 0.3, 0.5], storey=3)
+    assert (found.kind, found.storey, found.step_before) == ("step", 3, "test-4")
+    assert found.change == pytest.approx(-0.06, abs=0.01)
 
 
 @pytest.mark.planted
