@@ -16,7 +16,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import traceback
 from collections.abc import Iterator
 from itertools import count, islice
 from pathlib import Path
@@ -70,8 +69,8 @@ def run_case(case: Case, *, keep: Path | None = None, timeout_s: float = 900.0) 
             if keep is not None and not row["alone"]:
                 write(campaign, keep / f"rig-{case.seed}")
                 (keep / f"rig-{case.seed}.truth.json").write_text(json.dumps(row, indent=1), encoding="utf-8")
-    except Exception:
-        return {**row, "right": False, "alone": False, "error": traceback.format_exc(limit=-2)[-900:]}
+    except Exception as error:
+        return {**row, "right": False, "alone": False, "error": f"{type(error).__name__}: {error}"[-900:]}
     return {**row, "error": ""}
 
 

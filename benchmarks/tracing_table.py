@@ -30,8 +30,8 @@ cases are clean rigs.
     python -m benchmarks.tracing_table benchmarks/results/tracing.jsonl
 
 Number of cases in this table: {count}, seeds {first} to {last}. Cases of former states of the program are
-[earlier cases](tracing-benchmark-earlier.md). [Rigs of other generators](tracing-benchmark-other-rigs.md) were written from
-the contract of a campaign alone.
+[earlier cases](tracing-benchmark-earlier.md). [Rigs of other generators](tracing-benchmark-other-rigs.md) were
+written from the contract of a campaign alone.
 """
 
 _Item = TypeVar("_Item")
