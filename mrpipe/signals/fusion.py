@@ -64,6 +64,9 @@ LARGEST_COHERENCE = 0.999
 LEAST_WINDOWS = 8
 """Numerical technique: least number of windows of the spectra, because one window has a coherence of 1."""
 
+FEWEST_LINES = 8
+"""Numerical technique: least number of frequencies at which the sensors are compared."""
+
 GAIN_STEPS = 3
 """Numerical technique: number of times that the gain and the noise are estimated in turn."""
 
@@ -193,9 +196,17 @@ def sensor_agreement(pairs: Sequence[tuple[FloatArray, FloatArray]], sampling_ra
     Raises
     ------
     UserError
-        If the two sensors do not measure the same motion at any frequency.
+        If the tests are too short, or the two sensors do not measure the same motion at any frequency.
     """
-    late = _delay(_pooled(pairs, sampling_rate_hz))
+    first = _pooled(pairs, sampling_rate_hz)
+    if first.omega.size < FEWEST_LINES:
+        raise UserError(
+            "prepare",
+            "motion",
+            "is displacement-and-acceleration, but the tests are too short to compare the two sensors",
+            "give longer tests, or set prepare.motion to displacement",
+        )
+    late = _delay(first)
     # windows at different times would show a difference that neither sensor has
     aligned = [(x, advance(a, -late, sampling_rate_hz)) for x, a in pairs]
     spectra = _pooled(aligned, sampling_rate_hz)

@@ -128,3 +128,19 @@ def test_accelerometer_of_the_opposite_direction_is_refused() -> None:
     _, x, a = recorded(np.random.default_rng(11))
     with pytest.raises(UserError, match="phases do not agree"):
         sensor_agreement([(x, -a)], RATE)
+
+
+@pytest.mark.property
+def test_tests_that_are_too_short_are_refused() -> None:
+    """A campaign of one short test ended with a traceback."""
+    rng = np.random.default_rng(12)
+    x, a = rng.standard_normal((2, 30))
+    with pytest.raises(UserError, match="too short to compare"):
+        sensor_agreement([(x, a)], RATE)
+
+
+@pytest.mark.property
+def test_a_dead_accelerometer_is_refused() -> None:
+    x, _ = motion(np.random.default_rng(13))
+    with pytest.raises(UserError, match="is displacement-and-acceleration, but"):
+        sensor_agreement([(x, np.full(x.size, 0.2))], RATE)
