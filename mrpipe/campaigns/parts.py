@@ -54,11 +54,11 @@ def _part(item: Recording, part: tuple[int, int], number: int) -> Recording:
 
 def _note(item: Recording, parts: list[tuple[int, int]], kept: list[tuple[int, int]]) -> str:
     """Return what the user should know of the parts; empty if nothing was lost or divided by a gap."""
-    if len(parts) == len(item.segments or (0,)) and len(kept) == len(parts):
+    short, gaps = len(parts) - len(kept), len(parts) > len(item.segments)
+    if not short and not gaps:
         return ""
     used, whole = (sum(end - begin for begin, end in some) / item.sampling_rate_hz for some in (kept, parts))
-    reason = "its clock has gaps" if len(parts) > len(item.segments or (0,)) else "its segments differ in length"
-    short = len(parts) - len(kept)
+    reason = "its clock has gaps" if gaps else "its segments differ in length"
     left_out = f", {counted(short, 'shorter one')} {'are' if short > 1 else 'is'} left out" if short else ""
     return (
         f"test {item.name}: {reason}; {counted(len(kept), 'part')} without a gap, {used:.4g} of {whole:.4g} s, "

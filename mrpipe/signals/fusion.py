@@ -307,8 +307,9 @@ def _pooled(pairs: Sequence[tuple[FloatArray, FloatArray]], rate: float) -> _Spe
             sums[place] += np.real(density)
             # only the last one is complex
             sums[3] += np.imag(density)
-    motion, acceleration, even, odd = (averaged(frequency, item, SMOOTHED, 2)[0] for item in sums)
-    averages = averaged(frequency, sums[0], SMOOTHED, 2)[1] * total / length
+    smooth = [averaged(frequency, item, SMOOTHED, 2) for item in sums]
+    motion, acceleration, even, odd = (item for item, _ in smooth)
+    averages = smooth[0][1] * total / length
     # the first two bins hold the mean that was removed
     band = (np.arange(frequency.size) >= 2) & (frequency <= HIGHEST_SHARE * rate)
     omega = np.asarray(2.0 * np.pi * frequency[band], dtype=np.float64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import signal
@@ -12,7 +12,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.fit import Base, Design, base_rows, coefficients, design_of, stacked
 from mrpipe.tracing.structure.records import FrameRecord
-from mrpipe.tracing.structure.sensor_noise import noise_of, possible_colours
+from mrpipe.tracing.structure.sensor_noise import Noise, noise_of, possible_colours
 from mrpipe.tracing.structure.spectra import Band, Spectra, motion_of, spectra_of, storey_sums
 
 OF_RATE = 0.4
@@ -111,19 +111,15 @@ def _spectra(
     rules: FrameRules,
     colour: float = 0.0,
 ) -> list[Spectra]:
-    return [_spectra_of(item, masses, band, stiffness, rules, colour) for item in records]
+    noises = [noise_of(item, band.high_hz, rules, colour) for item in records]
+    return [
+        _spectra_of(item, masses, band, stiffness, rules, noise) for item, noise in zip(records, noises, strict=True)
+    ]
 
 
 def _spectra_of(
-    record: FrameRecord,
-    masses: FloatArray,
-    band: Band,
-    stiffness: FloatArray,
-    rules: FrameRules,
-    colour: float,
-    level: float = 1.0,
+    record: FrameRecord, masses: FloatArray, band: Band, stiffness: FloatArray, rules: FrameRules, noise: Noise
 ) -> Spectra:
-    noise = noise_of(record, band.high_hz, rules, colour, level)
     return spectra_of(record, masses, band, noise, stiffness, motion_of(record, band, noise, rules), rules)
 
 
@@ -143,10 +139,12 @@ def _with_levels(
     """
     found = []
     for record in records:
-        spectra = _spectra_of(record, masses, band, stiffness, rules, colour)
+        noise = noise_of(record, band.high_hz, rules, colour)
+        spectra = _spectra_of(record, masses, band, stiffness, rules, noise)
         level = float(np.quantile(_powers(design_of("linear-frame", [spectra])), 0.75))
         if level < LEAST_LEVEL:
-            spectra = _spectra_of(record, masses, band, stiffness, rules, colour, level)
+            lower = replace(noise, acceleration=level * noise.acceleration)
+            spectra = _spectra_of(record, masses, band, stiffness, rules, lower)
         found.append(spectra)
     return tuple(found)
 
@@ -163,8 +161,8 @@ def _colour_of(
     spread = []
     possible = possible_colours(records, band.high_hz)
     for colour in possible if len(possible) > 1 else ():
-        powers = [_powers(design_of("linear-frame", [_spectra_of(item, masses, band, stiffness, rules, colour)]))
-                  for item in records]  # fmt: skip
+        spectra = _spectra(records, masses, band, stiffness, rules, colour)
+        powers = [_powers(design_of("linear-frame", [item])) for item in spectra]
         relative = np.concatenate([np.maximum(item, 1e-300) / np.median(item) for item in powers])
         spread.append(float(np.std(np.log(np.quantile(relative, 0.25, axis=0)))))
     return possible[int(np.argmin(spread))] if spread else possible[0]

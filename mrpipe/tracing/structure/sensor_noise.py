@@ -174,9 +174,7 @@ def _costs(values: FloatArray, rate_hz: float, above_hz: float) -> tuple[FloatAr
     return averages * np.array([_whittle(density[upper], shape) for shape in shapes]), averages * float(upper.sum())
 
 
-def noise_of(
-    record: FrameRecord, band_high_hz: float, rules: FrameRules | None = None, colour: float = 0.0, level: float = 1.0
-) -> Noise:
+def noise_of(record: FrameRecord, band_high_hz: float, rules: FrameRules | None = None, colour: float = 0.0) -> Noise:
     """Return the noise of a record's sensors, measured above the band.
 
     Parameters
@@ -189,8 +187,6 @@ def noise_of(
         Decision thresholds; their defaults if None.
     colour
         Coefficient of the autoregressive process of the accelerometers' noise; 0: white.
-    level
-        Density of this noise in the band over the one that the noise above the band predicts.
     """
     above, rate, quietest = ABOVE_BAND * band_high_hz, record.rate_hz, (rules or FrameRules()).quietest
     channels = (record.ground, *record.acceleration.T)
@@ -199,7 +195,7 @@ def noise_of(
     # above the band the computed motion of a floor vanishes, but in the band it contains the noise of its neighbours
     densities[list(record.computed)] = densities[sensors].max(initial=0.0)
     return Noise(
-        level * densities,
+        densities,
         {floor: noise_density(x, rate, above, quietest) for floor, x in record.measured_displacement.items()},
         {floor: noise_density(x, rate, above, quietest) for floor, x in record.known_loads.items()},
         colour,
