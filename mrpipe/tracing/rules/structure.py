@@ -125,6 +125,12 @@ class FrameRules(Section):
         description="After screening, only effects that recover this share of what the best one recovers are searched "
         "in full.",
     )
+    differing_floors: float = Field(
+        2.0,
+        gt=1.0,
+        description="A validation test differs if its error exceeds its noise by this factor, and if this ratio "
+        "exceeds that of every training test by the same factor.",
+    )
     unlikely_error: float = Field(
         0.1,
         gt=0.0,
@@ -137,18 +143,25 @@ class FrameRules(Section):
         description="Penalty on the chi-square for each parameter of a form, relative, so that the simpler of two "
         "forms that fit alike is taken.",
     )
-    rocking_share: float = Field(
-        0.8,
+    probability_alone: float = Field(
+        0.97,
         gt=0.0,
         le=1.0,
-        description="A rocking base is named if it explains this share of what a shear frame lacks and exceeds any "
-        "linear frame by `rocking_lead`.",
+        description="Probability that an effect that is named alone and explains what is missing is present: on "
+        "planted campaigns all of 31 were, by the rule of succession.",
     )
-    rocking_lead: float = Field(
-        0.03,
-        ge=0.0,
-        description="Margin in the comparison of a rocking base with a general linear frame, as a share of what a "
-        "shear frame lacks: the spread of this share between records.",
+    probability_in_part: float = Field(
+        0.67,
+        gt=0.0,
+        le=1.0,
+        description="The same for an effect that explains only part of what is missing: 3 of 4 were present.",
+    )
+    probability_of_several: float = Field(
+        0.6,
+        gt=0.0,
+        le=1.0,
+        description="The same for each of several effects: 2 of 3 were present; a further one may only correct the "
+        "form of another.",
     )
     least_storey: float = Field(
         0.05,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import signal
@@ -56,6 +56,9 @@ class FrameProblem:
         Natural frequencies of this shear frame, shape (n,) [Hz].
     rules
         Decision thresholds.
+    stiffness, colour
+        Shear of each storey per floor displacement, shape (n, n) [N/m], and colour of the sensors' noise [1]; the
+        weights of the lines follow from them.
     """
 
     training: tuple[Spectra, ...]
@@ -64,7 +67,13 @@ class FrameProblem:
     band: Band
     storey_stiffness: FloatArray
     frequencies_hz: FloatArray
-    rules: FrameRules = field(default_factory=FrameRules)
+    rules: FrameRules
+    stiffness: FloatArray
+    colour: float
+
+    def spectra_of(self, record: FrameRecord) -> Spectra:
+        """Return the spectra of a further record, with the same band and weights."""
+        return _with_levels([record], self.masses_kg, self.band, self.stiffness, self.rules, self.colour)[0]
 
 
 def frame_problem(
@@ -100,7 +109,7 @@ def frame_problem(
     few_spectra = _spectra(few, masses, band, _matrix(storey), rules, colour)
     stiffness = coupled_stiffness(few_spectra, _matrix(storey), rules.coupling)
     found, held = (_with_levels(items, masses, band, stiffness, rules, colour) for items in (training, validation))
-    return FrameProblem(found, held, masses, band, storey, frequencies, rules)
+    return FrameProblem(found, held, masses, band, storey, frequencies, rules, stiffness, colour)
 
 
 def _spectra(

@@ -160,11 +160,14 @@ def _explained(tests: Sequence[TestStiffness], rules: FrameRules) -> tuple[Kind,
     # clocks and gains differ between tests by at least the floor of the model, whatever the noise
     weights = 1.0 / np.hypot([item.error for item in tests], rules.model_floor)
     order = np.linspace(-0.5, 0.5, count)
-    sizes = np.log(np.maximum([item.drift_m for item in tests], 1e-300))
-    sizes = (sizes - sizes.mean()) / max(float(np.ptp(sizes)), 1e-12)
+    drifts = np.array([item.drift_m for item in tests])
     ones = np.ones(count)
-    plain: dict[Kind, list[FloatArray]] = {"constant": [ones], "amplitude": [ones, sizes]}
-    without = {name: _left_out(columns, values, weights) for name, columns in plain.items()}
+    plain: dict[Kind, list[FloatArray]] = {"constant": [ones], "amplitude": [ones, _centred(sizes_of(drifts)[0])]}
+    without = {"constant": _left_out(plain["constant"], values, weights), "amplitude": np.inf}
+    for sizes in sizes_of(drifts):
+        columns = [ones, _centred(sizes)]
+        if (error := _left_out(columns, values, weights)) < without["amplitude"]:
+            plain["amplitude"], without["amplitude"] = columns, error
     kind: Kind = "amplitude" if without["amplitude"] < without["constant"] else "constant"
     steady = [*plain[kind], order]
     stepped = [*plain[kind], _best_step(plain[kind], values, weights)]
@@ -177,6 +180,19 @@ def _explained(tests: Sequence[TestStiffness], rules: FrameRules) -> tuple[Kind,
     if not matters or errors[best] > rules.better_drift * without[kind]:
         return kind, 0.0, ""
     return best, change, tests[int(np.argmax(columns[-1]))].test if best == "step" else ""
+
+
+def sizes_of(drifts: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the functions of the RMS drift of the tests, shape (tests,), with which the stiffness may change.
+
+    The logarithm stands for friction and slip, which act at small drifts; the square for a cubic stiffness.
+    """
+    relative = drifts / max(float(drifts.max()), 1e-300)
+    return np.log(np.maximum(relative, 1e-12)), relative**2
+
+
+def _centred(values: FloatArray) -> FloatArray:
+    return np.asarray((values - values.mean()) / max(float(np.ptp(values)), 1e-12))
 
 
 def _best_step(base: Sequence[FloatArray], values: FloatArray, weights: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ from mrpipe.tracing.bench.verdict import confidence_of
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.candidates import Fitted
 from mrpipe.tracing.structure.model import FrameModel
-from mrpipe.tracing.structure.select import FrameSelection
+from mrpipe.tracing.structure.rounds import FrameSelection
 from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
 
 BY_STOREY = 3
@@ -30,6 +30,7 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
     """
     found, first = [], 0
     total = selection.share(selection.residual)
+    most = _most_probable(selection, total >= rules.named_share)
     for place, item in enumerate(selection.chosen):
         count = _amplitudes_of(item, len(selection.design.residual))
         own = after.amplitudes[first : first + count]
@@ -37,8 +38,8 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
         if place < selection.declared:
             continue
         candidates = selection.rounds[place - selection.declared]
-        lead = candidates[0].share - max((other.share for other in candidates[1:]), default=0.0)
-        rivals = [other.name for other in candidates[1:] if other.share > candidates[0].share - rules.lead]
+        lead = min((other.behind for other in candidates[1:]), default=1.0)
+        rivals = [other.name for other in candidates[1:] if other.behind < rules.lead]
         gain = selection.gains[place - selection.declared] if selection.gains else None
         effect = item.placed.effect
         interval = None if gain is None else LeftOutGain(gain.share, Interval(*gain.interval))
@@ -47,7 +48,7 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
                 effect.name,
                 item.placed.form.name,
                 parameters_of(item, own, selection.rules.acting),
-                confidence_of(total, 0.5 + 0.5 * min(1.0, 2.0 * lead), None, rules),
+                min(most, confidence_of(total, 0.5 + 0.5 * min(1.0, 2.0 * lead), None, rules)),
                 effect.physics,
                 effect.remedy,
                 effect.source,
@@ -59,6 +60,14 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
             )
         )
     return found
+
+
+def _most_probable(selection: FrameSelection, proven: bool) -> float:
+    """Return the probability of effects of this kind on planted campaigns, which the evidence does not exceed."""
+    frame = selection.rules
+    if len(selection.chosen) - selection.declared > 1:
+        return frame.probability_of_several
+    return frame.probability_alone if proven else frame.probability_in_part
 
 
 def _amplitudes_of(item: Fitted, floors: int) -> int:

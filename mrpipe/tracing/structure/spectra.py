@@ -82,6 +82,8 @@ class Spectra:
         Inverse of the standard deviation of a line's real or imaginary part, shape (n, b).
     variance
         Mean square of the noise of a line, shape (n, b).
+    laser_share
+        Share of the displacement that comes from a displacement sensor, shape (n, b) [1].
     """
 
     record: FrameRecord
@@ -92,6 +94,7 @@ class Spectra:
     regressors: ComplexArray
     weight: FloatArray
     variance: FloatArray
+    laser_share: FloatArray
 
     def lines_of(self, history: FloatArray) -> ComplexArray:
         """Return the lines of a history of shape (m,) or (m, k): shape (b,) or (k, b)."""
@@ -296,4 +299,6 @@ def spectra_of(
         variance[:floor] += density
     own = np.mean(np.abs(target) ** 2, axis=1, keepdims=True)
     variance = variance + (rules or FrameRules()).model_floor ** 2 * own
-    return Spectra(record, motion, frequencies, taper, target, np.concatenate(parts), np.sqrt(2.0 / variance), variance)
+    return Spectra(
+        record, motion, frequencies, taper, target, np.concatenate(parts), np.sqrt(2.0 / variance), variance, lasers
+    )

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from mrpipe.artifacts import Progress, no_progress
+from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
 from mrpipe.errors import UserError
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, frame_problem
 from mrpipe.tracing.structure.drift import StiffnessBetweenTests, stiffness_between_tests
+from mrpipe.tracing.structure.fault_search import likely_fault
+from mrpipe.tracing.structure.fit import design_of
+from mrpipe.tracing.structure.groups import groups_of
 from mrpipe.tracing.structure.model import FrameModel, model_of
 from mrpipe.tracing.structure.naming import named_effects
+from mrpipe.tracing.structure.on_validation import DifferingTest, differing_tests, in_words
 from mrpipe.tracing.structure.records import FrameData
+from mrpipe.tracing.structure.rounds import FrameCandidate, FrameSelection
 from mrpipe.tracing.structure.scores import dependence, flexible_score, frame_score, noise_floor
-from mrpipe.tracing.structure.select import FrameCandidate, FrameSelection, select
+from mrpipe.tracing.structure.select import select
+from mrpipe.tracing.structure.sensor_faults import SensorFault, repaired
 from mrpipe.tracing.structure.spectra import Spectra
 from mrpipe.tracing.verdict import Candidate, NamedEffect, Unexplained, Verdict
 from mrpipe.words import listed
@@ -110,14 +116,45 @@ def trace_frame(
         problem, effects, rules, most=most, declared=declared, rng=rng, draws=draws, jobs=jobs, progress=progress
     )
     about = selection.about
-    reason = _unnamed(selection, rules)
+    fault = _sensor_fault(problem, selection, rules)
+    reason = _because_of(fault) if fault else _unnamed(selection, rules)
     chosen = selection.chosen[: selection.declared] if reason else selection.chosen
     before = model_of(selection.design, selection.chosen[: selection.declared], about)
     after = model_of(selection.design, chosen, about)
     progress(0.85, "errors on validation tests")
-    between = stiffness_between_tests(before, _in_order(problem, data), problem.rules)
-    summary = _summary(problem, selection, before, after, between, declared, rules, reason)
+    between = stiffness_between_tests(after, _in_order(problem, data), problem.rules)
+    if fault:
+        # a faulty sensor in one test looks like a change of the stiffness
+        between = replace(between, kind="constant", change=0.0, step_before="", storey=0)
+    differing = differing_tests(after, problem, selection.groups.scale, problem.rules.differing_floors)
+    summary = _summary(problem, selection, before, after, between, declared, rules, reason, differing)
+    summary["frame"]["sensor_fault"] = fault.as_json() if fault else None
     return FrameTracing(summary, problem, selection, before, after, between)
+
+
+def _sensor_fault(problem: FrameProblem, selection: FrameSelection, rules: NamingRules) -> SensorFault | None:
+    """Return the fault of a sensor that leaves nothing unexplained, where effects leave something."""
+    if not selection.structured or selection.share(_left(selection)) >= rules.named_share:
+        return None
+    design = design_of("linear-frame", problem.training)
+    fault = likely_fault(design, groups_of(design, problem.rules), problem.masses_kg, rules.least_share)
+    if fault is None:
+        return None
+    # the noise was estimated with the faulty sensor: fit the repaired records again
+    training, validation = (
+        [repaired(item.record, fault) for item in items] for items in (problem.training, problem.validation)
+    )
+    again = frame_problem(training, validation, problem.masses_kg, problem.rules)
+    design = design_of("linear-frame", again.training)
+    return None if groups_of(design, problem.rules).material(design.residual) else fault
+
+
+def _left(selection: FrameSelection) -> FloatArray:
+    return selection.residual if selection.chosen else selection.design.residual
+
+
+def _because_of(fault: SensorFault) -> str:
+    return f"{fault.sentence()}, which explains what is missing; correct the channel, and trace again"
 
 
 def _require_length(problem: FrameProblem, data: FrameData) -> None:
@@ -156,6 +193,7 @@ def _summary(
     declared: Sequence[StructuralEffect],
     rules: NamingRules,
     reason: str,
+    differing: Sequence[DifferingTest],
 ) -> dict[str, Any]:
     first, last = frame_score(before, problem.validation), frame_score(after, problem.validation)
     named = [] if reason else named_effects(selection, after, rules)
@@ -176,7 +214,7 @@ def _summary(
         },
         "nuisances": {"gain": {}, "channel_skew_s": 0.0, "observation_filter_s": 0.0},
         "effects": [item.as_json() for item in named],
-        **_verdict(selection, named, share, rules, reason, between).sentence_as_json(),
+        **_verdict(selection, named, share, rules, reason, between, differing).sentence_as_json(),
         "candidates": [item.as_json() for item in ranking(selection, problem)],
         "after": last.as_json(),
         "ceiling": _ceiling(problem, selection, before, first.nrmse, last.nrmse),
@@ -190,6 +228,7 @@ def _summary(
             "storey_stiffness_n_m": problem.storey_stiffness.tolist(),
             "band_hz": [problem.band.low_hz, problem.band.high_hz],
             "between_tests": between.as_json(),
+            "differing_tests": [item.as_json() for item in differing],
         },
     }
 
@@ -293,12 +332,18 @@ def _verdict(
     rules: NamingRules,
     reason: str,
     between: StiffnessBetweenTests,
+    differing: Sequence[DifferingTest],
 ) -> Verdict:
     # if the stiffness changed between tests, the residual also contains this change, which no effect explains
     drift = f"; {between.sentence()}" if between.drifts else ""
+    if differing and not selection.structured:
+        return Verdict("validation differs", f"the training tests lack nothing, but {in_words(differing)}{drift}")
     if reason:
         return Verdict("unknown" if selection.structured else "noise", f"{reason}{drift}")
     names = listed([f"{item.name} ({item.place})" for item in named])
+    if differing:
+        form = f"explains what the training tests lack, but {in_words(differing)}"
+        return Verdict("partly explained", f"{names}: {form}{drift}", share)
     if share >= rules.named_share:
         return Verdict("explained", f"{names}: explains what is missing{drift}", share)
     form = "explains part of what is missing; its form is not proven"

@@ -12,6 +12,7 @@ from mrpipe.campaigns.model import Campaign, Recording
 RATE, FINE, FLOORS = 100.0, 8, 3
 MASSES = np.array([6.0, 5.5, 5.0])
 STOREYS = np.array([9000.0, 8000.0, 7000.0])
+BRACE = 200.0
 DAMPERS = np.array([6.0, 5.0, 4.0])
 
 
@@ -34,6 +35,9 @@ def _slope(z: np.ndarray, ground: float, code: int, out: np.ndarray) -> None:
             total += (0.5, 0.8, 0.3)[s] * h
         elif code == 2:
             total += 2.0e7 * d**3 * (1.0 + 2e4 * d * d) if s == 1 else 0.0
+        elif code == 8:
+            # damping that grows with the square of the drift
+            total += 2.0e6 * d * d * r if s == 1 else 0.0
         elif code == 6:
             # a law of no family: a storey that sings at a beat of its own
             total += 0.6 * np.sin(40.0 * np.sin(300.0 * d)) if s == 0 else 0.0
@@ -42,9 +46,12 @@ def _slope(z: np.ndarray, ground: float, code: int, out: np.ndarray) -> None:
         load = force[s + 1] - force[s]
         if code == 3 and s == 1 and x[s] > 0.004:
             load -= 3.0e4 * (x[s] - 0.004) + 30.0 * max(v[s], 0.0)
+        if code == 7 and s != 1:
+            # a brace between the floors 1 and 3, so that the stiffness is not tri-diagonal
+            load += BRACE * (x[2] - x[0]) * (1.0 if s == 0 else -1.0)
         out[s] = v[s]
         out[3 + s] = load / MASSES[s] - ground
-    if code in (4, 5):
+    if code in (4, 5, 7):
         # an edge that lifts (5) gives up to half of the stiffness, by and by
         lifted = turn - 4e-4 * np.tanh(turn / 4e-4) if code == 5 else 0.0
         out[9], out[10] = turn_rate, (moment - 9.0e4 * (turn - 0.5 * lifted) - 60.0 * turn_rate) / 8.0
@@ -77,6 +84,8 @@ CODES = {
     "base-rocking": 4,
     "lifting-edge": 5,
     "unknown": 6,
+    "braced-rocking": 7,
+    "nonlinear-damping": 8,
 }
 
 

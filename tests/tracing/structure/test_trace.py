@@ -27,7 +27,7 @@ def summary(effect: str) -> dict[str, Any]:
 
 
 @pytest.mark.planted
-@pytest.mark.parametrize("effect", ["joint-friction", "cubic-stiffness", "impact", "base-rocking"])
+@pytest.mark.parametrize("effect", ["joint-friction", "cubic-stiffness", "impact", "base-rocking", "nonlinear-damping"])
 def test_a_planted_effect_is_named_first(effect: str) -> None:
     found = summary(effect)
     assert found["effects"][0]["name"] == effect

@@ -1,0 +1,212 @@
+"""Search of the fault of a sensor that explains the residual of a linear frame.
+
+One sensor after another is given an unknown gain and delay, in all tests or in a single one, and the linear frame is
+fitted again. Pairs of floors are exchanged as well.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mrpipe.artifacts import FloatArray
+from mrpipe.structures.dynamics import ComplexArray
+from mrpipe.tracing.structure.fit import Base, Columns, Design, coefficients, design_of, predicted, stacked
+from mrpipe.tracing.structure.groups import Groups
+from mrpipe.tracing.structure.sensor_faults import (
+    SensorFault,
+    corrected,
+    motion_change,
+    sensitivity_of,
+    sensors_of,
+)
+from mrpipe.tracing.structure.spectra import Spectra
+
+REFINED = 4
+"""Numerical technique: number of possible faults whose gain and delay are fitted after screening."""
+
+STEPS = 8
+"""Numerical technique: largest number of Gauss-Newton steps for gain and delay."""
+
+CONVERGED = 1e-4
+"""Numerical technique: change of gain, and of delay relative to the period of the fastest line, that ends the fit."""
+
+
+def likely_fault(design: Design, groups: Groups, masses: FloatArray, least_share: float) -> SensorFault | None:
+    """Return the fault of a sensor that removes most of the residual of a linear frame; None if none removes enough.
+
+    The weights of the lines were estimated with the faulty sensor. Judge the fault by tracing the corrected records.
+
+    Parameters
+    ----------
+    design
+        General linear frame, fitted to the training records.
+    groups
+        Groups of lines in which its residual exceeds the noise.
+    masses
+        Floor masses, shape (n,) [kg].
+    least_share
+        Share of the excess over the noise that the fault must remove.
+    """
+    spectra, whole = design.spectra, groups.excess(design.residual)
+    if whole <= 0.0:
+        return None
+    possible = (*_exchanges(spectra, masses), *_promising(design, masses))
+    fitted = [_fitted(item, spectra, masses) for item in possible]
+    best, own = min(fitted, key=lambda item: item[1].chi_square)
+    removed = 1.0 - groups.excess(own.residual) / whole
+    return replace(best, explained=removed) if removed >= least_share else None
+
+
+def fault_in_record(
+    base: Base, linear: Sequence[FloatArray], record: Spectra, expected: ComplexArray, masses: FloatArray
+) -> SensorFault:
+    """Return the fault of one sensor, in one record, that brings it nearest to a frame fitted to other records.
+
+    Parameters
+    ----------
+    base, linear
+        Kind of the linear frame, and its coefficients for each storey.
+    record
+        Spectra of the record.
+    expected
+        Shear forces that the frame predicts for it, shape (n, b) [N/sqrt(Hz)].
+    masses
+        Floor masses, shape (n,) [kg].
+    """
+    name = record.record.name
+    floors = [floor for floor in sensors_of([record]) if floor]
+    starts = [SensorFault(floor, name, gain) for floor in sensors_of([record]) for gain in (1.0, -1.0)]
+    exchanged = [SensorFault(a, name, exchanged_with=b) for a, b in itertools.combinations(floors, 2)]
+
+    def error(fault: SensorFault) -> ComplexArray:
+        moved = corrected(record, fault, masses)
+        return np.asarray((moved.target - expected - motion_change(base, linear, moved, record)) * record.weight)
+
+    def cost(fault: SensorFault) -> float:
+        return float(np.sum(np.abs(error(fault)) ** 2))
+
+    def sensitivity(fault: SensorFault) -> FloatArray:
+        lines = sensitivity_of(fault, corrected(record, fault, masses), base, linear, masses)
+        return stacked(lines * record.weight).reshape(2, -1)
+
+    found = list(exchanged)
+    fastest = 2.0 * np.pi * float(record.frequencies_hz[-1])
+    for start in starts:
+        best = start
+        for _ in range(STEPS):
+            columns = sensitivity(best)
+            change = np.linalg.lstsq(columns.T, stacked(error(best)).ravel(), rcond=None)[0]
+            tried = _changed_by(best, np.asarray(change), fastest)
+            if cost(tried) >= cost(best):
+                break
+            best = tried
+        found.append(_with_errors(best, sensitivity(best), cost(best) / (2 * record.target.size)))
+    return min(found, key=cost)
+
+
+def _with(fault: SensorFault, spectra: Sequence[Spectra], masses: FloatArray) -> Design:
+    return design_of("linear-frame", [corrected(item, fault, masses) for item in spectra])
+
+
+def _exchanges(spectra: Sequence[Spectra], masses: FloatArray) -> list[SensorFault]:
+    """Return the exchange of two floors in all tests, and the one in a single test, that promise most.
+
+    If two floors are exchanged in all tests, a linear frame of another stiffness often fits as well. In a single test,
+    the exchange is judged by a frame that is fitted to the other tests.
+    """
+    floors = [floor for floor in sensors_of(spectra) if floor]
+    pairs = list(itertools.combinations(floors, 2))
+    if not pairs:
+        return []
+    everywhere = [SensorFault(a, exchanged_with=b) for a, b in pairs]
+    found = [min(everywhere, key=lambda item: _with(item, spectra, masses).chi_square)]
+    alone = []
+    for record in spectra if len(spectra) > 1 else ():
+        design = design_of("linear-frame", [item for item in spectra if item is not record])
+        linear = coefficients(design, None, np.zeros(0))
+        before = _misfit(record, design.base, linear)
+        for a, b in pairs:
+            fault = SensorFault(a, record.record.name, exchanged_with=b)
+            alone.append((_misfit(corrected(record, fault, masses), design.base, linear) / before, fault))
+    if alone:
+        found.append(min(alone, key=lambda item: item[0])[1])
+    return found
+
+
+def _misfit(record: Spectra, base: Base, linear: Sequence[FloatArray]) -> float:
+    """Return the weighted squared error of a frame in one record."""
+    return float(
+        np.sum(np.abs((record.target - predicted(base, record, linear, None, np.zeros(0))) * record.weight) ** 2)
+    )
+
+
+def _promising(design: Design, masses: FloatArray) -> list[SensorFault]:
+    """Return the faults, with start values, that promise the smallest residual after one step of the fit."""
+    spectra = design.spectra
+    tests = ["", *(item.record.name for item in spectra)]
+    possible = [SensorFault(floor, test) for floor in sensors_of(spectra) for test in tests]
+    turned = [replace(item, gain=-1.0) for item in possible]
+    ranked = [(_step(item, design, masses)[1], item) for item in possible]
+    ranked += [(_with(item, spectra, masses).chi_square, item) for item in turned]
+    return [item for _, item in sorted(ranked, key=lambda pair: pair[0])[:REFINED]]
+
+
+def _fitted(fault: SensorFault, spectra: Sequence[Spectra], masses: FloatArray) -> tuple[SensorFault, Design]:
+    """Return a fault with fitted gain and delay, and the linear frame with the corrected sensor."""
+    best, design = fault, _with(fault, spectra, masses)
+    if fault.exchanged_with:
+        return best, design
+    fastest = 2.0 * np.pi * float(spectra[0].frequencies_hz[-1])
+    for _ in range(STEPS):
+        change, _ = _step(best, design, masses)
+        tried = _changed_by(best, change, fastest)
+        own = _with(tried, spectra, masses)
+        if own.chi_square >= design.chi_square:
+            break
+        best, design = tried, own
+        if float(np.max(np.abs(change * [1.0, fastest]))) < CONVERGED:
+            break
+    return _with_errors(best, _columns(best, design, masses), design.chi_square), design
+
+
+def _with_errors(fault: SensorFault, columns: FloatArray, mean_square: float) -> SensorFault:
+    """Return a fault with standard errors from the sensitivity to logarithmic gain and delay, shape (2, equations)."""
+    covariance = np.linalg.pinv(columns @ columns.T) * max(mean_square, 1.0)
+    gain, delay = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return replace(fault, gain_error=float(abs(fault.gain) * gain), delay_error_s=float(delay))
+
+
+def _changed_by(fault: SensorFault, change: FloatArray, fastest: float) -> SensorFault:
+    """Return a fault after a change of logarithmic gain and delay, shortened where it would not be linear."""
+    size = float(np.max(np.abs(change * [1.0, fastest])))
+    gain, delay = change * min(1.0, 0.5 / max(size, 1e-300))
+    return replace(fault, gain=float(fault.gain * (1.0 - gain)), delay_s=float(fault.delay_s + delay))
+
+
+def _step(fault: SensorFault, design: Design, masses: FloatArray) -> tuple[FloatArray, float]:
+    """Return the changes of logarithmic gain and of delay that lower the residual most, and the mean square expected.
+
+    The design is that of the records corrected with the fault. A small change of the corrected acceleration A by
+    (c + i w t) A changes the residual of each storey linearly, with the fitted frame.
+    """
+    flat = _columns(fault, design, masses)
+    target = design.residual.reshape(-1)
+    change = np.linalg.lstsq(flat.T, target, rcond=None)[0]
+    rest = target - change @ flat
+    return np.asarray(change), float(rest @ rest) / design.size
+
+
+def _columns(fault: SensorFault, design: Design, masses: FloatArray) -> FloatArray:
+    """Return the sensitivity to logarithmic gain and delay, projected as the residual, shape (2, equations)."""
+    linear = coefficients(design, None, np.zeros(0))
+    columns = []
+    for item in design.spectra:
+        lines = np.zeros((2, item.record.floors, len(item.frequencies_hz)), dtype=np.complex128)
+        if not fault.test or item.record.name == fault.test:
+            lines = sensitivity_of(fault, item, design.base, linear, masses)
+        columns.append(Columns(lines))
+    return np.asarray(design.project(columns).reshape(2, -1))
