@@ -33,9 +33,9 @@ from mrpipe.stages.registry import all_stages
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
 from mrpipe.thesis.gains import THESIS_GAINS
-from mrpipe.tracing.bench.identified import compared_with_identified
-from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.bench.verdict.identified import compared_with_identified
+from mrpipe.tracing.bench.verdict.summary import UNATTRIBUTED, Tracing
 from mrpipe.tracing.loop import band
 from mrpipe.tracing.options import TracingOptions, tracing_options
 from tests.tracing.bench.rig import campaign

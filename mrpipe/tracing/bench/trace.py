@@ -14,27 +14,27 @@ from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings, enough_tests, spread_tests
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.assess import Case, with_likely_names
-from mrpipe.tracing.bench.baseline import Baseline
-from mrpipe.tracing.bench.choose import Choice, judged_by_trees
-from mrpipe.tracing.bench.chosen import Bench, Chosen, begin, choose, validation_of
-from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
-from mrpipe.tracing.bench.drive_again import with_final_laws
-from mrpipe.tracing.bench.gates import judged, refusal_of, validated
-from mrpipe.tracing.bench.inner_springs import with_inner_springs
-from mrpipe.tracing.bench.law_rival import without_laws_of_drive
-from mrpipe.tracing.bench.needed import without_idle, without_superfluous
-from mrpipe.tracing.bench.nuisances import observation_window
-from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
-from mrpipe.tracing.bench.offsets import offset_between_tests
-from mrpipe.tracing.bench.on_validation import OnValidation
-from mrpipe.tracing.bench.passes import in_passes
-from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
-from mrpipe.tracing.bench.rivals import Orders, Unseen, with_best_base
-from mrpipe.tracing.bench.select import Selection, forward_selection
-from mrpipe.tracing.bench.summary import Summary, Tracing
-from mrpipe.tracing.bench.unnamed import without_beaten_names
-from mrpipe.tracing.bench.verdict import unnamed_reason
+from mrpipe.tracing.bench.campaign_tests.odd_tests import SortedTests, sort_tests
+from mrpipe.tracing.bench.model_choice.choose import Choice, judged_by_trees
+from mrpipe.tracing.bench.model_choice.chosen import Bench, Chosen, begin, choose, validation_of
+from mrpipe.tracing.bench.model_choice.passes import in_passes
+from mrpipe.tracing.bench.noise.baseline import Baseline
+from mrpipe.tracing.bench.residuals.crossvalidation import Gain, gain_of, left_out_residual
+from mrpipe.tracing.bench.residuals.nuisances import observation_window
+from mrpipe.tracing.bench.rivals.inner_springs import with_inner_springs
+from mrpipe.tracing.bench.rivals.law_rival import without_laws_of_drive
+from mrpipe.tracing.bench.rivals.needed import without_idle, without_superfluous
+from mrpipe.tracing.bench.rivals.rivals import Orders, Unseen, with_best_base
+from mrpipe.tracing.bench.rivals.unnamed import without_beaten_names
+from mrpipe.tracing.bench.selection.drive_again import with_final_laws
+from mrpipe.tracing.bench.selection.refine import with_further_terms, with_richer_forms
+from mrpipe.tracing.bench.selection.select import Selection, forward_selection
+from mrpipe.tracing.bench.validation.on_validation import OnValidation
+from mrpipe.tracing.bench.verdict.assess import Case, with_likely_names
+from mrpipe.tracing.bench.verdict.gates import judged, refusal_of, validated
+from mrpipe.tracing.bench.verdict.offsets import offset_between_tests
+from mrpipe.tracing.bench.verdict.summary import Summary, Tracing
+from mrpipe.tracing.bench.verdict.verdict import unnamed_reason
 from mrpipe.tracing.options import TracingOptions
 
 

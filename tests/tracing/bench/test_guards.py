@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from mrpipe.fitting.recordings import record_tests
-from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
-from mrpipe.tracing.bench.select import Candidate
-from mrpipe.tracing.bench.verdict import tied
+from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
+from mrpipe.tracing.bench.residuals.crossvalidation import Gain, gain_of, left_out_residual
+from mrpipe.tracing.bench.selection.select import Candidate
+from mrpipe.tracing.bench.verdict.verdict import tied
 from mrpipe.tracing.options import NamingRules
 from tests.tracing.bench.sines import harmed, scaled, sines
 
