@@ -19,7 +19,7 @@ from mrpipe.tracing.bench.model_choice.choose import Choice, judged_by_trees
 from mrpipe.tracing.bench.model_choice.chosen import Bench, Chosen, begin, choose, validation_of
 from mrpipe.tracing.bench.model_choice.passes import in_passes
 from mrpipe.tracing.bench.noise.baseline import Baseline
-from mrpipe.tracing.bench.residuals.crossvalidation import Gain, gain_of, left_out_residual
+from mrpipe.tracing.bench.residuals.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.residuals.nuisances import observation_window
 from mrpipe.tracing.bench.rivals.inner_springs import with_inner_springs
 from mrpipe.tracing.bench.rivals.law_rival import without_laws_of_drive
@@ -35,6 +35,7 @@ from mrpipe.tracing.bench.verdict.gates import judged, refusal_of, validated
 from mrpipe.tracing.bench.verdict.offsets import offset_between_tests
 from mrpipe.tracing.bench.verdict.summary import Summary, Tracing
 from mrpipe.tracing.bench.verdict.verdict import unnamed_reason
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import TracingOptions
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.tracing.bench.verdict.verdict import confidence_of
+from mrpipe.tracing.evidence import evidence_of as confidence_of
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.candidates import Fitted
 from mrpipe.tracing.structure.model import FrameModel

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.effects.structural.contract import StructuralEffect
-from mrpipe.tracing.bench.residuals.crossvalidation import Gain
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.base import FrameProblem, ladder

@@ -10,9 +10,10 @@ import pytest
 
 from mrpipe.fitting.recordings import record_tests
 from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.residuals.crossvalidation import Gain, gain_of, left_out_residual
+from mrpipe.tracing.bench.residuals.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.selection.select import Candidate
 from mrpipe.tracing.bench.verdict.verdict import tied
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import NamingRules
 from tests.tracing.bench.sines import harmed, scaled, sines
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import stats
@@ -16,30 +16,10 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.weighting import weighting
 from mrpipe.tracing.bench.residuals.residual_structure import BLOCK
+from mrpipe.tracing.gain import Gain
 
 BEYOND = 0.01
 """Numerical technique: tolerance at the ends of the range that a fit has seen, as a share of the range."""
-
-
-@dataclass(frozen=True)
-class Gain:
-    """Reduction of the error by an effect, on tests left out of its fit.
-
-    Attributes
-    ----------
-    share
-        Share of the squared error that the effect removes, cross-validated.
-    interval
-        95 % interval of the share, by block bootstrap.
-    """
-
-    share: float
-    interval: tuple[float, float]
-
-    @property
-    def significant(self) -> bool:
-        """Whether the interval lies above zero."""
-        return self.interval[0] > 0.0
 
 
 def folds_of(recordings: Recordings, folds: int, among: Sequence[int] | None = None) -> list[list[int]]:

@@ -14,10 +14,10 @@ from dataclasses import replace
 from mrpipe.fitting.drive_laws import YIELD_LAWS
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
-from mrpipe.tracing.bench.residuals.crossvalidation import Gain
 from mrpipe.tracing.bench.rivals.needed import without_one
 from mrpipe.tracing.bench.rivals.rivals import ITERATIONS, Unseen
 from mrpipe.tracing.bench.selection.select import Selection
+from mrpipe.tracing.gain import Gain
 
 LAWS = tuple(law for law in YIELD_LAWS if law.saturates)
 """Numerical technique: laws of the yield force that saturate, each with two coefficients and a scale."""

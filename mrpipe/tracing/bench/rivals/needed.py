@@ -16,10 +16,10 @@ from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.base_forms.promotion import with_candidates
 from mrpipe.tracing.bench.base_forms.race import Race
 from mrpipe.tracing.bench.base_forms.with_base_forms import on_all_tests
-from mrpipe.tracing.bench.residuals.crossvalidation import Gain
 from mrpipe.tracing.bench.rivals.rivals import Orders, best_rival, taken
 from mrpipe.tracing.bench.selection.refine import with_best_forms
 from mrpipe.tracing.bench.selection.select import Selection, draft
+from mrpipe.tracing.gain import Gain
 
 ITERATIONS = 15
 """Numerical technique: largest number of steps of a fit without one of the effects."""

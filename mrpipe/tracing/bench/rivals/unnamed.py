@@ -21,10 +21,10 @@ from mrpipe.dampers.plant import CURRENT, FIRST, FORCE, STEP_SIGNATURE, VELOCITY
 from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
-from mrpipe.tracing.bench.residuals.crossvalidation import Gain
 from mrpipe.tracing.bench.rivals.needed import without_names
 from mrpipe.tracing.bench.rivals.rivals import HOPELESS, ITERATIONS, Unseen
 from mrpipe.tracing.bench.selection.select import Selection, draft
+from mrpipe.tracing.gain import Gain
 from mrpipe.words import listed
 
 RELAXATION_TIMES = tuple(float(item) for item in np.geomspace(0.02, 12.0, 5))

@@ -13,13 +13,15 @@ import numpy as np
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.campaign_tests.odd_tests import SortedTests
 from mrpipe.tracing.bench.model_choice.choose import Choice
-from mrpipe.tracing.bench.residuals.crossvalidation import Gain, intervals
+from mrpipe.tracing.bench.residuals.crossvalidation import intervals
 from mrpipe.tracing.bench.rivals.needed import without_names
 from mrpipe.tracing.bench.selection.select import Selection, share_of
 from mrpipe.tracing.bench.validation.on_validation import Judgement, OnValidation
 from mrpipe.tracing.bench.verdict.gates import held, judged, structured, validated
 from mrpipe.tracing.bench.verdict.offsets import OffsetFinding
-from mrpipe.tracing.bench.verdict.verdict import Named, confidence_of, parameter_table, tied
+from mrpipe.tracing.bench.verdict.verdict import Named, parameter_table, tied
+from mrpipe.tracing.evidence import evidence_of
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import NamingRules, TracingOptions
 
 
@@ -220,7 +222,7 @@ def _named(
                 term.effect,
                 term.form.name,
                 parameter_table(chosen, index, limits[index], options.drive_unit),
-                confidence_of(total, support, gain, options),
+                evidence_of(total, support, gain, options),
                 rivals,
                 {name: term.effect.separated_by[name].advice for name in rivals if name in term.effect.separated_by},
                 gain,

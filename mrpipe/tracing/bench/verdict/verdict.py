@@ -10,8 +10,9 @@ import numpy as np
 
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit
-from mrpipe.tracing.bench.residuals.crossvalidation import Gain, gain_of
+from mrpipe.tracing.bench.residuals.crossvalidation import gain_of
 from mrpipe.tracing.bench.selection.select import Candidate, Selection, left_of, share_of
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.verdict import Candidate as RankedCandidate
 from mrpipe.tracing.verdict import Estimate, Interval, LeftOutGain, NamedEffect
@@ -103,32 +104,13 @@ def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
     return ""
 
 
-def confidence_of(share: float, support: float, gain: Gain | None, rules: NamingRules) -> float:
-    """Return the evidence for an effect, 0 to 1; :func:`calibrated` converts it to a probability.
-
-    Parameters
-    ----------
-    share
-        Share of the recoverable residual that the chosen effects recover.
-    support
-        Share of bootstrap samples of the training tests in which the effect is needed with every base form.
-    gain
-        Gain on left-out tests; None if it was not computed.
-    rules
-        When a cause is named.
-    """
-    proven = min(1.0, share / rules.named_share)
-    held = 1.0 if gain is None or gain.significant else rules.doubtful
-    return round(float(proven * support * held * rules.most_confidence), 3)
-
-
 def calibrated(evidence: float, rules: NamingRules, *, several: bool = False, partly: bool = False) -> float:
     """Return the probability that an effect with this evidence is present, calibrated on the planted benchmark.
 
     Parameters
     ----------
     evidence
-        See :func:`confidence_of`.
+        See :func:`mrpipe.tracing.evidence.evidence_of`.
     rules
         Rules that contain the calibrated probabilities.
     several
