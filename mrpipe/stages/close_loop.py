@@ -32,7 +32,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.reporting import close_loop as section
     from mrpipe.signals.prepared import read_prepared
     from mrpipe.tracing.bench.trace import trace_campaign
-    from mrpipe.tracing.bench.verdict.identified import compared_with_identified
+    from mrpipe.tracing.bench.verdict.identified import comparison_with_identified
     from mrpipe.tracing.options import tracing_options
 
     settings = context.settings.close_loop
@@ -55,7 +55,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         tests, library, declared, options, known=fitted, rng=context.rng, jobs=context.jobs, progress=context.progress
     )
     summary = {"campaign": campaign.name, **traced.summary}
-    identified = None if chosen is None else compared_with_identified(chosen, fitted, traced)
+    identified = None if chosen is None else comparison_with_identified(chosen, fitted, traced)
     summary["base_form"] = {**summary["base_form"], "identified": identified}
     summary["closed_loop"] = _closed_loop(context, traced, tests)
     summary["corrections"] = _corrections(context, traced, tests)

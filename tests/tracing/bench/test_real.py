@@ -17,7 +17,7 @@ from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.tracing.bench.noise.baseline import declared_base
 from mrpipe.tracing.bench.residuals.error_measures import judged_part, score
 from mrpipe.tracing.bench.residuals.nuisances import record_gains, session_gain
-from mrpipe.tracing.bench.validation.validation import first_parts
+from mrpipe.tracing.bench.validation.differences import first_parts
 
 
 @pytest.mark.real

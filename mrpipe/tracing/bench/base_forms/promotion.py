@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.problem import Problem
+from mrpipe.tracing.bench.base_forms.fits_of_forms import on_all_tests
 from mrpipe.tracing.bench.base_forms.race import Model, Race
-from mrpipe.tracing.bench.base_forms.with_base_forms import on_all_tests
-from mrpipe.tracing.bench.selection.select import Candidate, Selection, share_of
+from mrpipe.tracing.bench.selection.select import EffectCandidate, Selection, share_of
 from mrpipe.tracing.rules import RefinementRules
 
 PROMOTED = 3
@@ -19,7 +19,7 @@ PROMOTED_STEPS = 6
 """Numerical technique: ... and largest number of iterations of these fits."""
 
 
-def promoted(found: Race, winner: Model, base: Fit) -> Selection:
+def winner_on_all_tests(found: Race, winner: Model, base: Fit) -> Selection:
     """Return the winner of a race, fitted to all training tests, without its candidates.
 
     Parameters
@@ -52,7 +52,7 @@ def with_candidates(selection: Selection, found: Race) -> Selection:
     """
     count, form = len(found.own), selection.chosen.problem.base.name
     effects = _effects(selection.chosen)
-    rounds: list[tuple[Candidate, ...]] = []
+    rounds: list[tuple[EffectCandidate, ...]] = []
     search = found.searches.get(form, found.searches.get(found.declared))
     for place, candidates in enumerate((search.rounds if search else ())[: max(1, len(effects) - count)]):
         if any(_effects(item.fit)[:-1] != effects[: count + place] for item in candidates[:1]):
@@ -65,7 +65,9 @@ def _effects(found: Fit) -> tuple[str, ...]:
     return tuple(term.effect.name for term in found.problem.terms)
 
 
-def _on_all(candidates: tuple[Candidate, ...], found: Race, selection: Selection, place: int) -> tuple[Candidate, ...]:
+def _on_all(
+    candidates: tuple[EffectCandidate, ...], found: Race, selection: Selection, place: int
+) -> tuple[EffectCandidate, ...]:
     """Return the candidates of a round fitted to all training tests, the chosen effect first."""
     base, chosen = selection.base, selection.chosen
     effects, result = _effects(chosen), []

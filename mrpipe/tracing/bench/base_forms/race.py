@@ -18,9 +18,9 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.solution import regressors
 from mrpipe.fitting.weighting import centred, weighting
-from mrpipe.tracing.bench.base_forms.sufficient import nrmse_of_noise, sufficient_chi_square
-from mrpipe.tracing.bench.base_forms.with_base_forms import with_effects_of
-from mrpipe.tracing.bench.selection.select import Selection, left_of
+from mrpipe.tracing.bench.base_forms.fits_of_forms import with_effects_of
+from mrpipe.tracing.bench.base_forms.sufficient_error import nrmse_of_noise, sufficient_chi_square
+from mrpipe.tracing.bench.selection.select import Selection, excess_over_noise
 from mrpipe.tracing.rules import RaceRules
 
 SEARCHED_FORMS = 3
@@ -308,7 +308,7 @@ def _without(found: Fit, place: int) -> Fit:
 
 
 def _draft_cost(found: Fit, noise: float, rules: RaceRules) -> float:
-    return left_of(found, noise, rules.noise_share) * (1.0 + rules.claim_cost * claims_of(found.problem))
+    return excess_over_noise(found, noise, rules.noise_share) * (1.0 + rules.claim_cost * claims_of(found.problem))
 
 
 def _squares(found: Fit, problem: Problem) -> FloatArray:

@@ -12,11 +12,11 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.rules import TestabilityRules
 
 
-def untestable(
+def effects_by_testability(
     recordings: Recordings, effects: Mapping[str, Effect], rules: TestabilityRules | None = None
 ) -> tuple[dict[str, Effect], dict[str, str]]:
     """Return the effects that the tests can show, and for the others the reason why they cannot."""
-    lacks = missing(recordings, rules)
+    lacks = unmet_needs(recordings, rules)
     able, reasons = {}, {}
     for name, effect in effects.items():
         unmet = [lacks[need] for need in effect.needs if need in lacks]
@@ -27,7 +27,7 @@ def untestable(
     return able, reasons
 
 
-def missing(recordings: Recordings, rules: TestabilityRules | None = None) -> dict[Needs, str]:
+def unmet_needs(recordings: Recordings, rules: TestabilityRules | None = None) -> dict[Needs, str]:
     """Return the needs of effects that the tests do not meet: need -> reason, and the tests that should be recorded."""
     rules = rules or TestabilityRules()
     pieces = [

@@ -20,10 +20,10 @@ from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.start import fit_with_form
-from mrpipe.tracing.bench.base_forms.promotion import extension_of, promoted, with_candidates
+from mrpipe.tracing.bench.base_forms.fits_of_forms import compared_fits_without_effects, on_all_tests
+from mrpipe.tracing.bench.base_forms.promotion import extension_of, winner_on_all_tests, with_candidates
 from mrpipe.tracing.bench.base_forms.race import Race, race
-from mrpipe.tracing.bench.base_forms.sufficient import nrmse_of_noise, sufficient_chi_square
-from mrpipe.tracing.bench.base_forms.with_base_forms import alone_of, on_all_tests
+from mrpipe.tracing.bench.base_forms.sufficient_error import nrmse_of_noise, sufficient_chi_square
 from mrpipe.tracing.bench.noise.baseline import Baseline, declared_base, fit_baseline, noise_level_of
 from mrpipe.tracing.bench.noise.weights import NoiseScale, force_deviation, noise_scale, noise_variances
 from mrpipe.tracing.bench.residuals.ceiling import flexible_chi_square
@@ -31,7 +31,7 @@ from mrpipe.tracing.bench.residuals.nuisances import observation_window, with_la
 from mrpipe.tracing.bench.selection.drive_again import with_laws_again, with_laws_of_leaders
 from mrpipe.tracing.bench.selection.pairs import with_play
 from mrpipe.tracing.bench.selection.refine import with_richer_forms
-from mrpipe.tracing.bench.selection.select import Selection, draft, forward_selection
+from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests, forward_selection
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import ModelErrorRules, NoiseRules, TracingRules
 
@@ -114,7 +114,7 @@ def choose_model(
         if choice.race is not None:
             selection = with_laws_again(selection, options.yield_order, options.viscosity_order)
         if floor > 0.0:
-            selection = judged_by_trees(selection, options.rules.model_error)
+            selection = with_floor_of_flexible_model(selection, options.rules.model_error)
             return replace(choice, selection=completed(selection))
         if choice.race is None:
             return choice
@@ -177,7 +177,7 @@ def _raced(
         return Choice(baseline, nothing), lambda selection: selection
     progress(0.1, "base forms")
     singles = with_laws_of_leaders(
-        alone_of(baseline.fit, options, known=known, jobs=jobs),
+        compared_fits_without_effects(baseline.fit, options, known=known, jobs=jobs),
         options.yield_order,
         options.viscosity_order,
         enough=sufficient_chi_square(baseline.noise, nrmse_of_noise(baseline.fit, baseline.noise), options.rules.race),
@@ -203,7 +203,7 @@ def _raced(
     found = race(base, singles, search, noise, further=further, rules=options.rules.race, jobs=jobs, progress=progress)
     winner = found.winner(options.lead)
     progress(0.7, "fit to all tests")
-    selection = promoted(found, winner, base)
+    selection = winner_on_all_tests(found, winner, base)
     selection = replace(
         selection,
         proven=len(winner.effects) - len(found.own),
@@ -265,7 +265,7 @@ def _with_noise_of_best(
         return baseline, dict(singles)
     best_on_all = on_all_tests(best, base.problem, iterations=4)
     baseline = _weighed_by(baseline, best_on_all, noise_scale(best_on_all, rules.noise), rules.noise)
-    small = draft(baseline.fit)
+    small = fit_on_draft_tests(baseline.fit)
     again = {
         name: fit(replace(item.problem, root_weight=small.problem.root_weight), item.theta, iterations=3)
         for name, item in singles.items()
@@ -313,7 +313,7 @@ def _without_nuisances(baseline: Baseline, options: TracingOptions, known: Known
     return replace(baseline, fit=found, model_error=True)
 
 
-def judged_by_trees(selection: Selection, rules: ModelErrorRules) -> Selection:
+def with_floor_of_flexible_model(selection: Selection, rules: ModelErrorRules) -> Selection:
     """Judge shares by what a flexible model can recover, if sensor noise is far below the error of any model."""
     fits = [selection.base, selection.chosen]
     reached = [flexible_chi_square(item) for item in fits[: 1 if fits[0] is fits[1] else 2]]

@@ -65,7 +65,7 @@ def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
             iterations=2,
         )
         left_out = recordings.subset(part)
-        return part, predict(learned, left_out), seen_by(recordings.subset(keep), left_out)
+        return part, predict(learned, left_out), samples_seen_by(recordings.subset(keep), left_out)
 
     result = np.zeros(len(recordings.force))
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
@@ -78,7 +78,7 @@ def left_out_residual(found: Fit, folds: int, *, jobs: int = 1) -> FloatArray:
     return _without_offsets(result, problem.recordings.test, weights)
 
 
-def seen_by(known: Recordings, other: Recordings) -> BoolArray:
+def samples_seen_by(known: Recordings, other: Recordings) -> BoolArray:
     """Return the samples of `other` whose motion and drive lie in the range of `known`, shape (n of other,) of bool."""
     inside = np.ones(len(other.force), dtype=np.bool_)
     for name in ("displacement", "velocity", "drive"):

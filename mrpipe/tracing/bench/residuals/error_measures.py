@@ -12,7 +12,7 @@ from mrpipe.tracing.verdict import Score
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedPart:
     """Part of the validation tests on which errors are judged.
 
     Attributes
@@ -30,7 +30,7 @@ class Judged:
     offsets: FloatArray
 
 
-def judged_part(recordings: Recordings, simulated: FloatArray, offset: float | None, first: BoolArray) -> Judged:
+def judged_part(recordings: Recordings, simulated: FloatArray, offset: float | None, first: BoolArray) -> JudgedPart:
     """Return the offset-free measured force and the samples on which errors are judged.
 
     Parameters
@@ -46,13 +46,13 @@ def judged_part(recordings: Recordings, simulated: FloatArray, offset: float | N
         Samples of the first parts, shape (n,).
     """
     if offset is not None:
-        return Judged(recordings, recordings.force - offset, np.full(recordings.tests, offset))
+        return JudgedPart(recordings, recordings.force - offset, np.full(recordings.tests, offset))
     test, early = recordings.test, recordings.used & first
     counts = np.maximum(np.bincount(test[early], minlength=recordings.tests), 1)
     sums = np.bincount(test[early], weights=(recordings.force - simulated)[early], minlength=recordings.tests)
     offsets = np.asarray(sums / counts)
     rest = replace(recordings, used=recordings.used & ~first)
-    return Judged(rest, recordings.force - offsets[test], offsets)
+    return JudgedPart(rest, recordings.force - offsets[test], offsets)
 
 
 def campaign_offset(

@@ -12,7 +12,7 @@ from dataclasses import replace
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
-from mrpipe.tracing.bench.rivals.rivals import Unseen
+from mrpipe.tracing.bench.rivals.other_base_forms import Unseen
 from mrpipe.tracing.bench.selection.select import Selection
 
 ITERATIONS = 25

@@ -15,7 +15,7 @@ from mrpipe.fitting.drive_laws import YIELD_LAWS
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.tracing.bench.rivals.needed import without_one
-from mrpipe.tracing.bench.rivals.rivals import ITERATIONS, Unseen
+from mrpipe.tracing.bench.rivals.other_base_forms import ITERATIONS, Unseen
 from mrpipe.tracing.bench.selection.select import Selection
 from mrpipe.tracing.gain import Gain
 

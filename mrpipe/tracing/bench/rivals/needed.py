@@ -13,12 +13,12 @@ from dataclasses import replace
 
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.reference import with_own_laws
+from mrpipe.tracing.bench.base_forms.fits_of_forms import on_all_tests
 from mrpipe.tracing.bench.base_forms.promotion import with_candidates
 from mrpipe.tracing.bench.base_forms.race import Race
-from mrpipe.tracing.bench.base_forms.with_base_forms import on_all_tests
-from mrpipe.tracing.bench.rivals.rivals import Orders, best_rival, taken
+from mrpipe.tracing.bench.rivals.other_base_forms import Orders, best_rival, with_rival_base_form
 from mrpipe.tracing.bench.selection.refine import with_best_forms
-from mrpipe.tracing.bench.selection.select import Selection, draft
+from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
 from mrpipe.tracing.gain import Gain
 
 ITERATIONS = 15
@@ -90,7 +90,9 @@ def without_idle(
     """
     kept, left = selection, list(gains)
     while kept.proven > 0 and len(named := _named(kept, declared)) > 0:
-        fits = [(with_own_laws(in_order(kept.chosen, _others(kept.chosen, place))), place) for place in named]
+        fits = [
+            (with_own_laws(with_terms_in_order(kept.chosen, _others(kept.chosen, place))), place) for place in named
+        ]
         best, place = min(fits, key=lambda item: item[0].chi_square)
         if best.chi_square > lead * kept.chosen.chi_square:
             break
@@ -132,7 +134,7 @@ def without_one(
 
 def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: int) -> Selection | None:
     """Return the selection without one of its named effects, under the same base form; None if each is needed."""
-    small = draft(kept.chosen)
+    small = fit_on_draft_tests(kept.chosen)
     named = _named(kept, declared)
     with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
         without = pool.map(lambda k: _without(small, k, named, orders), named)
@@ -153,7 +155,7 @@ def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: 
         proven=kept.proven - 1,
         # a round that compares the remaining effects with their rivals; the first round even if its winner was dropped
         rounds=kept.rounds[: place - declared] or kept.rounds[:1],
-        extension=in_order(full, [*_others(full, place), place]),
+        extension=with_terms_in_order(full, [*_others(full, place), place]),
     )
 
 
@@ -169,7 +171,7 @@ def _with_rival(
     """Return the selection without one of its named effects, under another base form; None if each is needed."""
     if race is None:
         return None
-    small, named = draft(kept.chosen), _named(kept, declared)
+    small, named = fit_on_draft_tests(kept.chosen), _named(kept, declared)
     sets = [_others(small, place) for place in named]
     limit = (1.0 + worth_a_try) * kept.noise
     # the best forms only lower the error, and they take long
@@ -181,7 +183,7 @@ def _with_rival(
     rival, best = found
     if best.chi_square > lead * (full or with_best_forms(small, named, jobs=jobs)).chi_square:
         return None
-    again = taken(kept, race, rival, best)
+    again = with_rival_base_form(kept, race, rival, best)
     return with_candidates(again, race) if again.chosen.chi_square <= lead * kept.chosen.chi_square else None
 
 
@@ -195,11 +197,11 @@ def _others(found: Fit, place: int) -> list[int]:
 
 def _without(found: Fit, place: int, named: range, orders: Orders) -> Fit:
     """Return the fit without one term, with adequate laws of the drive and the best forms of the other named terms."""
-    start = orders.adequate(in_order(found, _others(found, place)))
+    start = orders.adequate(with_terms_in_order(found, _others(found, place)))
     return with_best_forms(start, range(named.start, named.stop - 1))
 
 
-def in_order(found: Fit, places: Sequence[int]) -> Fit:
+def with_terms_in_order(found: Fit, places: Sequence[int]) -> Fit:
     """Return a fit with these terms in this order, from the values of another fit."""
     problem = replace(found.problem, terms=tuple(found.problem.terms[k] for k in places))
     values = [found.term_values[k] for k in places]
@@ -227,10 +229,10 @@ def without_names(
     kept = [k for k in range(count) if k not in places]
     behind = range(declared + count, len(selection.chosen.problem.terms))
     order = [*range(declared), *(declared + k for k in kept), *(declared + k for k in places), *behind]
-    named = selection.without_effects if not kept else in_order(alone, order[: declared + len(kept)])
+    named = selection.without_effects if not kept else with_terms_in_order(alone, order[: declared + len(kept)])
     return replace(
         selection,
-        chosen=in_order(selection.chosen, order),
+        chosen=with_terms_in_order(selection.chosen, order),
         named_fit=named,
         proven=len(kept),
         rounds=tuple(selection.rounds[k] for k in kept if k < len(selection.rounds)) or selection.rounds[:1],

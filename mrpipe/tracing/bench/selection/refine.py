@@ -22,7 +22,7 @@ from mrpipe.effects.contract import EffectForm, EffectScales
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.residuals.crossvalidation import gain_of, left_out_residual
-from mrpipe.tracing.bench.selection.select import Selection, draft
+from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
 from mrpipe.tracing.rules import RefinementRules
 
 NO_STRENGTH = 1e-3
@@ -183,7 +183,7 @@ def _richer(chosen: Fit, place: int, count: int, jobs: int = 1) -> Iterator[Fit]
     """
     term = chosen.problem.terms[place]
     forms = [form for form in (*term.effect.refinements, *term.effect.forms) if form.name != term.form.name]
-    small = draft(chosen)
+    small = fit_on_draft_tests(chosen)
     starts = [
         (form, given)
         for form in forms

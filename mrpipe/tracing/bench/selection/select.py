@@ -40,7 +40,7 @@ _Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True)
-class Candidate:
+class EffectCandidate:
     """An effect in its best form, fitted jointly with the model.
 
     Attributes
@@ -89,7 +89,7 @@ class Selection:
 
     base: Fit
     noise: float
-    rounds: tuple[tuple[Candidate, ...], ...]
+    rounds: tuple[tuple[EffectCandidate, ...], ...]
     chosen: Fit
     proven: int = 3
     ground: Fit | None = None
@@ -149,7 +149,7 @@ def share_of(base: Fit, found: Fit, noise: float) -> float:
     return float(min(1.0, (base.chi_square - found.chi_square) / excess))
 
 
-def left_of(found: Fit, noise: float, share: float) -> float:
+def excess_over_noise(found: Fit, noise: float, share: float) -> float:
     """Return the excess of the chi-square over the noise, plus a share of the noise within which fits are equal."""
     return max(found.chi_square - noise, 0.0) + share * noise
 
@@ -166,7 +166,7 @@ def draft_tests(recordings: Recordings) -> list[int]:
     return sorted(index for group in groups for index in folds_of(recordings, parts, group)[0])
 
 
-def draft(found: Fit) -> Fit:
+def fit_on_draft_tests(found: Fit) -> Fit:
     """Return the fit on the tests of :func:`draft_tests`, which suffice to screen and to rank forms."""
     recordings = found.problem.recordings
     keep = draft_tests(recordings)
@@ -187,7 +187,7 @@ def candidates_after(
     rules: SelectionRules | None = None,
     jobs: int,
     progress: Progress = no_progress,
-) -> list[Candidate]:
+) -> list[EffectCandidate]:
     """Screen all terms after a fit, and refit the best families; the best candidate is first.
 
     Forms are tried on a share of the tests; the best ones are fitted to all tests.
@@ -195,7 +195,7 @@ def candidates_after(
     rules = rules or SelectionRules()
     penalised = partial(_penalised, share=rules.per_parameter)
     present = {term.effect.name for term in before.problem.terms}
-    small = draft(before)
+    small = fit_on_draft_tests(before)
     ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
     families: dict[str, list[Screened]] = {}
     for item in ranked:
@@ -225,7 +225,7 @@ def candidates_after(
         winner = min((item for item in fits if _name(item) == name), key=penalised)
         shares = {_form(item): already + (1.0 - already) * share_of(small, item, noise) for item in own[name]}
         shares |= {_form(item): share_of(base, item, noise) for item in fits if _name(item) == name}
-        found.append(Candidate(name, winner, share_of(base, winner, noise), shares))
+        found.append(EffectCandidate(name, winner, share_of(base, winner, noise), shares))
     return sorted(found, key=lambda item: item.fit.chi_square)
 
 
@@ -254,12 +254,12 @@ def _each(work: Callable[[_Item], Fit], items: Sequence[_Item], jobs: int) -> li
 
 def _nothing_more(before: Fit, terms: Sequence[Term], least: float, jobs: int) -> bool:
     present = {term.effect.name for term in before.problem.terms}
-    small = draft(before)
+    small = fit_on_draft_tests(before)
     ranked = screen(small, [term for term in terms if term.effect.name not in present], jobs=jobs)
     return ranked[0].gain * small.chi_square < least
 
 
-def admissible(found: Fit, main_part: float = SelectionRules().main_part) -> bool:
+def last_term_may_be_named(found: Fit, main_part: float = SelectionRules().main_part) -> bool:
     """Return whether the last term of a fit may be named: it has an effect, and no strength is at a bound."""
     term, values = found.problem.terms[-1], found.term_values[-1]
     for item in term.form.parameters:
@@ -274,7 +274,7 @@ def admissible(found: Fit, main_part: float = SelectionRules().main_part) -> boo
     return any(values[item.name] != 0.0 for item in term.form.parameters if item.role != "shape")
 
 
-def stuck(found: Fit) -> set[str]:
+def parameters_at_bound(found: Fit) -> set[str]:
     """Return the parameters at a bound, except one of several amplitudes at zero, because that part is absent."""
     absent = {
         item.name
@@ -303,7 +303,7 @@ def forward_selection(
     the other families. Otherwise it, and every later term, may only correct the form of an earlier effect.
     """
     rules = rules or SelectionRules()
-    rounds: list[tuple[Candidate, ...]] = []
+    rounds: list[tuple[EffectCandidate, ...]] = []
     chosen, proven, sure, again = base, 0, True, False
     excess = max(base.chi_square - noise, 0.0)
     if excess <= rules.nothing_missing * noise or most == 0:
@@ -331,10 +331,10 @@ def forward_selection(
                 nearer, noise, terms, most=most, refits=refits, rules=rules, jobs=jobs, progress=progress
             )
         found = _with_laws_of_their_own(found, base, noise, jobs)
-        able = [item for item in found if admissible(item.fit, rules.main_part)]
+        able = [item for item in found if last_term_may_be_named(item.fit, rules.main_part)]
         if rounds and rules.lead > 1.0:
             # with other effects present, a parameter at its bound corrects a form, and it extrapolates badly
-            able = [item for item in able if stuck(item.fit) <= stuck(chosen)]
+            able = [item for item in able if parameters_at_bound(item.fit) <= parameters_at_bound(chosen)]
         ordered = tuple(able + [item for item in found if item not in able])
         gain = chosen.chi_square - able[0].fit.chi_square if able else 0.0
         left = chosen.chi_square - noise
@@ -358,7 +358,9 @@ def forward_selection(
     return Selection(base, noise, tuple(rounds), chosen, proven, nothing_missing=rules.nothing_missing)
 
 
-def _with_laws_of_their_own(found: Sequence[Candidate], base: Fit, noise: float, jobs: int) -> list[Candidate]:
+def _with_laws_of_their_own(
+    found: Sequence[EffectCandidate], base: Fit, noise: float, jobs: int
+) -> list[EffectCandidate]:
     """Return the candidates, the best ones with effects proportional to the laws of the drive of their own fit.
 
     All were fitted with the laws of the fit before. A large effect changes the laws, and an error in one effect hides
@@ -375,12 +377,12 @@ def _nearer(chosen: Fit, best: Fit, share: float) -> Fit:
     return trial if trial.chi_square < (1.0 - share) * chosen.chi_square else chosen
 
 
-def _with_fit(item: Candidate, old: Fit, new: Fit, base: Fit, noise: float) -> Candidate:
+def _with_fit(item: EffectCandidate, old: Fit, new: Fit, base: Fit, noise: float) -> EffectCandidate:
     return replace(item, fit=new, share=share_of(base, new, noise)) if item.fit is old else item
 
 
-def _leads(candidates: Sequence[Candidate], noise: float, rules: SelectionRules) -> bool:
+def _leads(candidates: Sequence[EffectCandidate], noise: float, rules: SelectionRules) -> bool:
     if len(candidates) < 2:
         return True
-    best, second = (left_of(item.fit, noise, rules.same) for item in candidates[:2])
+    best, second = (excess_over_noise(item.fit, noise, rules.same) for item in candidates[:2])
     return second >= rules.lead * best

@@ -36,7 +36,7 @@ class Condition:
         """Return whether the error on this test does not exceed that of noise or that of a flexible model."""
         if self.after <= max(rules.within_floors * self.floor, self.ceiling_upper):
             return True
-        return recovered(self.before, self.after, self.ceiling) >= rules.ceiling_share
+        return recovered_share(self.before, self.after, self.ceiling) >= rules.ceiling_share
 
 
 @dataclass(frozen=True)
@@ -82,10 +82,10 @@ class Evidence:
     @property
     def share(self) -> float:
         """Share of the recoverable squared error that the named effects remove, 0 to 1."""
-        return recovered(self.before, self.after, self.ceiling)
+        return recovered_share(self.before, self.after, self.ceiling)
 
 
-def recovered(before: float, after: float, ceiling: float) -> float:
+def recovered_share(before: float, after: float, ceiling: float) -> float:
     """Return the share by which the squared error beyond a ceiling falls from `before` to `after`, 0 to 1."""
     able = before**2 - min(ceiling, after) ** 2
     return float(min(1.0, max(0.0, (before**2 - after**2) / able))) if able > 0.0 else 0.0
@@ -101,7 +101,7 @@ def classify(evidence: Evidence, rules: ValidationRules) -> VerdictClass:
         return "noise" if quiet and not evidence.structured else "unknown"
     if not better:
         return "unknown"
-    explained = reached(evidence, rules)
+    explained = reaches_floor_or_ceiling(evidence, rules)
     if evidence.base_changed and not evidence.effects:
         accounts = evidence.share >= rules.accounts and not evidence.unrepeatable(rules)
         # a ceiling far above the noise only shows the limit of flexible models of motion and drive
@@ -110,7 +110,7 @@ def classify(evidence: Evidence, rules: ValidationRules) -> VerdictClass:
     return "explained" if explained else "partly explained"
 
 
-def reached(evidence: Evidence, rules: ValidationRules) -> bool:
+def reaches_floor_or_ceiling(evidence: Evidence, rules: ValidationRules) -> bool:
     """Return whether the error is at the noise floor, or at the ceiling on every validation test."""
     if evidence.after <= rules.within_floors * evidence.floor:
         return True
@@ -119,7 +119,7 @@ def reached(evidence: Evidence, rules: ValidationRules) -> bool:
     return bool(evidence.conditions) and all(item.explained(rules) for item in evidence.conditions)
 
 
-def worst(conditions: Sequence[Condition], rules: ValidationRules) -> tuple[str, ...]:
+def unexplained_tests(conditions: Sequence[Condition], rules: ValidationRules) -> tuple[str, ...]:
     """Return the names of the tests on which the error is not explained, the worst first."""
     open_ = [item for item in conditions if not item.explained(rules)]
     return tuple(item.name for item in sorted(open_, key=lambda item: -item.after))

@@ -14,17 +14,17 @@ from mrpipe.fitting.recordings import Recordings
 from mrpipe.tracing.bench.noise.baseline import Baseline
 from mrpipe.tracing.bench.noise.weights import AS_SHOWN, NoiseScale, noise_limits, noise_variances
 from mrpipe.tracing.bench.residuals.ceiling import Ceiling, cross_fitted
-from mrpipe.tracing.bench.residuals.error_measures import Judged, campaign_offset, judged_part, rms, score
+from mrpipe.tracing.bench.residuals.error_measures import JudgedPart, campaign_offset, judged_part, rms, score
 from mrpipe.tracing.bench.residuals.nuisances import RecordGain, SessionGain, record_gains
 from mrpipe.tracing.bench.residuals.residual_structure import correlation_p_value
-from mrpipe.tracing.bench.validation.judgement import Condition, Evidence, classify, worst
-from mrpipe.tracing.bench.validation.validation import (
+from mrpipe.tracing.bench.validation.differences import (
     Comparison,
     compare,
     first_parts,
     training_agreements,
     with_session,
 )
+from mrpipe.tracing.bench.validation.judgement import Condition, Evidence, classify, unexplained_tests
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Comparable, Score, Verdict
 from mrpipe.words import listed
@@ -137,7 +137,7 @@ def on_validation(
     shared = campaign_offset(training, left, chosen.test_offsets, first_parts(training, rules.first_part))
     if own_offsets:
         shared = None
-    judged: Judged = judged_part(validation, after, shared, first)
+    judged: JudgedPart = judged_part(validation, after, shared, first)
     recordings = judged.recordings
     gains = record_gains(recordings, judged.measured, after, least=rules.deviation)
     if record_gain:
@@ -169,7 +169,7 @@ def on_validation(
 
 
 @dataclass(frozen=True)
-class Judgement:
+class VerdictWithEvidence:
     """The verdict and the data that it is based on.
 
     Attributes
@@ -206,7 +206,7 @@ def judge(
     folds: int,
     session: SessionGain | None = None,
     jobs: int = 1,
-) -> Judgement:
+) -> VerdictWithEvidence:
     """Return the verdict on the validation tests.
 
     Parameters
@@ -243,7 +243,7 @@ def judge(
     kind = classify(whole, rules)
     total = min((item.nrmse(found.recordings.used) for item in ceilings), key=lambda item: item[0])
     if kind in ("noise", "explained"):
-        return Judgement(
+        return VerdictWithEvidence(
             Verdict(kind, _sentence(kind, whole, names, base_taken, reason, rules), whole.share), whole, *total, None
         )
     trained = training_agreements(chosen, folds, rules, jobs=jobs)
@@ -251,7 +251,7 @@ def judge(
     comparison = with_session(comparison, session, found.recordings, found.floor_nrmse(), rules)
     if not comparison.differences or comparison.accounted < rules.accounts:
         verdict = Verdict(kind, _sentence(kind, whole, names, base_taken, reason, rules), whole.share)
-        return Judgement(verdict, whole, *total, comparison)
+        return VerdictWithEvidence(verdict, whole, *total, comparison)
     part = comparison.comparable
     evidence, inner = whole, ""
     tests: tuple[str, ...] = ()
@@ -275,7 +275,7 @@ def judge(
         comparison.differences,
         comparable,
     )
-    return Judgement(verdict, evidence, *total, comparison)
+    return VerdictWithEvidence(verdict, evidence, *total, comparison)
 
 
 def ceilings_of(found: OnValidation, base: Fit, chosen: Fit, training: Recordings) -> list[Ceiling]:
@@ -360,6 +360,6 @@ def _unrepeated(evidence: Evidence) -> str:
     )
 
 
-def open_tests(judgement: Judgement, rules: ValidationRules) -> tuple[str, ...]:
+def open_tests(judgement: VerdictWithEvidence, rules: ValidationRules) -> tuple[str, ...]:
     """Return the names of the validation tests with an unexplained error, the worst first."""
-    return worst(judgement.evidence.conditions, rules)
+    return unexplained_tests(judgement.evidence.conditions, rules)

@@ -16,10 +16,15 @@ from mrpipe.tracing.bench.model_choice.choose import Choice
 from mrpipe.tracing.bench.residuals.crossvalidation import intervals
 from mrpipe.tracing.bench.rivals.needed import without_names
 from mrpipe.tracing.bench.selection.select import Selection, share_of
-from mrpipe.tracing.bench.validation.on_validation import Judgement, OnValidation
-from mrpipe.tracing.bench.verdict.gates import held, judged, structured, validated
+from mrpipe.tracing.bench.validation.on_validation import OnValidation, VerdictWithEvidence
+from mrpipe.tracing.bench.verdict.gates import (
+    errors_on_validation,
+    residual_is_structured,
+    verdict_on_validation,
+    with_calibrated_probability,
+)
+from mrpipe.tracing.bench.verdict.naming import Named, parameter_table, tied_effects
 from mrpipe.tracing.bench.verdict.offsets import OffsetFinding
-from mrpipe.tracing.bench.verdict.verdict import Named, parameter_table, tied
 from mrpipe.tracing.evidence import evidence_of
 from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import NamingRules, TracingOptions
@@ -83,7 +88,7 @@ class Assessment:
     missing: bool
     found: OnValidation
     alone: OnValidation
-    judgement: Judgement
+    judgement: VerdictWithEvidence
 
     @property
     def further_terms_fail(self) -> bool:
@@ -125,29 +130,36 @@ def assess(
     proven = selection.with_named_alone
     named = _named(proven, case, gains, case.declared, rng)
     further = _named(selection, case, (), case.declared + len(named), rng)
-    causes = [*named, *([offsets.named()] if offsets is not None else [])]
+    causes = [*named, *([offsets.as_named_effect()] if offsets is not None else [])]
     if offsets is not None and any(item.effect.name == "offset" for item in named):
         causes.pop()
-    missing = structured(selection, baseline, case.training, options, bool(causes))
+    missing = residual_is_structured(selection, baseline, case.training, options, bool(causes))
     differ = offsets is not None
-    found = validated(selection.base, selection.chosen, baseline, case.training, case.validation, options, differ)
+    found = errors_on_validation(
+        selection.base, selection.chosen, baseline, case.training, case.validation, options, differ
+    )
     # the class of the verdict is that of the named effects; further terms do not explain anything
     alone = found
     if proven is not selection:
-        alone = validated(selection.base, proven.chosen, baseline, case.training, case.validation, options, differ)
-    judgement = judged(alone, proven, case.training, options, causes, missing, reason, case.ordered, case.jobs)
+        alone = errors_on_validation(
+            selection.base, proven.chosen, baseline, case.training, case.validation, options, differ
+        )
+    judgement = verdict_on_validation(
+        alone, proven, case.training, options, causes, missing, reason, case.ordered, case.jobs
+    )
     several = several or len(named) > 1
     evidence = judgement.evidence
     beyond = evidence.structured and evidence.after > options.rules.validation.noise_floors * evidence.floor
     likely = tuple(
-        held(item, judgement, options, several=several, beyond=beyond, chosen=item in named) for item in causes
+        with_calibrated_probability(item, judgement, options, several=several, beyond=beyond, chosen=item in named)
+        for item in causes
     )
     known = {item.effect.name: item for item in doubts}
     # a further term that never had a name stands at best for a part of what is missing
     unproven = tuple(
         replace(item, confidence=known[item.effect.name].confidence)
         if item.effect.name in known
-        else held(item, judgement, options, several=True, beyond=True)
+        else with_calibrated_probability(item, judgement, options, several=True, beyond=True)
         for item in further
     )
     return Assessment(named, likely, unproven, missing, found, alone, judgement)
@@ -214,7 +226,7 @@ def _named(
         candidates = selection.rounds[place] if place < len(selection.rounds) else ()
         rivals: tuple[str, ...] = ()
         if candidates and candidates[0].name == term.effect.name:
-            rivals = tied(candidates, selection.noise, options, draws=options.bootstrap_draws, rng=rng)
+            rivals = tied_effects(candidates, selection.noise, options, draws=options.bootstrap_draws, rng=rng)
         gain = gains[place] if place < len(gains) else None
         support = case.choice.support(term.effect.name, options, rng)
         named.append(

@@ -13,22 +13,22 @@ from mrpipe.fitting.kernel import HYSTERESIS_AT, run_recordings
 from mrpipe.fitting.known import Known
 from mrpipe.fitting.recordings import Recordings
 from mrpipe.fitting.solution import chain_of
-from mrpipe.tracing.bench.base_forms.with_base_forms import alone_of, on_all_tests
+from mrpipe.tracing.bench.base_forms.fits_of_forms import compared_fits_without_effects, on_all_tests
 from mrpipe.tracing.bench.campaign_tests.odd_tests import SortedTests
 from mrpipe.tracing.bench.noise.baseline import Baseline
 from mrpipe.tracing.bench.residuals.ceiling import flexible_chi_square
 from mrpipe.tracing.bench.residuals.nuisances import session_of
 from mrpipe.tracing.bench.residuals.residual_structure import states_of, structure_p_value
 from mrpipe.tracing.bench.selection.select import Selection
-from mrpipe.tracing.bench.validation.on_validation import Judgement, OnValidation, judge, on_validation
-from mrpipe.tracing.bench.validation.validation import compare, training_agreements
-from mrpipe.tracing.bench.verdict.verdict import Named, calibrated
+from mrpipe.tracing.bench.validation.differences import compare, training_agreements
+from mrpipe.tracing.bench.validation.on_validation import OnValidation, VerdictWithEvidence, judge, on_validation
+from mrpipe.tracing.bench.verdict.naming import Named, calibrated_probability
 from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.words import listed
 
 
-def validated(
+def errors_on_validation(
     base: Fit,
     chosen: Fit,
     baseline: Baseline,
@@ -51,7 +51,7 @@ def never_yields(found: Fit, rules: ValidationRules) -> bool:
     return bool(np.max(reached, initial=0.0) < rules.yielded)
 
 
-def predicts(
+def predicts_validation(
     found: OnValidation,
     model: Fit,
     training: Recordings,
@@ -117,21 +117,24 @@ def refusal_of(
     """
     if never_yields(first.fit, options.rules.validation):
         return "the damper does not yield within the stroke of the training tests"
-    if predicts(found, first.fit, training, options, faults, jobs):
+    if predicts_validation(found, first.fit, training, options, faults, jobs):
         return ""
     refusal = f"the model {options.model} does not predict the validation tests (NRMSE {found.nrmse(found.after):.3g})"
-    best = min(alone_of(first.fit, options, known=known, jobs=jobs).values(), key=lambda item: item.chi_square)
+    best = min(
+        compared_fits_without_effects(first.fit, options, known=known, jobs=jobs).values(),
+        key=lambda item: item.chi_square,
+    )
     if best.problem.base.name == first.fit.problem.base.name:
         return refusal
     other = on_all_tests(best, first.fit.problem)
-    tried = validated(first.fit, other, first, training, validation, options)
-    if predicts(tried, other, training, options, faults, jobs):
+    tried = errors_on_validation(first.fit, other, first, training, validation, options)
+    if predicts_validation(tried, other, training, options, faults, jobs):
         return ""
     error = tried.nrmse(tried.after)
     return f"{refusal}, nor does {other.problem.base.name}, which fits the training tests best (NRMSE {error:.3g})"
 
 
-def judged(
+def verdict_on_validation(
     found: OnValidation,
     selection: Selection,
     training: Recordings,
@@ -141,7 +144,7 @@ def judged(
     reason: str,
     ordered: SortedTests,
     jobs: int,
-) -> Judgement:
+) -> VerdictWithEvidence:
     """Return the verdict on the validation tests, with the thresholds from the options of the tracing."""
     taken = selection.ground.problem.base.name if selection.ground is not None else ""
     rules = options.rules
@@ -154,20 +157,20 @@ def judged(
         structured=missing or bool(causes), reason=reason, faults=ordered.faults, folds=options.folds,
         session=session, jobs=jobs,
     )  # fmt: skip
-    words = not_separated(causes)
+    words = sentence_on_ties(causes)
     if not words:
         return found_out
     verdict = found_out.verdict
     return replace(found_out, verdict=replace(verdict, sentence=f"{verdict.sentence}; {words}"))
 
 
-def not_separated(causes: Sequence[Named]) -> str:
+def sentence_on_ties(causes: Sequence[Named]) -> str:
     """Return which other effects the tests do not separate from the named ones; empty if they separate all."""
     parts = [f"{item.effect.name} from {listed(item.tied_with)}" for item in causes if item.tied_with]
     return f"these tests do not separate {', nor '.join(parts)}" if parts else ""
 
 
-def structured(
+def residual_is_structured(
     selection: Selection,
     baseline: Baseline,
     training: Recordings,
@@ -183,9 +186,9 @@ def structured(
     return learnt or structure_p_value(base.residual, states_of(base, training)) < options.rules.validation.whiteness
 
 
-def held(
+def with_calibrated_probability(
     item: Named,
-    judgement: Judgement,
+    judgement: VerdictWithEvidence,
     rules: NamingRules,
     *,
     several: bool,
@@ -218,5 +221,5 @@ def held(
     kind = judgement.verdict.kind
     evidence = item.confidence * (1.0 if kind == "explained" else judgement.evidence.share)
     partly = chosen and (beyond or kind == "partly explained")
-    probability = calibrated(evidence, rules, several=several and chosen, partly=partly)
+    probability = calibrated_probability(evidence, rules, several=several and chosen, partly=partly)
     return replace(item, confidence=probability)

@@ -23,7 +23,7 @@ OTHER_FIT = (
 """Reason why the two models differ although they have the same form."""
 
 
-def compared_with_identified(chosen: DamperModel, known: Known, traced: Tracing) -> dict[str, Any]:
+def comparison_with_identified(chosen: DamperModel, known: Known, traced: Tracing) -> dict[str, Any]:
     """Return the comparison of the damper of `identify-damper` with the declared model of the tracing, for JSON.
 
     Parameters

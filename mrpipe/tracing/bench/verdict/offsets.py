@@ -8,7 +8,7 @@ import numpy as np
 
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit, fit
-from mrpipe.tracing.bench.verdict.verdict import Named
+from mrpipe.tracing.bench.verdict.naming import Named
 from mrpipe.tracing.rules import OffsetRules
 from mrpipe.tracing.verdict import Estimate, Interval
 
@@ -38,7 +38,7 @@ class OffsetFinding:
     share: float
     confidence: float
 
-    def named(self) -> Named:
+    def as_named_effect(self) -> Named:
         """Return the finding as an effect of the verdict."""
         table = {"spread": Estimate(self.spread_n, "N", Interval(*self.interval))}
         return Named(self.effect, "per-test", table, self.confidence)

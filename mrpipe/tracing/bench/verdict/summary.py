@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.fitting.engine import predict
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.tracing.bench.base_forms.listed import COMMON_FORMS, forms_alone
+from mrpipe.tracing.bench.base_forms.listed_forms import COMMON_FORMS, listed_fits_without_effects
 from mrpipe.tracing.bench.base_forms.race import Race
 from mrpipe.tracing.bench.campaign_tests.odd_tests import SortedTests
 from mrpipe.tracing.bench.noise.baseline import Baseline
@@ -20,10 +20,10 @@ from mrpipe.tracing.bench.residuals.error_measures import score
 from mrpipe.tracing.bench.residuals.nuisances import session_of
 from mrpipe.tracing.bench.residuals.residual_structure import States, dependence, location, states_of, structure_p_value
 from mrpipe.tracing.bench.selection.select import Selection
-from mrpipe.tracing.bench.validation.judgement import recovered
-from mrpipe.tracing.bench.validation.on_validation import Judgement, OnValidation, open_tests
+from mrpipe.tracing.bench.validation.judgement import recovered_share
+from mrpipe.tracing.bench.validation.on_validation import OnValidation, VerdictWithEvidence, open_tests
+from mrpipe.tracing.bench.verdict.naming import Named, ranking
 from mrpipe.tracing.bench.verdict.offsets import OffsetFinding
-from mrpipe.tracing.bench.verdict.verdict import Named, ranking
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import TracingRules
 from mrpipe.tracing.verdict import Score, Unexplained
@@ -94,7 +94,7 @@ class Summary:
     training: Recordings
     offsets: OffsetFinding | None
     found: OnValidation
-    judgement: Judgement
+    judgement: VerdictWithEvidence
     sorted_tests: SortedTests
     race: Race | None = None
     jobs: int = 1
@@ -141,7 +141,7 @@ class Summary:
             "ceiling": {
                 "nrmse": min(self.judgement.ceiling, score_after.nrmse),
                 "interval": list(self.judgement.ceiling_interval),
-                "recovered": recovered(score_before.nrmse, found.nrmse(found.after), self.judgement.ceiling),
+                "recovered": recovered_share(score_before.nrmse, found.nrmse(found.after), self.judgement.ceiling),
             },
             "unexplained": self._unexplained(options.rules),
             "tests": [
@@ -237,7 +237,7 @@ class Summary:
 
     def _base_form(self, options: TracingOptions, measured: FloatArray) -> dict[str, Any]:
         base = self.selection.base
-        fits = forms_alone(base, self.race, jobs=self.jobs)
+        fits = listed_fits_without_effects(base, self.race, jobs=self.jobs)
         judged = self.found.recordings
         errors = {name: score(judged, measured, predict(f, judged)).nrmse for name, f in fits.items()}
         if options.model not in errors:

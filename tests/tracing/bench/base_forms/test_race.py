@@ -15,8 +15,8 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import fit, start_of
 from mrpipe.fitting.problem import Problem, Term
 from mrpipe.fitting.solution import regressors
+from mrpipe.tracing.bench.base_forms.fits_of_forms import fits_without_effects, with_effects_of
 from mrpipe.tracing.bench.base_forms.race import Model, Race, _compared, _held
-from mrpipe.tracing.bench.base_forms.with_base_forms import alone, with_effects_of
 from mrpipe.tracing.rules import RaceRules
 from tests.tracing.bench.fits import plain_fit
 
@@ -138,7 +138,9 @@ def test_a_form_that_reads_its_yield_force_finds_it_again_with_the_effects() -> 
     effect = damper_effects()["accumulator"]
     problem = replace(plain.problem, terms=(Term(effect, effect.form("linear")),))
     chosen = fit(problem, start_of(problem, plain.base_values, [{}]), iterations=6)
-    single = _held(alone(plain, {"bouc-wen-stiffness": base_form("bouc-wen-stiffness")})["bouc-wen-stiffness"])
+    single = _held(
+        fits_without_effects(plain, {"bouc-wen-stiffness": base_form("bouc-wen-stiffness")})["bouc-wen-stiffness"]
+    )
     (found,) = with_effects_of(chosen, [single])
     drive = np.linspace(0.0, found.problem.scales.drive, 9)
     largest = np.max(np.abs(found.laws[0](drive)))
@@ -153,7 +155,7 @@ def test_numbers_of_a_form_that_imitate_the_missing_effect_are_not_kept() -> Non
     effect = damper_effects()["accumulator"]
     problem = replace(plain.problem, terms=(Term(effect, effect.form("linear")),))
     chosen = fit(problem, start_of(problem, plain.base_values, [{}]), iterations=6)
-    single = alone(plain, {"viscoplastic": base_form("viscoplastic")})["viscoplastic"]
+    single = fits_without_effects(plain, {"viscoplastic": base_form("viscoplastic")})["viscoplastic"]
     low, high = single.problem.bounds()
     names = [parameter.name for _, parameter in single.problem.searched]
     theta = single.theta.copy()

@@ -11,7 +11,7 @@ import pytest
 from mrpipe.effects.contract import Effect, Needs
 from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.recordings import Recordings
-from mrpipe.tracing.bench.campaign_tests.testability import missing, untestable
+from mrpipe.tracing.bench.campaign_tests.testability import effects_by_testability, unmet_needs
 
 RATE = 500.0
 
@@ -53,17 +53,17 @@ POOR: dict[Needs, Recordings] = {
 @pytest.mark.property
 def test_every_kind_of_need_is_looked_at() -> None:
     assert set(POOR) == set(get_args(Needs))
-    assert missing(RICH) == {}
+    assert unmet_needs(RICH) == {}
 
 
 @pytest.mark.planted
 @pytest.mark.parametrize("need", POOR)
 def test_an_unmet_need_makes_the_effect_untestable_and_says_what_to_record(need: Needs) -> None:
-    assert list(missing(POOR[need])) == [need]
+    assert list(unmet_needs(POOR[need])) == [need]
     effect = replace(next(iter(damper_effects().values())), needs=(need,))
     library: dict[str, Effect] = {"own": effect, "other": replace(effect, needs=())}
-    able, reasons = untestable(POOR[need], library)
+    able, reasons = effects_by_testability(POOR[need], library)
     assert list(able) == ["other"]
     assert reasons["own"].startswith("untestable: ")
     assert "record" in reasons["own"]
-    assert untestable(RICH, library) == (library, {})
+    assert effects_by_testability(RICH, library) == (library, {})

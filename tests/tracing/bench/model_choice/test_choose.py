@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrpipe.tracing.bench.model_choice.choose import _with_noise_of, judged_by_trees
+from mrpipe.tracing.bench.model_choice.choose import _with_noise_of, with_floor_of_flexible_model
 from mrpipe.tracing.bench.noise.baseline import Baseline, noise_level_of
 from mrpipe.tracing.bench.noise.weights import noise_scale
 from mrpipe.tracing.bench.selection.select import Selection
@@ -21,7 +21,7 @@ RULES = ModelErrorRules()
 def test_what_trees_learn_becomes_the_floor() -> None:
     base = plain_fit("accumulator")
     selection = Selection(base, 1e-3, (), base)
-    judged = judged_by_trees(selection, RULES)
+    judged = with_floor_of_flexible_model(selection, RULES)
     assert selection.noise < judged.noise < 0.5 * base.chi_square
 
 
@@ -31,7 +31,7 @@ def test_the_noise_stays_the_measure_where_trees_learn_nothing() -> None:
     noise = np.where(used, np.random.default_rng(5).standard_normal(len(used)), 0.0)
     flat = replace(base, residual=noise, cost=float(noise @ noise))
     selection = Selection(flat, 0.9, (), flat)
-    assert judged_by_trees(selection, RULES) is selection
+    assert with_floor_of_flexible_model(selection, RULES) is selection
 
 
 @pytest.mark.parametrize("hum", [0.0, 2.0])

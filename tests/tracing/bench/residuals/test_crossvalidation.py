@@ -13,7 +13,7 @@ from scipy import stats
 from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import fit, start_of
 from mrpipe.fitting.problem import Term
-from mrpipe.tracing.bench.residuals.crossvalidation import _jackknife, folds_of, intervals, seen_by
+from mrpipe.tracing.bench.residuals.crossvalidation import _jackknife, folds_of, intervals, samples_seen_by
 from tests.tracing.bench.fits import plain_fit
 
 
@@ -43,10 +43,10 @@ def test_what_a_fold_has_not_seen_is_not_held_against_an_effect() -> None:
         wave = np.sin(np.linspace(0.0, 6.28, 400))
         return SimpleNamespace(force=wave, displacement=stroke * wave, velocity=0.1 * wave, drive=np.full(400, drive))
 
-    inside = seen_by(recordings(8e-3, 1.0), recordings(1e-2, 1.0))
+    inside = samples_seen_by(recordings(8e-3, 1.0), recordings(1e-2, 1.0))
     assert np.array_equal(inside, np.abs(recordings(1e-2, 1.0).displacement) <= 8e-3 * 1.02)
-    assert seen_by(recordings(1e-2, 1.0), recordings(8e-3, 1.0)).all()
-    assert not seen_by(recordings(1e-2, 1.0), recordings(8e-3, 2.0)).any()
+    assert samples_seen_by(recordings(1e-2, 1.0), recordings(8e-3, 1.0)).all()
+    assert not samples_seen_by(recordings(1e-2, 1.0), recordings(8e-3, 2.0)).any()
 
 
 def _regression(rng: np.random.Generator, tests: int = 12, samples: int = 40) -> tuple[np.ndarray, ...]:

@@ -13,7 +13,7 @@ from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.start import fit_with_form
 from mrpipe.tracing.bench.rivals.inner_springs import with_inner_springs
-from mrpipe.tracing.bench.rivals.rivals import Unseen
+from mrpipe.tracing.bench.rivals.other_base_forms import Unseen
 from mrpipe.tracing.bench.selection.select import Selection
 from tests.fitting.spencer import spencer_fit
 

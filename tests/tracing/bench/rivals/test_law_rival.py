@@ -15,7 +15,7 @@ from mrpipe.fitting.recordings import record_tests
 from mrpipe.fitting.start import base_of, best_fit, first_problem, polynomial_laws
 from mrpipe.signals.prepared import PreparedTest
 from mrpipe.tracing.bench.rivals.law_rival import without_laws_of_drive
-from mrpipe.tracing.bench.rivals.rivals import Unseen
+from mrpipe.tracing.bench.rivals.other_base_forms import Unseen
 from mrpipe.tracing.bench.selection.select import Selection
 from tests.tracing.bench.rig import hysteresis
 

@@ -10,7 +10,7 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.rivals.needed import without_idle, without_names, without_superfluous
-from mrpipe.tracing.bench.rivals.rivals import Orders
+from mrpipe.tracing.bench.rivals.other_base_forms import Orders
 from mrpipe.tracing.bench.selection.select import Selection
 from tests.tracing.bench.fits import plain_fit
 

@@ -6,14 +6,14 @@ import pytest
 
 from mrpipe.effects.library import damper_effects
 from mrpipe.tracing.bench.selection.pairs import with_play
-from mrpipe.tracing.bench.selection.select import draft
+from mrpipe.tracing.bench.selection.select import fit_on_draft_tests
 from tests.tracing.bench.fits import plain_fit
 
 pytestmark = pytest.mark.planted
 
 
 def test_a_gap_is_found_from_several_starts() -> None:
-    found = draft(plain_fit("wide-backlash"))
+    found = fit_on_draft_tests(plain_fit("wide-backlash"))
     trials = with_play(found, damper_effects())
     assert trials
     best = min(trials, key=lambda item: item.chi_square)

@@ -16,8 +16,14 @@ from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.selection import select
 from mrpipe.tracing.bench.selection.refit import refit
 from mrpipe.tracing.bench.selection.screen import Screened
-from mrpipe.tracing.bench.selection.select import Candidate, Selection, admissible, draft_tests, forward_selection
-from mrpipe.tracing.bench.verdict.verdict import unnamed_reason
+from mrpipe.tracing.bench.selection.select import (
+    EffectCandidate,
+    Selection,
+    draft_tests,
+    forward_selection,
+    last_term_may_be_named,
+)
+from mrpipe.tracing.bench.verdict.naming import unnamed_reason
 from mrpipe.tracing.options import NamingRules
 from tests.tracing.bench.fits import plain_fit
 
@@ -35,9 +41,9 @@ def fitted(stiffness: float, curvature: float) -> Fit:
 @pytest.mark.property
 def test_a_spring_of_hardly_any_stiffness_is_no_spring() -> None:
     # over the stroke 5 N against 140 N of curvature: an even force, whatever it is
-    assert not admissible(fitted(500.0, 1.4e6))
-    assert admissible(fitted(500.0, 5e4))
-    assert not admissible(fitted(0.0, 5e4))
+    assert not last_term_may_be_named(fitted(500.0, 1.4e6))
+    assert last_term_may_be_named(fitted(500.0, 5e4))
+    assert not last_term_may_be_named(fitted(0.0, 5e4))
 
 
 @pytest.mark.property
@@ -59,7 +65,7 @@ def selected(share: float, ground: float = 101.0) -> Selection:
         return SimpleNamespace(chi_square=left)
 
     chosen, base, other = fit(ground - share * (ground - 1.0)), fit(101.0), fit(ground)
-    rounds = ((Candidate("asymmetry", chosen, share, {}),),)
+    rounds = ((EffectCandidate("asymmetry", chosen, share, {}),),)
     return Selection(base, 1.0, rounds, chosen, 1, other if ground != 101.0 else None)
 
 
@@ -105,9 +111,9 @@ def selection_of(monkeypatch: pytest.MonkeyPatch, base: float, *left: float) -> 
             at_bound=(),
         )
 
-    def candidates(before: Any, *_: Any, **__: Any) -> list[Candidate]:
+    def candidates(before: Any, *_: Any, **__: Any) -> list[EffectCandidate]:
         count = len(before.problem.terms) + 1
-        return [Candidate(f"effect-{count}", after(left[count - 1], count), 0.9, {})]
+        return [EffectCandidate(f"effect-{count}", after(left[count - 1], count), 0.9, {})]
 
     monkeypatch.setattr(select, "with_settled_laws", lambda item: item)
     monkeypatch.setattr(select, "candidates_after", candidates)

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mrpipe.tracing.bench.validation.judgement import Condition, Evidence, classify, recovered
-from mrpipe.tracing.bench.verdict.verdict import calibrated
+from mrpipe.tracing.bench.validation.judgement import Condition, Evidence, classify, recovered_share
+from mrpipe.tracing.bench.verdict.naming import calibrated_probability
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.rules import ValidationRules
 
@@ -79,12 +79,12 @@ def test_an_effect_that_does_not_lower_the_error_explains_nothing(
 
 @pytest.mark.property
 def test_the_share_is_that_of_the_squared_error_beyond_the_ceiling() -> None:
-    assert recovered(0.1, 0.1, 0.01) == 0.0
-    assert recovered(0.1, 0.01, 0.01) == 1.0
-    assert recovered(0.05, 0.04, 0.03) == pytest.approx(9.0 / 16.0)
+    assert recovered_share(0.1, 0.1, 0.01) == 0.0
+    assert recovered_share(0.1, 0.01, 0.01) == 1.0
+    assert recovered_share(0.05, 0.04, 0.03) == pytest.approx(9.0 / 16.0)
     # a ceiling above the error that is reached is none
-    assert recovered(0.1, 0.01, 0.05) == 1.0
-    assert recovered(0.01, 0.02, 0.01) == 0.0
+    assert recovered_share(0.1, 0.01, 0.05) == 1.0
+    assert recovered_share(0.01, 0.02, 0.01) == 0.0
 
 
 @pytest.mark.property
@@ -93,12 +93,19 @@ def test_more_evidence_is_never_less_probable(pair: list[float]) -> None:
     less, more = sorted(pair)
     rules = NamingRules()
     for several in (False, True):
-        assert 0.0 <= calibrated(less, rules, several=several) <= calibrated(more, rules, several=several) < 1.0
-        assert calibrated(less, rules, partly=True) <= calibrated(more, rules, partly=True) < 1.0
+        assert (
+            0.0
+            <= calibrated_probability(less, rules, several=several)
+            <= calibrated_probability(more, rules, several=several)
+            < 1.0
+        )
+        assert (
+            calibrated_probability(less, rules, partly=True) <= calibrated_probability(more, rules, partly=True) < 1.0
+        )
     # one of several effects may correct the form of another
-    assert calibrated(more, rules, several=True) <= calibrated(more, rules)
+    assert calibrated_probability(more, rules, several=True) <= calibrated_probability(more, rules)
     # an effect that leaves something may stand for one that the library lacks
-    assert calibrated(more, rules, partly=True) <= calibrated(more, rules)
+    assert calibrated_probability(more, rules, partly=True) <= calibrated_probability(more, rules)
 
 
 @pytest.mark.property

@@ -11,9 +11,16 @@ from mrpipe.tracing.bench.campaign_tests.odd_tests import sort_tests
 from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
 from mrpipe.tracing.bench.selection.select import Selection
 from mrpipe.tracing.bench.validation.judgement import Evidence
-from mrpipe.tracing.bench.validation.on_validation import Judgement
-from mrpipe.tracing.bench.verdict.gates import held, judged, never_yields, not_separated, refusal_of, validated
-from mrpipe.tracing.bench.verdict.verdict import Named
+from mrpipe.tracing.bench.validation.on_validation import VerdictWithEvidence
+from mrpipe.tracing.bench.verdict.gates import (
+    errors_on_validation,
+    never_yields,
+    refusal_of,
+    sentence_on_ties,
+    verdict_on_validation,
+    with_calibrated_probability,
+)
+from mrpipe.tracing.bench.verdict.naming import Named
 from mrpipe.tracing.options import NamingRules, TracingOptions
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Verdict, VerdictClass
@@ -37,7 +44,7 @@ def test_a_declared_form_that_fails_is_no_reason_to_trace_nothing() -> None:
     training, validation = recorded(tests), recorded(tests, validation=True)
     first = fit_baseline(training, declared_base(training, "bouc-wen", 2, 1))
     options = TracingOptions(base_forms=("bouc-wen", "rounded-yield"))
-    found = validated(first.fit, first.fit, first, training, validation, options)
+    found = errors_on_validation(first.fit, first.fit, first, training, validation, options)
     error = found.nrmse(found.after)
 
     def refusal(failed: float) -> str:
@@ -59,8 +66,8 @@ def test_an_effect_that_explains_a_part_is_less_probable() -> None:
     evidence = Evidence(0.05, 0.018, 0.004, 0.012, (), structured=True, effects=True)
 
     def confidence(kind: VerdictClass, *, chosen: bool = True, several: bool = False) -> float:
-        judgement = Judgement(Verdict(kind, ""), evidence, 0.012, (0.012, 0.012), None)
-        return held(item, judgement, NamingRules(), several=several, chosen=chosen).confidence
+        judgement = VerdictWithEvidence(Verdict(kind, ""), evidence, 0.012, (0.012, 0.012), None)
+        return with_calibrated_probability(item, judgement, NamingRules(), several=several, chosen=chosen).confidence
 
     assert confidence("explained") > 0.9
     assert NamingRules().least_probability < confidence("partly explained") < 0.7
@@ -74,9 +81,9 @@ def test_the_verdict_says_which_effects_the_tests_do_not_separate() -> None:
     late = Named(effects["channel-skew"], "shift", {}, 0.5, ("inertia", "accumulator"))
     dry = Named(effects["stribeck"], "gaussian", {}, 0.5, ("backlash",))
     alone = Named(effects["heating"], "cooling", {}, 0.9)
-    assert not_separated([alone]) == ""
-    assert not_separated([late, alone]) == "these tests do not separate channel-skew from inertia and accumulator"
-    assert not_separated([late, dry]).endswith("inertia and accumulator, nor stribeck from backlash")
+    assert sentence_on_ties([alone]) == ""
+    assert sentence_on_ties([late, alone]) == "these tests do not separate channel-skew from inertia and accumulator"
+    assert sentence_on_ties([late, dry]).endswith("inertia and accumulator, nor stribeck from backlash")
 
 
 def test_a_tie_is_part_of_the_sentence() -> None:
@@ -85,8 +92,8 @@ def test_a_tie_is_part_of_the_sentence() -> None:
     training, validation = recorded(tests), recorded(tests, validation=True)
     first = fit_baseline(training, declared_base(training, "rounded-yield", 2, 1))
     options = TracingOptions()
-    found = validated(first.fit, first.fit, first, training, validation, options)
+    found = errors_on_validation(first.fit, first.fit, first, training, validation, options)
     selection = Selection(first.fit, first.noise, (), first.fit, nothing_missing=0.0)
     late = Named(damper_effects()["channel-skew"], "shift", {}, 0.5, ("inertia",))
-    judgement = judged(found, selection, training, options, [late], True, "", sort_tests(tests), 1)
+    judgement = verdict_on_validation(found, selection, training, options, [late], True, "", sort_tests(tests), 1)
     assert judgement.verdict.sentence.endswith("; these tests do not separate channel-skew from inertia")

@@ -26,7 +26,7 @@ def test_the_spread_of_shifted_zeros_comes_out() -> None:
     assert found is not None
     training = [shift for test, shift in zip(tests, shifts, strict=False) if test.role != "validation"]
     assert found.spread_n == pytest.approx(float(np.std(training, ddof=1)), rel=0.1)
-    assert found.named().parameters["spread"].unit == "N"
+    assert found.as_named_effect().parameters["spread"].unit == "N"
 
 
 def test_a_steady_zero_is_not_reported() -> None:

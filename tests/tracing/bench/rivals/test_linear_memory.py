@@ -13,8 +13,8 @@ from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.rivals.rivals import Unseen
-from mrpipe.tracing.bench.rivals.unnamed import with_linear_memory, without_beaten_names
+from mrpipe.tracing.bench.rivals.linear_memory import with_linear_memory, without_beaten_names
+from mrpipe.tracing.bench.rivals.other_base_forms import Unseen
 from mrpipe.tracing.bench.selection.select import Selection
 from tests.tracing.bench.fits import fit_of
 from tests.tracing.bench.rig import RATE, campaign

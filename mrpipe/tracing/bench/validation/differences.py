@@ -206,7 +206,7 @@ def compare(
         if item.error_n <= rules.odd_ratio * max(high * item.rms_n, noise):
             corrected_squares += float(np.sum(squares[own]))
             continue
-        inside = own & covered(validation, known, rules)
+        inside = own & covered_samples(validation, known, rules)
         fault = faults.get(item.name)
         causes = _causes(item, trained, expected, rules)
         ranges = _ranges(validation, known, own, inside, squares, expected, rules) if not (causes or fault) else []
@@ -315,7 +315,7 @@ def _ranges(
     return found
 
 
-def covered(other: Recordings, known: Recordings, rules: ValidationRules) -> BoolArray:
+def covered_samples(other: Recordings, known: Recordings, rules: ValidationRules) -> BoolArray:
     """Return the samples of `other` whose motion and drive the known tests cover, shape (n of other,)."""
     inside = np.ones(len(other.force), dtype=np.bool_)
     for channel in RANGES:

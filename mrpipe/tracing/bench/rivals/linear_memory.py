@@ -22,8 +22,8 @@ from mrpipe.effects.contract import Effect, EffectForm, Values, amplitude
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.tracing.bench.rivals.needed import without_names
-from mrpipe.tracing.bench.rivals.rivals import HOPELESS, ITERATIONS, Unseen
-from mrpipe.tracing.bench.selection.select import Selection, draft
+from mrpipe.tracing.bench.rivals.other_base_forms import HOPELESS, ITERATIONS, Unseen
+from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
 from mrpipe.tracing.gain import Gain
 from mrpipe.words import listed
 
@@ -102,7 +102,7 @@ def without_beaten_names(
     kept = list(gains)
     if not selection.proven or named.chi_square <= selection.noise:
         return selection, kept, ""
-    small = draft(named)
+    small = fit_on_draft_tests(named)
     rival = with_linear_memory(small, declared)
     if rival.chi_square > HOPELESS * small.chi_square:
         return selection, kept, ""

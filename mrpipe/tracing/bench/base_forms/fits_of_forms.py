@@ -13,11 +13,13 @@ from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Problem
 from mrpipe.fitting.reference import with_own_laws
 from mrpipe.fitting.start import fit_with_form, own_start
-from mrpipe.tracing.bench.selection.select import draft
+from mrpipe.tracing.bench.selection.select import fit_on_draft_tests
 from mrpipe.tracing.options import TracingOptions
 
 
-def alone(small: Fit, forms: Mapping[str, BaseForm], *, known: Known | None = None, jobs: int = 1) -> dict[str, Fit]:
+def fits_without_effects(
+    small: Fit, forms: Mapping[str, BaseForm], *, known: Known | None = None, jobs: int = 1
+) -> dict[str, Fit]:
     """Return name -> fit of all base forms to the tests of a draft; the form of the draft is not fitted again.
 
     Parameters
@@ -43,13 +45,20 @@ def alone(small: Fit, forms: Mapping[str, BaseForm], *, known: Known | None = No
         return {own: small, **dict(zip(names, fits, strict=True))}
 
 
-def alone_of(found: Fit, options: TracingOptions, *, known: Known | None = None, jobs: int = 1) -> dict[str, Fit]:
-    """Return all base forms that are compared, fitted without effects to the draft of a fit; `known` as in `alone`.
+def compared_fits_without_effects(
+    found: Fit, options: TracingOptions, *, known: Known | None = None, jobs: int = 1
+) -> dict[str, Fit]:
+    """Return all base forms that are compared, fitted without effects to the draft of a fit.
 
     Springs of base forms are left to the effect `accumulator`.
     """
     forms = forms_named(options.base_forms, options.form_files)
-    return alone(draft(found), {name: form.without_springs() for name, form in forms.items()}, known=known, jobs=jobs)
+    return fits_without_effects(
+        fit_on_draft_tests(found),
+        {name: form.without_springs() for name, form in forms.items()},
+        known=known,
+        jobs=jobs,
+    )
 
 
 def with_effects_of(chosen: Fit, singles: Sequence[Fit], *, iterations: int = 8, jobs: int = 1) -> list[Fit]:

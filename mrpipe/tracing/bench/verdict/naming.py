@@ -11,7 +11,7 @@ import numpy as np
 from mrpipe.effects.contract import Effect
 from mrpipe.fitting.engine import Fit
 from mrpipe.tracing.bench.residuals.crossvalidation import gain_of
-from mrpipe.tracing.bench.selection.select import Candidate, Selection, left_of, share_of
+from mrpipe.tracing.bench.selection.select import EffectCandidate, Selection, excess_over_noise, share_of
 from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.verdict import Candidate as RankedCandidate
@@ -69,8 +69,8 @@ class Named:
         return self.typed.as_json()
 
 
-def tied(
-    candidates: Sequence[Candidate], noise: float, rules: NamingRules, *, draws: int, rng: np.random.Generator
+def tied_effects(
+    candidates: Sequence[EffectCandidate], noise: float, rules: NamingRules, *, draws: int, rng: np.random.Generator
 ) -> tuple[str, ...]:
     """Return the families that these tests do not separate from the best one of a round.
 
@@ -82,8 +82,8 @@ def tied(
     best = candidates[0].fit
     rivals = []
     for item in candidates[1:]:
-        least = left_of(best, noise, rules.noise_share)
-        alike = left_of(item.fit, noise, rules.noise_share) <= (1.0 + rules.lead) * least
+        least = excess_over_noise(best, noise, rules.noise_share)
+        alike = excess_over_noise(item.fit, noise, rules.noise_share) <= (1.0 + rules.lead) * least
         if not alike:
             alike = not gain_of(item.fit.residual, best.residual, best.problem, draws=draws, rng=rng).significant
         if alike:
@@ -104,7 +104,9 @@ def unnamed_reason(selection: Selection, rules: NamingRules) -> str:
     return ""
 
 
-def calibrated(evidence: float, rules: NamingRules, *, several: bool = False, partly: bool = False) -> float:
+def calibrated_probability(
+    evidence: float, rules: NamingRules, *, several: bool = False, partly: bool = False
+) -> float:
     """Return the probability that an effect with this evidence is present, calibrated on the planted benchmark.
 
     Parameters

@@ -12,11 +12,11 @@ from mrpipe.dampers.library import base_form
 from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
+from mrpipe.tracing.bench.base_forms.fits_of_forms import fits_without_effects, on_all_tests, with_effects_of
 from mrpipe.tracing.bench.base_forms.race import Race, _compared
-from mrpipe.tracing.bench.base_forms.with_base_forms import alone, on_all_tests, with_effects_of
 from mrpipe.tracing.bench.rivals.needed import without_superfluous
-from mrpipe.tracing.bench.rivals.rivals import Orders, Unseen, _before_yielding, rivals_of, with_best_base
-from mrpipe.tracing.bench.selection.select import Selection, draft
+from mrpipe.tracing.bench.rivals.other_base_forms import Orders, Unseen, _before_yielding, rivals_of, with_best_base
+from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
 from mrpipe.tracing.rules import RaceRules
 from tests.tracing.bench.fits import plain_fit
 
@@ -42,8 +42,8 @@ def _with_terms(found: Fit, *forms: tuple[str, str]) -> Fit:
 def _raced(*forms: tuple[str, str]) -> tuple[Selection, Race]:
     """Return Bouc-Wen with some effects as what was chosen, and its race with Dahl's law."""
     plain = plain_fit(PLANTED)
-    small = draft(plain)
-    singles = alone(small, {"bouc-wen": small.problem.base.form, "dahl": base_form("dahl")})
+    small = fit_on_draft_tests(plain)
+    singles = fits_without_effects(small, {"bouc-wen": small.problem.base.form, "dahl": base_form("dahl")})
     models = [*singles.values()]
     for count in range(1, len(forms) + 1):
         models += with_effects_of(_with_terms(small, *forms[:count]), list(singles.values()))
@@ -90,7 +90,7 @@ def test_a_form_that_the_race_did_not_combine_with_the_effect_is_tried_with_its_
 
 
 def test_forms_that_act_before_the_damper_yields_are_tried_for_effects_whose_simple_forms_change_the_force() -> None:
-    small = draft(plain_fit(PLANTED))
+    small = fit_on_draft_tests(plain_fit(PLANTED))
     pair = _with_terms(small, ("migration", "slip"), ("backlash", "held"))
 
     def forms(places: list[int], declared: int = 0) -> list[list[str]]:

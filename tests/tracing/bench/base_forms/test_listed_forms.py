@@ -9,10 +9,10 @@ import pytest
 
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import Fit
-from mrpipe.tracing.bench.base_forms.listed import COMMON_FORMS, forms_alone
+from mrpipe.tracing.bench.base_forms.fits_of_forms import fits_without_effects
+from mrpipe.tracing.bench.base_forms.listed_forms import COMMON_FORMS, listed_fits_without_effects
 from mrpipe.tracing.bench.base_forms.race import Race
-from mrpipe.tracing.bench.base_forms.with_base_forms import alone
-from mrpipe.tracing.bench.selection.select import draft
+from mrpipe.tracing.bench.selection.select import fit_on_draft_tests
 from tests.tracing.bench.fits import plain_fit
 
 pytestmark = pytest.mark.planted
@@ -25,9 +25,9 @@ def _race(models: list[tuple[str, tuple[str, ...], Any]]) -> Race:
 
 def test_every_base_form_of_the_race_is_listed_without_effects() -> None:
     plain = plain_fit("accumulator")
-    drafted = alone(draft(plain), {name: base_form(name) for name in ("lugre", "dahl")})
+    drafted = fits_without_effects(fit_on_draft_tests(plain), {name: base_form(name) for name in ("lugre", "dahl")})
     models = [(name, (), fitted) for name, fitted in drafted.items()]
-    found = forms_alone(plain, _race([*models, ("kwok", ("accumulator",), None)]))
+    found = listed_fits_without_effects(plain, _race([*models, ("kwok", ("accumulator",), None)]))
     assert next(iter(found)) == "bouc-wen"
     assert set(found) == {*COMMON_FORMS, "lugre"}
     for name, fitted in found.items():
@@ -36,4 +36,4 @@ def test_every_base_form_of_the_race_is_listed_without_effects() -> None:
 
 
 def test_the_common_forms_are_listed_without_a_race() -> None:
-    assert set(forms_alone(plain_fit("accumulator"), None)) == set(COMMON_FORMS)
+    assert set(listed_fits_without_effects(plain_fit("accumulator"), None)) == set(COMMON_FORMS)

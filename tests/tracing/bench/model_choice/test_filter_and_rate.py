@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mrpipe.tracing.bench.model_choice.chosen as module
+import mrpipe.tracing.bench.model_choice.filter_and_rate as module
 from mrpipe.effects.library import damper_effects
-from mrpipe.tracing.bench.model_choice.chosen import Bench, begin, choose
+from mrpipe.tracing.bench.model_choice.filter_and_rate import Bench, choose_with_filter_and_rate, fit_declared_model
 from mrpipe.tracing.options import TracingOptions
 from tests.tracing.bench.rig import campaign
 
@@ -36,9 +36,9 @@ def _twice(_bench: Bench, found: Any) -> TracingOptions:
 
 def test_a_higher_rate_that_keeps_the_names_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = _bench("wide-backlash", "backlash")
-    begun = begin(bench, _options(62.5))
+    begun = fit_declared_model(bench, _options(62.5))
     monkeypatch.setattr(module, "_at_better_rate", _twice)
-    found = choose(bench, begun)
+    found = choose_with_filter_and_rate(bench, begun)
     assert found.options.fit_rate_hz == 125.0
     assert found.names == {"backlash"}
     assert len(found.training.force) > len(begun.training.force)
@@ -52,12 +52,12 @@ def test_a_rate_that_changes_the_names_is_not_kept(monkeypatch: pytest.MonkeyPat
         calls.append(begun.options.fit_rate_hz)
         found = real(bench, begun)
         # the second choice finds nothing
-        return found if len(calls) == 1 else module.Chosen(**vars(begun), choice=_nothing(found.choice))
+        return found if len(calls) == 1 else module.ChosenModel(**vars(begun), choice=_nothing(found.choice))
 
     monkeypatch.setattr(module, "_choose", choose_once)
     monkeypatch.setattr(module, "_at_better_rate", _twice)
     monkeypatch.setattr(module, "better_filter", lambda *args, **_: args[3])
-    found = choose(bench, begin(bench, _options(62.5)))
+    found = choose_with_filter_and_rate(bench, fit_declared_model(bench, _options(62.5)))
     assert len(calls) == 2
     assert found.options.fit_rate_hz == 62.5
     assert found.names == {"backlash"}
@@ -82,7 +82,7 @@ def test_one_more_name_at_a_higher_rate_is_not_taken_but_the_rate_is(monkeypatch
     monkeypatch.setattr(module, "_choose", choose_once)
     monkeypatch.setattr(module, "_at_better_rate", _twice)
     monkeypatch.setattr(module, "_better_filter", lambda _bench, found, _options: found.filter)
-    found = choose(bench, begin(bench, _options(62.5)))
+    found = choose_with_filter_and_rate(bench, fit_declared_model(bench, _options(62.5)))
     assert found.options.fit_rate_hz == 125.0 and found.names == {"backlash"}
     assert able[1] > able[2] == {"backlash"}
 
@@ -98,7 +98,7 @@ def test_another_name_at_a_higher_rate_counts_where_it_leaves_less(
     monkeypatch.setattr(module, "_at_better_rate", _twice)
     monkeypatch.setattr(module, "_better_filter", lambda _bench, found, _options: found.filter)
     monkeypatch.setattr(module, "_leaves_less", lambda *_: leaves_less)
-    found = choose(bench, begin(bench, _options(62.5)))
+    found = choose_with_filter_and_rate(bench, fit_declared_model(bench, _options(62.5)))
     assert found.names == ({"backlash"} if leaves_less else {"channel-skew"})
 
 
@@ -108,7 +108,7 @@ def _nothing(choice: Any) -> Any:
 
 def test_a_model_within_the_noise_keeps_filter_and_rate() -> None:
     bench = _bench("none", "backlash")
-    begun = begin(bench, _options(250.0))
-    found = choose(bench, begun)
+    begun = fit_declared_model(bench, _options(250.0))
+    found = choose_with_filter_and_rate(bench, begun)
     assert found.options.fit_rate_hz == 250.0
     assert found.names == set()

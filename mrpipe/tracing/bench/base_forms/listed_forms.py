@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 from mrpipe.dampers.library import base_form
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.start import fit_with_form
+from mrpipe.tracing.bench.base_forms.fits_of_forms import on_all_tests
 from mrpipe.tracing.bench.base_forms.race import Race
-from mrpipe.tracing.bench.base_forms.with_base_forms import on_all_tests
 
 COMMON_FORMS = ("bouc-wen", "bouc-wen-n", "dahl", "yielding-part")
 """Base forms that are always listed, also if there was no race."""
@@ -17,7 +17,7 @@ SEARCH_STEPS = 3
 """Numerical technique: iterations of the common forms on all tests; they start from the fit to the draft."""
 
 
-def forms_alone(found: Fit, race: Race | None, *, jobs: int = 1) -> dict[str, Fit]:
+def listed_fits_without_effects(found: Fit, race: Race | None, *, jobs: int = 1) -> dict[str, Fit]:
     """Return name -> fit to all tests, without effects, of every base form that was tried.
 
     The shape parameters of the common forms are searched on all tests. The other forms keep the shape parameters of the

@@ -19,7 +19,7 @@ from mrpipe.fitting.engine import fit
 from mrpipe.fitting.known import Known
 from mrpipe.fitting.recordings import MOST_JUDGED, MOST_SAMPLES, Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.campaign_tests.testability import untestable
+from mrpipe.tracing.bench.campaign_tests.testability import effects_by_testability
 from mrpipe.tracing.bench.model_choice.choose import Choice, choose_model
 from mrpipe.tracing.bench.model_choice.cutoff import (
     MotionFilter,
@@ -92,7 +92,7 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Chosen(Start):
+class ChosenModel(Start):
     """Training tests in the form in which they are fitted, and the chosen base form with its effects.
 
     Attributes
@@ -109,7 +109,7 @@ class Chosen(Start):
         return {term.effect.name for term in self.choice.selection.chosen.problem.terms}
 
 
-def begin(bench: Bench, options: TracingOptions) -> Start:
+def fit_declared_model(bench: Bench, options: TracingOptions) -> Start:
     """Return the training tests, with noise removed from the displacement, and the fit of the declared model.
 
     Either the noise that all tests share is removed, or a low-pass is chosen for each test. The error of simple base
@@ -124,12 +124,12 @@ def begin(bench: Bench, options: TracingOptions) -> Start:
             viscosity_order=options.viscosity_order,
             known=bench.known,
         )
-        automatic = recorded(bench.tests, way, options)
+        automatic = filtered_recordings(bench.tests, way, options)
         way = best_filter(bench.tests, automatic, judging, rules=options.rules.nuisances, jobs=bench.jobs)
-    return _started(bench, options, way, recorded(bench.tests, way, options))
+    return _started(bench, options, way, filtered_recordings(bench.tests, way, options))
 
 
-def choose(bench: Bench, begun: Start) -> Chosen:
+def choose_with_filter_and_rate(bench: Bench, begun: Start) -> ChosenModel:
     """Return base form and effects, chosen again if another filter or rate gives a clearly smaller error.
 
     Parameters
@@ -164,9 +164,9 @@ def _at(
     way: MotionFilter,
     samples: int = MOST_SAMPLES,
     names: Set[str] | None = None,
-) -> Chosen:
+) -> ChosenModel:
     """Return the choice with a given rate and filter; `names` limits the effects that are tried."""
-    training = recorded(bench.tests, way, options, most_samples=samples)
+    training = filtered_recordings(bench.tests, way, options, most_samples=samples)
     begun = _started(bench, options, way, training)
     if names is not None:
         begun = replace(begun, able={name: effect for name, effect in begun.able.items() if name in names})
@@ -174,11 +174,11 @@ def _at(
 
 
 def _started(bench: Bench, options: TracingOptions, way: MotionFilter, training: Recordings) -> Start:
-    able, reasons = untestable(training, bench.effects, options.rules.testability)
+    able, reasons = effects_by_testability(training, bench.effects, options.rules.testability)
     return Start(options, way, training, able, reasons, _first_baseline(training, bench, options))
 
 
-def _choose(bench: Bench, begun: Start) -> Chosen:
+def _choose(bench: Bench, begun: Start) -> ChosenModel:
     choice = choose_model(
         begun.first,
         begun.training,
@@ -190,17 +190,17 @@ def _choose(bench: Bench, begun: Start) -> Chosen:
         jobs=bench.jobs,
         progress=bench.progress,
     )
-    return Chosen(**vars(begun), choice=choice)
+    return ChosenModel(**vars(begun), choice=choice)
 
 
-def _better_filter(bench: Bench, found: Chosen, options: TracingOptions) -> MotionFilter:
+def _better_filter(bench: Bench, found: ChosenModel, options: TracingOptions) -> MotionFilter:
     """Return the filter with which the error of the chosen model is clearly smaller, else the present one."""
     if options.displacement_cutoff_hz > 0.0:
         return found.filter
     return better_filter(
         found.choice.selection.chosen,
         bench.tests,
-        recorded(bench.tests, MotionFilter(), options),
+        filtered_recordings(bench.tests, MotionFilter(), options),
         found.filter,
         rate_hz=options.fit_rate_hz,
         rules=options.rules.nuisances,
@@ -208,7 +208,7 @@ def _better_filter(bench: Bench, found: Chosen, options: TracingOptions) -> Moti
     )
 
 
-def validation_of(bench: Bench, begun: Start, unseen: Sequence[PreparedTest]) -> Recordings:
+def validation_recordings(bench: Bench, begun: Start, unseen: Sequence[PreparedTest]) -> Recordings:
     """Return the validation tests, concatenated, with the displacement filtered like that of the training tests.
 
     The cut-off of a low-pass is the highest one that does not raise the error of the chosen model. Shared noise is
@@ -224,21 +224,21 @@ def validation_of(bench: Bench, begun: Start, unseen: Sequence[PreparedTest]) ->
         Validation tests.
     """
     way, options = begun.filter, begun.options
-    if isinstance(begun, Chosen) and way.noise is None and options.displacement_cutoff_hz == 0.0:
+    if isinstance(begun, ChosenModel) and way.noise is None and options.displacement_cutoff_hz == 0.0:
         limit = loosest_limit(
             begun.choice.selection.chosen,
             bench.tests,
-            recorded(bench.tests, MotionFilter(), options),
+            filtered_recordings(bench.tests, MotionFilter(), options),
             way.limit_hz,
             rate_hz=options.fit_rate_hz,
             rules=options.rules.nuisances,
             jobs=bench.jobs,
         )
         way = MotionFilter(limit)
-    return recorded(unseen, way, options, most_samples=MOST_JUDGED)
+    return filtered_recordings(unseen, way, options, most_samples=MOST_JUDGED)
 
 
-def _at_better_rate(bench: Bench, found: Chosen) -> TracingOptions:
+def _at_better_rate(bench: Bench, found: ChosenModel) -> TracingOptions:
     """Return the options with the rate at which the error of the chosen model is clearly smaller, else unchanged."""
     choice, options = found.choice, found.options
     chosen, rules = choice.selection.chosen, options.rules
@@ -257,7 +257,7 @@ def _at_better_rate(bench: Bench, found: Chosen) -> TracingOptions:
     return options if rate == options.fit_rate_hz else options.model_copy(update={"fit_rate_hz": rate})
 
 
-def _leaves_less(again: Chosen, found: Chosen, gain: float) -> bool:
+def _leaves_less(again: ChosenModel, found: ChosenModel, gain: float) -> bool:
     """Return whether the choice at a higher rate has a clearly smaller error there than the choice before.
 
     A reversal that lasts a few samples of the lower rate can look like a delay between the channels.
@@ -274,7 +274,7 @@ def _leaves_less(again: Chosen, found: Chosen, gain: float) -> bool:
     return bool(np.sqrt(chosen.chi_square) < (1.0 - gain) * np.sqrt(present.chi_square))
 
 
-def recorded(
+def filtered_recordings(
     tests: Sequence[PreparedTest], way: MotionFilter, options: TracingOptions, *, most_samples: int = MOST_SAMPLES
 ) -> Recordings:
     """Return concatenated tests, with noise removed from the displacement in a given way."""

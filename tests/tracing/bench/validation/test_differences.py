@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrpipe.tracing.bench.residuals.nuisances import SessionGain
-from mrpipe.tracing.bench.validation.validation import Comparison, with_session
+from mrpipe.tracing.bench.validation.differences import Comparison, with_session
 from mrpipe.tracing.rules import ValidationRules
 from mrpipe.tracing.verdict import Difference
 from tests.tracing.bench.residuals.test_nuisances import recordings

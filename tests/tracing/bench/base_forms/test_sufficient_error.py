@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrpipe.tracing.bench.base_forms.sufficient import nrmse_of_noise, sufficient_chi_square
+from mrpipe.tracing.bench.base_forms.sufficient_error import nrmse_of_noise, sufficient_chi_square
 from mrpipe.tracing.rules import RaceRules
 from tests.tracing.bench.fits import plain_fit
 

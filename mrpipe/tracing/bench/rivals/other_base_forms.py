@@ -16,13 +16,13 @@ import numpy as np
 from mrpipe.fitting.engine import Fit, fit, start_of
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.reference import with_own_laws
-from mrpipe.tracing.bench.base_forms.promotion import promoted, with_candidates
+from mrpipe.tracing.bench.base_forms.fits_of_forms import on_all_tests, with_effects_of
+from mrpipe.tracing.bench.base_forms.promotion import winner_on_all_tests, with_candidates
 from mrpipe.tracing.bench.base_forms.race import Model, Race
-from mrpipe.tracing.bench.base_forms.with_base_forms import on_all_tests, with_effects_of
 from mrpipe.tracing.bench.residuals.crossvalidation import gain_of, left_out_residual
 from mrpipe.tracing.bench.selection.drive_again import with_adequate_laws
 from mrpipe.tracing.bench.selection.refine import starts_of, with_best_forms
-from mrpipe.tracing.bench.selection.select import Selection, draft
+from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
 
 RIVALS = 3
 """Numerical technique: base forms, in addition to the chosen one, that are compared again."""
@@ -154,7 +154,7 @@ def with_best_base(
     limit = selection.sufficient(worth_a_try, model_error=model_error)
     if race is None or not named or chosen.chi_square < limit:
         return selection
-    small = draft(chosen)
+    small = fit_on_draft_tests(chosen)
     places = range(len(small.problem.terms))
     full = with_best_forms(orders.adequate(small), named, jobs=jobs)
     if full.chi_square < limit:
@@ -166,7 +166,7 @@ def with_best_base(
     rival, best = found
     if full.chi_square <= (1.0 + lead) * best.chi_square:
         return selection
-    again = taken(selection, race, rival, best)
+    again = with_rival_base_form(selection, race, rival, best)
     own = on_all_tests(full, chosen.problem)
     if own.chi_square <= (1.0 + lead) * again.chosen.chi_square:
         return selection
@@ -298,7 +298,7 @@ def _before_yielding(full: Fit, places: Sequence[int], declared: int) -> Iterato
         yield fit(problem, start_of(problem, full.base_values, given), iterations=0)
 
 
-def taken(selection: Selection, race: Race, rival: Model, found: Fit) -> Selection:
+def with_rival_base_form(selection: Selection, race: Race, rival: Model, found: Fit) -> Selection:
     """Return the selection with a rival in place of the chosen fit, fitted to all training tests, without candidates.
 
     Parameters
@@ -312,7 +312,7 @@ def taken(selection: Selection, race: Race, rival: Model, found: Fit) -> Selecti
     found
         The base form with its effects, fitted to the draft.
     """
-    again = promoted(race, replace(rival, fit=found), selection.base)
+    again = winner_on_all_tests(race, replace(rival, fit=found), selection.base)
     return replace(
         again.with_floor(selection.noise),
         proven=len(found.problem.terms) - len(race.own),
