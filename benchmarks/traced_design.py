@@ -61,8 +61,8 @@ from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.simulation.steady_state import CurveOptions
 from mrpipe.structures import Frame, frame_from_parameter_set
 from mrpipe.thesis.gains import THESIS_GAINS
-from mrpipe.tracing.bench.summary import Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.bench.verdict.summary import Tracing
 from mrpipe.tracing.loop.augmented import traced_damper
 from mrpipe.tracing.options import TracingOptions
 

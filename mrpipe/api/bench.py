@@ -15,7 +15,7 @@ from mrpipe.campaigns import load_campaign as _load_campaign
 from mrpipe.dampers.model import DamperModel
 from mrpipe.fitting.comparison import Comparison, JudgedFit
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.summary import Tracing
+from mrpipe.tracing.bench.verdict.summary import Tracing
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -24,7 +24,7 @@ from mrpipe.reporting.closed_loop import band_table, law_table, response_by_law
 from mrpipe.reporting.closed_loop_words import in_words
 from mrpipe.reporting.headlines import open_questions
 from mrpipe.reporting.sink import Sink
-from mrpipe.tracing.bench.summary import Tracing
+from mrpipe.tracing.bench.verdict.summary import Tracing
 
 
 @dataclass(frozen=True)

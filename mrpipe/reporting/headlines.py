@@ -211,7 +211,7 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
 
 def open_questions(decides: Sequence[Mapping[str, Any]]) -> str:
     """Return what tests would decide, the rivals of one effect together, and likewise the effects in doubt."""
-    from mrpipe.tracing.bench.extra_tests import WHETHER
+    from mrpipe.tracing.bench.campaign_tests.extra_tests import WHETHER
 
     rivals: dict[str, list[str]] = {}
     absent, others = [], []

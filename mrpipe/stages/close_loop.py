@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from mrpipe.effects.contract import Effect
     from mrpipe.fitting.known import Known
     from mrpipe.signals.prepared import PreparedTest
-    from mrpipe.tracing.bench.summary import Tracing
+    from mrpipe.tracing.bench.verdict.summary import Tracing
 
 CORRECTIONS = "corrections.yaml"
 NEXT_TESTS = "next-tests.yaml"
@@ -31,8 +31,8 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.effects.library import damper_effects, effects_named
     from mrpipe.reporting import close_loop as section
     from mrpipe.signals.prepared import read_prepared
-    from mrpipe.tracing.bench.identified import compared_with_identified
     from mrpipe.tracing.bench.trace import trace_campaign
+    from mrpipe.tracing.bench.verdict.identified import comparison_with_identified
     from mrpipe.tracing.options import tracing_options
 
     settings = context.settings.close_loop
@@ -55,7 +55,7 @@ def _run(context: StageContext) -> Mapping[str, Any]:
         tests, library, declared, options, known=fitted, rng=context.rng, jobs=context.jobs, progress=context.progress
     )
     summary = {"campaign": campaign.name, **traced.summary}
-    identified = None if chosen is None else compared_with_identified(chosen, fitted, traced)
+    identified = None if chosen is None else comparison_with_identified(chosen, fitted, traced)
     summary["base_form"] = {**summary["base_form"], "identified": identified}
     summary["closed_loop"] = _closed_loop(context, traced, tests)
     summary["corrections"] = _corrections(context, traced, tests)
@@ -159,7 +159,7 @@ def _laws(context: StageContext, available: list[str]) -> list[str]:
 
 def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTest]) -> dict[str, Any]:
     """Write the corrections that `prepare` should apply to the channels, as settings for the configuration."""
-    from mrpipe.tracing.bench.corrections import Corrections, corrections_of
+    from mrpipe.tracing.bench.verdict.corrections import Corrections, corrections_of
 
     prepare = context.settings.prepare
     present = Corrections(**prepare.corrections.model_dump(), displacement_late_s=prepare.displacement_late_s)
@@ -179,7 +179,7 @@ def _corrections(context: StageContext, traced: Tracing, tests: list[PreparedTes
 
 def _next_tests(context: StageContext, traced: Tracing, library: Mapping[str, Effect]) -> dict[str, Any]:
     """Write the tests that would decide open questions, as settings for `record`; earlier tests stay in the list."""
-    from mrpipe.tracing.bench.extra_tests import wanted_tests
+    from mrpipe.tracing.bench.campaign_tests.extra_tests import wanted_tests
 
     extra = wanted_tests(traced.summary, library, traced.training)
     listed = context.settings.laboratory.bench.tests
@@ -252,7 +252,7 @@ def _check(settings: Any) -> None:
     """Check that effects and base forms are known, and that files of the user can be read."""
     from mrpipe.dampers.library import forms_named
     from mrpipe.effects.library import effects_named
-    from mrpipe.tracing.bench.baseline import form_name
+    from mrpipe.tracing.bench.noise.baseline import form_name
     from mrpipe.tracing.options import IDENTIFIED
 
     section = settings.close_loop

@@ -10,7 +10,7 @@ from numba import njit
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.recordings import record_tests
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
+from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
 from tests.tracing.bench.rig import RATE, campaign
 
 YIELD_DISPLACEMENT = 3.7e-4

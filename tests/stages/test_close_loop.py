@@ -33,9 +33,9 @@ from mrpipe.stages.registry import all_stages
 from mrpipe.structures import floor_position, frame_from_parameter_set
 from mrpipe.structures.frame import write_frame
 from mrpipe.thesis.gains import THESIS_GAINS
-from mrpipe.tracing.bench.identified import compared_with_identified
-from mrpipe.tracing.bench.summary import UNATTRIBUTED, Tracing
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.bench.verdict.identified import comparison_with_identified
+from mrpipe.tracing.bench.verdict.summary import UNATTRIBUTED, Tracing
 from mrpipe.tracing.loop import band
 from mrpipe.tracing.options import TracingOptions, tracing_options
 from tests.tracing.bench.rig import campaign
@@ -172,12 +172,12 @@ def test_the_declared_form_is_the_identified_one_unless_the_settings_name_anothe
 @pytest.mark.planted
 def test_the_report_compares_the_declared_model_with_the_identified_damper(traced: Tracing) -> None:
     same = damper_model(traced.selection.base, traced.drive_unit)
-    found = compared_with_identified(same, {"bouc-wen": same}, traced)
+    found = comparison_with_identified(same, {"bouc-wen": same}, traced)
     # the same numbers have the same error, on the same samples
     assert found["nrmse"] == pytest.approx(traced.summary["before"]["nrmse"], rel=1e-3)
     assert found["parameters"]["yield_displacement"]["value"] == found["parameters"]["yield_displacement"]["before"]
     assert found["laws"][-1]["yield_force_n"] == found["laws"][-1]["yield_force_before_n"]
-    other = compared_with_identified(replace(same, form="dahl"), {}, traced)
+    other = comparison_with_identified(replace(same, form="dahl"), {}, traced)
     assert other["why"].startswith("close_loop.model names bouc-wen, identify-damper chose dahl.")
     assert "parameters" not in other
 

@@ -14,27 +14,34 @@ from mrpipe.fitting.known import Known
 from mrpipe.fitting.problem import Term
 from mrpipe.fitting.recordings import Recordings, enough_tests, spread_tests
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.assess import Case, with_likely_names
-from mrpipe.tracing.bench.baseline import Baseline
-from mrpipe.tracing.bench.choose import Choice, judged_by_trees
-from mrpipe.tracing.bench.chosen import Bench, Chosen, begin, choose, validation_of
-from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
-from mrpipe.tracing.bench.drive_again import with_final_laws
-from mrpipe.tracing.bench.gates import judged, refusal_of, validated
-from mrpipe.tracing.bench.inner_springs import with_inner_springs
-from mrpipe.tracing.bench.law_rival import without_laws_of_drive
-from mrpipe.tracing.bench.needed import without_idle, without_superfluous
-from mrpipe.tracing.bench.nuisances import observation_window
-from mrpipe.tracing.bench.odd_tests import SortedTests, sort_tests
-from mrpipe.tracing.bench.offsets import offset_between_tests
-from mrpipe.tracing.bench.on_validation import OnValidation
-from mrpipe.tracing.bench.passes import in_passes
-from mrpipe.tracing.bench.refine import with_further_terms, with_richer_forms
-from mrpipe.tracing.bench.rivals import Orders, Unseen, with_best_base
-from mrpipe.tracing.bench.select import Selection, forward_selection
-from mrpipe.tracing.bench.summary import Summary, Tracing
-from mrpipe.tracing.bench.unnamed import without_beaten_names
-from mrpipe.tracing.bench.verdict import unnamed_reason
+from mrpipe.tracing.bench.campaign_tests.odd_tests import SortedTests, sort_tests
+from mrpipe.tracing.bench.model_choice.choose import Choice, with_floor_of_flexible_model
+from mrpipe.tracing.bench.model_choice.filter_and_rate import (
+    Bench,
+    ChosenModel,
+    choose_with_filter_and_rate,
+    fit_declared_model,
+    validation_recordings,
+)
+from mrpipe.tracing.bench.model_choice.passes import in_passes
+from mrpipe.tracing.bench.noise.baseline import Baseline
+from mrpipe.tracing.bench.residuals.crossvalidation import gain_of, left_out_residual
+from mrpipe.tracing.bench.residuals.nuisances import observation_window
+from mrpipe.tracing.bench.rivals.inner_springs import with_inner_springs
+from mrpipe.tracing.bench.rivals.law_rival import without_laws_of_drive
+from mrpipe.tracing.bench.rivals.linear_memory import without_beaten_names
+from mrpipe.tracing.bench.rivals.needed import without_idle, without_superfluous
+from mrpipe.tracing.bench.rivals.other_base_forms import Orders, Unseen, with_best_base
+from mrpipe.tracing.bench.selection.drive_again import with_final_laws
+from mrpipe.tracing.bench.selection.refine import with_further_terms, with_richer_forms
+from mrpipe.tracing.bench.selection.select import Selection, forward_selection
+from mrpipe.tracing.bench.validation.on_validation import OnValidation
+from mrpipe.tracing.bench.verdict.assess import Case, with_likely_names
+from mrpipe.tracing.bench.verdict.gates import errors_on_validation, refusal_of, verdict_on_validation
+from mrpipe.tracing.bench.verdict.naming import unnamed_reason
+from mrpipe.tracing.bench.verdict.offsets import offset_between_tests
+from mrpipe.tracing.bench.verdict.summary import Summary, Tracing
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import TracingOptions
 
 
@@ -77,19 +84,19 @@ def trace_campaign(
     usable = spread_tests(enough_tests([t for t in ordered.tests if t.role != "validation"]))
     unseen = [t for t in ordered.tests if t.role == "validation"]
     bench = Bench(usable, effects, declared, rng, jobs, in_passes(progress), known or {})
-    begun = begin(bench, options)
-    validation = validation_of(bench, begun, unseen)
+    begun = fit_declared_model(bench, options)
+    validation = validation_recordings(bench, begun, unseen)
     progress(0.05, "baseline")
     training, first = begun.training, begun.first
-    found = validated(first.fit, first.fit, first, training, validation, options)
+    found = errors_on_validation(first.fit, first.fit, first, training, validation, options)
     refusal = refusal_of(found, first, training, validation, options, ordered.faults, jobs, bench.known)
     if refusal:
         return _nothing_traced(
             f"{refusal}: nothing is traced", ordered, found, first, training, begun.reasons, declared, options, jobs
         )
-    taken = choose(bench, begun)
+    taken = choose_with_filter_and_rate(bench, begun)
     options, training, choice = taken.options, taken.training, taken.choice
-    validation = validation_of(bench, taken, unseen)
+    validation = validation_recordings(bench, taken, unseen)
     baseline = choice.baseline
     window, selection, gains, reason = _named_on_training(taken, len(declared), rng, jobs)
     progress(0.85, "ceiling")
@@ -110,14 +117,16 @@ def trace_campaign(
         selection = replace(selection, chosen=selection.without_effects, named_fit=None)
         causes, further, offsets = (), (), None
         reason = "the effects that the training tests require do not lower the error on the validation tests"
-        found = validated(selection.base, selection.chosen, baseline, training, validation, options)
-        judgement = judged(found, selection, training, options, causes, assessed.missing, reason, ordered, jobs)
+        found = errors_on_validation(selection.base, selection.chosen, baseline, training, validation, options)
+        judgement = verdict_on_validation(
+            found, selection, training, options, causes, assessed.missing, reason, ordered, jobs
+        )
     report = Summary(selection, baseline, training, offsets, found, judgement, ordered, choice.race, jobs)
     return report.build(options, causes, further, taken.reasons, window, [item.name for item in declared])
 
 
 def _named_on_training(
-    taken: Chosen, declared: int, rng: np.random.Generator, jobs: int
+    taken: ChosenModel, declared: int, rng: np.random.Generator, jobs: int
 ) -> tuple[float, Selection, list[Gain | None], str]:
     """Return the effects that the training tests require, in the forms and with the laws of the drive that they need.
 
@@ -172,7 +181,7 @@ def _nothing_traced(
     selection = Selection(
         baseline.fit, baseline.noise, (), baseline.fit, nothing_missing=options.rules.selection.nothing_missing
     )
-    judgement = judged(found, selection, training, options, (), True, reason, ordered, jobs)
+    judgement = verdict_on_validation(found, selection, training, options, (), True, reason, ordered, jobs)
     if reason not in judgement.verdict.sentence:
         words = f"{reason}; {judgement.verdict.sentence}"
         judgement = replace(judgement, verdict=replace(judgement.verdict, sentence=words))
@@ -272,7 +281,7 @@ def _with_window(
         # an effect may have led to a better optimum of the base form
         again = replace(again, base=base, ground=again.base).with_floor(noise)
     if noise < selection.noise:
-        again = judged_by_trees(again, options.rules.model_error)
+        again = with_floor_of_flexible_model(again, options.rules.model_error)
     known = {term.effect.name for term in selection.chosen.problem.terms}
     others = {term.effect.name for term in again.chosen.problem.terms} - known
     if others or again.chosen.chi_square > filtered.chi_square:

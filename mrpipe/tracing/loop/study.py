@@ -19,7 +19,7 @@ from mrpipe.signals.prepared import PreparedTest
 from mrpipe.simulation.response_curve import ResponseCurve
 from mrpipe.simulation.rig import Rig, excitation_of
 from mrpipe.simulation.settings import SimulateSettings
-from mrpipe.tracing.bench.summary import Tracing
+from mrpipe.tracing.bench.verdict.summary import Tracing
 from mrpipe.tracing.loop.augmented import (
     ForceInUse,
     changed_share,

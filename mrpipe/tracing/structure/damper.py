@@ -21,9 +21,9 @@ from mrpipe.signals.filters import butterworth_lowpass
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.summary import Tracing
+from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.bench.verdict.summary import Tracing
 from mrpipe.tracing.options import TracingOptions
 from mrpipe.tracing.rules import BraceRules
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.tracing.bench.crossvalidation import Gain
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.structure.candidates import Fitted, Surroundings
 from mrpipe.tracing.structure.fit import Base, Design, design_of
 from mrpipe.tracing.structure.groups import LINES_OF_A_GROUP

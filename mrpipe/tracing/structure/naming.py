@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.tracing.bench.verdict import confidence_of
+from mrpipe.tracing.evidence import evidence_of
 from mrpipe.tracing.options import NamingRules
 from mrpipe.tracing.structure.candidates import Fitted
 from mrpipe.tracing.structure.model import FrameModel
@@ -48,7 +48,7 @@ def named_effects(selection: FrameSelection, after: FrameModel, rules: NamingRul
                 effect.name,
                 item.placed.form.name,
                 parameters_of(item, own, selection.rules.acting),
-                min(most, confidence_of(total, 0.5 + 0.5 * min(1.0, 2.0 * lead), None, rules)),
+                min(most, evidence_of(total, 0.5 + 0.5 * min(1.0, 2.0 * lead), None, rules)),
                 effect.physics,
                 effect.remedy,
                 effect.source,

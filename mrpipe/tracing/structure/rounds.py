@@ -10,7 +10,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.effects.structural.contract import StructuralEffect
-from mrpipe.tracing.bench.crossvalidation import Gain
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.rules import FrameRules
 from mrpipe.tracing.structure.candidates import Fitted, Outcome, Placed, Surroundings, columns_of, search
 from mrpipe.tracing.structure.fit import Base, Design

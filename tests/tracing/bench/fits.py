@@ -8,7 +8,7 @@ from functools import cache
 from mrpipe.fitting.engine import Fit
 from mrpipe.fitting.recordings import Recordings, record_tests
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
+from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
 from tests.tracing.bench.rig import campaign
 
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from mrpipe.fitting.recordings import record_tests
-from mrpipe.tracing.bench.baseline import declared_base, fit_baseline
-from mrpipe.tracing.bench.crossvalidation import Gain, gain_of, left_out_residual
-from mrpipe.tracing.bench.select import Candidate
-from mrpipe.tracing.bench.verdict import tied
+from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
+from mrpipe.tracing.bench.residuals.crossvalidation import gain_of, left_out_residual
+from mrpipe.tracing.bench.selection.select import EffectCandidate
+from mrpipe.tracing.bench.verdict.naming import tied_effects
+from mrpipe.tracing.gain import Gain
 from mrpipe.tracing.options import NamingRules
 from tests.tracing.bench.sines import harmed, scaled, sines
 
@@ -51,10 +52,10 @@ def test_a_test_that_is_left_out_is_not_seen() -> None:
     assert np.mean(unseen[own] ** 2) > 1.3 * np.mean(found.residual[own] ** 2)
 
 
-def candidate(name: str, residual: np.ndarray) -> Candidate:
+def candidate(name: str, residual: np.ndarray) -> EffectCandidate:
     chi_square = float(np.mean(residual**2))
     found = SimpleNamespace(chi_square=chi_square, residual=residual, problem=blocks())
-    return Candidate(name, cast(Any, found), 0.9, {})
+    return EffectCandidate(name, cast(Any, found), 0.9, {})
 
 
 @pytest.mark.property
@@ -62,5 +63,5 @@ def test_rivals_that_leave_as_much_are_tied_and_others_are_not() -> None:
     rng = np.random.default_rng(1)
     noise = rng.standard_normal(1600)
     field = (candidate("stribeck", 1.05 * noise), candidate("migration", 1.06 * noise), candidate("inertia", 2 * noise))
-    assert tied(field, 1.0, NamingRules(), draws=100, rng=rng) == ("migration",)
-    assert tied(field[::2], 1.0, NamingRules(), draws=100, rng=rng) == ()
+    assert tied_effects(field, 1.0, NamingRules(), draws=100, rng=rng) == ("migration",)
+    assert tied_effects(field[::2], 1.0, NamingRules(), draws=100, rng=rng) == ()

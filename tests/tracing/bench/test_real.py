@@ -14,10 +14,10 @@ from mrpipe.fitting.recordings import record_tests
 from mrpipe.fitting.start import first_problem, fit_with_form
 from mrpipe.signals.options import PreparationOptions
 from mrpipe.signals.preparation import prepare_campaign
-from mrpipe.tracing.bench.baseline import declared_base
-from mrpipe.tracing.bench.error_measures import judged_part, score
-from mrpipe.tracing.bench.nuisances import record_gains, session_gain
-from mrpipe.tracing.bench.validation import first_parts
+from mrpipe.tracing.bench.noise.baseline import declared_base
+from mrpipe.tracing.bench.residuals.error_measures import judged_part, score
+from mrpipe.tracing.bench.residuals.nuisances import record_gains, session_gain
+from mrpipe.tracing.bench.validation.differences import first_parts
 
 
 @pytest.mark.real

@@ -16,9 +16,9 @@ from mrpipe.fitting.damper import damper_model
 from mrpipe.fitting.recordings import record_tests
 from mrpipe.fitting.start import best_fit, first_problem
 from mrpipe.signals.prepared import PreparedTest
-from mrpipe.tracing.bench.baseline import declared_base
-from mrpipe.tracing.bench.summary import Tracing
+from mrpipe.tracing.bench.noise.baseline import declared_base
 from mrpipe.tracing.bench.trace import trace_campaign
+from mrpipe.tracing.bench.verdict.summary import Tracing
 from mrpipe.tracing.options import TracingOptions
 from tests.tracing.bench.rig import campaign
 

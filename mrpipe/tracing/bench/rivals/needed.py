@@ -1,0 +1,239 @@
+"""Which of several effects are needed, and which are superfluous with another form of the others.
+
+The search adds effects in simple forms, to a base form with simple laws of the drive. A second effect may then only
+correct the form of the first effect, the laws, or the base form. Before it is named, richer forms of the other effects,
+richer laws and the best rival base forms are tried without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+from mrpipe.fitting.engine import Fit, fit, start_of
+from mrpipe.fitting.reference import with_own_laws
+from mrpipe.tracing.bench.base_forms.fits_of_forms import on_all_tests
+from mrpipe.tracing.bench.base_forms.promotion import with_candidates
+from mrpipe.tracing.bench.base_forms.race import Race
+from mrpipe.tracing.bench.rivals.other_base_forms import Orders, best_rival, with_rival_base_form
+from mrpipe.tracing.bench.selection.refine import with_best_forms
+from mrpipe.tracing.bench.selection.select import Selection, fit_on_draft_tests
+from mrpipe.tracing.gain import Gain
+
+ITERATIONS = 15
+"""Numerical technique: largest number of steps of a fit without one of the effects."""
+
+
+def without_superfluous(
+    selection: Selection,
+    declared: int,
+    *,
+    lead: float,
+    orders: Orders,
+    worth_a_try: float,
+    race: Race | None = None,
+    jobs: int = 1,
+) -> Selection:
+    """Return the selection without effects that richer forms, richer laws of the drive or a base form replace.
+
+    An effect that is dropped is kept as a further term, whose cause is not proven.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit.
+    declared
+        Number of terms that the campaign declares; they belong to the baseline and are never dropped.
+    lead
+        An effect is dropped if the fit without it has at most this multiple of the chi-square of the fit with it.
+    orders
+        Largest degrees of the laws of the drive.
+    worth_a_try
+        All base forms are tried with the best forms of the effects only if the excess of the chi-square over the noise,
+        in units of the noise, exceeds this.
+    race
+        The models that were compared; None if no other base form is tried.
+    jobs
+        Threads.
+    """
+    kept = selection
+    while kept.proven > 1 and len(kept.chosen.problem.terms) >= declared + 2:
+        shorter = _shorter(kept, declared, lead, orders, jobs) or _with_rival(
+            kept, declared, lead, orders, worth_a_try, race, jobs
+        )
+        if shorter is None:
+            break
+        kept = shorter
+    return kept
+
+
+def without_idle(
+    selection: Selection, gains: Sequence[Gain | None], declared: int, *, lead: float
+) -> tuple[Selection, list[Gain | None], str]:
+    """Return the selection, its gains, and why no effect is named if the model fits as well without its effects.
+
+    A fit with an effect may end in a better minimum of the other parameters than any fit without the effect has found.
+    Then these parameters lower the error, and not the effect. Each effect is therefore left out once, and the other
+    parameters are fitted again from where they ended. The reason is empty if effects remain.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit, without further terms.
+    gains
+        Gains of the named effects on tests that were left out.
+    declared
+        Number of terms that the campaign declares; they are part of every model.
+    lead
+        An effect is dropped if the fit without it has at most this multiple of the chi-square of the fit with it.
+    """
+    kept, left = selection, list(gains)
+    while kept.proven > 0 and len(named := _named(kept, declared)) > 0:
+        fits = [
+            (with_own_laws(with_terms_in_order(kept.chosen, _others(kept.chosen, place))), place) for place in named
+        ]
+        best, place = min(fits, key=lambda item: item[0].chi_square)
+        if best.chi_square > lead * kept.chosen.chi_square:
+            break
+        name = kept.chosen.problem.terms[place].effect.name
+        kept, left = without_one(kept, left, place, declared, best)
+        if not kept.proven:
+            return kept, left, f"no effect is named: the base form fits as well without {name}"
+    return kept, left, ""
+
+
+def without_one(
+    selection: Selection, gains: Sequence[Gain | None], place: int, declared: int, chosen: Fit
+) -> tuple[Selection, list[Gain | None]]:
+    """Return the selection and its gains without one of its named effects.
+
+    Parameters
+    ----------
+    selection, gains
+        Named effects with their fit, without further terms, and their gains on tests that were left out.
+    place
+        Which term of the model is dropped.
+    declared
+        Number of terms that the campaign declares.
+    chosen
+        The fit without this term.
+    """
+    number = place - declared
+    proven = len(_named(selection, declared)) - 1
+    rest = tuple(item for k, item in enumerate(selection.rounds) if k != number)
+    found = replace(
+        selection,
+        chosen=chosen,
+        ground=selection.ground if proven else chosen,
+        proven=proven,
+        rounds=rest or selection.rounds[:1],
+    )
+    return found, [gain for k, gain in enumerate(gains) if k != number]
+
+
+def _shorter(kept: Selection, declared: int, lead: float, orders: Orders, jobs: int) -> Selection | None:
+    """Return the selection without one of its named effects, under the same base form; None if each is needed."""
+    small = fit_on_draft_tests(kept.chosen)
+    named = _named(kept, declared)
+    with ThreadPoolExecutor(max_workers=max(1, jobs)) as pool:
+        without = pool.map(lambda k: _without(small, k, named, orders), named)
+        place, best = min(zip(named, without, strict=True), key=lambda item: item[1].chi_square)
+    # richer forms of the full model only lower its error, so most pairs are confirmed without fitting them
+    if best.chi_square > lead * small.chi_square:
+        return None
+    full = with_best_forms(small, named, jobs=jobs)
+    if best.chi_square > lead * full.chi_square:
+        return None
+    # they were ranked on a share of the tests; all tests decide
+    full, best = (on_all_tests(item, kept.chosen.problem) for item in (full, best))
+    if best.chi_square > lead * full.chi_square:
+        return None
+    return replace(
+        kept,
+        chosen=best,
+        proven=kept.proven - 1,
+        # a round that compares the remaining effects with their rivals; the first round even if its winner was dropped
+        rounds=kept.rounds[: place - declared] or kept.rounds[:1],
+        extension=with_terms_in_order(full, [*_others(full, place), place]),
+    )
+
+
+def _with_rival(
+    kept: Selection,
+    declared: int,
+    lead: float,
+    orders: Orders,
+    worth_a_try: float,
+    race: Race | None,
+    jobs: int,
+) -> Selection | None:
+    """Return the selection without one of its named effects, under another base form; None if each is needed."""
+    if race is None:
+        return None
+    small, named = fit_on_draft_tests(kept.chosen), _named(kept, declared)
+    sets = [_others(small, place) for place in named]
+    limit = (1.0 + worth_a_try) * kept.noise
+    # the best forms only lower the error, and they take long
+    full = with_best_forms(small, named, jobs=jobs) if small.chi_square > limit else None
+    more = full if full is not None and full.chi_square > limit else None
+    found = best_rival(kept, small, sets, declared, orders, race, jobs, full=more)
+    if found is None or found[1].chi_square > lead * small.chi_square:
+        return None
+    rival, best = found
+    if best.chi_square > lead * (full or with_best_forms(small, named, jobs=jobs)).chi_square:
+        return None
+    again = with_rival_base_form(kept, race, rival, best)
+    return with_candidates(again, race) if again.chosen.chi_square <= lead * kept.chosen.chi_square else None
+
+
+def _named(kept: Selection, declared: int) -> range:
+    return range(declared, min(declared + kept.proven, len(kept.chosen.problem.terms)))
+
+
+def _others(found: Fit, place: int) -> list[int]:
+    return [k for k in range(len(found.problem.terms)) if k != place]
+
+
+def _without(found: Fit, place: int, named: range, orders: Orders) -> Fit:
+    """Return the fit without one term, with adequate laws of the drive and the best forms of the other named terms."""
+    start = orders.adequate(with_terms_in_order(found, _others(found, place)))
+    return with_best_forms(start, range(named.start, named.stop - 1))
+
+
+def with_terms_in_order(found: Fit, places: Sequence[int]) -> Fit:
+    """Return a fit with these terms in this order, from the values of another fit."""
+    problem = replace(found.problem, terms=tuple(found.problem.terms[k] for k in places))
+    values = [found.term_values[k] for k in places]
+    return fit(problem, start_of(problem, found.base_values, values), iterations=ITERATIONS)
+
+
+def without_names(
+    selection: Selection, gains: Sequence[Gain | None], places: Sequence[int], declared: int
+) -> tuple[Selection, list[Gain | None]]:
+    """Return the selection with some of its named terms as further terms, and the gains of the others.
+
+    Parameters
+    ----------
+    selection
+        Named effects with their fit, and further terms.
+    gains
+        Gains of the named effects on tests that were left out.
+    places
+        Indices, among the named effects, of those that become further terms.
+    declared
+        Number of terms that the campaign declares.
+    """
+    alone = selection.with_named_alone.chosen
+    count = len(alone.problem.terms) - declared
+    kept = [k for k in range(count) if k not in places]
+    behind = range(declared + count, len(selection.chosen.problem.terms))
+    order = [*range(declared), *(declared + k for k in kept), *(declared + k for k in places), *behind]
+    named = selection.without_effects if not kept else with_terms_in_order(alone, order[: declared + len(kept)])
+    return replace(
+        selection,
+        chosen=with_terms_in_order(selection.chosen, order),
+        named_fit=named,
+        proven=len(kept),
+        rounds=tuple(selection.rounds[k] for k in kept if k < len(selection.rounds)) or selection.rounds[:1],
+    ), [gains[k] if k < len(gains) else None for k in kept]

@@ -1,0 +1,64 @@
+"""The noise floor holds what the channels show, and noise in the band of the motion that only repetition shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from mrpipe.fitting.recordings import record_tests
+from mrpipe.signals.prepared import PreparedTest
+from mrpipe.tracing.bench.noise.baseline import declared_base, fit_baseline
+from mrpipe.tracing.bench.noise.weights import _limit, sensor_deviation
+from tests.tracing.bench.rig import RATE, campaign
+
+
+def coloured(corner_hz: float, deviation: float, size: int, rng: np.random.Generator) -> np.ndarray:
+    """Return noise of first order with a corner frequency."""
+    keep = np.exp(-2.0 * np.pi * corner_hz / RATE)
+    noise = signal.lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(size + 1000))[1000:]
+    return deviation * noise
+
+
+def sine_tests() -> list[PreparedTest]:
+    tests = [test for test in campaign("none") if test.name.endswith(("sine", "triangle")) and test.role == "training"]
+    return [test for test in tests if np.ptp(test.drive) == 0.0]
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("corner_hz", [0.0, 10.0])
+@pytest.mark.parametrize("step_n", [0.0, 6.0])
+def test_the_floor_is_the_error_of_the_true_model(corner_hz: float, step_n: float) -> None:
+    rng = np.random.default_rng(7)
+    tests, errors = [], []
+    for test in sine_tests():
+        # 0.5 N of white noise and 4 micrometres are in the record already
+        extra = coloured(corner_hz, 2.0, len(test.force_n), rng) if corner_hz else np.zeros(len(test.force_n))
+        force = test.force_raw_n + extra
+        force = np.round(force / step_n) * step_n if step_n else force
+        errors.append(force - test.force_raw_n)
+        tests.append(replace(test, force_n=force, force_raw_n=force))
+    recordings = record_tests(tests, rate_hz=250.0)
+    baseline = fit_baseline(recordings, declared_base(recordings, "bouc-wen", 2, 1))
+    used = recordings.used
+    deviation = sensor_deviation(baseline.fit, recordings, baseline.scale)[used]
+    left = baseline.fit.residual[used] / baseline.fit.problem.root_weight[used]
+    # the base form is the true one: what it leaves is noise
+    assert np.sqrt(np.mean(deviation**2)) == pytest.approx(np.sqrt(np.mean(left**2)), rel=0.25)
+    assert np.sqrt(np.mean(left**2)) > 0.9 * np.sqrt(np.mean(np.concatenate(errors) ** 2))
+    assert baseline.noise == pytest.approx(baseline.fit.chi_square, rel=0.5)
+    assert baseline.scale.cycles > 0
+
+
+@pytest.mark.property
+def test_noise_that_is_simulated_too_large_in_one_test_leaves_that_of_the_others() -> None:
+    """One limit for all tests made the noise of all a tenth of what the others show."""
+    rng = np.random.default_rng(3)
+    test = np.repeat(np.arange(10), 2000)
+    residual = rng.standard_normal(test.size)
+    variance = np.where(test == 4, 100.0, 0.9)
+    assert _limit(residual, variance, test) == pytest.approx(0.9, abs=0.03)
+    assert _limit(residual, 4.0 * np.ones(test.size), test) == pytest.approx(0.25, rel=0.05)
+    assert _limit(residual, 0.5 * np.ones(test.size), test) == 1.0
