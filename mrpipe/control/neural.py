@@ -173,6 +173,7 @@ def _history(
         starts=np.cumsum([0, *(len(item[0]) for item in loops)], dtype=np.int64),
         drive_varies=tuple(False for _ in pairs),
         sampling_rate_hz=options.rate_hz,
+        drive_unit="",  # the reference network has no drive
     )
 
 
