@@ -84,7 +84,7 @@ def test_effects_are_drawn_and_their_forces_scaled(tmp_path: Path, damper: Dampe
     uncertainty = traced_damper_uncertainty(identified, _traced(tmp_path / "a.h5", damper, SUMMARY))
     rng = np.random.default_rng(2)
     frame = frame_from_parameter_set("thesis")
-    certain = FrameUncertainty(np.zeros(5), np.zeros(5))
+    certain = FrameUncertainty.none(5)
     draws = [draw(frame, traced, certain, uncertainty, rng) for _ in range(200)]
     shares = np.array([item.damper.effects[0].values["share"] for item in draws])
     assert np.std(shares) == pytest.approx(0.05, rel=0.15)
@@ -103,7 +103,7 @@ def test_a_drawn_frame_keeps_its_ground_motion_and_names(damper: DamperModel) ->
         degrees_of_freedom=tuple("abcde"),
     )
     known = FrameUncertainty(np.full(5, 0.01), np.full(5, 0.001))
-    drawn = draw(frame, damper, known, DamperUncertainty((), np.zeros((0, 0))), np.random.default_rng(1)).frame
+    drawn = draw(frame, damper, known, DamperUncertainty.without_covariance(), np.random.default_rng(1)).frame
     assert (drawn.moved_by_ground, drawn.names) == ((0, 2, 4), frame.names)
     assert not np.allclose(drawn.stiffness, frame.stiffness)
 
