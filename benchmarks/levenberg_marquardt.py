@@ -52,6 +52,7 @@ def history_of(rows: int, tests: int = 95) -> History:
         starts=np.arange(tests + 1, dtype=np.int64) * length,
         drive_varies=tuple(test % 2 == 0 for test in range(tests)),
         sampling_rate_hz=RATE,
+        drive_unit="A",
     )
 
 

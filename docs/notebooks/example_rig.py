@@ -12,7 +12,8 @@ import numpy as np
 import yaml
 
 from mrpipe.dampers.model import DamperModel
-from mrpipe.structures.dynamics import discretise_zero_order, state_space
+from mrpipe.signals.discretisation import discretise_zero_order
+from mrpipe.structures.dynamics import state_space
 from mrpipe.structures.shear_frames import shear_frame
 
 BENCH_RATE_HZ = 500.0

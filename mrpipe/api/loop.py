@@ -222,13 +222,12 @@ def design(
     chosen = settings_of(DesignSettings, "design", {"laws": tuple(laws), **settings})
     rig, plant = _rig(_plain(frame), damper, floor, tuple(law_named(name) for name in ("vd", *laws)), None, {})
     band = chosen.band_rad_s or (BAND[0] * plant.modes.omega_0, BAND[1] * plant.modes.omega_inf)
-    n = rig.frame.floors
     result = run_design(
         rig,
         plant,
         chosen,
         load_of(chosen, base_amplitude_m_s2, band),
-        (FrameUncertainty(np.zeros(n), np.zeros(n)), DamperUncertainty((), np.zeros((0, 0)), 0.05)),
+        (FrameUncertainty.none(rig.frame.floors), DamperUncertainty.without_covariance(0.05)),
         absolute=False,
         rng=np.random.default_rng(seed),
         jobs=jobs,

@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.model import ModalModel
+from mrpipe.control.limits import optimal_friction, optimal_viscosity_thesis
 
 
 @dataclass(frozen=True)
@@ -30,11 +31,11 @@ class TwoComponent:
 
     def viscous(self, stiffness: float = 0.0) -> float:
         """Return c of (4.13), or (4.16) = P4 (22) with a device stiffness k_d [N/m]; N s/m."""
-        return 2.0 * (self.omega_inf - self.omega_0) / self.u_0**2 + stiffness / self.omega_0
+        return optimal_viscosity_thesis(self, stiffness)
 
     def friction(self) -> float:
         """Return alpha of FDNS (4.25) [N/m]."""
-        return float((self.omega_inf**2 - self.omega_0**2) / self.u_0**2 / np.hypot(4.0 / np.pi, 1.0))
+        return optimal_friction(self)
 
 
 def two_component(modal: ModalModel, device: int = 0, mode: int = 0) -> TwoComponent:

@@ -61,6 +61,7 @@ from mrpipe.dampers.plant import (
     WIRE_SIZE,
     advance,
 )
+from mrpipe.simulation.parts import multiply
 
 REST = 1e-12
 """Velocity below which a rod is at rest [m/s]."""
@@ -98,20 +99,10 @@ def free_step(
             result[i] = blocks[i, 0] * q + blocks[i, 1] * v + pulses[i, 0] * p + pulses[i, 1] * r
             result[n + i] = blocks[i, 2] * q + blocks[i, 3] * v + pulses[i, 2] * p + pulses[i, 3] * r
         return
-    multiply(state, step, result)
+    multiply(step, state, result)
     for j in range(now.shape[0]):
         for i in range(2 * n):
             result[i] += load_now[j, i] * now[j] + load_next[j, i] * after[j]
-
-
-@njit(cache=True)
-def multiply(vector: FloatArray, columns: FloatArray, result: FloatArray) -> None:
-    """Put sum_j columns[j] vector[j] in `result`; columns are stored as rows so that the inner loop is contiguous."""
-    result[:] = 0.0
-    for j in range(vector.shape[0]):
-        value = vector[j]
-        for i in range(result.shape[0]):
-            result[i] += columns[j, i] * value
 
 
 @njit(cache=True)
@@ -176,7 +167,7 @@ def observe(
         for i in range(estimate.shape[0]):
             wanted[d] += feedback[d, i] * estimate[i]
     updated = np.zeros_like(estimate)
-    multiply(estimate, step, updated)
+    multiply(step, estimate, updated)
     for i in range(estimate.shape[0]):
         for d in range(force.shape[0]):
             updated[i] -= step_force[d, i] * force[d]
@@ -260,7 +251,7 @@ def device_force(
 
 
 @njit(cache=True)
-def chain_force(
+def mean_chain_force(
     settings: FloatArray,
     chain: Any,
     memory: FloatArray,
@@ -272,8 +263,10 @@ def chain_force(
 ) -> float:
     """Return the mean force [N] over a step of a damper given as a chain of steps; `trial` becomes its state.
 
-    Predictor and corrector: the chain is run with the motion that a guess of the force gives, from the same state each
-    time. `start` is the guess, the force at the start of the step, and the voltage.
+    Predictor and corrector with a given number of steps, unlike the loops of :mod:`mrpipe.simulation`: the mean force
+    over a step is needed, and the slope of the answer is known. The chain is run with the motion that a guess of the
+    force gives, from the same state each time. `start` is the guess, the force at the start of the step, and the
+    voltage.
     """
     guess, before, volts = start
     v, free_x, free_v = motion[1], motion[2], motion[3]
@@ -294,7 +287,9 @@ def chain_force(
 
 
 @njit(void(_V, _STRUCTURE, _CONTROL, _NETWORK, _CHAIN, _RESULT), cache=True, nogil=True)
-def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain: Any, result: Any) -> None:
+def run(  # noqa: C901, PLR0915 - functions that take arrays in each step make it up to half slower
+    settings: FloatArray, structure: Any, control: Any, network: Any, chain: Any, result: Any
+) -> None:
     """Run the structure from rest; see :mod:`mrpipe.case_studies.run` for what the arrays hold.
 
     Matrices whose product with a vector is wanted are passed transposed (a row a column), for contiguous inner loops.
@@ -345,7 +340,7 @@ def run(settings: FloatArray, structure: Any, control: Any, network: Any, chain:
                 if chained:
                     own = (compliance[d, d], compliance[devices + d, d])
                     start = (force[d], before, volts[d])
-                    force[d] = chain_force(settings, chain, memory, trial, wire, start, motion, own)
+                    force[d] = mean_chain_force(settings, chain, memory, trial, wire, start, motion, own)
                 else:
                     drive = (desired[d], steady[d], amplitude[d, 0])
                     force[d] = device_force(settings, gains[d], drive, motion, compliance[devices + d, d])

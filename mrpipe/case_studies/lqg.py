@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from mrpipe.artifacts import FloatArray
-from mrpipe.structures.dynamics import discretise_zero_order
+from mrpipe.control.riccati import kalman_bucy_gain, regulator_gain
+from mrpipe.signals.discretisation import discretise_zero_order
 
 
 @dataclass(frozen=True)
@@ -56,20 +56,6 @@ class SampledController:
     interval_s: float
 
 
-def regulator_gain(A: FloatArray, B: FloatArray, Q: FloatArray, R: FloatArray, S: FloatArray) -> FloatArray:
-    """Return K of u = -K x, shape (k, n), that minimises the integral of x'Qx + 2 x'S u + u'R u.
-
-    Parameters
-    ----------
-    A, B
-        Shapes (n, n), (n, k).
-    Q, R, S
-        Shapes (n, n), (k, k), (n, k).
-    """
-    P = solve_continuous_are(A, B, Q, R, s=S)
-    return np.asarray(np.linalg.solve(R, B.T @ P + S.T))
-
-
 def output_regulator_gain(A: FloatArray, B: FloatArray, regulated: Outputs, Q: FloatArray, R: FloatArray) -> FloatArray:
     """Return K, shape (k, n), for the cost z'Qz + u'R u with z = Cz x + Dz u (E.4): the lqry of (E.6) and (E.7).
 
@@ -88,7 +74,7 @@ def output_regulator_gain(A: FloatArray, B: FloatArray, regulated: Outputs, Q: F
     return regulator_gain(A, B, 0.5 * (Qbar + Qbar.T), 0.5 * (Rbar + Rbar.T), C.T @ Q @ D)
 
 
-def observer_gain(
+def output_observer_gain(
     A: FloatArray, E: FloatArray, measured: Outputs, disturbance: FloatArray, noise: FloatArray
 ) -> FloatArray:
     """Return L of the Kalman-Bucy filter, shape (n, p): (E.9) to (E.12) with the missing transpose.
@@ -105,8 +91,7 @@ def observer_gain(
     Qk = E @ disturbance @ E.T
     Sk = E @ disturbance @ measured.F.T
     Rk = noise + measured.F @ disturbance @ measured.F.T
-    P = solve_continuous_are(A.T, measured.C.T, 0.5 * (Qk + Qk.T), 0.5 * (Rk + Rk.T), s=Sk)
-    return np.asarray(np.linalg.solve(Rk, measured.C @ P + Sk.T).T)
+    return kalman_bucy_gain(A, measured.C, Qk, Rk, Sk)
 
 
 def sampled_controller(

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.signal import lfilter
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.case_studies.options import MotionSettings
 from mrpipe.case_studies.public_files import named_file
 from mrpipe.structures.records import GRAVITY, GroundMotion, read_motion
 
@@ -60,7 +63,7 @@ def response_spectrum(
     damping_ratio
         Of the oscillators.
     """
-    from mrpipe.structures.dynamics import discretise_first_order
+    from mrpipe.signals.discretisation import discretise_first_order
 
     result = np.empty(len(periods_s))
     for index, period in enumerate(periods_s):
@@ -187,3 +190,30 @@ def load_motion(
         other = named_file("second_file", second_file, PUBLIC_MOTIONS)
         motion = motion.with_second(read_motion(other, unit=unit, interval_s=interval_s))
     return motion if resampled_interval_s is None else motion.resampled(resampled_interval_s)
+
+
+def motion_from_settings(settings: MotionSettings, rng: np.random.Generator, components: int) -> GroundMotion:
+    """Return the ground motion that the settings name, in one or two components; see :func:`load_motion`."""
+    return load_motion(
+        settings.file,
+        rng,
+        second_file=settings.second_file,
+        unit=settings.unit,
+        interval_s=settings.interval_s,
+        resampled_interval_s=settings.resampled_interval_s,
+        peak_ground_g=settings.peak_ground_g,
+        duration_s=settings.duration_s,
+    ).in_components(components)
+
+
+def motion_facts(motion: GroundMotion) -> dict[str, Any]:
+    """Return what a summary says about a motion, in SI."""
+    return {
+        "name": motion.name,
+        "peaks_m_s2": motion.peaks_m_s2,
+        "duration_s": motion.duration_s,
+        "interval_s": motion.interval_s,
+        "unit_in_file": motion.unit,
+        "unit_from": motion.unit_from,
+        "notes": list(motion.notes),
+    }

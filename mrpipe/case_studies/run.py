@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import expm
 
-from mrpipe.artifacts import FloatArray
+from mrpipe.artifacts import FloatArray, load_parameter_set
 from mrpipe.case_studies import devices as packed
 from mrpipe.case_studies.kernel import run
 from mrpipe.case_studies.lqg import SampledController
@@ -16,7 +15,7 @@ from mrpipe.case_studies.model import ModalModel
 from mrpipe.dampers.plant import Chain, build_chain
 from mrpipe.errors import DivergedError
 from mrpipe.networks.network import Network
-from mrpipe.structures.dynamics import discretise_first_order, discretise_zero_order
+from mrpipe.signals.discretisation import discretise_first_order, discretise_zero_order
 
 Law = Literal["none", "kelvin", "friction", "lqg", "constant"]
 Realisation = Literal["active", "semi-active", "bingham", "chain"]
@@ -52,6 +51,13 @@ class BinghamDevice:
     viscosity: float = 81e3
     viscosity_per_volt: float = 90e3
     highest_voltage: float = 10.0
+
+
+def bingham_device(name: str) -> BinghamDevice:
+    """Return the damper of a parameter set of `dampers`."""
+    values = load_parameter_set("dampers", name)
+    parts = ("yield_force_a", "yield_force_b", "c0_a", "c0_b", "drive_limit")
+    return BinghamDevice(*(values.scalar(part) for part in parts))
 
 
 @dataclass(frozen=True)
@@ -168,7 +174,7 @@ class Response:
     def stored_energy(self) -> FloatArray:
         """Return kinetic and elastic energy of the motion [J], shape (N,)."""
         elastic = np.sum((self.positions * self.modal.angular_frequencies) ** 2, axis=1)
-        return 0.5 * (np.sum(self.velocities**2, axis=1) + elastic)
+        return np.asarray(0.5 * (np.sum(self.velocities**2, axis=1) + elastic))
 
     @property
     def energy_balance_error(self) -> float:
@@ -216,9 +222,8 @@ def _classical_reaction(modal: ModalModel, dt: float) -> FloatArray:
     reaction = np.zeros((2 * n, modal.devices.shape[1]))
     for mode in range(n):
         rate, omega = modal.damping[mode, mode], modal.angular_frequencies[mode]
-        block = np.zeros((3, 3))
-        block[0, 1], block[1, 0], block[1, 1], block[1, 2] = 1.0, -(omega**2), -rate, 1.0
-        pulse = expm(block * dt)[:2, 2]
+        single = np.array([[0.0, 1.0], [-(omega**2), -rate]])
+        pulse = discretise_zero_order(single, np.array([[0.0], [1.0]]), dt)[1][:, 0]
         reaction[mode] = pulse[0] * modal.devices[mode]
         reaction[n + mode] = pulse[1] * modal.devices[mode]
     return reaction

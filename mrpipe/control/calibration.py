@@ -14,7 +14,7 @@ from mrpipe.control.calibration_settings import CalibrationSettings
 from mrpipe.control.gains import Gains
 from mrpipe.control.law import Law, Plant
 from mrpipe.control.laws import all_laws, law_named
-from mrpipe.control.lqg import Weights, regulator_gain
+from mrpipe.control.lqg import Weights, frame_regulator_gain
 from mrpipe.errors import UserError
 from mrpipe.structures import Frame
 
@@ -173,7 +173,7 @@ def calibrate(
         plant.modes,
         plant.static_stiffness_n_m,
         found,
-        regulator_gain(frame, position, plant.weights),
+        frame_regulator_gain(frame, position, plant.weights),
         position,
         skipped,
     )

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.linalg import LinAlgError, solve_continuous_are, solve_discrete_are
+from scipy.linalg import LinAlgError
 
 from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.kernel import LAW_SIGNATURE, S_REQUEST
 from mrpipe.control.law import Law
 from mrpipe.control.lqg import Weights, state_weight
+from mrpipe.control.riccati import predictor_gain, regulator_gain
 from mrpipe.errors import UserError
-from mrpipe.structures import Frame, discretise_zero_order, state_space
+from mrpipe.signals.discretisation import discretise_zero_order
+from mrpipe.structures import Frame, state_space
 
 MODEL_NOISE_SHARE = 0.05
 """Ratio of the noise on the velocity of every degree of freedom to that of the ground. It keeps the gain of the
@@ -112,15 +114,13 @@ def central_regulator(
     V += np.diag(np.sum((D[:, 1:] * force_noise) ** 2, axis=1))
     try:
         R = np.diag([item.force for item in weights])
-        P = solve_continuous_are(space.A, space.B[:, 1:], state_weight(frame, first), R)
         # the columns of B hold the sign of a resisting force, so that u = -K z is the force of the dampers
-        gain = np.linalg.solve(R, space.B[:, 1:].T @ P)
-        covariance = solve_discrete_are(Ad.T, C.T, W, V)
+        gain = regulator_gain(space.A, space.B[:, 1:], state_weight(frame, first), R)
+        L = predictor_gain(Ad, C, W, V)
     except (LinAlgError, ValueError) as error:
         raise UserError(
             "control law", "lqg", f"no regulator ({error})", "give positive weights, or more sensors"
         ) from error
-    L = Ad @ covariance @ C.T @ np.linalg.inv(C @ covariance @ C.T + V)
     return CentralRegulator(
         transition=Ad - L @ C,
         force_input=Bd[:, 1:] - L @ D[:, 1:],

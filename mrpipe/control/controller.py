@@ -20,7 +20,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control import kernel
 from mrpipe.control.gains import Gains
 from mrpipe.control.inverse import InverseTable
-from mrpipe.control.kalman import kalman_gains
+from mrpipe.control.kalman import discrete_kalman_gains
 from mrpipe.control.law import Law
 from mrpipe.control.laws import law_named
 from mrpipe.control.lqg import Observer
@@ -268,7 +268,7 @@ class _Pack:
         dt = 1.0 / options.rate_hz
         head[kernel.SAMPLE_TIME] = dt
         head[kernel.RESIDUAL_FORCE] = options.residual_force_n
-        head[kernel.KALMAN : kernel.KALMAN + 3] = kalman_gains(
+        head[kernel.KALMAN : kernel.KALMAN + 3] = discrete_kalman_gains(
             options.displacement_noise_m, options.acceleration_noise_m_s2, dt, options.bias_drift_m_s2
         )
         head[kernel.DEAD_BAND] = options.dead_band_m_s

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from mrpipe.artifacts import FloatArray
 
 
-def continuous_kalman_gains(displacement_noise_m: float, acceleration_noise_m_s2: float) -> tuple[float, float]:
-    """Return k [1/s] and l [1/s^2] of (5.3): l = sigma_a/sigma_x, k = sqrt(2 l) (errata section D)."""
-    rate = acceleration_noise_m_s2 / displacement_noise_m
-    return math.sqrt(2.0 * rate), rate
-
-
-def kalman_gains(
+def discrete_kalman_gains(
     displacement_noise_m: float, acceleration_noise_m_s2: float, dt: float, bias_drift_m_s2: float = 0.0
 ) -> FloatArray:
     """Return the steady gains on displacement [1], velocity [1/s] and acceleration bias [1/s^2], shape (3,).
 
     The filter is discrete: x- = x + dt v + dt2/2 (a - b), v- = v + dt (a - b), where a is the mean of the acceleration
-    over the interval. For short intervals gains/dt tend to those of :func:`continuous_kalman_gains`.
+    over the interval. For short intervals gains/dt tend to those of
+    :func:`mrpipe.signals.kalman.continuous_kalman_gains`.
 
     Parameters
     ----------
@@ -31,7 +24,7 @@ def kalman_gains(
     dt
         Interval [s].
     bias_drift_m_s2
-        Drift of the bias of the accelerometer per second [m/s^2]; 0: no bias state.
+        Standard deviation of the change of the bias in one second, a random walk [m/s^2]; 0: no bias state.
     """
     size = 3 if bias_drift_m_s2 > 0.0 else 2
     A = np.eye(size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import eigh, null_space
@@ -14,6 +15,27 @@ from mrpipe.structures import Frame
 
 FRICTION_RATIO = 4.0 / math.pi
 """Ratio of the viscous part to the stiffness part of the equivalent (4.24)."""
+
+
+class TwoLimits(Protocol):
+    """Frequencies of a mode without and with a locked device, as far as the closed forms need them."""
+
+    @property
+    def omega_0(self) -> float:
+        """Angular frequency with the device free [rad/s]."""
+
+    @property
+    def omega_inf(self) -> float:
+        """Angular frequency with the device locked [rad/s]."""
+
+    @property
+    def u_0(self) -> float:
+        """Amplitude of the free mode at the device, of unit modal mass [1/sqrt(kg)]."""
+
+
+def modal_flexibility(limits: TwoLimits) -> float:
+    """Return nu of P2 (8), mu of (4.9): u_0^2/(omega_inf^2 - omega_0^2) [m/N]."""
+    return limits.u_0**2 / (limits.omega_inf**2 - limits.omega_0**2)
 
 
 @dataclass(frozen=True)
@@ -53,7 +75,7 @@ class LimitingModes:
     @property
     def nu(self) -> float:
         """Modal flexibility of P2 (8), mu of (4.9): u_0^2/(omega_inf^2 - omega_0^2) [m/N]."""
-        return self.u_0**2 / (self.omega_inf**2 - self.omega_0**2)
+        return modal_flexibility(self)
 
     @property
     def share_p2(self) -> float:
@@ -157,7 +179,7 @@ def optimal_viscosity(modes: LimitingModes, stiffness: float = 0.0) -> float:
     return 1.0 / (modes.nu * modes.omega_0) + stiffness / modes.omega_0
 
 
-def optimal_viscosity_thesis(modes: LimitingModes, stiffness: float = 0.0) -> float:
+def optimal_viscosity_thesis(modes: TwoLimits, stiffness: float = 0.0) -> float:
     """Return c [N s/m] of (4.13) and (4.16), with omega_inf + omega_0 instead of 2 omega_0."""
     return 2.0 * (modes.omega_inf - modes.omega_0) / modes.u_0**2 + stiffness / modes.omega_0
 
@@ -190,9 +212,9 @@ def placement_warning(frame: Frame, modes: LimitingModes) -> str:
     )
 
 
-def optimal_friction(modes: LimitingModes) -> float:
+def optimal_friction(modes: TwoLimits) -> float:
     """Return alpha [N/m] of (4.25), P2 (20)."""
-    return 1.0 / (modes.nu * math.hypot(1.0, FRICTION_RATIO))
+    return 1.0 / (modal_flexibility(modes) * math.hypot(1.0, FRICTION_RATIO))
 
 
 def attainable_damping_friction(modes: LimitingModes) -> float:

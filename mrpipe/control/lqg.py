@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, solve_continuous_are, solve_discrete_are
+from scipy.linalg import LinAlgError
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.calibration_settings import RegulatorSettings
+from mrpipe.control.riccati import predictor_gain, regulator_gain
 from mrpipe.control.settings import ControllerSettings
 from mrpipe.errors import UserError
-from mrpipe.structures import Frame, discretise_zero_order, state_space
+from mrpipe.signals.discretisation import discretise_zero_order
+from mrpipe.structures import Frame, state_space
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def state_weight(frame: Frame, weights: Weights) -> FloatArray:
     return Q
 
 
-def regulator_gain(frame: Frame, position: FloatArray, weights: Weights) -> FloatArray:
+def frame_regulator_gain(frame: Frame, position: FloatArray, weights: Weights) -> FloatArray:
     """Return k, shape (2n,), of the continuous regulator u = -k z with u the force on the structure along `position`.
 
     u = -R^-1 B' P z, with one minus sign (errata row 18).
@@ -94,15 +96,14 @@ def regulator_gain(frame: Frame, position: FloatArray, weights: Weights) -> Floa
     if np.linalg.matrix_rank(frame.mass) < frame.floors:
         raise UserError(f"frame {frame.name}", "mass", "is singular", "every floor needs a positive mass")
     space = state_space(frame, position)
-    B = space.B[:, 1:]
     try:
-        P = solve_continuous_are(space.A, B, state_weight(frame, weights), np.array([[weights.force]]))
+        gain = regulator_gain(space.A, space.B[:, 1:], state_weight(frame, weights), np.array([[weights.force]]))
     except (LinAlgError, ValueError) as error:
         raise UserError("control law", "lqg", f"no regulator ({error})", "give positive weights") from error
-    return np.asarray((B.T @ P)[0] / weights.force)
+    return np.asarray(gain[0])
 
 
-def observer_gain(frame: Frame, position: FloatArray, weights: Weights, dt: float) -> FloatArray:
+def frame_observer_gain(frame: Frame, position: FloatArray, weights: Weights, dt: float) -> FloatArray:
     """Return the steady gain L (2n, n + 1) of the discrete Kalman predictor on [damper displacement, accelerations].
 
     The noise of the accelerometer of the ground excites the state. The accelerometers of the floors have independent
@@ -117,8 +118,7 @@ def observer_gain(frame: Frame, position: FloatArray, weights: Weights, dt: floa
     V = np.diag([weights.displacement_noise_m**2] + [weights.acceleration_noise_m_s2**2] * n)
     # an accelerometer on the floor of the damper measures the force without delay
     V += weights.force_noise_n**2 * np.diag(D[:, 1] ** 2)
-    P = solve_discrete_are(Ad.T, C.T, W, V)
-    return np.asarray(Ad @ P @ C.T @ np.linalg.inv(C @ P @ C.T + V))
+    return predictor_gain(Ad, C, W, V)
 
 
 def _sampled(frame: Frame, position: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -140,7 +140,7 @@ def lqg_observer(frame: Frame, position: FloatArray, weights: Weights, dt: float
     in (4.1), is minus the force on the structure that the regulator demands.
     """
     Ad, Bd, C, D = _sampled(frame, position, dt)
-    L = observer_gain(frame, position, weights, dt)
+    L = frame_observer_gain(frame, position, weights, dt)
     n = frame.floors
     H = np.zeros((2 * n, n + 2))
     H[:, 0] = L[:, 0]
@@ -150,7 +150,7 @@ def lqg_observer(frame: Frame, position: FloatArray, weights: Weights, dt: float
         transition=Ad - L @ C,
         force_input=Bd[:, 1] - L @ D[:, 1],
         innovation=H,
-        gain=-regulator_gain(frame, position, weights),
+        gain=-frame_regulator_gain(frame, position, weights),
         sample_time_s=dt,
         floors=n,
     )

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from mrpipe.artifacts import FloatArray, Progress, no_progress
 from mrpipe.control.calibration_settings import NeuralReferenceSettings
+from mrpipe.control.limits import LimitingModes
+from mrpipe.control.linearisation import equivalent_stiffness, friction_stiffness
 from mrpipe.networks.assembly import History
 from mrpipe.networks.network import FeatureSpec, Network, lagged
 from mrpipe.networks.options import TrainingOptions
 from mrpipe.networks.training import train
+from mrpipe.structures import Frame, natural_modes
 
 _SETTINGS = NeuralReferenceSettings()
 """Source of the defaults, so that options and settings have the same ones."""
@@ -75,6 +79,83 @@ class ReferenceNetwork:
     training_nrmse: float
     verification_nrmse: float
     iterations: int
+
+    def assessment(self, alpha_n_m: float, amplitude_m: float, angular_frequency: float) -> dict[str, Any]:
+        """Return the errors, and the equivalent stiffness [N/m] in harmonic motion against that of FDNS.
+
+        Parameters
+        ----------
+        alpha_n_m
+            Gain of FDNS that the network learned.
+        amplitude_m, angular_frequency
+            Of the motion [m], [rad/s].
+        """
+        H = equivalent_stiffness(lambda x, v: network_force(self.network, x, v), amplitude_m, angular_frequency)
+        wanted = friction_stiffness(alpha_n_m)
+        return {
+            "architecture": self.network.architecture,
+            "training_nrmse": self.training_nrmse,
+            "verification_nrmse": self.verification_nrmse,
+            "equivalent_stiffness_n_m": H.real,
+            "equivalent_loss_n_m": H.imag,
+            "equivalent_error": abs(H - wanted) / abs(wanted),
+        }
+
+
+AMPLITUDES = (0.2, 2.0)
+"""Ratios of the smallest and the largest training amplitude to the expected amplitude."""
+
+FREQUENCIES = (0.625, 1.6)
+"""Ratios of the lowest and the highest training frequency to the frequency of the free mode. This frequency is in the
+middle of the range, because a network that cannot distinguish a slow large motion from a fast small one gives the force
+for the middle.
+"""
+
+INPUT_NOISE = (0.002, 0.04)
+"""Ratio of the noise on displacement and velocity in the training to the expected amplitude of each."""
+
+
+def reference_options(
+    settings: NeuralReferenceSettings,
+    alpha_n_m: float,
+    frame: Frame,
+    modes: LimitingModes,
+    amplitude_m: float,
+    rounding_m_s: float,
+) -> ReferenceOptions:
+    """Return the loops for a structure: a range about the free target mode and the expected amplitude.
+
+    Parameters
+    ----------
+    settings
+        Of the section `calibrate.neural`.
+    alpha_n_m
+        Gain of FDNS.
+    frame, modes
+        The structure and its target mode without and with the damper locked.
+    amplitude_m
+        Expected amplitude of the damper [m].
+    rounding_m_s
+        Speed over which the friction of the law changes its sign [m/s].
+    """
+    free = modes.omega_0 / (2.0 * np.pi)
+    others = np.delete(natural_modes(frame).angular_frequencies, modes.mode - 1)
+    return ReferenceOptions(
+        alpha_n_m=alpha_n_m,
+        amplitudes_m=tuple(amplitude_m * np.geomspace(*AMPLITUDES, settings.amplitudes)),
+        frequencies_hz=tuple(free * np.geomspace(*FREQUENCIES, settings.frequencies)),
+        rate_hz=settings.rate_hz,
+        past_values=settings.past_values,
+        hidden=settings.hidden,
+        starts=settings.starts,
+        iterations=settings.iterations,
+        rounding_m_s=rounding_m_s,
+        # what lies above a quarter of the rate is not motion to the network
+        disturbances_rad_s=tuple(others[others < 0.5 * np.pi * settings.rate_hz]),
+        disturbance_share=settings.disturbance_share,
+        displacement_noise_m=INPUT_NOISE[0] * amplitude_m,
+        velocity_noise_m_s=INPUT_NOISE[1] * amplitude_m * modes.omega_0,
+    )
 
 
 CYCLES = 4
@@ -173,6 +254,7 @@ def _history(
         starts=np.cumsum([0, *(len(item[0]) for item in loops)], dtype=np.int64),
         drive_varies=tuple(False for _ in pairs),
         sampling_rate_hz=options.rate_hz,
+        drive_unit="",  # the reference network has no drive
     )
 
 

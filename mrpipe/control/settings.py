@@ -31,7 +31,8 @@ class ControllerSettings(Section):
     kalman_bias_drift_m_s2: float = Field(
         0.0,
         ge=0.0,
-        description="Drift of the bias of the accelerometer per second that the filter follows; 0: no bias state.",
+        description="Drift of the bias of the accelerometer that the filter follows: standard deviation of its change "
+        "in one second [m/s^2]; 0: no bias state.",
     )
     inverse: Literal["network", "model"] = Field(
         "network",

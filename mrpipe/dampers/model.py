@@ -90,7 +90,7 @@ class DamperModel:
 
     form: str
     parameters: Mapping[str, float]
-    drive_unit: str = "A"
+    drive_unit: str
     drive_limit: float = math.inf
     laws: Mapping[str, str] = field(default_factory=dict)
     effects: tuple[Addition, ...] = ()

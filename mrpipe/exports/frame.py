@@ -9,7 +9,8 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.exports.contract import Channel, Subject, Vectors
-from mrpipe.structures.dynamics import discretise_zero_order, natural_modes, state_space
+from mrpipe.signals.discretisation import discretise_zero_order
+from mrpipe.structures.dynamics import natural_modes, state_space
 from mrpipe.structures.frame import Frame
 
 ROWS = 400

@@ -149,7 +149,8 @@ def judge(cells: Cells, laws: tuple[LawShape, LawShape]) -> Judged:
 
 def _by_level(cells: Cells, error: FloatArray) -> FloatArray:
     power = np.bincount(cells.level, weights=cells.power)
-    return np.log(np.maximum(np.bincount(cells.level, weights=error), 1e-9 * power) / np.maximum(power, 1e-300))
+    errors = np.maximum(np.bincount(cells.level, weights=error), 1e-9 * power)
+    return np.asarray(np.log(errors / np.maximum(power, 1e-300)))
 
 
 def _risk(item: Judged) -> FloatArray:

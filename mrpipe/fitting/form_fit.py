@@ -142,7 +142,7 @@ def form_problem(
 
 
 def fit_form(
-    problem: Problem, method: FitMethod = FitMethod(), *, drive_unit: str = "A", warm: Mapping[str, float] | None = None
+    problem: Problem, method: FitMethod = FitMethod(), *, drive_unit: str, warm: Mapping[str, float] | None = None
 ) -> FormFit:
     """Fit one form.
 

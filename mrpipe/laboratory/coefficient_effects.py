@@ -108,6 +108,32 @@ def _unfamiliar(code: int, numbers: FloatArray, x: float, v: float, u: float, ti
 
 
 @njit(cache=True)
+def _accumulator(code: int, numbers: FloatArray, x: float) -> float:
+    if code == ACCUMULATOR_GAS:
+        room = max(1.0 - x / numbers[1], 0.2)
+        return numbers[2] + numbers[0] * numbers[1] / 1.35 * (room**-1.35 - 1.0)
+    return numbers[2] + numbers[0] * x * (1.0 + (x / numbers[1]) ** 2)
+
+
+@njit(cache=True)
+def _inertia(code: int, numbers: FloatArray, own: FloatArray, x: float, a: float, h: float) -> float:
+    if code == INERTIA_LAGGED:
+        own[0] += (a - own[0]) * (1.0 - math.exp(-h / numbers[1]))
+        return numbers[0] * own[0]
+    if code == INERTIA_PLAIN:
+        return numbers[0] * a * (1.0 + (x / numbers[1]) ** 2)
+    # the variable part, if the constant part is a mass of the structure
+    return numbers[0] * a * (x / numbers[1]) ** 2
+
+
+@njit(cache=True)
+def _drag(code: int, numbers: FloatArray, v: float) -> float:
+    if code == DRAG_POWER:
+        return numbers[0] * v * abs(v) ** (numbers[1] - 1.0)
+    return numbers[0] * v * v * abs(v) / (abs(v) + numbers[1]) * (1.0 if v > 0.0 else -1.0)
+
+
+@njit(cache=True)
 def parallel_force(
     codes: IntArray,
     values: FloatArray,
@@ -125,26 +151,15 @@ def parallel_force(
     force = core
     for k in range(codes.shape[0]):
         code = codes[k]
-        numbers, own = values[k], memory[k]
+        numbers = values[k]
         if code == ASYMMETRY_FORCE:
             force *= 1.0 + numbers[0] * core / math.sqrt(core * core + numbers[1] * numbers[1])
-        elif code == ACCUMULATOR_GAS:
-            room = max(1.0 - x / numbers[1], 0.2)
-            force += numbers[2] + numbers[0] * numbers[1] / 1.35 * (room**-1.35 - 1.0)
-        elif code == ACCUMULATOR_BLADDER:
-            force += numbers[2] + numbers[0] * x * (1.0 + (x / numbers[1]) ** 2)
-        elif code == INERTIA_LAGGED:
-            own[0] += (a - own[0]) * (1.0 - math.exp(-h / numbers[1]))
-            force += numbers[0] * own[0]
-        elif code == INERTIA_PLAIN:
-            force += numbers[0] * a * (1.0 + (x / numbers[1]) ** 2)
-        elif code == INERTIA_GROWTH:
-            # the variable part, if the constant part is a mass of the structure
-            force += numbers[0] * a * (x / numbers[1]) ** 2
-        elif code == DRAG_POWER:
-            force += numbers[0] * v * abs(v) ** (numbers[1] - 1.0)
-        elif code == DRAG_TURBULENT:
-            force += numbers[0] * v * v * abs(v) / (abs(v) + numbers[1]) * (1.0 if v > 0.0 else -1.0)
+        elif code in (ACCUMULATOR_GAS, ACCUMULATOR_BLADDER):
+            force += _accumulator(code, numbers, x)
+        elif code in (INERTIA_LAGGED, INERTIA_PLAIN, INERTIA_GROWTH):
+            force += _inertia(code, numbers, memory[k], x, a, h)
+        elif code in (DRAG_POWER, DRAG_TURBULENT):
+            force += _drag(code, numbers, v)
         elif code in (END_STOP_HERTZ, END_STOP_RUBBER):
             force += _end_stop(code, numbers, x, v)
         elif code == OFFSET_PER_TEST:

@@ -133,7 +133,7 @@ def _skewed(force: FloatArray, effect: Planted, step_s: float) -> FloatArray:
         return force
     if effect.form.code == CHANNEL_SKEW_CONSTANT:
         time = np.arange(force.size) * step_s
-        return np.interp(time - effect.strength, time, force)
+        return np.asarray(np.interp(time - effect.strength, time, force))
     # a Bessel filter of order two delays low frequencies by norm / (2 pi f)
     b, a = signal.bessel(2, 1.0 / (2.0 * np.pi * effect.strength), norm="delay", fs=1.0 / step_s)
     start = signal.lfilter_zi(b, a) * force[0]

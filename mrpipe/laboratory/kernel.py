@@ -69,6 +69,41 @@ def _rod_held(state: FloatArray, parameters: FloatArray, x1: float, v1: float, h
 
 
 @njit(cache=True)
+def _begin(state: FloatArray, ring: FloatArray, drive: float, x1: float, count: int) -> None:
+    """Start current and rod in equilibrium at the first step."""
+    if state[STARTED] < 0.5:
+        state[STARTED] = 1.0
+        state[U] = drive
+        state[ROD] = x1
+        for k in range(count):
+            ring[k, :] = drive
+
+
+@njit(cache=True)
+def _note_reversal(state: FloatArray, speed: float, h: float) -> None:
+    """Update path and time since the last reversal of the rod."""
+    if speed * state[DIRECTION] < 0.0:
+        state[SLIP] = 0.0
+        state[SINCE] = 0.0
+    if speed != 0.0:
+        state[DIRECTION] = 1.0 if speed > 0.0 else -1.0
+    state[SLIP] += abs(speed) * h
+    state[SINCE] += h
+
+
+@njit(cache=True)
+def _in_play(state: FloatArray, core: float) -> float:
+    """Return the force of a rod that is free inside its play: the flank can only push."""
+    if state[CONTACT] == 0.0:
+        return 0.0
+    if core * state[CONTACT] < 0.0:
+        # the contact opens, and the force of the rod is zero
+        state[CONTACT] = 0.0
+        return 0.0
+    return core
+
+
+@njit(cache=True)
 def damper_step(
     base: FloatArray,
     codes: IntArray,
@@ -105,12 +140,7 @@ def damper_step(
         Time step [s].
     """
     count = codes.shape[0]
-    if state[STARTED] < 0.5:
-        state[STARTED] = 1.0
-        state[U] = drive
-        state[ROD] = x1
-        for k in range(count):
-            ring[k, :] = drive
+    _begin(state, ring, drive, x1, count)
     asked = effective_current(codes, values, memory, ring, drive, v1, h, 0)
     state[U] = asked + (state[U] - asked) * math.exp(-base[10] * h)
     u = max(effective_current(codes, values, memory, ring, state[U], v1, h, 1), 0.0)
@@ -136,26 +166,14 @@ def damper_step(
         speed0 = state[ROD_SPEED]
         rod = state[ROD]
     state[ROD_SPEED] = speed1
-
-    if speed1 * state[DIRECTION] < 0.0:
-        state[SLIP] = 0.0
-        state[SINCE] = 0.0
-    if speed1 != 0.0:
-        state[DIRECTION] = 1.0 if speed1 > 0.0 else -1.0
-    state[SLIP] += abs(speed1) * h
-    state[SINCE] += h
+    _note_reversal(state, speed1, h)
 
     if free < 0 or state[CONTACT] != 0.0:
         state[Z] = _hysteresis(state[Z], speed0, speed1, h, base, creep)
     yielding, viscous = coefficient_factors(codes, values, memory, state, rod, speed1, h)
     core = alpha * yielding * state[Z] + c0 * viscous * speed1
     if free >= 0:
-        if state[CONTACT] == 0.0:
-            core = 0.0
-        elif core * state[CONTACT] < 0.0:
-            # the flank can only push: the contact opens, and the force of the rod is zero
-            state[CONTACT] = 0.0
-            core = 0.0
+        core = _in_play(state, core)
     state[POWER] = abs(core * speed1)
     return parallel_force(codes, values, memory, core, rod, speed1, a1, u, drive, time, h)
 

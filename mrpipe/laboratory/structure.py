@@ -1,4 +1,8 @@
-"""True structure: frame, undeclared effects, and exact time step."""
+"""True structure: frame, undeclared effects, and exact time step.
+
+The exact step repeats that of :mod:`mrpipe.signals.discretisation` on purpose: the laboratory shares no code with the
+identification, so that an error of the one cannot hide in the other.
+"""
 
 from __future__ import annotations
 

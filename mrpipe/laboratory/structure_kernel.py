@@ -145,7 +145,7 @@ _ROW = float64[::1]
     ),
     cache=True,
 )  # fmt: skip
-def run_structure(
+def run_structure(  # noqa: PLR0915 - as the compiled loop of the simulation
     A: FloatArray,
     B: FloatArray,
     Ad: FloatArray,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mrpipe.artifacts import Artifact, FloatArray
+from mrpipe.errors import UserError
 from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
 from mrpipe.structures import Frame, natural_modes
 
@@ -16,17 +17,33 @@ WIDTH_OF_95_PERCENT = 2.0 * 1.96
 
 
 def frame_uncertainty(artifact: Artifact, frame: Frame) -> FrameUncertainty:
-    """Return the standard deviations of the modes from their 95 % intervals in frame.h5; zero where there are none."""
+    """Return the standard deviations of the modes from their 95 % intervals in frame.h5.
+
+    They are zero without intervals, and for modes of the frame that were not identified.
+
+    Raises
+    ------
+    UserError
+        If stored intervals have another shape than (modes, 2), or belong to modes that the frame does not have.
+    """
     n = frame.floors
     members = set(artifact.members("modes")) if "modes" in artifact.members() else set()
+    numbers = artifact.array("modes/number").astype(np.int64) if "number" in members else np.arange(1, n + 1)
 
     def deviations(name: str) -> FloatArray:
+        found = np.zeros(n)
+        key = f"modes/{name}_interval"
         if f"{name}_interval" not in members:
-            return np.zeros(n)
-        bounds = artifact.array(f"modes/{name}_interval")
-        if bounds.shape != (n, 2):
-            return np.zeros(n)
-        return np.asarray(np.nan_to_num(np.abs(bounds[:, 1] - bounds[:, 0])) / WIDTH_OF_95_PERCENT)
+            return found
+        bounds = artifact.array(key)
+        if bounds.shape != (len(numbers), 2):
+            problem = f"has shape {bounds.shape}, and the structure has {len(numbers)} identified modes"
+            raise UserError(artifact.path, key, problem, f"shape ({len(numbers)}, 2): run identify-frame again")
+        if len(numbers) and not (numbers.min() >= 1 and numbers.max() <= n):
+            problem = f"holds modes {numbers.min()} to {numbers.max()}, and the frame has {n}"
+            raise UserError(artifact.path, "modes/number", problem, "run identify-frame again")
+        found[numbers - 1] = np.nan_to_num(np.abs(bounds[:, 1] - bounds[:, 0])) / WIDTH_OF_95_PERCENT
+        return found
 
     omega = natural_modes(frame).angular_frequencies
     return FrameUncertainty(deviations("angular_frequency") / omega, deviations("damping_ratio"))

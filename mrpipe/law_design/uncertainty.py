@@ -27,6 +27,11 @@ class FrameUncertainty:
     frequency_relative: FloatArray
     damping_ratio: FloatArray
 
+    @classmethod
+    def none(cls, floors: int) -> FrameUncertainty:
+        """Return that of a frame of known matrices."""
+        return cls(np.zeros(floors), np.zeros(floors))
+
     @property
     def exists(self) -> bool:
         """Whether anything is uncertain."""
@@ -54,6 +59,11 @@ class DamperUncertainty:
     covariance: FloatArray
     force_relative: float = 0.0
     effects: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def without_covariance(cls, force_relative: float = 0.0) -> DamperUncertainty:
+        """Return that of a damper of known parameters, with the error of its model."""
+        return cls((), np.zeros((0, 0)), force_relative)
 
     @property
     def exists(self) -> bool:

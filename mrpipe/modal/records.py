@@ -110,7 +110,7 @@ class FrameTest:
     @property
     def duration_s(self) -> float:
         """Length of the test [s]."""
-        return self.responses.shape[0] / self.sampling_rate_hz
+        return float(self.responses.shape[0] / self.sampling_rate_hz)
 
 
 _FLOOR_CHANNEL = re.compile(r"^(floor_acceleration|floor_displacement)_([1-9][0-9]*)(?:_([a-z][a-z0-9]*))?$")

@@ -36,7 +36,7 @@ class History:
     sampling_rate_hz
         Sampling rate of the network [Hz].
     drive_unit
-        A or V.
+        A or V; empty where no test or no channel of the drive gives it.
     """
 
     names: tuple[str, ...]
@@ -44,7 +44,7 @@ class History:
     starts: IntArray
     drive_varies: tuple[bool, ...]
     sampling_rate_hz: float
-    drive_unit: str = "A"
+    drive_unit: str
 
     @property
     def samples(self) -> int:
@@ -184,7 +184,7 @@ def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float)
         starts=starts,
         drive_varies=tuple(False for _ in tests),
         sampling_rate_hz=native / factor,
-        drive_unit=tests[0].drive_unit if tests else "A",
+        drive_unit=tests[0].drive_unit if tests else "",
     )
     return replace(history, drive_varies=_which_drives_vary(history))
 

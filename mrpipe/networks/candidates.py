@@ -135,7 +135,7 @@ class Grid:
             (at.biases, self.biases),
         )
         moving = sum(any(value != own for value in values) for own, values in axes)
-        return 2**moving - 1 - moving + len(self.states)
+        return int(2**moving) - 1 - moving + len(self.states)
 
 
 def _once(candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -100,7 +100,7 @@ class Problem:
     @cached_property
     def size(self) -> int:
         """Number of parameters."""
-        return layer_slices(self.layers, self.biases)[-1][1].stop
+        return int(layer_slices(self.layers, self.biases)[-1][1].stop)
 
     @property
     def rows(self) -> int:
@@ -116,7 +116,7 @@ class Problem:
             if self.biases:
                 signal += bias[:, None]
             np.tanh(signal, out=signal)
-        return (weights[-1] @ signal)[0] + biases[-1][0]
+        return np.asarray((weights[-1] @ signal)[0] + biases[-1][0])
 
     def residual(self, parameters: FloatArray) -> FloatArray:
         """Return output minus target, shape (n,)."""

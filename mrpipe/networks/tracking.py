@@ -66,7 +66,12 @@ def round_trip(inverse: Network, forward: Network, history: History, drive_limit
 
 
 def sinusoidal_motion(
-    amplitude_m: float, frequency_hz: float, damping_n_s_m: float, sampling_rate_hz: float, periods: int = 4
+    amplitude_m: float,
+    frequency_hz: float,
+    damping_n_s_m: float,
+    sampling_rate_hz: float,
+    drive_unit: str,
+    periods: int = 4,
 ) -> History:
     """Return sinusoidal motion with the force c v of a viscous damper as the desired one (2.4.3)."""
     time = np.arange(round(periods / frequency_hz * sampling_rate_hz) + 1) / sampling_rate_hz
@@ -80,7 +85,7 @@ def sinusoidal_motion(
         "force": damping_n_s_m * velocity,
     }
     starts = np.array([0, len(time)], dtype=np.int64)
-    return History(("viscous",), channels, starts, (True,), sampling_rate_hz)
+    return History(("viscous",), channels, starts, (True,), sampling_rate_hz, drive_unit)
 
 
 @dataclass(frozen=True)
@@ -144,7 +149,7 @@ def emulate_viscous(
     amplitude = amplitude_m or float(np.percentile(np.abs(training.channels["displacement"]), 95))
     peak = amplitude * 2.0 * np.pi * frequency_hz
     damping = damping_n_s_m or 0.5 * float(np.percentile(np.abs(training.channels["force"]), 99)) / peak
-    motion = sinusoidal_motion(amplitude, frequency_hz, damping, inverse.features.sampling_rate_hz)
+    motion = sinusoidal_motion(amplitude, frequency_hz, damping, inverse.features.sampling_rate_hz, training.drive_unit)
     tracking = round_trip(inverse, forward, motion, drive_limit)
     place = tracking.sample
     velocity = motion.channels["velocity"][place]

@@ -76,7 +76,8 @@ class Manifest:
     def load(cls, directory: Path, stage: str) -> Manifest | None:
         """Read the manifest of a stage, or None if it does not exist or cannot be read."""
         try:
-            return _adapter().validate_json((directory / f"{stage}.json").read_bytes())
+            found: Manifest = _adapter().validate_json((directory / f"{stage}.json").read_bytes())
+            return found
         except (OSError, ValueError):
             return None
 

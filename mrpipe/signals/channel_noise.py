@@ -32,7 +32,7 @@ def steady_noise(values: FloatArray, rate_hz: float) -> float:
     """
     spectral = noise_level(values, rate_hz)
     typical = float(np.median(np.abs(np.diff(values, 3)))) / (0.6745 * np.sqrt(20.0))
-    return max(min(spectral, max(typical, 0.2 * spectral)), resolution(values) / np.sqrt(12.0))
+    return float(max(min(spectral, max(typical, 0.2 * spectral)), resolution(values) / np.sqrt(12.0)))
 
 
 def resolution(values: FloatArray) -> float:

@@ -24,9 +24,9 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from scipy import linalg
 
 from mrpipe.artifacts import FloatArray
+from mrpipe.signals.discretisation import discretise_first_order
 
 
 @dataclass(frozen=True)
@@ -38,32 +38,36 @@ class KalmanGains:
     m: float = 0.0
 
 
-def kalman_gains(
-    displacement_noise_m: float, acceleration_noise_m_s2: float, bias_drift_m_s3: float = 0.0
+def continuous_kalman_gains(
+    displacement_noise_m: float, acceleration_noise_m_s2: float, bias_drift_m_s2: float = 0.0, rate_hz: float = 1.0
 ) -> KalmanGains:
     """Return the gains from the standard deviations of noise that is white at one and the same sampling rate.
 
     Without a bias state l = sigma_a / sigma_x and k = sqrt(2 l) (errata D). With one, k, l and m are the coefficients
-    of the stable half of s^6 + (sigma_a/sigma_x)^2 s^2 - (sigma_b/sigma_x)^2, where the Riccati equation leads.
+    of the stable half of s^6 + (sigma_a/sigma_x)^2 s^2 - (sigma_b/sigma_x)^2, where the Riccati equation leads; sigma_b
+    is the noise of the rate of the bias at the same sampling rate [m/s^3], the drift times the root of the rate.
+    :func:`mrpipe.control.kalman.discrete_kalman_gains` gives the gains of a filter that runs at samples.
 
     Parameters
     ----------
     displacement_noise_m, acceleration_noise_m_s2
         Above zero.
-    bias_drift_m_s3
-        Drift of the bias [m/s^3]; 0: no bias state.
+    bias_drift_m_s2
+        Standard deviation of the change of the bias in one second, a random walk [m/s^2]; 0: no bias state.
+    rate_hz
+        Sampling rate of the noise [Hz]; it matters for the drift only.
 
     Raises
     ------
     ValueError
         If a noise level is not above zero.
     """
-    if not (displacement_noise_m > 0.0 and acceleration_noise_m_s2 > 0.0 and bias_drift_m_s3 >= 0.0):
+    if not (displacement_noise_m > 0.0 and acceleration_noise_m_s2 > 0.0 and bias_drift_m_s2 >= 0.0):
         raise ValueError("noise levels must be above zero")
     ratio = acceleration_noise_m_s2 / displacement_noise_m
-    if bias_drift_m_s3 == 0.0:
+    if bias_drift_m_s2 == 0.0:
         return KalmanGains(math.sqrt(2.0 * ratio), ratio)
-    drift = bias_drift_m_s3 / displacement_noise_m
+    drift = bias_drift_m_s2 * math.sqrt(rate_hz) / displacement_noise_m
     roots = np.roots([1.0, 0.0, 0.0, 0.0, ratio**2, 0.0, -(drift**2)])
     stable = sorted(roots, key=lambda root: root.real)[:3]
     coefficients = np.real(np.poly(stable))
@@ -74,14 +78,7 @@ def discretise(gains: KalmanGains, dt: float) -> tuple[FloatArray, FloatArray, F
     """Return F (3, 3), G0 (3, 2) and G1 (3, 2) of the recursion in the head of this module."""
     state = np.array([[-gains.k, 1.0, 0.0], [-gains.l, 0.0, -1.0], [gains.m, 0.0, 0.0]])
     inputs = np.array([[gains.k, 0.0], [gains.l, 1.0], [-gains.m, 0.0]])
-    # Van Loan: exponential of the state augmented by the input and its slope
-    block = np.zeros((7, 7))
-    block[:3, :3] = state * dt
-    block[:3, 3:5] = inputs * dt
-    block[3:5, 5:7] = np.eye(2)
-    whole = linalg.expm(block)
-    held, ramp = whole[:3, 3:5], whole[:3, 5:7]
-    return whole[:3, :3], held - ramp, ramp
+    return discretise_first_order(state, inputs, dt)
 
 
 @numba.njit(cache=True)
@@ -125,7 +122,7 @@ def kinematic_kalman(
     dt
         Sampling interval [s].
     gains
-        See :func:`kalman_gains`.
+        See :func:`continuous_kalman_gains`.
     start
         First state (displacement, velocity, bias); by default the first displacement, at rest, without bias. An error
         of this state decays within about 5/k.

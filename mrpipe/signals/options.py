@@ -96,8 +96,11 @@ class PreparationOptions(Section):
         ge=0.0,
         description="Noise of the accelerometer (standard deviation) for the Kalman filter; 0 estimates it as above.",
     )
-    kalman_bias_drift_m_s3: float = Field(
-        0.0, ge=0.0, description="Drift of the bias of the accelerometer for the Kalman filter; 0: no bias state."
+    kalman_bias_drift_m_s2: float = Field(
+        0.0,
+        ge=0.0,
+        description="Drift of the bias of the accelerometer that the Kalman filter follows: standard deviation of its "
+        "change in one second [m/s^2]; 0: no bias state.",
     )
     offset: Literal["test", "campaign", "off"] = Field(
         "test",
@@ -133,11 +136,12 @@ class PreparationOptions(Section):
     def gains(self, displacement: FloatArray, acceleration: FloatArray, rate: float) -> KalmanGains:
         """Return the gains of the kinematic Kalman filter; noise levels of 0 are estimated from the channels."""
         # the configuration needs this module without numba
-        from mrpipe.signals.kalman import kalman_gains
+        from mrpipe.signals.kalman import continuous_kalman_gains
         from mrpipe.signals.spectra import noise_level
 
-        return kalman_gains(
+        return continuous_kalman_gains(
             self.kalman_displacement_noise_m or max(noise_level(displacement, rate), 1e-9),
             self.kalman_acceleration_noise_m_s2 or max(noise_level(acceleration, rate), 1e-6),
-            self.kalman_bias_drift_m_s3,
+            self.kalman_bias_drift_m_s2,
+            rate,
         )

@@ -74,7 +74,7 @@ class PreparedTest:
     displacement_raw_m: FloatArray
     force_raw_n: FloatArray
     cycles: IntArray
-    drive_unit: str = "A"
+    drive_unit: str
     excitation: str = "periodic"
     drive_is_set_point: bool = False
     displacement_offset_m: float = 0.0

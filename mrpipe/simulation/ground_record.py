@@ -137,7 +137,7 @@ def _table(path: Path) -> tuple[FloatArray, list[str]]:
     bad = np.flatnonzero(~np.all(np.isfinite(table), axis=1))
     if bad.size:
         raise UserError(path, f"line {lines[bad[0]]}", "holds a number that is not finite", "give finite numbers")
-    _require_clock(path, table[:, 0])
+    _require_clock(path, table[:, 0], lines)
     return table, headers
 
 
@@ -148,18 +148,21 @@ def _words(line: str) -> list[str]:
     return [field.replace(",", ".") for field in fields] if decimal else line.replace(",", " ").split()
 
 
-def _require_clock(path: Path, time_s: FloatArray) -> None:
+def _require_clock(path: Path, time_s: FloatArray, lines: Sequence[int]) -> None:
+    """Refuse a clock that does not rise or has a gap; `lines` holds the line of each row in the file."""
     steps = np.diff(time_s)
     wrong = np.flatnonzero(~(steps > 0.0))
     if wrong.size:
-        raise UserError(path, f"row {wrong[0] + 2}", "time does not rise", "give a strictly rising clock in seconds")
+        raise UserError(
+            path, f"line {lines[wrong[0] + 1]}", "time does not rise", "give a strictly rising clock in seconds"
+        )
     usual = float(np.median(steps))
     if np.mean(np.abs(steps - usual) < 0.02 * usual) < UNIFORM_SHARE:
         return  # a history of straight lines between times that the user chose
     gap = int(np.argmax(steps))
     if steps[gap] > LONGEST_GAP * usual:
         problem = f"time jumps from {time_s[gap]:g} to {time_s[gap + 1]:g} s, and other rows are {usual:g} s apart"
-        raise UserError(path, f"row {gap + 2}", problem, "fill the gap, or give the part before or after it")
+        raise UserError(path, f"line {lines[gap + 1]}", problem, "fill the gap, or give the part before or after it")
 
 
 def _require_unit(path: Path, headers: Sequence[str], unit: str, quantity: str, unit_setting: str) -> None:

@@ -25,16 +25,19 @@ from mrpipe.control.kernel import (
 from mrpipe.dampers.drive import advance_lag
 from mrpipe.dampers.hysteresis import follow_hysteresis
 from mrpipe.dampers.plant import (
-    ACCELERATION,
     CHAIN_FUNCTIONS,
-    DISPLACEMENT,
-    DRIVE,
     FIRST,
-    FORCE,
-    TIME,
-    VELOCITY,
     WIRE_SIZE,
-    advance,
+)
+from mrpipe.simulation.implicit_force import (
+    ITERATIONS,
+    damper_force,
+    narrowed,
+    nearly_settled,
+    next_guess,
+    secant,
+    settled,
+    slope_between,
 )
 from mrpipe.simulation.parts import (
     D_COMMAND,
@@ -71,44 +74,22 @@ from mrpipe.simulation.parts import (
     sense,
 )
 
-PLAIN_ITERATIONS = 12
-TOLERANCE_N = 1e-5
-CORRECTED_N = 2e-3
-
-
-@njit(
-    float64(
-        CHAIN_FUNCTIONS, float64[::1], int64[::1], int64[::1], float64[::1], float64[::1], float64[::1],
-        float64, float64, float64, float64, float64, float64,
-    ),
-    cache=True,
-)  # fmt: skip
-def _damper_force(
-    functions: Any, parameters: FloatArray, parameter_offsets: IntArray, state_offsets: IntArray, before: FloatArray,
-    state: FloatArray, wire: FloatArray, time: float, x: float, v: float, a: float, drive: float, dt: float,
-) -> float:  # fmt: skip
-    """Advance a copy of the damper's state over one step and return the force at its end."""
-    for index in range(before.shape[0]):
-        state[index] = before[index]
-    wire[TIME] = time
-    wire[DISPLACEMENT] = x
-    wire[VELOCITY] = v
-    wire[ACCELERATION] = a
-    wire[DRIVE] = drive
-    advance(functions, parameters, parameter_offsets, state_offsets, state, wire, dt)
-    return wire[FORCE]
-
 
 @njit(inline="always")
-def _plain_chain(track: int, parameters: FloatArray, dt: float) -> tuple[float, ...]:
+def _plain_chain(
+    track: int, parameters: FloatArray, dt: float
+) -> tuple[float, tuple[float, ...], tuple[float, float, float]]:
     """Return the numbers of the plain chain: share of the lag, both polynomials, and the shape of the hysteresis."""
     if track != TRACK_BOUC_WEN:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.5, 2.0
+        return 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (1.0, 0.5, 2.0)
     return (
         parameters[P_ETA] * dt,
-        parameters[P_YIELD], parameters[P_YIELD + 1], parameters[P_YIELD + 2], parameters[P_YIELD + 3],
-        parameters[P_VISCOSITY], parameters[P_VISCOSITY + 1], parameters[P_VISCOSITY + 2], parameters[P_VISCOSITY + 3],
-        parameters[P_YIELD_DISPLACEMENT], parameters[P_GAMMA_SHARE], parameters[P_EXPONENT],
+        (
+            parameters[P_YIELD], parameters[P_YIELD + 1], parameters[P_YIELD + 2], parameters[P_YIELD + 3],
+            parameters[P_VISCOSITY], parameters[P_VISCOSITY + 1], parameters[P_VISCOSITY + 2],
+            parameters[P_VISCOSITY + 3],
+        ),
+        (parameters[P_YIELD_DISPLACEMENT], parameters[P_GAMMA_SHARE], parameters[P_EXPONENT]),
     )  # fmt: skip
 
 
@@ -139,7 +120,7 @@ def _first_force(track: int, run: FloatArray, chain: Any, motion: tuple[float, .
     if track == TRACK_SAMPLED:
         return wanted
     wire[FIRST] = 1.0
-    force = _damper_force(
+    force = damper_force(
         functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, 0.0, x, v, a, drive, dt
     )
     wire[FIRST] = 0.0
@@ -151,8 +132,8 @@ def _first_force(track: int, run: FloatArray, chain: Any, motion: tuple[float, .
 @njit(inline="always")
 def _force_at_end(
     track: int, run: FloatArray, functions: Any, parameters: FloatArray, parameter_offsets: IntArray,
-    state_offsets: IntArray, damper: FloatArray, trial: FloatArray, wire: FloatArray, hysteresis: tuple[float, ...],
-    motion: tuple[float, ...], wanted: float, guess: float, slope: float,
+    state_offsets: IntArray, damper: FloatArray, trial: FloatArray, wire: FloatArray, shape: tuple[float, float, float],
+    hysteresis: tuple[float, ...], motion: tuple[float, ...], wanted: float, guess: float, slope: float,
 ) -> tuple[float, float, float, float, float]:  # fmt: skip
     """Return the force at the end of the step with the motion there: a secant, and bisection where a law jumps.
 
@@ -164,9 +145,11 @@ def _force_at_end(
         The chain. It is not given as a tuple, because counting the references to its arrays takes time.
     damper, trial, wire
         State of the chain at the start of the step and at its end, and its signals.
+    shape
+        Of the hysteresis of the plain chain: yield displacement, share of gamma, exponent.
     hysteresis
         Of the plain chain: yield force, viscosity, hysteretic variable, displacement and velocity of the rod at the
-        start of the step, yield displacement, share of gamma, exponent.
+        start of the step.
     motion
         Displacement, velocity and acceleration without the force, what one newton adds to each, time, drive, step.
     wanted
@@ -179,15 +162,15 @@ def _force_at_end(
     tuple
         Force, slope, and of the plain chain the hysteretic variable, displacement and velocity of the rod.
     """
-    yielding, viscous, hysteretic, rod, rod_speed, yield_displacement, gamma_share, exponent = hysteresis
+    yield_displacement, gamma_share, exponent = shape
+    yielding, viscous, hysteretic, rod, rod_speed = hysteresis
     x_free, v_free, a_free, end_x, end_v, end_a, time, drive, dt = motion
     real = track in (TRACK_DAMPER, TRACK_BOUC_WEN)
     zeta, x_end, v_end = 0.0, 0.0, 0.0
-    found = guess
+    found, slope_before = guess, slope
     last_guess, last_found = 0.0, 0.0
-    converged = False
     low, high = -math.inf, math.inf
-    for iteration in range(60):
+    for iteration in range(ITERATIONS):
         x_end, v_end = x_free + end_x * guess, v_free + end_v * guess
         if track == TRACK_BOUC_WEN:
             zeta = follow_hysteresis(
@@ -195,7 +178,7 @@ def _force_at_end(
             )
             found = yielding * zeta + viscous * v_end
         elif track == TRACK_DAMPER:
-            found = _damper_force(
+            found = damper_force(
                 functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, time, x_end, v_end,
                 a_free + end_a * guess, drive, dt,
             )  # fmt: skip
@@ -203,47 +186,73 @@ def _force_at_end(
             found = ideal_force(run, x_end, v_end)
         else:
             found = wanted
-        difference = found - guess
-        if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
-            converged = True
+        if settled(found, guess):
+            return found, slope, zeta, x_end, v_end
+        if real and nearly_settled(found, guess):
+            # the slope hardly changes from step to step: that of the step before is sufficient
+            return secant(found, guess, slope), slope, zeta, x_end, v_end
+        low, high = narrowed(low, high, found, guess)
+        if iteration > 0 and guess != last_guess:
+            slope = slope_between(found, guess, last_found, last_guess)
+        last_guess, last_found = guess, found
+        guess = next_guess(iteration, found, guess, slope, low, high)
+        if guess == last_guess:
             break
-        if real and abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
-            # so close that a correction with the slope of the step before leaves a negligible error
-            found = guess + difference / (1.0 - slope)
-            converged = True
-            break
-        # the force of the damper grows with the motion, and the motion falls with the force: the root is bracketed
-        if difference > 0.0:
-            low = max(low, guess)
-            high = min(high, found)
-        else:
-            high = min(high, guess)
-            low = max(low, found)
-        if iteration < PLAIN_ITERATIONS:
-            # the slope hardly changes from step to step: a secant with the stored slope
-            if iteration > 0 and guess != last_guess:
-                slope = min(max((found - last_found) / (guess - last_guess), -0.9), 0.9)
-            last_guess, last_found = guess, found
-            guess += difference / (1.0 - slope)
-        elif low < high:
-            guess = 0.5 * (low + high)
-        else:
-            break
-    if not converged:
-        # a jump: any force within the bracket satisfies the law, and with the one found the damper sticks
-        found = guess
-    return found, slope, zeta, x_end, v_end
+    # a jump: any force within the bracket satisfies the law, and with the one found the damper sticks
+    return guess, slope_before, zeta, x_end, v_end
+
+
+# The functions below that run in each step have no arrays as arguments: counting the references to an array takes as
+# long as their arithmetic.
+
+
+@njit(inline="always")
+def _output_due(step: int, delay: int, per_sample: int, to_output: int, active: int) -> tuple[int, int, bool]:
+    """Return the counter to the next output, the sample that acts, and whether it acts from this step on."""
+    jumped = False
+    if step >= delay:
+        if to_output == 0:
+            active, to_output, jumped = active + 1, per_sample, True
+        to_output -= 1
+    return to_output, active, jumped
+
+
+@njit(inline="always")
+def _hold(
+    track: int, run: FloatArray, counts: IntArray, damper: FloatArray, wanted: float, asked: float, force: float
+) -> float:
+    """Let a new command act and return the force: a controller holds its output, which does not change along a step."""
+    if track == TRACK_SAMPLED:
+        return wanted
+    if run[R_LAG] == 1.0 and counts[I_COMMAND] >= 0:
+        damper[counts[I_COMMAND]] = asked
+    return force
+
+
+@njit(inline="always")
+def _drive_terms(polynomials: tuple[float, ...], u: float) -> tuple[float, float]:
+    """Return yield force [N] and viscosity [N s/m] of the plain chain at the current u."""
+    y0, y1, y2, y3, v0, v1, v2, v3 = polynomials
+    return y0 + u * (y1 + u * (y2 + u * y3)), v0 + u * (v1 + u * (v2 + u * v3))
 
 
 @njit(inline="always")
 def _note_row(
-    row: FloatArray, n: int, force: float, drive: float, desired: float, ground: float, work_in: float,
-    work_damper: float, work_frame: float,
-) -> None:  # fmt: skip
-    """Write force, commands, ground acceleration and work into a row of the record."""
+    row: FloatArray, n: int, signals: tuple[float, float, float, float], works: tuple[float, float, float]
+) -> None:
+    """Write force, drive, desired force, ground acceleration and works into a row of the record."""
     tail = row[3 * n :]
-    tail[T_FORCE], tail[T_DRIVE], tail[T_DESIRED], tail[T_GROUND] = force, drive, desired, ground
-    tail[T_WORK_IN], tail[T_WORK_DAMPER], tail[T_WORK_FRAME] = work_in, work_damper, work_frame
+    tail[T_FORCE], tail[T_DRIVE], tail[T_DESIRED], tail[T_GROUND] = signals
+    tail[T_WORK_IN], tail[T_WORK_DAMPER], tail[T_WORK_FRAME] = works
+
+
+@njit(inline="always")
+def _works_after(
+    works: tuple[float, float, float], ground: float, moved_mass: float, force: float, moved: float, losses: float
+) -> tuple[float, float, float]:
+    """Return the works of input, damper and frame [J] after a step; all but the works are sums over its two ends."""
+    work_in, work_damper, work_frame = works
+    return work_in - 0.5 * ground * moved_mass, work_damper + 0.5 * force * moved, work_frame + 0.5 * losses
 
 
 @njit(
@@ -256,7 +265,7 @@ def _note_row(
     cache=True,
     nogil=True,
 )  # fmt: skip
-def run_loop(
+def run_loop(  # noqa: C901, PLR0915 - functions that take arrays in each step make it slower
     counts: IntArray, run: FloatArray, step_matrix: FloatArray, at_end: FloatArray, lower: FloatArray,
     gain: FloatArray, M: FloatArray, C: FloatArray, K: FloatArray, w: FloatArray, ground: FloatArray, z: FloatArray,
     functions: Any, parameters: FloatArray, parameter_offsets: IntArray, state_offsets: IntArray, damper: FloatArray,
@@ -296,66 +305,44 @@ def run_loop(
     """
     n = w.shape[0]
     size = 2 * n
-    track, per_sample, every = counts[I_TRACK], counts[I_PER_SAMPLE], counts[I_RECORD]
+    track, delay, per_sample, dt = counts[I_TRACK], counts[I_DELAY], counts[I_PER_SAMPLE], run[R_DT]
     real = track in (TRACK_DAMPER, TRACK_BOUC_WEN)
-    dt = run[R_DT]
-    end_x, end_v, end_a = at_end[size], at_end[size + 1], at_end[size + 2]
-    wire = np.zeros(WIRE_SIZE)
-    measured = np.zeros(MEASURED_FLOORS + n)
+    wire, measured = np.zeros(WIRE_SIZE), np.zeros(MEASURED_FLOORS + n)
     trial, before, after = np.zeros(damper.shape[0]), np.zeros(size + 3), np.zeros(size + 4)
-    velocities = after[n:size]
+    velocities, state = after[n:size], before[:size]
     drive, force, force_before, slope = 0.0, 0.0, 0.0, 0.0
     # the plain chain in separate variables: reading arrays through function pointers takes longer than the arithmetic
-    eta_dt, y0, y1, y2, y3, v0, v1, v2, v3, yield_displacement, gamma_share, exponent = _plain_chain(
-        track, parameters, dt
-    )
-    u, yielding, viscous, hysteretic, rod, rod_speed = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    work_in, work_damper, work_frame = 0.0, 0.0, 0.0
-    loss = quadratic(C, z[n:])
+    eta_dt, polynomials, shape = _plain_chain(track, parameters, dt)
+    yielding, viscous, hysteretic, rod, rod_speed = 0.0, 0.0, 0.0, 0.0, 0.0
+    works, loss = (0.0, 0.0, 0.0), quadratic(C, z[n:])
     x, v, pushed = _start_motion(z, w, M)
-    before[:size] = z
-    state = before[:size]
-    sample, active, written = -1, -1, 0
-    to_sample, to_output, to_record = 0, 0, 0
-    wanted, asked, jumped = 0.0, 0.0, False
+    state[:] = z
+    sample, active, written, to_sample, to_output, to_record = -1, -1, 0, 0, 0, 0
+    wanted, asked = 0.0, 0.0
     for step in range(counts[I_STEPS] + 1):
         # counters instead of remainders, because integer division takes as long as the rest of the bookkeeping
         if to_sample == 0:
-            sample += 1
-            to_sample = per_sample
+            sample, to_sample = sample + 1, per_sample
             sense(lower, gain, w, state, force, ground[step], noise[sample], measured)
             controller_step(law, numbers, layout, memory, measured, commands[sample])
         to_sample -= 1
-        if step >= counts[I_DELAY]:
-            if to_output == 0:
-                active += 1
-                to_output = per_sample
-                wanted, asked = commands[active, COMMAND_FORCE], commands[active, COMMAND_DRIVE]
-                jumped = True
-            to_output -= 1
-        elif step == 0:
-            asked = commands[0, COMMAND_DRIVE]
+        to_output, active, jumped = _output_due(step, delay, per_sample, to_output, active)
+        if jumped:
+            wanted, asked = commands[active, COMMAND_FORCE], commands[active, COMMAND_DRIVE]
         if step == 0:
-            # all lags start in equilibrium with the first command
-            drive = asked
+            # all lags start in equilibrium with the first command, which may be delayed
+            asked = commands[0, COMMAND_DRIVE]
             acceleration = measured[MEASURED_ACCELERATION] - noise[0, MEASURED_ACCELERATION]
             chain = (functions, parameters, parameter_offsets, state_offsets, damper, trial, wire)
-            force = _first_force(track, run, chain, (x, v, acceleration, drive, dt), wanted)
-            rod, rod_speed, force_before = x, v, force
-        if jumped and step > 0:
-            # the controller holds its output: it changes now, and not along the step
-            if track == TRACK_SAMPLED:
-                force = wanted
-            elif run[R_LAG] == 1.0 and counts[I_COMMAND] >= 0:
-                damper[counts[I_COMMAND]] = asked
-        jumped = False
+            force = _first_force(track, run, chain, (x, v, acceleration, asked, dt), wanted)
+            drive, rod, rod_speed, force_before = asked, x, v, force
+        elif jumped:
+            force = _hold(track, run, counts, damper, wanted, asked, force)
         if to_record == 0:
-            to_record = every
-            row = record[written]
+            to_record = counts[I_RECORD]
+            note(lower, gain, M, K, state, force, record[written])
+            _note_row(record[written], n, (force, drive, force if track == TRACK_LAW else wanted, ground[step]), works)
             written += 1
-            note(lower, gain, M, K, state, force, row)
-            desired = force if track == TRACK_LAW else wanted
-            _note_row(row, n, force, drive, desired, ground[step], work_in, work_damper, work_frame)
         to_record -= 1
         if step == counts[I_STEPS]:
             break
@@ -363,37 +350,31 @@ def run_loop(
         drive += run[R_LAG] * (asked - drive)
         before[size], before[size + 1], before[size + 2] = ground[step], ground[step + 1], force
         multiply(step_matrix, before, after)
-        x_free, v_free, a_free = after[size], after[size + 1], after[size + 2]
         # --- the force at the end of the step, with the motion there
-        time = (step + 1) * dt
-        guess = 2.0 * force - force_before if real else force
         if track == TRACK_BOUC_WEN:
             # the command is known: only motion and hysteresis are not
-            u = advance_lag(damper[D_CURRENT], damper[D_COMMAND], drive, eta_dt)
-            yielding = y0 + u * (y1 + u * (y2 + u * y3))
-            viscous = v0 + u * (v1 + u * (v2 + u * v3))
-            damper[D_CURRENT], damper[D_COMMAND] = u, drive
-        hysteresis = (yielding, viscous, hysteretic, rod, rod_speed, yield_displacement, gamma_share, exponent)
-        motion = (x_free, v_free, a_free, end_x, end_v, end_a, time, drive, dt)
-        found, slope, zeta, rod_end, speed_end = _force_at_end(
-            track, run, functions, parameters, parameter_offsets, state_offsets, damper, trial, wire, hysteresis,
-            motion, wanted, guess, slope,
+            damper[D_CURRENT] = advance_lag(damper[D_CURRENT], damper[D_COMMAND], drive, eta_dt)
+            damper[D_COMMAND] = drive
+            yielding, viscous = _drive_terms(polynomials, damper[D_CURRENT])
+        found, slope, hysteretic, rod, rod_speed = _force_at_end(
+            track, run, functions, parameters, parameter_offsets, state_offsets, damper, trial, wire,
+            shape, (yielding, viscous, hysteretic, rod, rod_speed),
+            (after[size], after[size + 1], after[size + 2], at_end[size], at_end[size + 1], at_end[size + 2],
+             (step + 1) * dt, drive, dt),
+            wanted, 2.0 * force - force_before if real else force, slope,
         )  # fmt: skip
         for row_index in range(size + 4):
             after[row_index] += at_end[row_index] * found
-        # --- energy
         loss_end = quadratic(C, velocities)
-        work_damper += 0.5 * (force + found) * (after[size] - x)
-        work_in -= 0.5 * (ground[step] + ground[step + 1]) * (after[size + 3] - pushed)
-        work_frame += 0.5 * (loss + loss_end) * dt
+        moved, moved_mass = after[size] - x, after[size + 3] - pushed
+        works = _works_after(
+            works, ground[step] + ground[step + 1], moved_mass, force + found, moved, (loss + loss_end) * dt
+        )
         loss, x, pushed = loss_end, after[size], after[size + 3]
         force_before, force = force, found
         for index in range(size):
             before[index] = after[index]
-        if track == TRACK_BOUC_WEN:
-            hysteretic, rod, rod_speed = zeta, rod_end, speed_end
-        elif real:
+        if track == TRACK_DAMPER:
             for index in range(damper.shape[0]):
                 damper[index] = trial[index]
-    for index in range(size):
-        z[index] = before[index]
+    z[:] = state

@@ -17,13 +17,14 @@ from mrpipe.dampers.drive import command_place, lag_step, polynomial_step
 from mrpipe.dampers.hysteresis import hysteresis_step
 from mrpipe.dampers.plant import Chain, build_chain, new_state, sum_step
 from mrpipe.errors import DivergedError, UserError
+from mrpipe.signals.discretisation import discretise_first_order
 from mrpipe.simulation import kernel, parts
 from mrpipe.simulation.checks import check_loop
 from mrpipe.simulation.clock import Clock, clock_of
 from mrpipe.simulation.excitation import Excitation
 from mrpipe.simulation.sensors import SensorFault, SensorNoise, add_fault, sensor_noise
 from mrpipe.simulation.settings import SimulateSettings
-from mrpipe.structures import Frame, discretise_first_order, state_space
+from mrpipe.structures import Frame, state_space
 
 Tracking = Literal["damper", "ideal", "continuous", "unclipped"]
 
@@ -157,7 +158,7 @@ def base_shear(frame: Frame, absolute_acceleration: FloatArray) -> FloatArray:
         Of the degrees of freedom [m/s^2], shape (m, n).
     """
     # BLAS is not used, because its second thread continues to run after a product of this length
-    return np.einsum("tf,f->t", absolute_acceleration, frame.ground_masses)
+    return np.asarray(np.einsum("tf,f->t", absolute_acceleration, frame.ground_masses))
 
 
 def no_damper() -> Chain:

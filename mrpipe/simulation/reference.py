@@ -15,10 +15,11 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.control.controller import ControllerOptions
 from mrpipe.control.gains import Gains
-from mrpipe.control.kalman import kalman_gains
+from mrpipe.control.kalman import discrete_kalman_gains
 from mrpipe.dampers.model import DamperModel
 from mrpipe.networks.network import Network
-from mrpipe.structures import Frame, discretise_first_order, state_space
+from mrpipe.signals.discretisation import discretise_first_order
+from mrpipe.structures import Frame, state_space
 
 
 @dataclass
@@ -66,7 +67,7 @@ class ReferenceController:
         if self.last_acceleration is None:
             self.x, self.v = displacement, 0.0
         else:
-            gain = kalman_gains(self.options.displacement_noise_m, self.options.acceleration_noise_m_s2, dt)
+            gain = discrete_kalman_gains(self.options.displacement_noise_m, self.options.acceleration_noise_m_s2, dt)
             mean = 0.5 * (acceleration + self.last_acceleration)
             predicted = np.array([[1.0, dt], [0.0, 1.0]]) @ [self.x, self.v] + np.array([0.5 * dt**2, dt]) * mean
             corrected = predicted + gain[:2] * (displacement - predicted[0])

@@ -278,22 +278,16 @@ def _momenta(pull: FloatArray, state: FloatArray, result: FloatArray) -> None:
             result[i] += pull[i, floor] * state[floor]
 
 
-def _run(
-    counts: IntArray, dt: float, plant: Any, positions: FloatArray, settings: FloatArray, inputs: FloatArray,
-    z: FloatArray, chains: Any, parameters: FloatArray, offsets: Any, damper_states: FloatArray, laws: Any,
-    numbers: FloatArray, layouts: IntArray, places: IntArray, memories: FloatArray, regulator: Any, members: IntArray,
-    noise: FloatArray, commands: FloatArray, record: FloatArray,
-) -> None:  # fmt: skip
-    """Run the loop; see :mod:`mrpipe.simulation.several` and :mod:`mrpipe.simulation.several_parts` for the arrays.
-
-    `plant` holds the first seven arrays of :class:`Structure`, and the rows of `influence`, `pull` and `direct` one
-    after another, shape (3m, n). `z` is the initial state; it is overwritten by the final state.
-    """
+@compiled_inside
+def _assembled(
+    plant: Any, positions: FloatArray, inputs: int, settings: FloatArray, chains: Any, parameters: FloatArray,
+    offsets: Any, damper_states: FloatArray, control: Any, commands: FloatArray,
+) -> tuple[Structure, Devices, Controllers, Central]:  # fmt: skip
+    """Return structure, dampers, controllers and central regulator from the arrays of :func:`_run`."""
     step_matrix, at_end, lower, gains, M, C, K, columns = plant
+    laws, numbers, layouts, places, memories, regulator, members = control
     k, n = positions.shape
-    m = inputs.shape[1]
-    size = 2 * n
-    track, per_sample = counts[I_TRACK], counts[I_PER_SAMPLE]
+    m = inputs
     structure = Structure(
         step_matrix, at_end, lower, gains, M, C, K, columns[:m], columns[m : 2 * m], columns[2 * m :], positions
     )
@@ -306,7 +300,44 @@ def _run(
         laws, numbers, layouts, memories, places, np.zeros((k, MEASURED_FLOORS + n)), commands, np.zeros(k), np.zeros(k)
     )
     estimate, both = np.zeros(regulator[0].shape[0]), np.zeros((2, members.shape[0]))
-    central = Central(regulator, members, estimate, both[0], both[1])
+    return structure, devices, controllers, Central(regulator, members, estimate, both[0], both[1])
+
+
+@compiled_inside
+def _act(
+    counts: IntArray, step: int, active: int, devices: Devices, motion: Motion, controllers: Controllers, dt: float
+) -> int:
+    """Let the commands of the coming sample act; at the first step set the forces. Return the sample that acts."""
+    if step >= counts[I_DELAY]:
+        active += 1
+        controllers.wanted[:] = controllers.commands[:, active, COMMAND_FORCE]
+    controllers.asked[:] = controllers.commands[:, max(active, 0), COMMAND_DRIVE]
+    if step == 0:
+        _start_forces(devices, motion, controllers, counts[I_TRACK], dt)
+    else:
+        _hold(devices, motion, controllers, counts[I_TRACK])
+    return active
+
+
+def _run(
+    counts: IntArray, dt: float, plant: Any, positions: FloatArray, settings: FloatArray, inputs: FloatArray,
+    z: FloatArray, chains: Any, parameters: FloatArray, offsets: Any, damper_states: FloatArray, laws: Any,
+    numbers: FloatArray, layouts: IntArray, places: IntArray, memories: FloatArray, regulator: Any, members: IntArray,
+    noise: FloatArray, commands: FloatArray, record: FloatArray,
+) -> None:  # fmt: skip
+    """Run the loop; see :mod:`mrpipe.simulation.several` and :mod:`mrpipe.simulation.several_parts` for the arrays.
+
+    `plant` holds the first seven arrays of :class:`Structure`, and the rows of `influence`, `pull` and `direct` one
+    after another, shape (3m, n). `z` is the initial state; it is overwritten by the final state.
+    """
+    k, n = positions.shape
+    m = inputs.shape[1]
+    size = 2 * n
+    track, C = counts[I_TRACK], plant[5]
+    control = (laws, numbers, layouts, places, memories, regulator, members)
+    structure, devices, controllers, central = _assembled(
+        plant, positions, m, settings, chains, parameters, offsets, damper_states, control, commands
+    )
     before, free, no_forces = np.zeros(size + 2 * m + k), np.zeros(size), np.zeros(0)
     accelerations, moved, pushed, pushed_end = np.zeros(n), np.zeros(n), np.zeros(m), np.zeros(m)
     before[:size] = z
@@ -316,20 +347,13 @@ def _run(
     _momenta(structure.pull, state, pushed)
     sample, active, written = -1, -1, 0
     for step in range(counts[I_STEPS] + 1):
-        if step % per_sample == 0:
+        if step % counts[I_PER_SAMPLE] == 0:
             sample += 1
             accelerations_of(structure, state, inputs[step], motion.forces, accelerations, moved)
             _control(positions, motion, controllers, central, noise, sample, accelerations, moved, inputs[step, 0])
-        jumped = step >= counts[I_DELAY] and (step - counts[I_DELAY]) % per_sample == 0
-        if jumped:
-            active += 1
-            controllers.wanted[:] = commands[:, active, COMMAND_FORCE]
-        if jumped or step == 0:
-            controllers.asked[:] = commands[:, max(active, 0), COMMAND_DRIVE]
-        if step == 0:
-            _start_forces(devices, motion, controllers, track, dt)
-        elif jumped:
-            _hold(devices, motion, controllers, track)
+        late = step - counts[I_DELAY]
+        if step == 0 or (late >= 0 and late % counts[I_PER_SAMPLE] == 0):
+            active = _act(counts, step, active, devices, motion, controllers, dt)
         if step % counts[I_RECORD] == 0:
             accelerations_of(structure, state, inputs[step], motion.forces, accelerations, moved)
             _record(
@@ -343,13 +367,13 @@ def _run(
         before[size + 2 * m :] = motion.forces
         for d in range(k):
             motion.known[d, CURRENT] += settings[d, D_LAG] * (controllers.asked[d] - motion.known[d, CURRENT])
-        multiply(step_matrix, before, free)
+        multiply(structure.step_matrix, before, free)
         accelerations_of(structure, free, inputs[step + 1], no_forces, accelerations, moved)
         _move_freely(positions, settings, motion, track, free, accelerations, moved, dt)
         devices.wire[TIME] = (step + 1) * dt
         _find_forces(devices, motion, controllers, track, dt)
         devices.states[:] = devices.trial
-        _finish_step(positions, at_end, settings, motion, free, dt)
+        _finish_step(positions, structure.at_end, settings, motion, free, dt)
         loss_end = quadratic(C, free[n:])
         _momenta(structure.pull, free, pushed_end)
         for i in range(m):

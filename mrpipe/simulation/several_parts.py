@@ -17,14 +17,22 @@ from mrpipe.control.kernel import (
     MEASURED_VELOCITY,
 )
 from mrpipe.dampers.plant import ACCELERATION, DISPLACEMENT, DRIVE, FORCE, VELOCITY, advance
+from mrpipe.simulation.implicit_force import (
+    ITERATIONS,
+    narrowed,
+    nearly_settled,
+    next_guess,
+    secant,
+    settled,
+    slope_between,
+)
 from mrpipe.simulation.parts import apply_faults, multiply
 
 compiled_inside = njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 """For functions that are called by compiled functions only: without entry points from Python they compile faster."""
 
 TRACK_DAMPER, TRACK_LAW, TRACK_SAMPLED = 0, 1, 2
-SWEEPS, ITERATIONS = 40, 60
-TOLERANCE_N, CORRECTED_N = 1e-5, 2e-3
+SWEEPS = 40
 SETTLED, SETTLED_LAW = 1e-6, 1e-10
 """Relative change of the forces between iterations at which a step ends, with dampers and with linear laws."""
 
@@ -199,6 +207,7 @@ def chain_force(
     found, last_guess, last_found = guess, 0.0, 0.0
     low, high = -math.inf, math.inf
     for iteration in range(ITERATIONS):
+        # written out, because a function with these arrays counts the references to them in each iteration
         for index in range(before.shape[0]):
             trial[index] = before[index]
         wire[DISPLACEMENT] = motion[0] + motion[3] * guess
@@ -207,31 +216,22 @@ def chain_force(
         wire[DRIVE] = device[CURRENT]
         advance(functions, parameters, parameter_offsets, state_offsets, trial, wire, dt)
         found = wire[FORCE]
-        difference = found - guess
-        if abs(difference) <= TOLERANCE_N + 1e-7 * abs(found):
-            break
+        if settled(found, guess):
+            motion[7] = slope
+            return found
         if iteration > 0 and guess != last_guess:
-            slope = min((found - last_found) / (guess - last_guess), 0.9)
-        if abs(difference) <= CORRECTED_N + 1e-4 * abs(found):
-            # so near that the slope leaves an error far below what matters
-            guess += difference / (1.0 - slope)
-            found = guess
-            break
+            # before the last correction, because a brace makes the slope steep and different from step to step
+            slope = slope_between(found, guess, last_found, last_guess)
+        if nearly_settled(found, guess):
+            motion[7] = slope
+            return secant(found, guess, slope)
+        low, high = narrowed(low, high, found, guess)
         last_guess, last_found = guess, found
-        # the answer falls with the force that slows the motion, so that the solution is bracketed
-        if difference > 0.0:
-            low = max(low, guess)
-        else:
-            high = min(high, guess)
-        following = guess + difference / (1.0 - slope)
-        if low < high and not low < following < high:
-            inside = low > -math.inf and high < math.inf
-            following = 0.5 * (low + high) if inside else guess + difference
-        if following == guess:
+        guess = next_guess(iteration, found, guess, slope, low, high)
+        if guess == last_guess:
             break
-        guess = following
-    motion[7] = slope
-    return found if abs(found - guess) <= 1e-3 * (1.0 + abs(found)) else guess
+    # a jump: the slope across it is not that of the next step
+    return guess
 
 
 @compiled_inside

@@ -175,7 +175,7 @@ def _steady(windows: FloatArray, length: int, steady: bool, cycles: int) -> Stea
 
 def _scatter(windows: FloatArray, values: FloatArray) -> FloatArray:
     spread = np.std(windows, axis=0, ddof=1)
-    return np.divide(spread, values, out=np.zeros_like(spread), where=values > 0.0)
+    return np.asarray(np.divide(spread, values, out=np.zeros_like(spread), where=values > 0.0))
 
 
 @dataclass

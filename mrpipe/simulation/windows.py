@@ -59,7 +59,7 @@ def values_between(response: Response, edges_s: FloatArray, absolute: bool) -> F
     def rms(history: FloatArray) -> FloatArray:
         square = history[start:] ** 2
         integral = np.concatenate([[0.0], np.cumsum(half_steps * (square[1:] + square[:-1]))])
-        return np.sqrt(np.maximum(np.diff(np.interp(edges, clock, integral)) / np.diff(edges), 0.0))
+        return np.asarray(np.sqrt(np.maximum(np.diff(np.interp(edges, clock, integral)) / np.diff(edges), 0.0)))
 
     def largest(history: FloatArray) -> FloatArray:
         return np.asarray(np.maximum.reduceat(np.abs(history[start:]), places))

@@ -12,24 +12,14 @@ if TYPE_CHECKING:
     from mrpipe.config.sections.calibrate import CalibrateSettings
     from mrpipe.control.calibration import Calibration, CalibrationOptions
     from mrpipe.control.lqg import Weights
-    from mrpipe.control.neural import ReferenceNetwork
     from mrpipe.structures import Frame
-
-
-FREQUENCIES = (0.625, 1.6)
-"""Ratios of the lowest and the highest training frequency of nnc to the frequency of the free mode. This frequency is
-in the middle of the range, because a network that cannot distinguish a slow large motion from a fast small one gives
-the force for the middle.
-"""
-
-INPUT_NOISE = (0.002, 0.04)
-"""Ratio of the noise on displacement and velocity in the training of nnc to the expected amplitude of each."""
 
 
 def _run(context: StageContext) -> Mapping[str, Any]:
     from mrpipe.control.assembly import expected_amplitude
     from mrpipe.control.calibration import balanced_weights, calibrate, validity_warnings
     from mrpipe.control.limits import limiting_modes, placement_warning
+    from mrpipe.control.neural import reference_options, train_reference
     from mrpipe.control.operation import forces_at
     from mrpipe.control.storage import calibration_to_json, write_calibration
     from mrpipe.dampers.model import read_tested
@@ -61,12 +51,21 @@ def _run(context: StageContext) -> Mapping[str, Any]:
     ):
         context.warn(line)
     rounding = settings.friction_rounding_share * (amplitude * modes.omega_0)
-    reference = _train_reference(context, calibration, frame, amplitude, rounding) if _networks(calibration) else None
+    reference = None
+    if _networks(calibration):
+        trained = reference_options(
+            settings.neural, calibration.laws["nnc"].gains.alpha_n_m, frame, modes, amplitude, rounding
+        )
+        reference = train_reference(
+            trained, context.rng, lambda f, text="": context.progress(0.3 + 0.6 * f, f"nnc {text}")
+        )
     with context.write("control.h5") as artifact:
         write_calibration(artifact, calibration, position, weights, reference, rounding, amplitude, residual)
     summary = calibration_to_json(calibration)
     if reference is not None:
-        summary["laws"]["nnc"] |= _neural_summary(calibration, reference, amplitude)
+        summary["laws"]["nnc"] |= reference.assessment(
+            calibration.laws["nnc"].gains.alpha_n_m, amplitude, modes.omega_0
+        )
     summary |= {
         "expected_amplitude_m": amplitude,
         "residual_force_n": residual,
@@ -107,54 +106,6 @@ def _networks(calibration: Calibration) -> bool:
     from mrpipe.control.laws import law_named
 
     return any("network" in law_named(law).needs for law in calibration.laws)
-
-
-def _train_reference(
-    context: StageContext, calibration: Calibration, frame: Frame, amplitude: float, rounding_m_s: float
-) -> ReferenceNetwork:
-    import numpy as np
-
-    from mrpipe.control.neural import ReferenceOptions, train_reference
-    from mrpipe.structures import natural_modes
-
-    settings = context.settings.calibrate
-    neural = settings.neural
-    omega = calibration.modes.omega_0
-    free = omega / (2.0 * np.pi)
-    others = np.delete(natural_modes(frame).angular_frequencies, settings.target_mode - 1)
-    options = ReferenceOptions(
-        alpha_n_m=calibration.laws["nnc"].gains.alpha_n_m,
-        amplitudes_m=tuple(amplitude * np.geomspace(0.2, 2.0, neural.amplitudes)),
-        frequencies_hz=tuple(free * np.geomspace(*FREQUENCIES, neural.frequencies)),
-        rate_hz=neural.rate_hz,
-        past_values=neural.past_values,
-        hidden=neural.hidden,
-        starts=neural.starts,
-        iterations=neural.iterations,
-        rounding_m_s=rounding_m_s,
-        # what lies above a quarter of the rate is not motion to the network
-        disturbances_rad_s=tuple(others[others < 0.5 * np.pi * neural.rate_hz]),
-        disturbance_share=neural.disturbance_share,
-        displacement_noise_m=INPUT_NOISE[0] * amplitude,
-        velocity_noise_m_s=INPUT_NOISE[1] * amplitude * omega,
-    )
-    return train_reference(options, context.rng, lambda f, text="": context.progress(0.3 + 0.6 * f, f"nnc {text}"))
-
-
-def _neural_summary(calibration: Calibration, reference: ReferenceNetwork, amplitude: float) -> dict[str, Any]:
-    from mrpipe.control.linearisation import equivalent_stiffness, friction_stiffness
-    from mrpipe.control.neural import network_force
-
-    H = equivalent_stiffness(lambda x, v: network_force(reference.network, x, v), amplitude, calibration.modes.omega_0)
-    wanted = friction_stiffness(calibration.laws["nnc"].gains.alpha_n_m)
-    return {
-        "architecture": reference.network.architecture,
-        "training_nrmse": reference.training_nrmse,
-        "verification_nrmse": reference.verification_nrmse,
-        "equivalent_stiffness_n_m": H.real,
-        "equivalent_loss_n_m": H.imag,
-        "equivalent_error": abs(H - wanted) / abs(wanted),
-    }
 
 
 STAGE = Stage(

@@ -239,7 +239,7 @@ def _write(context: StageContext, traced: Tracing, summary: Mapping[str, Any]) -
             ("after", traced.after, "N"),
             ("displacement", validation.displacement, "m"),
             ("velocity", validation.velocity, "m/s"),
-            ("drive", validation.drive, "A"),
+            ("drive", validation.drive, traced.drive_unit),
             ("time", validation.time, "s"),
         ):
             artifact.put(f"validation/{name}", values, unit=unit, dims=("sample",))

@@ -72,17 +72,14 @@ def _problem(context: StageContext) -> str:
 
 
 def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, DamperUncertainty]:
-    import numpy as np
-
     from mrpipe.law_design.identified import damper_uncertainty, frame_uncertainty, traced_damper_uncertainty
     from mrpipe.law_design.uncertainty import DamperUncertainty, FrameUncertainty
 
     simulate = context.settings.simulate
-    n = rig.frame.floors
-    frame = FrameUncertainty(np.zeros(n), np.zeros(n))
+    frame = FrameUncertainty.none(rig.frame.floors)
     if simulate.frame == "identified":
         frame = frame_uncertainty(context.artifact("identify-frame"), rig.frame)
-    damper = DamperUncertainty((), np.zeros((0, 0)))
+    damper = DamperUncertainty.without_covariance()
     if simulate.damper == "identified":
         damper = damper_uncertainty(context.artifact("identify-damper"))
     elif simulate.damper == "traced":

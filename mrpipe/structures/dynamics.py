@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eigh, expm
+from scipy.linalg import eigh
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.structures.frame import Frame
@@ -175,28 +175,6 @@ def complex_modes(
     poles, shapes = poles[order], shapes[:, order]
     largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None, :], axis=0)
     return ComplexModes(np.asarray(poles, dtype=np.complex128), np.asarray(shapes / largest, dtype=np.complex128))
-
-
-def discretise_zero_order(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-    """Return Ad, Bd of the exact step with inputs constant over `dt` [s]: z+ = Ad z + Bd u."""
-    n, m = B.shape
-    block = np.zeros((n + m, n + m))
-    block[:n, :n] = A
-    block[:n, n:] = B
-    step = expm(block * dt)
-    return np.asarray(step[:n, :n]), np.asarray(step[:n, n:])
-
-
-def discretise_first_order(A: FloatArray, B: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return Ad, B0, B1 of the exact step with inputs linear over `dt` [s]: z+ = Ad z + B0 u + B1 u+."""
-    n, m = B.shape
-    block = np.zeros((n + 2 * m, n + 2 * m))
-    block[:n, :n] = A * dt
-    block[:n, n : n + m] = B * dt
-    block[n : n + m, n + m :] = np.eye(m)
-    step = expm(block)
-    ramp = step[:n, n + m :]
-    return np.asarray(step[:n, :n]), np.asarray(step[:n, n : n + m] - ramp), np.asarray(ramp)
 
 
 def frequency_response(

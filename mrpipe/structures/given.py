@@ -329,7 +329,7 @@ def floor_heights(settings: StructureSettings, read: Reader) -> list[float] | No
         if storeys.size != floors:
             problem = f"has {storeys.size} values, and the table has {floors} storeys"
             raise UserError("structure.storey_table", "height", problem, "give the height of each storey")
-        return np.cumsum(storeys).tolist()
+        return [float(height) for height in np.cumsum(storeys)]
     heights = [row.height_m for row in settings.storeys for _ in range(row.repeat)]
     known = [height for height in heights if height is not None]
     return np.cumsum(known).tolist() if heights and len(known) == len(heights) else None

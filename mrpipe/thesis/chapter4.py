@@ -9,8 +9,7 @@ import numpy as np
 from mrpipe.artifacts import Artifact, FloatArray
 from mrpipe.control import exact, limits
 from mrpipe.control.calibration import CalibrationOptions, calibrate
-from mrpipe.control.kalman import continuous_kalman_gains
-from mrpipe.signals.kalman import kalman_gains, kinematic_kalman
+from mrpipe.signals.kalman import continuous_kalman_gains, kinematic_kalman
 from mrpipe.simulation.sensors import SensorNoise
 from mrpipe.structures import Frame, floor_position
 from mrpipe.thesis.bench import OMEGA, Bench, LoopRun, amplitude_of, excite, run_law
@@ -93,7 +92,8 @@ def _formulas(modes: limits.LimitingModes, k: float) -> Outcomes:
 
 
 def _kalman() -> Outcomes:
-    k, gain = continuous_kalman_gains(20e-6, 0.1)
+    gains = continuous_kalman_gains(20e-6, 0.1)
+    k, gain = gains.k, gains.l
     # x1' = x2 + k (y - x1), x2' = l (y - x1): (5.3) as printed, without the acceleration
     s = OMEGA * 1j
     filter_matrix = np.array([[s + k, -1.0], [gain, s]])
@@ -101,7 +101,7 @@ def _kalman() -> Outcomes:
     time = np.arange(int(20.0 * _RATE_HZ)) / _RATE_HZ
     x: FloatArray = 6e-3 * np.sin(OMEGA * time)
     v: FloatArray = 6e-3 * OMEGA * np.cos(OMEGA * time)
-    _, estimated, _ = kinematic_kalman(x, -(OMEGA**2) * x, 1.0 / _RATE_HZ, kalman_gains(20e-6, 0.1))
+    _, estimated, _ = kinematic_kalman(x, -(OMEGA**2) * x, 1.0 / _RATE_HZ, gains)
     late = time > 10.0
     error = float(np.sqrt(np.mean((estimated - v)[late] ** 2) / np.mean(v[late] ** 2)))
     return {

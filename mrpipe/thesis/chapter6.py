@@ -20,7 +20,7 @@ from mrpipe.case_studies.ten_storey.study import TenStoreyCase, ten_storey_study
 from mrpipe.case_studies.wind.load import synthetic_wind
 from mrpipe.case_studies.wind.structure import FLOORS, HEIGHT_M, WIDTH_M, Tower, tower_of
 from mrpipe.case_studies.wind.study import run_wind_cases, wind_study
-from mrpipe.control.lqg import Weights, regulator_gain
+from mrpipe.control.lqg import Weights, frame_regulator_gain
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.structures import Frame, floor_position, shear_stiffness, state_space
 from mrpipe.structures.records import GroundMotion
@@ -118,7 +118,7 @@ def _units() -> Outcomes:
 def _regulator(frame: Frame) -> Outcomes:
     position = floor_position(frame.floors)
     space = state_space(frame, position)
-    gain = regulator_gain(frame, position, Weights())
+    gain = frame_regulator_gain(frame, position, Weights())
     B = space.B[:, 1]
 
     def loop(sign: float) -> tuple[str, str]:

@@ -29,7 +29,7 @@ from mrpipe.case_studies.indices import IsolatedResponse, base_isolated_indices
 from mrpipe.case_studies.inverse import train_inverse, validated_inverse
 from mrpipe.case_studies.laws import LAWS
 from mrpipe.case_studies.lqg import (
-    observer_gain,
+    output_observer_gain,
     output_regulator_gain,
     sampled_loop_radius,
 )
@@ -319,6 +319,6 @@ def test_lqg_of_the_building_agrees_with_python_control(study: IsolationStudy) -
     E, Sw, Sv = modal.input_matrix(modal.load), 0.1 * np.eye(2), 1e-6 * np.eye(8)
     disturbance = E @ Sw @ E.T
     filtered, _, _ = control.lqe(A, np.eye(54), measured.C, 0.5 * (disturbance + disturbance.T), Sv)
-    gain = observer_gain(A, E, measured, Sw, Sv)
+    gain = output_observer_gain(A, E, measured, Sw, Sv)
     np.testing.assert_allclose(gain, filtered, rtol=1e-9, atol=1e-9 * np.abs(filtered).max())
     assert sampled_loop_radius(A, B, study.observer) < 1.0

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from mrpipe.case_studies.kernel import damping_power, free_step, input_work, interpolate, multiply, observe, rod_motion
-from mrpipe.structures.dynamics import discretise_first_order
+from mrpipe.case_studies.kernel import damping_power, free_step, input_work, interpolate, observe, rod_motion
+from mrpipe.signals.discretisation import discretise_first_order
+from mrpipe.simulation.parts import multiply
 
 pytestmark = pytest.mark.property
 
@@ -45,7 +46,7 @@ def test_both_steps_are_the_matrix_exponential() -> None:
 
 def test_products_and_rod_motion() -> None:
     A, vector, result = RNG.standard_normal((3, 4)), RNG.standard_normal(4), np.zeros(3)
-    multiply(vector, A.T.copy(), result)
+    multiply(A.T.copy(), vector, result)
     assert result == pytest.approx(A @ vector)
     positions, x, v = RNG.standard_normal((2, 2)), np.zeros(2), np.zeros(2)
     rod_motion(positions, vector, x, v)

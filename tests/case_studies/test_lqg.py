@@ -9,11 +9,11 @@ import pytest
 from mrpipe.artifacts import FloatArray
 from mrpipe.case_studies.lqg import (
     Outputs,
-    observer_gain,
+    output_observer_gain,
     output_regulator_gain,
-    regulator_gain,
     sampled_controller,
 )
+from mrpipe.control.riccati import regulator_gain
 
 
 def plant(seed: int = 5, n: int = 4, k: int = 2, p: int = 3, m: int = 2) -> tuple[FloatArray, ...]:
@@ -45,7 +45,7 @@ def test_regulator_with_cross_term_agrees_with_python_control(seed: int) -> None
 def test_observer_agrees_with_python_control(seed: int) -> None:
     A, _, E, C, D, _ = plant(seed)
     Sw, Sv = np.diag([2.0, 0.5]), np.diag([0.1, 0.2, 0.3])
-    ours = observer_gain(A, E, Outputs(C, D, np.zeros((3, 2))), Sw, Sv)
+    ours = output_observer_gain(A, E, Outputs(C, D, np.zeros((3, 2))), Sw, Sv)
     theirs, _, _ = control.lqe(A, E, C, Sw, Sv)
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
 
@@ -55,7 +55,7 @@ def test_observer_with_correlated_noise_is_the_decorrelated_problem() -> None:
     # process noise E w and measurement noise F w + v: subtract S R^-1 y from the plant, and the noises are independent
     A, _, E, C, D, F = plant(7)
     Sw, Sv = np.diag([2.0, 0.5]), np.diag([0.1, 0.2, 0.3])
-    ours = observer_gain(A, E, Outputs(C, D, F), Sw, Sv)
+    ours = output_observer_gain(A, E, Outputs(C, D, F), Sw, Sv)
     R = Sv + F @ Sw @ F.T
     S = E @ Sw @ F.T
     shift = S @ np.linalg.inv(R)
@@ -78,7 +78,7 @@ def test_separation_principle_and_sampling() -> None:
     A, B, E, C, D, F = plant()
     outputs = Outputs(C, D, F)
     K = output_regulator_gain(A, B, outputs, np.eye(3), np.eye(2))
-    L = observer_gain(A, E, outputs, np.eye(2), 0.1 * np.eye(3))
+    L = output_observer_gain(A, E, outputs, np.eye(2), 0.1 * np.eye(3))
     # plant and observer together
     joint = np.sort_complex(np.linalg.eigvals(np.block([[A, -B @ K], [L @ C, A - B @ K - L @ C]])))
     apart = np.sort_complex(np.concatenate([np.linalg.eigvals(A - B @ K), np.linalg.eigvals(A - L @ C)]))

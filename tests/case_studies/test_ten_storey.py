@@ -18,7 +18,7 @@ from mrpipe.case_studies.ten_storey.structure import ten_storey
 from mrpipe.case_studies.ten_storey.study import TenStoreyStudy, stiffness_share, ten_storey_study
 from mrpipe.dampers.model import damper_from_parameter_set
 from mrpipe.errors import UserError
-from mrpipe.structures.dynamics import discretise_first_order
+from mrpipe.signals.discretisation import discretise_first_order
 
 
 @pytest.fixture(scope="module")

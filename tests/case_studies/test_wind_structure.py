@@ -189,10 +189,16 @@ def test_users_wind_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("nan", "row 4, column 2"),
+        ("nan", "line 4, column 2: is not finite"),
+        ("array", "row 4, column 2: is not finite"),
         ("columns", "4 columns"),
         ("clock", "no clock"),
-        ("words", "not a matrix"),
+        ("words", "line 1, column 1: 'a' is not a number"),
+        ("word", "line 5, column 3: '1x' is not a number"),
+        ("ragged", "line 5: has 3 numbers, the first row 4"),
+        ("matlab", "not a MATLAB file that can be read"),
+        ("text", "holds no array of real numbers"),
+        ("numpy", "is not an array of numbers"),
         ("missing", "no such wind"),
     ],
 )
@@ -203,8 +209,23 @@ def test_bad_wind_files_get_one_line(tmp_path: Path, kind: str, words: str) -> N
         forces[3, 1] = np.nan
     if kind == "columns":
         forces = forces[:, :3]
-    if kind == "words":
-        path.write_text("a b c\nd e f\n")
+    contents = {
+        "words": "a b c\nd e f\n",
+        "word": "# north\n\n1 1 1 1\n1 1 1 1\n1 1 1x 1\n",
+        "ragged": "# north\n\n1 1 1 1\n1 1 1 1\n1, 1; 1\n",
+        "matlab": "no MATLAB file",
+        "numpy": "no array",
+    }
+    if kind in contents:
+        path = path.with_suffix({"matlab": ".mat", "numpy": ".npy"}.get(kind, ".txt"))
+        path.write_text(contents[kind])
+    elif kind == "text":
+        path = path.with_suffix(".mat")
+        savemat(path, {"name": "north"})
+    elif kind == "array":
+        forces[3, 1] = np.nan
+        path = path.with_suffix(".npy")
+        np.save(path, forces)
     elif kind != "missing":
         np.savetxt(path, forces)
     with pytest.raises(UserError, match=words):

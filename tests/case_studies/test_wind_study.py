@@ -9,7 +9,7 @@ import pytest
 
 from mrpipe.case_studies.indices import WIND_FLOORS, WindResponse, wind_indices
 from mrpipe.case_studies.laws import LAWS
-from mrpipe.case_studies.lqg import observer_gain
+from mrpipe.case_studies.lqg import output_observer_gain
 from mrpipe.case_studies.options import LqgWeights
 from mrpipe.case_studies.run import BinghamDevice, Controller, simulate
 from mrpipe.case_studies.wind.design import CORRELATION_S, SENSOR_DENSITY, wind_outputs
@@ -17,7 +17,7 @@ from mrpipe.case_studies.wind.load import WindLoad, synthetic_wind
 from mrpipe.case_studies.wind.structure import HEIGHT_M, WIDTH_M, Tower, place_device, surrogate_tower
 from mrpipe.case_studies.wind.study import WindStudy, wind_response, wind_sensitivity, wind_study
 from mrpipe.errors import UserError
-from mrpipe.structures.dynamics import discretise_first_order
+from mrpipe.signals.discretisation import discretise_first_order
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,7 @@ def test_tuned_mass_with_its_damper_works(tower: Tower, load: WindLoad) -> None:
 @pytest.mark.oracle
 def test_lqg_loop_in_the_kernel_is_the_joint_linear_system(outrigger: WindStudy) -> None:
     """The kernel's observer and plant against the same recursion written out with matrices."""
-    from mrpipe.structures.dynamics import discretise_first_order, discretise_zero_order
+    from mrpipe.signals.discretisation import discretise_first_order, discretise_zero_order
 
     modal, observer = outrigger.modal, outrigger.observer
     loads = outrigger.load.forces_n[:41]
@@ -184,7 +184,7 @@ def test_lqg_of_the_tower_agrees_with_python_control(outrigger: WindStudy) -> No
     shift = E @ wind @ measured.F.T @ np.linalg.inv(both)
     rest = E @ wind @ E.T - shift @ both @ shift.T
     gain, _, _ = control.lqe(A - shift @ measured.C, np.eye(46), measured.C, 0.5 * (rest + rest.T), both)
-    ours = observer_gain(A, E, measured, wind, noise)
+    ours = output_observer_gain(A, E, measured, wind, noise)
     np.testing.assert_allclose(ours, gain + shift, rtol=1e-9, atol=1e-9 * np.abs(ours).max())
 
 

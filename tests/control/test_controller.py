@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from mrpipe.artifacts import load_parameter_set
 from mrpipe.control import ControllerOptions, Gains, build_controller, inverse_table
-from mrpipe.control.kalman import continuous_kalman_gains, kalman_gains
 from mrpipe.control.kernel import (
     COMMAND_AMPLITUDE,
     COMMAND_DRIVE,
@@ -47,14 +46,6 @@ def motion(rate, seconds, noise=None, omega=8.0, amplitude=0.009):
         x = x + 20e-6 * noise.standard_normal(len(t))
         a = a + 0.1 * noise.standard_normal(len(t))
     return t, x, a, amplitude * omega * np.cos(omega * t)
-
-
-@pytest.mark.literature
-def test_gains_of_the_kalman_filter():
-    k, l = continuous_kalman_gains(20e-6, 0.1)  # noqa: E741
-    assert (k, l) == (pytest.approx(100.0), pytest.approx(5000.0))
-    # sampled fast, the steady filter is the continuous one
-    np.testing.assert_allclose(kalman_gains(20e-6, 0.1, 1e-5)[:2] / 1e-5, [100.0, 5000.0], rtol=2e-3)
 
 
 @pytest.mark.literature

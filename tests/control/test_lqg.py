@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrpipe.control.lqg import Weights, lqg_observer, observer_gain, regulator_gain, state_weight
+from mrpipe.control.lqg import Weights, frame_observer_gain, frame_regulator_gain, lqg_observer, state_weight
 from mrpipe.errors import UserError
-from mrpipe.structures import Frame, discretise_zero_order, state_space
+from mrpipe.signals.discretisation import discretise_zero_order
+from mrpipe.structures import Frame, state_space
 
 control = pytest.importorskip("control")
 
@@ -17,7 +18,7 @@ control = pytest.importorskip("control")
 def test_regulator_equals_the_control_package(thesis_frame, floor_one, weights):
     space = state_space(thesis_frame, floor_one)
     theirs, _, poles = control.lqr(space.A, space.B[:, 1:], state_weight(thesis_frame, weights), [[weights.force]])
-    ours = regulator_gain(thesis_frame, floor_one, weights)
+    ours = frame_regulator_gain(thesis_frame, floor_one, weights)
     np.testing.assert_allclose(ours, theirs[0], rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
     # one minus sign: the loop is stable (errata row 18)
     assert np.max(np.linalg.eigvals(space.A - np.outer(space.B[:, 1], ours)).real) < 0.0
@@ -38,7 +39,7 @@ def test_observer_equals_the_control_package(thesis_frame, floor_one):
     V = np.diag([weights.displacement_noise_m**2] + [weights.acceleration_noise_m_s2**2] * n)
     V += weights.force_noise_n**2 * np.diag(direct**2)
     theirs, _, _ = control.dlqe(Ad, np.eye(2 * n), C, W, V)
-    ours = observer_gain(thesis_frame, floor_one, weights, dt)
+    ours = frame_observer_gain(thesis_frame, floor_one, weights, dt)
     # theirs is the gain of the predictor A P C' (C P C' + V)^-1, as ours
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.abs(ours).max())
 
@@ -66,4 +67,4 @@ def test_observer_follows_the_plant_without_noise(thesis_frame, floor_one):
 def test_singular_mass_is_told(floor_one):
     frame = Frame(np.diag([1.0, 1.0, 1.0, 1.0, 0.0]), np.zeros((5, 5)), np.eye(5), "mine")
     with pytest.raises(UserError, match="frame mine: mass: is singular"):
-        regulator_gain(frame, floor_one, Weights())
+        frame_regulator_gain(frame, floor_one, Weights())

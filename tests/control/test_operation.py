@@ -27,7 +27,7 @@ def operation(item: PlacedCalibration, *, wanted_mode: int = 1, drive_limit: flo
     return operation_of(
         FRAME,
         item,
-        DamperModel("bouc-wen", FRICTION, drive_limit=drive_limit),
+        DamperModel("bouc-wen", FRICTION, "A", drive_limit=drive_limit),
         AMPLITUDE_M,
         wanted_mode=wanted_mode,
         rounding_share=0.05,

@@ -79,6 +79,7 @@ def bench_test(name, role, amplitude, frequency, current, force=None, *, seed=0,
         displacement_raw_m=raw,
         force_raw_n=measured,
         cycles=np.zeros(0, dtype=np.int64),
+        drive_unit="A",
     )
 
 

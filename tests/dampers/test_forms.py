@@ -84,7 +84,7 @@ NUMBERS: dict[str, dict[str, float]] = {
 
 
 def model(name: str) -> DamperModel:
-    return DamperModel(name, {**LAWS, **NUMBERS[name]}, drive_limit=2.0, stroke_m=STROKE)
+    return DamperModel(name, {**LAWS, **NUMBERS[name]}, "A", drive_limit=2.0, stroke_m=STROKE)
 
 
 def motion(dt: float, seconds: float = 1.6) -> tuple[np.ndarray, ...]:
@@ -317,7 +317,7 @@ def test_the_general_loop_contains_those_of_dahl_and_nearly_those_of_bouc_and_we
     t, x, v = motion(1e-3)
     length = {"yield_displacement": 8e-4}
     forces = [
-        DamperModel(name, {**LAWS, **length, **values}, drive_limit=2.0, stroke_m=STROKE).force(
+        DamperModel(name, {**LAWS, **length, **values}, "A", drive_limit=2.0, stroke_m=STROKE).force(
             x, v, np.gradient(v, t), np.full_like(t, DRIVE), 1e-3
         )
         for name, values in (("duhem", numbers), other)
@@ -438,7 +438,7 @@ def test_a_users_own_form_is_one_file(tmp_path: Path) -> None:
     path.write_text(source.read_text(encoding="utf-8").replace('name="biviscous"', 'name="mine"'), encoding="utf-8")
     form = form_of_file(path)
     assert base_form("mine", str(path)).name == form.name == "mine"
-    damper = DamperModel("mine", {**LAWS, "yield_velocity": 0.02}, form_file=str(path))
+    damper = DamperModel("mine", {**LAWS, "yield_velocity": 0.02}, "A", form_file=str(path))
     assert float(damper.quasi_static_force(0.05, DRIVE)) == pytest.approx(YIELD + 0.05 * VISCOSITY)
 
 

@@ -159,11 +159,11 @@ def test_a_faulty_set_is_told_in_one_line(tmp_path: Path, text, message):
 def test_forms_that_round_agree_with_their_post_yield_force():
     common = {"yield_displacement": 1e-4, "yield_force_a": 50.0, "yield_force_b": 20.0, "c0_a": 30.0}
     models = [
-        DamperModel("rounded-yield", {**common, "rounded_force_a": 25.0, "velocity_scale": 0.02}),
-        DamperModel("power-yield", {**common, "reference_velocity": 0.1, "velocity_exponent": 0.2}),
-        DamperModel("saturating-dashpot", {**common, "spring_rate": 4000.0, "velocity_scale": 0.03}),
-        DamperModel("dahl", common),
-        DamperModel("bingham", {**common, "transition_velocity": 0.01}),
+        DamperModel("rounded-yield", {**common, "rounded_force_a": 25.0, "velocity_scale": 0.02}, "A"),
+        DamperModel("power-yield", {**common, "reference_velocity": 0.1, "velocity_exponent": 0.2}, "A"),
+        DamperModel("saturating-dashpot", {**common, "spring_rate": 4000.0, "velocity_scale": 0.03}, "A"),
+        DamperModel("dahl", common, "A"),
+        DamperModel("bingham", {**common, "transition_velocity": 0.01}, "A"),
     ]
     times = np.arange(0.0, 1.0, 1e-3)
     for model in models:

@@ -27,7 +27,7 @@ def added(name: str, form: str, **values: float) -> Addition:
 
 def damper() -> DamperModel:
     inertia = added("inertia", damper_effects()["inertia"].forms[0].name, mass=1.5)
-    return DamperModel("bouc-wen", BASE, drive_limit=2.0, effects=(inertia,), stroke_m=0.02)
+    return DamperModel("bouc-wen", BASE, "A", drive_limit=2.0, effects=(inertia,), stroke_m=0.02)
 
 
 def motion() -> tuple[np.ndarray, ...]:
@@ -44,7 +44,7 @@ def write(model: DamperModel, path: Path) -> Artifact:
 @pytest.mark.property
 def test_an_effect_adds_its_force() -> None:
     x, v, a, u = motion()
-    plain = DamperModel("bouc-wen", BASE, drive_limit=2.0)
+    plain = DamperModel("bouc-wen", BASE, "A", drive_limit=2.0)
     np.testing.assert_allclose(damper().force(x, v, a, u, 1e-3) - plain.force(x, v, a, u, 1e-3), 1.5 * a, atol=1e-9)
 
 
@@ -63,7 +63,7 @@ def test_it_survives_its_artifact(tmp_path: Path) -> None:
 def test_a_saturating_law_survives_its_artifact(tmp_path: Path) -> None:
     numbers = {**BASE, "yield_force_saturating": 80.0, "yield_force_scale": 0.7}
     numbers.pop("yield_force_b")
-    model = DamperModel("bouc-wen", numbers, drive_limit=2.0, laws={"yield_force": "tanh"})
+    model = DamperModel("bouc-wen", numbers, "A", drive_limit=2.0, laws={"yield_force": "tanh"})
     again = read_damper(write(model, tmp_path / "damper.h5"))
     assert again == model
     assert again.unit("yield_force_scale") == "A"
@@ -72,7 +72,9 @@ def test_a_saturating_law_survives_its_artifact(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.yield_force(drive), 40.0 + 80.0 * np.tanh(drive / 0.7))
     x, v, a, u = motion()
     held = again.force(x, v, a, 0 * u + 1.3, 1e-3)
-    polynomial = DamperModel("bouc-wen", {**BASE, "yield_force_a": float(again.yield_force(1.3)), "yield_force_b": 0.0})
+    polynomial = DamperModel(
+        "bouc-wen", {**BASE, "yield_force_a": float(again.yield_force(1.3)), "yield_force_b": 0.0}, "A"
+    )
     np.testing.assert_allclose(held, polynomial.force(x, v, a, 0 * u + 1.3, 1e-3), rtol=1e-9)
 
 
@@ -81,13 +83,13 @@ def test_a_fault_of_sensors_is_no_part_of_the_damper() -> None:
     effect = next(item for item in damper_effects().values() if item.sensor)
     form = effect.forms[0]
     fault = added(effect.name, form.name, **{item.name: 1e-3 for item in form.parameters})
-    model = DamperModel("bouc-wen", BASE, drive_limit=2.0, effects=(fault,))
-    assert model.chain().names == DamperModel("bouc-wen", BASE).chain().names
+    model = DamperModel("bouc-wen", BASE, "A", drive_limit=2.0, effects=(fault,))
+    assert model.chain().names == DamperModel("bouc-wen", BASE, "A").chain().names
 
 
 @pytest.mark.property
 def test_the_force_at_constant_speed_is_simulated_with_effects() -> None:
-    model, plain = damper(), DamperModel("bouc-wen", BASE, drive_limit=2.0)
+    model, plain = damper(), DamperModel("bouc-wen", BASE, "A", drive_limit=2.0)
     speed, drive = np.array([0.02, 0.1, -0.1])[:, None], np.array([0.0, 1.0, 2.0])
     # inertia gives no force at constant speed
     np.testing.assert_allclose(

@@ -23,7 +23,7 @@ def fitted() -> FormFit:
     tests = [
         bench_test(f"t{place}", "training", 8e-3, 1.5, level, seed=place) for place, level in enumerate((0.0, 2.0, 4.0))
     ]
-    return fit_form(problem_of(tests, orders=(2, 1)), FitMethod(starts=1, iterations=15))
+    return fit_form(problem_of(tests, orders=(2, 1)), FitMethod(starts=1, iterations=15), drive_unit="A")
 
 
 def test_the_numbers_of_form_and_laws_are_those_of_the_fit(fitted: FormFit) -> None:

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.planted
 
 def _cells(*currents: object) -> Cells:
     tests = [bench_test(f"t{k}", "training", 8e-3, 1.5, current, seed=k) for k, current in enumerate(currents)]
-    return cells_of(fit_form(problem_of(tests, orders=(2, 1)), FitMethod(starts=1, iterations=15)).fit)
+    return cells_of(fit_form(problem_of(tests, orders=(2, 1)), FitMethod(starts=1, iterations=15), drive_unit="A").fit)
 
 
 def test_tests_of_the_same_drive_are_one_level() -> None:
@@ -48,6 +48,6 @@ def test_a_varying_drive_is_sorted_into_levels() -> None:
 def test_cells_of_a_varying_drive_leave_the_error_of_the_fit() -> None:
     # the mean of a law times a signal over a test is not the law times the mean of the signal
     tests = [bench_test(f"t{k}", "training", 8e-3, 1.5, ("half-sine", 4.0), seed=k) for k in range(2)]
-    found = fit_form(problem_of(tests, orders=(2, 1)), FitMethod(starts=1, iterations=15)).fit
+    found = fit_form(problem_of(tests, orders=(2, 1)), FitMethod(starts=1, iterations=15), drive_unit="A").fit
     errors = fit_laws(cells_of(found), found.problem.base.laws[:2])[0]
     assert float(np.sum(errors)) == pytest.approx(found.cost, rel=0.1)

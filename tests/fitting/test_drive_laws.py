@@ -29,7 +29,7 @@ def recorded_at(levels, law, *, noise=0.3, exact=True):
     """Sines at constant drives of a damper whose yield force follows a law."""
     tests = []
     for place, level in enumerate(levels):
-        damper = DamperModel("bouc-wen", {**BASE, "yield_force_a": float(law(level))})
+        damper = DamperModel("bouc-wen", {**BASE, "yield_force_a": float(law(level))}, "A")
         for amplitude, frequency in ((6e-3, 1.0), (9e-3, 1.7)):
 
             def force(x, v, u, times, damper=damper):

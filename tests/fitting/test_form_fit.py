@@ -55,7 +55,7 @@ def campaign():
 @pytest.fixture(scope="module")
 def fitted(campaign):
     training = [test for test in campaign if test.role == "training"]
-    return fit_form(problem_of(training))
+    return fit_form(problem_of(training), drive_unit="A")
 
 
 @pytest.mark.planted
@@ -128,8 +128,8 @@ def test_standard_errors_cover_what_was_planted(fitted):
 def test_nelder_mead_of_the_thesis_ends_where_least_squares_does(campaign, fitted):
     training = [test for test in campaign if test.role == "training"][::2]
     problem = problem_of(training, maximum_samples=3000)
-    simplex = fit_form(problem, FitMethod("nelder-mead", starts=1))
-    squares = fit_form(problem, FitMethod(starts=1))
+    simplex = fit_form(problem, FitMethod("nelder-mead", starts=1), drive_unit="A")
+    squares = fit_form(problem, FitMethod(starts=1), drive_unit="A")
     assert simplex.training_nrmse == pytest.approx(squares.training_nrmse, rel=1e-3)
     for name in ("yield_displacement", "eta", "gamma_share"):
         assert simplex.model.parameters[name] == pytest.approx(squares.model.parameters[name], rel=0.03)
@@ -139,7 +139,9 @@ def test_nelder_mead_of_the_thesis_ends_where_least_squares_does(campaign, fitte
 @pytest.mark.parametrize("form", sorted(set(NUMBERS) - REDUNDANT))
 def test_every_form_finds_itself(form):
     """Recover planted numbers from exact motion: a test of the fits, not of differentiation."""
-    fit = fit_form(problem_of(planted_tests(form), form, orders=(1, 1), maximum_samples=4000, raw_force=True))
+    fit = fit_form(
+        problem_of(planted_tests(form), form, orders=(1, 1), maximum_samples=4000, raw_force=True), drive_unit="A"
+    )
     assert fit.training_nrmse < 3e-3
     for name, value in NUMBERS[form].items():
         if name == "yield_displacement" and "growth" in NUMBERS[form]:
@@ -156,13 +158,13 @@ def test_every_form_finds_itself(form):
 @pytest.mark.parametrize("form", sorted(REDUNDANT))
 def test_forms_with_redundant_numbers_reach_the_noise(form):
     problem = problem_of(planted_tests(form)[:3], form, orders=(1, 1), maximum_samples=4000, raw_force=True)
-    fit = fit_form(problem, FitMethod(starts=1))
+    fit = fit_form(problem, FitMethod(starts=1), drive_unit="A")
     # along the ridge of the two springs in series the search ends before the noise
     assert fit.training_nrmse < (0.01 if form == "gamota-filisko" else 5e-3)
 
 
 def planted_tests(form):
-    damper = DamperModel(form, {**LAWS, **NUMBERS[form]})
+    damper = DamperModel(form, {**LAWS, **NUMBERS[form]}, "A")
     rows = [(5e-3, 0.8, 0.0), (10e-3, 1.0, 2.0), (5e-3, 2.0, 2.0), (10e-3, 1.8, 0.0)]
     tests = []
     for place, (amplitude, frequency, current) in enumerate(rows):
@@ -217,7 +219,7 @@ def test_the_fit_predicts_what_its_damper_gives(campaign, fitted):
 def test_a_coupled_form_predicts_what_its_damper_gives(form):
     tests = planted_tests(form)[1:3]
     problem = problem_of(tests, form, orders=(0, 0), maximum_samples=4000, raw_force=True)
-    fit = fit_form(problem, FitMethod(starts=1, iterations=12))
+    fit = fit_form(problem, FitMethod(starts=1, iterations=12), drive_unit="A")
     force = np.concatenate(
         [fit.model.force(t.displacement_m, t.velocity_m_s, t.acceleration_m_s2, t.drive, t.dt) for t in tests]
     )
@@ -258,7 +260,7 @@ def test_a_drive_that_steps_between_levels_determines_no_more_than_these(campaig
 @pytest.mark.property
 def test_a_lag_that_cannot_be_told_is_assumed(campaign):
     constant = [test for test in campaign if np.ptp(test.drive) == 0.0 and test.role == "training"]
-    fit = fit_form(problem_of(constant), FitMethod(starts=1, assumed_eta=70.0))
+    fit = fit_form(problem_of(constant), FitMethod(starts=1, assumed_eta=70.0), drive_unit="A")
     assert fit.model.parameters["eta"] == 70.0
     assert "eta" not in fit.names
 

@@ -11,6 +11,7 @@ import pytest
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance, load_parameter_set
 from mrpipe.dampers.model import Addition, DamperModel, damper_from_parameter_set, write_damper
+from mrpipe.errors import UserError
 from mrpipe.law_design import uncertainty as uncertain
 from mrpipe.law_design.identified import damper_uncertainty, frame_uncertainty, traced_damper_uncertainty
 from mrpipe.law_design.problem import scaled_force
@@ -83,7 +84,7 @@ def test_effects_are_drawn_and_their_forces_scaled(tmp_path: Path, damper: Dampe
     uncertainty = traced_damper_uncertainty(identified, _traced(tmp_path / "a.h5", damper, SUMMARY))
     rng = np.random.default_rng(2)
     frame = frame_from_parameter_set("thesis")
-    certain = FrameUncertainty(np.zeros(5), np.zeros(5))
+    certain = FrameUncertainty.none(5)
     draws = [draw(frame, traced, certain, uncertainty, rng) for _ in range(200)]
     shares = np.array([item.damper.effects[0].values["share"] for item in draws])
     assert np.std(shares) == pytest.approx(0.05, rel=0.15)
@@ -102,7 +103,7 @@ def test_a_drawn_frame_keeps_its_ground_motion_and_names(damper: DamperModel) ->
         degrees_of_freedom=tuple("abcde"),
     )
     known = FrameUncertainty(np.full(5, 0.01), np.full(5, 0.001))
-    drawn = draw(frame, damper, known, DamperUncertainty((), np.zeros((0, 0))), np.random.default_rng(1)).frame
+    drawn = draw(frame, damper, known, DamperUncertainty.without_covariance(), np.random.default_rng(1)).frame
     assert (drawn.moved_by_ground, drawn.names) == ((0, 2, 4), frame.names)
     assert not np.allclose(drawn.stiffness, frame.stiffness)
 
@@ -113,3 +114,33 @@ def test_a_frame_without_intervals_is_certain(tmp_path: Path) -> None:
         artifact.put_json("structure", {})
     found = frame_uncertainty(Artifact(tmp_path / "frame.h5"), frame)
     assert not found.frequency_relative.any() and not found.damping_ratio.any()
+
+
+def _frame_artifact(path: Path, bounds: np.ndarray, numbers: list[int]) -> Artifact:
+    with ArtifactWriter.create(path, Provenance("identify-frame")) as artifact:
+        artifact.put("modes/number", np.asarray(numbers, dtype=np.float64), unit="1", dims=("mode",))
+        artifact.put("modes/damping_ratio_interval", bounds, unit="1", dims=("mode", "bound"))
+    return Artifact(path)
+
+
+def test_intervals_belong_to_the_modes_that_were_identified(tmp_path: Path) -> None:
+    bounds = np.array([[0.01, 0.01 + 2.0 * 1.96 * 0.001], [0.02, 0.02 + 2.0 * 1.96 * 0.003]])
+    artifact = _frame_artifact(tmp_path / "frame.h5", bounds, [1, 3])
+    found = frame_uncertainty(artifact, frame_from_parameter_set("thesis"))
+    np.testing.assert_allclose(found.damping_ratio, [0.001, 0.0, 0.003, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("shape", "numbers", "words"),
+    [
+        ((3, 2), [1, 2], r"frame\.h5: modes/damping_ratio_interval: has shape \(3, 2\).*2 identified modes"),
+        ((2, 1), [1, 2], r"frame\.h5: modes/damping_ratio_interval: has shape \(2, 1\)"),
+        ((2, 2), [1, 9], r"frame\.h5: modes/number: holds modes 1 to 9, and the frame has 5"),
+    ],
+)
+def test_intervals_of_a_wrong_shape_are_refused(
+    tmp_path: Path, shape: tuple[int, int], numbers: list[int], words: str
+) -> None:
+    artifact = _frame_artifact(tmp_path / "frame.h5", np.ones(shape), numbers)
+    with pytest.raises(UserError, match=words):
+        frame_uncertainty(artifact, frame_from_parameter_set("thesis"))

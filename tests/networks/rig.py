@@ -56,6 +56,7 @@ def bench_test(
         displacement_raw_m=displacement,
         force_raw_n=force,
         cycles=ups.astype(np.int64),
+        drive_unit="A",
     )
 
 

@@ -72,6 +72,7 @@ def test_rows_of_prepared_tests_carry_their_meaning() -> None:
                 name=f"t{number}", role="training", time_s=t, displacement_m=x, velocity_m_s=v,
                 acceleration_m_s2=np.gradient(v, t), drive=np.full_like(t, drive), force_n=force,
                 sampling_rate_hz=1000.0, displacement_raw_m=x, force_raw_n=force, cycles=np.arange(0, 4000, 500),
+                drive_unit="A",
             )
         )  # fmt: skip
     X, y, groups, spec = network_rows(tests, past_values=2)

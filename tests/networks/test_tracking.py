@@ -59,6 +59,6 @@ def test_defaults_of_the_emulation_stay_within_the_campaign() -> None:
 
 @pytest.mark.property
 def test_sinusoidal_motion_is_consistent() -> None:
-    motion = sinusoidal_motion(0.01, 1.5, 1000.0, 2000.0)
+    motion = sinusoidal_motion(0.01, 1.5, 1000.0, 2000.0, "A")
     speed = np.gradient(motion.channels["displacement"], 1.0 / 2000.0)
     np.testing.assert_allclose(speed[1:-1], motion.channels["velocity"][1:-1], atol=1e-5)

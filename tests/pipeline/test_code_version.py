@@ -47,7 +47,7 @@ def test_tracing_depends_on_every_effect(stage: str, folder: str) -> None:
         ("mrpipe.stages.simulate", "configs/dampers/set-c.yaml"),
         ("mrpipe.stages.simulate", "configs/frames/thesis.yaml"),
         ("mrpipe.stages.record", "configs/dampers/set-c.yaml"),
-        ("mrpipe.stages.benchmark", "configs/structures/ten-storey.yaml"),
+        ("mrpipe.stages.benchmark_ten_storey", "configs/structures/ten-storey.yaml"),
         ("mrpipe.stages.identify_frame", "configs/frames/geometry.yaml"),
     ],
 )

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from mrpipe.artifacts import FloatArray
 from mrpipe.signals.differentiation import backward_difference
 from mrpipe.signals.filters import butterworth_lowpass
-from mrpipe.signals.kalman import discretise, kalman_gains, kinematic_kalman, kinematic_smoother
+from mrpipe.signals.kalman import continuous_kalman_gains, discretise, kinematic_kalman, kinematic_smoother
 
 DT = 1e-3
 NOISE_X, NOISE_A = 20e-6, 0.1
@@ -38,7 +38,7 @@ MOTIONS = [(frequency, amplitude) for frequency in (0.5, 1.0, 2.2) for amplitude
 
 @pytest.mark.literature
 def test_gains_of_errata_d() -> None:
-    gains = kalman_gains(NOISE_X, NOISE_A)
+    gains = continuous_kalman_gains(NOISE_X, NOISE_A)
     assert gains.l == pytest.approx(5000.0) and gains.k == pytest.approx(100.0) and gains.m == 0.0
 
 
@@ -46,7 +46,7 @@ def test_gains_of_errata_d() -> None:
 @pytest.mark.parametrize(("frequency", "amplitude"), MOTIONS)
 def test_velocity_error_of_errata_d(frequency: float, amplitude: float) -> None:
     x, a, v = sine(frequency, amplitude, seed=7)
-    error = rms(kinematic_kalman(x, a, DT, kalman_gains(NOISE_X, NOISE_A))[1] - v)
+    error = rms(kinematic_kalman(x, a, DT, continuous_kalman_gains(NOISE_X, NOISE_A))[1] - v)
     assert 0.8 * 0.4e-3 < error < 1.2 * 0.8e-3
     # the steady covariance of the continuous filter says what the error must be
     expected = np.sqrt(np.sqrt(2.0) * NOISE_A**1.5 * NOISE_X**0.5 * DT)
@@ -64,10 +64,10 @@ def test_difference_and_causal_filter_err_as_errata_d_says(frequency: float, amp
 @pytest.mark.literature
 def test_a_bias_of_the_accelerometer_and_its_remedy() -> None:
     x, a, v = sine(1.0, 5e-3, seed=1)
-    gains = kalman_gains(NOISE_X, NOISE_A)
+    gains = continuous_kalman_gains(NOISE_X, NOISE_A)
     error = kinematic_kalman(x, a + 0.3, DT, gains)[1] - v
     assert np.mean(error[2000:]) == pytest.approx(0.3 * gains.k / gains.l, rel=0.02)
-    _, velocity, bias = kinematic_kalman(x, a + 0.3, DT, kalman_gains(NOISE_X, NOISE_A, 0.2))
+    _, velocity, bias = kinematic_kalman(x, a + 0.3, DT, continuous_kalman_gains(NOISE_X, NOISE_A, 0.2))
     assert abs(np.mean((velocity - v)[5000:])) < 0.02 * 0.3 * gains.k / gains.l
     assert np.mean(bias[5000:]) == pytest.approx(0.3, rel=0.02)
     # forwards and backwards the bias cancels without a state for it
@@ -79,7 +79,7 @@ def test_a_bias_of_the_accelerometer_and_its_remedy() -> None:
 @pytest.mark.parametrize(("frequency", "amplitude"), MOTIONS)
 def test_smoothing_halves_the_variance_and_adds_no_delay(frequency: float, amplitude: float) -> None:
     x, a, v = sine(frequency, amplitude, seed=3)
-    gains = kalman_gains(NOISE_X, NOISE_A)
+    gains = continuous_kalman_gains(NOISE_X, NOISE_A)
     ahead, both = (method(x, a, DT, gains)[1] - v for method in (kinematic_kalman, kinematic_smoother))
     assert rms(both) < 0.8 * rms(ahead)
     lag = np.sum(both[2000:-2000] * np.gradient(v, DT)[2000:-2000]) / np.sum(np.gradient(v, DT)[2000:-2000] ** 2)
@@ -89,7 +89,7 @@ def test_smoothing_halves_the_variance_and_adds_no_delay(frequency: float, ampli
 @pytest.mark.oracle
 @pytest.mark.parametrize("drift", [0.0, 0.02, 3.0])
 def test_gains_equal_the_riccati_solution_of_control(drift: float) -> None:
-    gains = kalman_gains(NOISE_X, NOISE_A, drift)
+    gains = continuous_kalman_gains(NOISE_X, NOISE_A, drift)
     size = 3 if drift else 2
     state = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])[:size, :size]
     noise = np.diag([0.0, NOISE_A**2, drift**2])[:size, :size]
@@ -100,7 +100,7 @@ def test_gains_equal_the_riccati_solution_of_control(drift: float) -> None:
 
 @pytest.mark.oracle
 def test_recursion_equals_the_differential_equation() -> None:
-    gains = kalman_gains(NOISE_X, NOISE_A, 0.05)
+    gains = continuous_kalman_gains(NOISE_X, NOISE_A, 0.05)
     rng = np.random.default_rng(0)
     y, a = 1e-3 * rng.standard_normal(60), rng.standard_normal(60)
     t = np.arange(60) * DT
@@ -127,7 +127,7 @@ def test_recursion_equals_the_differential_equation() -> None:
 def test_the_filter_is_stable_and_true_to_constant_acceleration(
     noise_x: float, noise_a: float, drift: float, dt: float
 ) -> None:
-    gains = kalman_gains(noise_x, noise_a, drift)
+    gains = continuous_kalman_gains(noise_x, noise_a, drift)
     transition, previous, present = discretise(gains, dt)
     active = 3 if drift > 0.0 else 2
     assert np.max(np.abs(np.linalg.eigvals(transition[:active, :active]))) < 1.0
@@ -143,4 +143,4 @@ def test_the_filter_is_stable_and_true_to_constant_acceleration(
 @pytest.mark.parametrize("levels", [(0.0, 0.1, 0.0), (1e-5, -1.0, 0.0), (1e-5, 0.1, -1.0)])
 def test_noise_levels_must_be_above_zero(levels: tuple[float, float, float]) -> None:
     with pytest.raises(ValueError, match="above zero"):
-        kalman_gains(*levels)
+        continuous_kalman_gains(*levels)

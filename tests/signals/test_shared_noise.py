@@ -66,7 +66,7 @@ def recorded(noise: Callable[[np.random.Generator], np.ndarray], motions: list[n
         tests.append(
             PreparedTest(
                 f"{number}", "training", RATE, TIME, x, v, np.gradient(v, 1.0 / RATE), np.ones_like(x), v,
-                x + noise(rng), v, np.array([], dtype=np.int64),
+                x + noise(rng), v, np.array([], dtype=np.int64), "A",
             )
         )  # fmt: skip
     return tests

@@ -25,7 +25,8 @@ def test_headers_separators_and_units(tmp_path):
 @pytest.mark.parametrize(
     ("text", "unit", "words"),
     [
-        ("0 1\n0 2\n", "m/s^2", "row 2: time does not rise"),
+        ("0 1\n0 2\n", "m/s^2", "line 2: time does not rise"),
+        ("time a\n\n0 1\n# pause\n0 2\n", "m/s^2", "line 5: time does not rise"),
         ("0 1\n1\n", "m/s^2", "line 2: has no two numbers"),
         ("a b\n", "m/s^2", "holds 0 rows"),
         ("0 1\n1 2\n", "mm", "is not a unit of acceleration"),
@@ -64,7 +65,10 @@ def test_a_gap_in_a_record_is_told_and_a_history_of_straight_lines_is_not(tmp_pa
     path = tmp_path / "record.txt"
     time = np.concatenate([np.arange(50) * 0.01, 3.0 + np.arange(50) * 0.01])
     np.savetxt(path, np.column_stack([time, np.cos(time)]))
-    with pytest.raises(UserError, match=r"row 51: time jumps from 0\.49 to 3 s, and other rows are 0\.01 s"):
+    with pytest.raises(UserError, match=r"line 51: time jumps from 0\.49 to 3 s, and other rows are 0\.01 s"):
+        read_histories(path, "m/s^2")
+    path.write_text("time [s] acceleration\n\n" + path.read_text())
+    with pytest.raises(UserError, match="line 53: time jumps"):
         read_histories(path, "m/s^2")
     path.write_text("0 0\n1 5\n2 5\n60 5\n61 0\n")
     assert read_histories(path, "m/s^2")[0][-1] == 61.0

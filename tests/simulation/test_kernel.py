@@ -8,7 +8,7 @@ import pytest
 from mrpipe.control.gains import Gains
 from mrpipe.dampers.drive import driver_lag_apart
 from mrpipe.dampers.plant import Phase, Step, build_chain, idle_step
-from mrpipe.simulation import LoopOptions, kernel, simulate_law
+from mrpipe.simulation import LoopOptions, implicit_force, simulate_law
 from mrpipe.simulation.parts import BOUC_WEN
 
 
@@ -49,7 +49,7 @@ def test_force_and_motion_at_the_end_of_a_step_belong_together(rig):
     options = LoopOptions(tracking="unclipped", plant_rate_hz=2000.0, record_rate_hz=2000.0)
     found = simulate_law(rig.frame, None, rig.controller("vdps", gains), rig.excitation(0.7, 3), options)
     law = 650.0 * found.damper_velocity + 1500.0 * found.damper_displacement
-    tolerance = kernel.TOLERANCE_N + 1e-6 * np.abs(law).max()
+    tolerance = implicit_force.TOLERANCE_N + 1e-6 * np.abs(law).max()
     np.testing.assert_allclose(found.force[1:], law[1:], atol=tolerance)
 
 

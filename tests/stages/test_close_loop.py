@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mrpipe.artifacts import ArtifactWriter, Provenance
+from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.config.loader import LoadedConfig, load_config
 from mrpipe.config.model import config_model
 from mrpipe.control.calibration import CalibrationOptions, calibrate
@@ -18,6 +18,7 @@ from mrpipe.control.laws import law_names
 from mrpipe.control.lqg import Weights
 from mrpipe.control.neural import ReferenceOptions, train_reference
 from mrpipe.control.storage import write_calibration
+from mrpipe.effects.damper import read_damper
 from mrpipe.effects.library import damper_effects
 from mrpipe.fitting.damper import damper_model
 from mrpipe.pipeline.fingerprint import FileHashes, plain_settings
@@ -101,15 +102,19 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def tests() -> list[PreparedTest]:
-    # a few of them do: what is tested is what becomes of a verdict
-    return [test for k, test in enumerate(campaign("accumulator")) if k in (0, 1, 3, 6, 8, 11, 12)]
+    # a few of them do: what is tested is what becomes of a verdict; in volts, because amperes are the usual unit
+    return [
+        replace(test, drive_unit="V") for k, test in enumerate(campaign("accumulator")) if k in (0, 1, 3, 6, 8, 11, 12)
+    ]
 
 
 @pytest.fixture(scope="module")
 def traced(tests: list[PreparedTest]) -> Tracing:
     library = {name: damper_effects()[name] for name in ("accumulator",)}
     few = ("bouc-wen", "dahl")
-    options = TracingOptions(base_forms=few, refits=1, bootstrap_draws=50, most_effects=1, observation_filter=False)
+    options = TracingOptions(
+        base_forms=few, refits=1, bootstrap_draws=50, most_effects=1, observation_filter=False, drive_unit="V"
+    )
     return trace_campaign(tests, library, [], options, rng=np.random.default_rng(1))
 
 
@@ -253,3 +258,10 @@ def test_files_are_settings_that_keep_what_was_there(
     config = load_config(base, [], [tmp_path / "corrections.yaml", tmp_path / "next-tests.yaml"]).config
     assert config.prepare.corrections.force_offset_n == {"00-sine": 2.0}
     assert [item.name for item in config.laboratory.bench.tests] == ["own", *(item["name"] for item in wanted["tests"])]
+
+
+@pytest.mark.property
+def test_the_drive_of_a_campaign_in_volts_is_stored_in_volts(tmp_path: Path, traced: Tracing) -> None:
+    close_loop._write(context(tmp_path, {}), traced, traced.summary)
+    assert Artifact(tmp_path / "close-loop.h5").unit("validation/drive") == "V"
+    assert read_damper(Artifact(tmp_path / close_loop.TRACED)).drive_unit == "V"

@@ -4,8 +4,6 @@ import pytest
 from mrpipe.structures import (
     Frame,
     complex_modes,
-    discretise_first_order,
-    discretise_zero_order,
     floor_position,
     frame_from_parameter_set,
     frequency_response,
@@ -17,33 +15,6 @@ from mrpipe.structures import (
 
 def one_floor(zeta=0.05):
     return shear_frame([2.0], [200.0], zeta)
-
-
-@pytest.mark.property
-def test_exact_step_equals_the_analytic_decay():
-    frame = one_floor()
-    space = state_space(frame)
-    step, _ = discretise_zero_order(space.A, space.B, 0.01)
-    state = np.array([1e-3, 0.0])
-    for _ in range(500):
-        state = step @ state
-    omega, zeta = 10.0, 0.05
-    damped = omega * np.sqrt(1 - zeta**2)
-    t = 5.0
-    exact = 1e-3 * np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta / np.sqrt(1 - zeta**2) * np.sin(damped * t))
-    assert state[0] == pytest.approx(exact, rel=1e-9)
-
-
-@pytest.mark.property
-def test_first_order_hold_is_exact_for_a_ramp():
-    frame = one_floor(1e-9)
-    space = state_space(frame)
-    step, first, second = discretise_first_order(space.A, space.B, 0.02)
-    state = np.zeros(2)
-    for k in range(300):
-        state = step @ state + first @ [0.02 * k] + second @ [0.02 * (k + 1)]
-    t = 6.0  # x'' + 100 x = -t
-    assert state[0] == pytest.approx(-(t / 100.0 - np.sin(10.0 * t) / 1000.0), rel=1e-6)
 
 
 @pytest.mark.property

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from mrpipe.structures import discretise_first_order, floor_position, frame_from_parameter_set, state_space
+from mrpipe.signals.discretisation import discretise_first_order
+from mrpipe.structures import floor_position, frame_from_parameter_set, state_space
 from mrpipe.structures.response import linear_response
 
 

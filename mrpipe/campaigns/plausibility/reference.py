@@ -179,7 +179,8 @@ class ReferenceMap:
     def coefficients(self, without: Collection[int]) -> FloatArray:
         """Return the coefficients that fit all tests but those with the indices `without`, shape (p,)."""
         kept = [index for index in range(len(self.parts)) if index not in without]
-        return self._solved(self._matrices[kept].sum(axis=0)[None], self._vectors[kept].sum(axis=0)[None])[0]
+        solved = self._solved(self._matrices[kept].sum(axis=0)[None], self._vectors[kept].sum(axis=0)[None])
+        return np.asarray(solved[0])
 
     def jackknife(self, without: Collection[int]) -> FloatArray:
         """Return the coefficients without one more test each, for all tests not in `without`, shape (m, p)."""

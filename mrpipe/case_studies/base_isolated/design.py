@@ -13,7 +13,7 @@ from mrpipe.case_studies.gains import damped_modes, viscous_for_damping
 from mrpipe.case_studies.lqg import (
     Outputs,
     SampledController,
-    observer_gain,
+    output_observer_gain,
     output_regulator_gain,
     sampled_controller,
 )
@@ -149,5 +149,5 @@ def isolation_lqg(
     Q = np.diag([weights.displacement] * 2 + [weights.acceleration] * 4)
     feedback = output_regulator_gain(A, B, regulated, Q, np.eye(2) / weights.force_n**2)
     noise = np.diag([1e-4**2] * 2 + [1e-3**2] * 2 + [1e-2**2] * 4) * weights.interval_s
-    gain = observer_gain(A, modal.input_matrix(modal.load), measured, 0.1 * np.eye(2), noise)
+    gain = output_observer_gain(A, modal.input_matrix(modal.load), measured, 0.1 * np.eye(2), noise)
     return sampled_controller(A, B, measured, feedback, gain, weights.interval_s)

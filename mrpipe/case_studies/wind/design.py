@@ -11,7 +11,7 @@ from mrpipe.case_studies.indices import WIND_FLOORS
 from mrpipe.case_studies.lqg import (
     Outputs,
     SampledController,
-    observer_gain,
+    output_observer_gain,
     output_regulator_gain,
     sampled_controller,
     sampled_loop_radius,
@@ -150,7 +150,9 @@ def wind_lqg(modal: ModalModel, weights: LqgWeights, load: WindLoad) -> tuple[Sa
     Q = np.diag([weights.displacement] * nine + [0.0] * nine + [weights.acceleration] * nine)
     # the wind as white noise of the same variance over a few seconds of correlation
     covariance = np.cov(load.forces_n.T) * CORRELATION_S
-    gain = observer_gain(A, modal.input_matrix(modal.load), measured, covariance, SENSOR_DENSITY * np.eye(2 * nine))
+    gain = output_observer_gain(
+        A, modal.input_matrix(modal.load), measured, covariance, SENSOR_DENSITY * np.eye(2 * nine)
+    )
 
     def design(force_n: float) -> SampledController:
         feedback = output_regulator_gain(A, B, regulated, Q, np.eye(1) / force_n**2)

@@ -153,7 +153,8 @@ def read_wind(path: Path, floors: int, *, unit: str = "kN", interval_s: float | 
     Raises
     ------
     UserError
-        If the file is missing, not a matrix with this number of columns, not finite, or its interval is unknown.
+        If the file is missing, not a matrix of finite numbers with this number of columns, or its interval is unknown.
+        For text, the message names line and column.
     """
     path = Path(path)
     if not path.is_file():
@@ -179,16 +180,55 @@ def read_wind(path: Path, floors: int, *, unit: str = "kN", interval_s: float | 
 
 
 def _matrix(path: Path) -> FloatArray:
-    try:
-        if path.suffix.lower() == ".npy":
-            return np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
-        if path.suffix.lower() == ".mat":
-            from scipy.io import loadmat
+    """Return the matrix in a file, of any shape."""
+    readers = {".npy": _numpy_array, ".mat": _matlab_array}
+    return readers.get(path.suffix.lower(), _rows_of_text)(path)
 
-            arrays = [value for key, value in loadmat(path).items() if not key.startswith("__")]
-            return np.asarray(max(arrays, key=np.size), dtype=np.float64)
-        text = path.read_text(encoding="latin-1").replace(",", " ").replace(";", " ")
-        rows = [line for line in text.splitlines() if line.strip() and line.strip()[0] not in "%#"]
-        return np.array([[float(word) for word in row.split()] for row in rows])
-    except Exception as error:  # readers of three formats raise a dozen kinds
-        raise UserError(path, "", "is not a matrix of forces", "rows of numbers, one a sample") from error
+
+def _numpy_array(path: Path) -> FloatArray:
+    try:
+        return np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
+    except (OSError, ValueError, TypeError) as error:
+        raise UserError(
+            path, "", f"is not an array of numbers ({error})", "store one matrix, a row a sample"
+        ) from error
+
+
+def _matlab_array(path: Path) -> FloatArray:
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path)
+    except Exception as error:  # scipy raises half a dozen kinds for a bad file
+        raise UserError(path, "", f"not a MATLAB file that can be read ({error})", "save it as version 7") from error
+    arrays = [np.asarray(value) for key, value in content.items() if not key.startswith("__")]
+    arrays = [array for array in arrays if array.dtype.kind in "fiu"]
+    if not arrays:
+        raise UserError(path, "", "holds no array of real numbers", "store one matrix, a row a sample")
+    return np.asarray(max(arrays, key=np.size), dtype=np.float64)
+
+
+def _rows_of_text(path: Path) -> FloatArray:
+    """Return the rows of a text; blank lines and those that begin with % or # are left out."""
+    rows: list[list[float]] = []
+    for number, line in enumerate(path.read_text(encoding="latin-1").splitlines(), start=1):
+        words = line.replace(",", " ").replace(";", " ").split()
+        if not words or words[0][0] in "%#":
+            continue
+        rows.append([_number(path, word, number, column) for column, word in enumerate(words, start=1)])
+        if len(words) != len(rows[0]):
+            problem = f"has {len(words)} numbers, the first row {len(rows[0])}"
+            raise UserError(path, f"line {number}", problem, "write a force for each floor in each row")
+    return np.array(rows)
+
+
+def _number(path: Path, word: str, line: int, column: int) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value, problem = np.nan, f"{word[:30]!r} is not a number"
+    else:
+        problem = "is not finite"
+    if not np.isfinite(value):
+        raise UserError(path, f"line {line}, column {column}", problem, "write a force in each column")
+    return value

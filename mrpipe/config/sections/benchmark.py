@@ -6,35 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from mrpipe.case_studies.options import LqgWeights, WindClimate
+from mrpipe.case_studies.options import LqgWeights, MotionSettings, WindClimate
 from mrpipe.options import Section
-
-
-class MotionSettings(Section):
-    """A ground motion."""
-
-    file: str = Field(
-        "synthetic",
-        description="Record: `synthetic` (spectrum-compatible, seeded), a path (AT2, text, csv, mat), or the name of a "
-        "public record if the public data are present: elcentro, erzikan, jiji, kobe, newhall, rinaldi, sylmar, "
-        "elcentro-ns.",
-    )
-    second_file: str | None = Field(
-        None, description="Record of the second horizontal component, if each component has a separate file (AT2)."
-    )
-    unit: str | None = Field(
-        None, description="Unit of the samples (g, cm/s^2, m/s^2); null: from the header, or from the size of the peak."
-    )
-    interval_s: float | None = Field(
-        None, gt=0.0, description="Sampling interval [s] of a record with neither clock nor DT; null: that of the file."
-    )
-    resampled_interval_s: float | None = Field(
-        None, gt=0.0, description="Interval to which the record is resampled without aliasing [s]; null: not resampled."
-    )
-    peak_ground_g: float = Field(
-        0.3, gt=0.0, description="Design ground acceleration on rock of the synthetic motion [g]."
-    )
-    duration_s: float = Field(30.0, gt=5.0, description="Length of the synthetic motion [s].")
 
 
 class TenStoreySettings(Section):

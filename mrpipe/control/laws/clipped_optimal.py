@@ -8,7 +8,7 @@ from mrpipe.artifacts import FloatArray, IntArray
 from mrpipe.control.kernel import DRIVE_LIMIT, LAW_SIGNATURE, MEASURED_FORCE, S_REQUEST
 from mrpipe.control.law import Law
 from mrpipe.control.laws._regulator import C_OBSERVE, observe, regulator_assessment
-from mrpipe.control.lqg import lqg_observer, regulator_gain
+from mrpipe.control.lqg import frame_regulator_gain, lqg_observer
 
 
 @njit(LAW_SIGNATURE, cache=True)
@@ -33,6 +33,8 @@ LAW = Law(
 """,
     c_helpers=C_OBSERVE,
     needs=frozenset({"observer", "floor-accelerations", "damper-force", "drive-limit"}),
-    assess=lambda plant, _: regulator_assessment(plant, regulator_gain(plant.frame, plant.position, plant.weights)),
+    assess=lambda plant, _: regulator_assessment(
+        plant, frame_regulator_gain(plant.frame, plant.position, plant.weights)
+    ),
     observer=lqg_observer,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mrpipe.control.law import Law
 from mrpipe.control.laws._regulator import C_BODY, C_OBSERVE, regulator_assessment, regulator_force
-from mrpipe.control.lqg import lqg_observer, regulator_gain
+from mrpipe.control.lqg import frame_regulator_gain, lqg_observer
 
 LAW = Law(
     name="lqg",
@@ -14,6 +14,8 @@ LAW = Law(
     c_body=C_BODY,
     c_helpers=C_OBSERVE,
     needs=frozenset({"observer", "floor-accelerations"}),
-    assess=lambda plant, _: regulator_assessment(plant, regulator_gain(plant.frame, plant.position, plant.weights)),
+    assess=lambda plant, _: regulator_assessment(
+        plant, frame_regulator_gain(plant.frame, plant.position, plant.weights)
+    ),
     observer=lqg_observer,
 )

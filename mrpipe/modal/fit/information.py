@@ -53,7 +53,7 @@ def poles_of_fit(fit: MultiModeFit, spectra: Sequence[RecordSpectrum]) -> FloatA
 
     def theta_of(others: list[int]) -> FloatArray:
         omegas = np.concatenate([fit.angular_frequencies, omega[others]])
-        return np.log(np.concatenate([omegas, fit.damping_ratios, zeta[others]]))
+        return np.asarray(np.log(np.concatenate([omegas, fit.damping_ratios, zeta[others]])))
 
     def criterion(others: list[int]) -> float:
         theta = theta_of(others)

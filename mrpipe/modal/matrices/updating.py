@@ -268,7 +268,7 @@ def _jackknife(values: Sequence[FloatArray]) -> FloatArray:
     """Return the half widths of 95 % intervals of logarithms from fits that each leave one mode out."""
     logs = np.log(np.stack(values))
     squares = np.sum((logs - logs.mean(axis=0)) ** 2, axis=0)
-    return np.minimum(_NORMAL_95 * np.sqrt((len(logs) - 1) / len(logs) * squares), _RANGE)
+    return np.asarray(np.minimum(_NORMAL_95 * np.sqrt((len(logs) - 1) / len(logs) * squares), _RANGE))
 
 
 def _collect(problem: _Problem, theta: FloatArray, jacobian: FloatArray, cost: float) -> UpdatedModel:

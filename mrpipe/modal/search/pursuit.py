@@ -97,7 +97,8 @@ def _improvement(before: FloatArray, added: FloatArray, q: FloatArray) -> float:
     seen = first > 0.0
     count = before.shape[0]
     likelihood = float(np.sum(count * np.log(first[seen] / np.maximum(second[seen], 1e-12 * first[seen]))))
-    return likelihood - (left.shape[1] * int(seen.sum()) + 2) * float(np.log(count * int(seen.sum())))
+    parameters = int(left.shape[1]) * int(seen.sum()) + 2
+    return likelihood - parameters * float(np.log(count * int(seen.sum())))
 
 
 def _unit(columns: FloatArray) -> FloatArray:

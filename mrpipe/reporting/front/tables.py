@@ -133,7 +133,7 @@ def determined(low: float, high: float) -> bool:
     return low * high <= 0.0 or large <= UNDETERMINED * small
 
 
-def wanted_tests(tests: Sequence[Mapping[str, Any]], drive_unit: str = "A") -> pd.DataFrame:
+def wanted_tests(tests: Sequence[Mapping[str, Any]], drive_unit: str) -> pd.DataFrame:
     """Return tests to be made, with the headings and units that people use."""
     headings = {**_COLUMNS, "current_a": (f"largest drive [{drive_unit}]", 1.0)}
     rows = []

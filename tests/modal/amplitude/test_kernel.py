@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrpipe.modal.amplitude.kernel import simulate_modes
-from mrpipe.structures.dynamics import discretise_first_order
+from mrpipe.signals.discretisation import discretise_first_order
 
 pytestmark = pytest.mark.property
 

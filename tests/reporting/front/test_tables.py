@@ -39,7 +39,7 @@ def test_the_drive_of_tests_to_be_made_is_in_the_unit_of_the_campaign(unit: str)
 
 def test_tests_to_be_made_are_in_practical_units() -> None:
     frame = wanted_tests(
-        [{"name": "a", "amplitude_m": 0.0083, "later": True, "current": "steps", "rounds": 3}, {"name": "b"}]
+        [{"name": "a", "amplitude_m": 0.0083, "later": True, "current": "steps", "rounds": 3}, {"name": "b"}], "A"
     )
     assert list(frame.columns) == ["test", "amplitude [mm]", "drive", "rounds"]
     assert frame["amplitude [mm]"].tolist() == ["8.30", "-"]

@@ -37,7 +37,19 @@ def motions(role: str) -> list[PreparedTest]:
         none, cycles = np.zeros_like(x), np.round(np.arange(0.0, 4.0 * frequency) / frequency / 0.002).astype(np.int64)
         tests.append(
             PreparedTest(
-                f"{role}-{number}", role, 500.0, time, x, v, -w * w * x, np.full_like(x, drive), none, x, none, cycles
+                f"{role}-{number}",
+                role,
+                500.0,
+                time,
+                x,
+                v,
+                -w * w * x,
+                np.full_like(x, drive),
+                none,
+                x,
+                none,
+                cycles,
+                "A",
             )
         )
     return tests

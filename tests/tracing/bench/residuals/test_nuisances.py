@@ -24,7 +24,7 @@ def recordings(tests: int = 6, seconds: float = 6.0) -> Recordings:
         found.append(
             PreparedTest(
                 f"t{k}", "training", RATE, t, x, np.gradient(x, 1 / RATE), zeros, zeros, force, x, force,
-                np.array([], dtype=np.int64),
+                np.array([], dtype=np.int64), "A",
             )
         )  # fmt: skip
     return record_tests(found, rate_hz=100.0)
@@ -92,7 +92,7 @@ def switched(rise: float, fall: float) -> Recordings:
         zeros = np.zeros_like(t)
         found.append(
             PreparedTest(
-                f"s{k}", "training", RATE, t, x, v, zeros, drive, force, x, force, np.array([], dtype=np.int64)
+                f"s{k}", "training", RATE, t, x, v, zeros, drive, force, x, force, np.array([], dtype=np.int64), "A"
             )
         )
     return record_tests(found, rate_hz=RATE)

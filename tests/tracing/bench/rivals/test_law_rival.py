@@ -40,7 +40,7 @@ def campaign(driver: bool) -> list[PreparedTest]:
         a = np.gradient(v, 1.0 / RATE)
         tests.append(
             PreparedTest(
-                f"{number}", "training", RATE, TIME, x, v, a, drive, force, x, force, np.array([], dtype=np.int64),
+                f"{number}", "training", RATE, TIME, x, v, a, drive, force, x, force, np.array([], dtype=np.int64), "A",
             )
         )  # fmt: skip
     return tests
