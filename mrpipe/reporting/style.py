@@ -80,7 +80,8 @@ def place_legends(figure: Figure) -> None:
 def as_svg(figure: Figure) -> str:
     """Return a figure as an SVG element without time stamp, so that the same figure is the same text.
 
-    Texts stay texts (searchable, small); coordinates are rounded to a hundredth of a point.
+    Texts stay texts (searchable, small). Coordinates are cut to a hundredth of a point: these are the numbers in the
+    attributes of elements, because the content of an element is a text that a reader sees.
     """
     buffer = io.StringIO()
     place_legends(figure)
@@ -89,5 +90,5 @@ def as_svg(figure: Figure) -> str:
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
-    text = re.sub(r"(\d+\.\d{2})\d+", r"\1", text)
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d+\.\d{2})\d+", r"\1", tag[0]), text)
     return re.sub(r"\n\s*", "\n", text)
