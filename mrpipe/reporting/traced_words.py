@@ -1,4 +1,4 @@
-"""Words on what a tracing found: an exchanged base form, and the numbers of an effect, the well-determined ones first."""
+"""Words on what a tracing found: an exchanged base form, and the numbers of effects, well-determined ones first."""
 
 from __future__ import annotations
 
