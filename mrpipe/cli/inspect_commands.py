@@ -75,10 +75,11 @@ def check(
     """
     from mrpipe.cli import checking
     from mrpipe.cli.output import print_json
-    from mrpipe.cli.session import load
+    from mrpipe.cli.session import load, run_directory
     from mrpipe.errors import CheckFailed
 
     loaded = load(replace(options, quiet=True))
+    run_directory(options, loaded)  # refuses a name that cannot be that of a directory
     checking.check_stages(loaded)
     if explain:
         _explain(loaded.config, options.json)
