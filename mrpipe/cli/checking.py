@@ -65,9 +65,11 @@ def check_stages(loaded: LoadedConfig) -> None:
     UserError
         If a stage is unknown or its settings do not fit together.
     """
+    from mrpipe.cli.session import require_stages
     from mrpipe.pipeline.settings_view import SettingsView
     from mrpipe.stages.registry import stage_named
 
+    require_stages(loaded)
     config = _without_own_effects(loaded)
     for name in loaded.config.stages:
         stage = None if name == "report" else stage_named(name)

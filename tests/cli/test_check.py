@@ -346,3 +346,12 @@ def test_a_name_that_cannot_be_that_of_a_directory(
     config.write_text(config.read_text().replace("name: own", f"name: '{name}'"), encoding="utf-8")
     status, _, err = checked(capsys, str(config))
     assert status == 2 and f"name: {name!r}: is not the name of a directory" in err
+
+
+@pytest.mark.golden
+def test_a_campaign_on_the_command_line_is_what_was_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project(tmp_path / "my rig")
+    campaign = str(tmp_path / "my rig" / "data")
+    status, out, _ = checked(capsys, "--campaign", campaign)
+    assert status == 0 and out.startswith(f"campaign {campaign}: valid")
+    assert f"next: mrpipe run --campaign '{campaign}'" in out
