@@ -299,7 +299,11 @@ def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tu
         known = reader.drive_units.setdefault("drive", units.SI_UNITS[kind])
         if known != units.SI_UNITS[kind]:
             problem = f"is in {units.SI_UNITS[kind]} in {dotted(place)} and in {known} in the tests before"
-            raise reader.source.error(_place_of(reader, name, place), problem, "use one of the two")
+            remedy = (
+                "use one of the two; a command in V becomes the current with unit: A, scale: (A per V) and offset: "
+                "(A at 0 V)"
+            )
+            raise reader.source.error(_place_of(reader, name, place), problem, remedy)
         quantity = kind
     if channel.mass_kg is not None:
         quantity = "acceleration"
