@@ -119,10 +119,13 @@ def _describe_data(path: Path) -> dict[str, Any]:
     import numpy as np
 
     from mrpipe.campaigns.proposal.columns import open_columns
+    from mrpipe.campaigns.proposal.unreadable import why_no_columns
 
-    _, columns = open_columns(path)
+    file, columns = open_columns(path)
     if not columns:
-        raise UserError(path, "", "holds no column of numbers", "name a file of measurements")
+        why = why_no_columns(file)
+        few = why if why.startswith("has ") else "holds no column of numbers"
+        raise UserError(path, "", few, "name a file of measurements")
     rows = [
         {
             "name": item.name,

@@ -81,7 +81,8 @@ class History:
 
         It is at most 2 (:data:`CONTINUOUS`) for the displacement of periodic tests, because one test ends one sample
         before its zero crossing and the next begins one sample after it. A test whose motion is not periodic is used
-        completely, so that the displacement may have a step of any size at its ends. The ratio is 0 if the channel is constant within every test (constant drive).
+        completely, so that the displacement may have a step of any size at its ends. The ratio is 0 if the channel is
+        constant within every test (constant drive).
         """
         values = self.channels[channel]
         steps = np.abs(np.diff(values))

@@ -137,6 +137,10 @@ def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: d
         ({"part": 2}, "part: is 2, the file has 1"),
         ({"file": "one.xls"}, "one.xls: data file not found"),
         ({"drive": {"value": 1.0, "unit": "V"}}, "drive: is in A in tests[1] and in V in the tests before"),
+        (
+            {"drive": {"value": 1.0, "unit": "V"}},
+            "a command in V becomes the current with unit: A, scale:",
+        ),
         ({"drive": {"value": 1.0, "column": "i", "unit": "A"}}, "either column or value expected, not both"),
         ({"drive": {"value": float("inf"), "unit": "A"}}, "a finite number expected"),
     ],
