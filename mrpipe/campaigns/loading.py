@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -141,7 +142,9 @@ def _folder(source: YamlSource, entry: CampaignEntry) -> Path:
     folder = source.path.parent / entry.directory
     if not folder.is_dir():
         raise source.error(("directory",), f"{entry.directory!r} is not a directory", "name the folder of the files")
-    return folder
+    # messages name files in it; `..` after a link leads elsewhere than its text says
+    short = Path(os.path.normpath(folder))
+    return short if short.is_dir() and short.samefile(folder) else folder
 
 
 def _channels(source: YamlSource, content: dict[str, Any], rig: str, place: Place) -> dict[str, ChannelEntry]:

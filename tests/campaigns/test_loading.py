@@ -423,3 +423,13 @@ def test_a_mass_driver_and_unknown_masses(tmp_path: Path) -> None:
 )
 def test_faults_of_a_frame_campaign(tmp_path: Path, changes: dict, expected: str) -> None:
     assert expected in told(frame(tmp_path / "a", **changes))
+
+
+@pytest.mark.property
+def test_messages_name_files_without_detours(tmp_path: Path) -> None:
+    campaign(tmp_path / "project" / "data", directory="../../files")
+    files = tmp_path / "files"
+    files.mkdir()
+    with pytest.raises(UserError, match="data file not found") as caught:
+        load_campaign(tmp_path / "project" / "data")
+    assert str(caught.value).startswith(f"{files}/")
