@@ -120,11 +120,13 @@ def candidate_ranking(candidates: Sequence[Mapping[str, Any]], named_share: floa
     for y, share, item, stuck in zip(place, shares, candidates, bound, strict=True):
         note = f" {100.0 * share:.0f} %, NRMSE {item['nrmse']:.3g}{', at a bound' if stuck else ''}"
         inside = share > 0.75
+        # a text in front of a line has a white ground, so that it can be read
+        ground = None if inside else {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
         axis.text(share, y, note + " ", va="center", ha="right" if inside else "left", fontsize=8,
-                  color="white" if inside else "black")  # fmt: skip
+                  color="white" if inside else "black", bbox=ground, zorder=3)  # fmt: skip
     axis.set_yticks(place, [f"{item['name']} ({item['form']})" for item in candidates])
-    axis.axvline(named_share, color="k", lw=0.8, ls="--", label=f"proves a name ({named_share:g})")
-    axis.axvline(least_share, color="k", lw=0.8, ls=":", label=f"least share ({least_share:g})")
+    for limit, style, text in ((named_share, "--", "proves a name"), (least_share, ":", "least share")):
+        axis.axvline(limit, color="k", lw=0.8, ls=style, label=f"{text} ({limit:g})", zorder=0.9)
     axis.set_xlim(0, 1.02)
     axis.grid(axis="y", visible=False)
     axis.legend(fontsize=7, loc="lower right")

@@ -64,6 +64,15 @@ def label(axis: Axes, x: str, y: str, title: str = "") -> None:
         axis.set_title(title, fontsize=9)
 
 
+_DRAWN_IN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3)}
+"""SI unit -> unit of a damper's motion in figures, and its number in one SI unit."""
+
+
+def drawn_in(unit: str) -> tuple[str, float]:
+    """Return the unit in which figures show a channel of this SI unit, and the factor of its numbers."""
+    return _DRAWN_IN.get(unit, (unit, 1.0))
+
+
 MOST_POINTS = 20_000
 """Points of a figure up to which the best place of a legend is searched; the search is slow for more."""
 
