@@ -105,7 +105,9 @@ def check(
         print(f"{named}: {verdict}, {counted(len(stages), 'stage')}")
         _print_findings(result, without)
         if not result.errors:
-            words = [] if options.config is None and options.campaign else [options.config or _shortest(loaded.path)]
+            words: list[str | Path] = []
+            if options.config is not None or options.campaign is None:
+                words.append(options.config or _shortest(loaded.path))
             words += ["--campaign", options.campaign] if options.campaign else []
             print("next: mrpipe run " + " ".join(shell_word(word) for word in words))
     if result.errors:
