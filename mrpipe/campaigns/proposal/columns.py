@@ -19,7 +19,7 @@ from mrpipe.words import counted, listed
 
 MOST_COLUMNS = 200
 FEWEST_SAMPLES = 20
-"""A column with no more samples than this is no record."""
+"""A column with at most as many samples is not a record."""
 _BESIDE = "no sensor at the base was found; this one is near the structure and may move differently"
 _DRIVE_GUESSED = "no unit in the header; guessed from the numbers"
 

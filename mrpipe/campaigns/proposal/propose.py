@@ -237,7 +237,7 @@ def _own(item: _File, shared: dict[str, Guess]) -> dict[str, Guess]:
 
 
 def _guessed_in_tests(tests: Sequence[TestText]) -> list[str]:
-    """Return a line for each guess that is no channel of the whole campaign; tests with the same guess share it."""
+    """Return a line for each guess that belongs to single tests only; tests with the same guess share it."""
     found: dict[tuple[str, str, str], list[str]] = {}
     for test in tests:
         for key, guess in test.channels.items():

@@ -44,7 +44,7 @@ SPEED = 8.0
 """Largest plausible velocity of a damper's piston [m/s]."""
 
 _SPIKES = ("displacement", "force")
-"""Quantities of a bench in which spikes are an error of their own."""
+"""Quantities of a bench in which the check of spikes reports an error."""
 
 _SI = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
 
