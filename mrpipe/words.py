@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
+from pathlib import Path
 
 
 def listed(names: Sequence[str]) -> str:
@@ -10,6 +12,11 @@ def listed(names: Sequence[str]) -> str:
     if len(names) < 2:
         return "".join(names)
     return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def shell_word(text: str | Path) -> str:
+    """Return a path or value as one word of a command that can be copied into a shell."""
+    return shlex.quote(str(text))
 
 
 def noun(count: int, word: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mrpipe.words import counted, duration, listed, noun
+from mrpipe.words import counted, duration, listed, noun, shell_word
 
 pytestmark = pytest.mark.property
 
@@ -23,3 +23,12 @@ def test_counts() -> None:
 )
 def test_times(seconds: float, text: str) -> None:
     assert duration(seconds) == text
+
+
+def test_a_path_is_one_word_of_a_shell() -> None:
+    import shlex
+    from pathlib import Path
+
+    for path in ("runs/a", "Mein Projekt ß", "it's"):
+        assert shlex.split(f"cd {shell_word(Path(path))}") == ["cd", path]
+    assert shell_word("runs/a") == "runs/a"

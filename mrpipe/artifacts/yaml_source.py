@@ -148,6 +148,8 @@ def expected(fault: Mapping[str, Any]) -> str:
         "tuple_type": "a list expected, as in [a, b]",
     }
     said = str(fault["msg"]).removeprefix("Value error, ")
+    if kind in {"float_parsing", "int_parsing"} and _COMMA.match(str(fault.get("input"))):
+        return f"{plain[kind]}; write a decimal point, as in {str(fault['input']).replace(',', '.')}"
     limit = said.removeprefix("Input should be ")
     if limit.startswith(("greater", "less")):
         return f"a value {limit} expected"
@@ -158,6 +160,7 @@ class _Loader(yaml.SafeLoader):
     """The safe loader without dates, octal numbers and numbers to the base 60: 0123 and 10:30 are names."""
 
 
+_COMMA = re.compile(r"^\s*[-+]?\d+,\d+\s*$")
 _WHOLE = re.compile(r"^(?:[-+]?(?:0|[1-9][0-9_]*)|0x[0-9a-fA-F_]+)$")
 _DECIMAL = re.compile(r"^(?:[-+]?(?:[0-9][0-9_]*)\.[0-9_]*(?:[eE][-+][0-9]+)?|[-+]?\.[0-9][0-9_]*(?:[eE][-+][0-9]+)?"
                       r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$")  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -141,7 +142,9 @@ def _folder(source: YamlSource, entry: CampaignEntry) -> Path:
     folder = source.path.parent / entry.directory
     if not folder.is_dir():
         raise source.error(("directory",), f"{entry.directory!r} is not a directory", "name the folder of the files")
-    return folder
+    # messages name files in it; `..` after a link leads elsewhere than its text says
+    short = Path(os.path.normpath(folder))
+    return short if short.is_dir() and short.samefile(folder) else folder
 
 
 def _channels(source: YamlSource, content: dict[str, Any], rig: str, place: Place) -> dict[str, ChannelEntry]:
@@ -299,7 +302,11 @@ def _unit(reader: _Reader, name: str, channel: ChannelEntry, place: Place) -> tu
         known = reader.drive_units.setdefault("drive", units.SI_UNITS[kind])
         if known != units.SI_UNITS[kind]:
             problem = f"is in {units.SI_UNITS[kind]} in {dotted(place)} and in {known} in the tests before"
-            raise reader.source.error(_place_of(reader, name, place), problem, "use one of the two")
+            remedy = (
+                "use one of the two; a command in V becomes the current with unit: A, scale: (A per V) and offset: "
+                "(A at 0 V)"
+            )
+            raise reader.source.error(_place_of(reader, name, place), problem, remedy)
         quantity = kind
     if channel.mass_kg is not None:
         quantity = "acceleration"

@@ -20,6 +20,7 @@ from mrpipe.errors import UserError
 
 _NUMBER = re.compile(r"^[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?$|^[+-]?(nan|inf(inity)?)$", re.IGNORECASE)
 _THOUSANDS = re.compile(r"^[+-]?\d{1,3}(?:[.,'\u00a0\u202f ]\d{3})+(?:[.,]\d+)?$")
+_DECIMAL_COMMA = re.compile(r"^[+-]?\d*,\d+([eE][+-]?\d+)?$")
 _DOTTED_THOUSANDS = r"[+-]?\d{1,3}(?:\.\d{3})+"
 MOST_ROWS_LOOKED_AT = 1000
 """Rows in which the decimal sign is looked for."""
@@ -198,14 +199,20 @@ def _numbers(path: Path, column: Any, name: str, lines: tuple[int, ...], decimal
     if wrong.any():
         row = int(np.argmax(wrong))
         found = str(column.iloc[row])
-        raise UserError(path, f"line {lines[row]}, column {name}", f"{found!r} is not a number", _remedy(found, wrong))
+        where = f"line {lines[row]}, column {name}"
+        raise UserError(path, where, f"{found!r} is not a number", _remedy(found, wrong, decimal))
     return np.asarray(numbers, dtype=np.float64)
 
 
-def _remedy(found: str, wrong: BoolArray) -> str:
+def _remedy(found: str, wrong: BoolArray, decimal: str) -> str:
     """Return what to do about the first of some fields that are not numbers."""
+    if decimal == "." and _DECIMAL_COMMA.match(found):
+        other = "write numbers without separators of thousands, or " if _THOUSANDS.match(found) else ""
+        return f"{other}for decimal commas give text: {{decimal: ','}} in campaign.yaml"
     if _THOUSANDS.match(found):
-        return "write numbers without separators of thousands"
+        whole, _, part = re.split(r"([.,])(?=\d*$)", found) if {".", ","} <= set(found) else ("", "", "")
+        example = f", as {re.sub('[^0-9+-]', '', whole)}{decimal}{part}" if part else ""
+        return f"write numbers without separators of thousands{example}"
     last = np.flatnonzero(~wrong)[-1:]
     if last.size and wrong[last[0] + 1 :].all() and wrong.sum() == wrong.size - last[0] - 1 and not found[:1].isdigit():
         return "delete the lines after the last sample"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -65,9 +65,11 @@ def check_stages(loaded: LoadedConfig) -> None:
     UserError
         If a stage is unknown or its settings do not fit together.
     """
+    from mrpipe.cli.session import require_stages
     from mrpipe.pipeline.settings_view import SettingsView
     from mrpipe.stages.registry import stage_named
 
+    require_stages(loaded)
     config = _without_own_effects(loaded)
     for name in loaded.config.stages:
         stage = None if name == "report" else stage_named(name)
@@ -229,7 +231,12 @@ def check_campaigns(loaded: LoadedConfig) -> CheckResult:
         campaign = load_campaign(measured[key])
         result.campaigns[key] = f"{campaign.name}: {counted(len(campaign.recordings), 'test')}"
         result.notes[key] = list(campaign.findings)
-        result.findings[key] = [*judge(campaign), *_too_short(loaded, campaign), *_no_validation(loaded, key, campaign)]
+        result.findings[key] = [
+            *judge(campaign),
+            *_too_short(loaded, campaign),
+            *_refused_by_stages(loaded, campaign),
+            *_no_validation(loaded, key, campaign),
+        ]
         if key == "closed_loop":
             result.findings[key] += _without_law(campaign)
     return result
@@ -277,12 +284,65 @@ def _no_validation(loaded: LoadedConfig, key: str, campaign: Campaign) -> list[F
 
 
 def _too_short(loaded: LoadedConfig, campaign: Campaign) -> list[Finding]:
-    if campaign.rig != "damper-bench" or "prepare" not in loaded.config.stages:
+    if campaign.rig != "damper-bench" or "prepare" not in needed_stages(loaded):
         return []
     from mrpipe.pipeline.settings_view import setting_named
     from mrpipe.signals.lengths import find_short_tests
 
     return find_short_tests(campaign, setting_named(loaded.config, "prepare"))
+
+
+def _refused_by_stages(loaded: LoadedConfig, campaign: Campaign) -> list[Finding]:
+    """Return what stages of the configuration refuse of a bench campaign, with the message of the stage."""
+    if campaign.rig != "damper-bench":
+        return []
+    from mrpipe.campaigns import require_varying
+    from mrpipe.pipeline.settings_view import setting_named
+    from mrpipe.signals.accelerometer import require_acceleration
+
+    needed, source = needed_stages(loaded), str(campaign.file)
+    found = []
+    if "prepare" in needed:
+        motion = setting_named(loaded.config, "prepare.motion")
+        channels = {test.name: set(test.channels) for test in campaign.recordings}
+        found.append(_refusal("no-acceleration", lambda: require_acceleration(channels, motion, source)))
+    if "train-inverse" in needed:
+        drives = {test.name: test.used("drive") for test in campaign.with_role("training")}
+        found.append(_refusal("constant-drive", lambda: require_varying(drives, source)))
+    return [item for item in found if item is not None]
+
+
+def _refusal(name: str, require: Callable[[], None]) -> Finding | None:
+    """Return the error that a requirement raises as a finding."""
+    from mrpipe.campaigns.plausibility import Finding
+
+    try:
+        require()
+    except UserError as error:
+        test = error.where.removeprefix("test ")
+        return Finding(
+            name=name,
+            severity="error",
+            sentence=error.problem,
+            remedy=error.remedy,
+            test=test if test != error.where else "",
+            channel="" if test != error.where else error.where,
+        )
+    return None
+
+
+def needed_stages(loaded: LoadedConfig) -> set[str]:
+    """Return the stages that `mrpipe run` builds: those of the configuration, and those that they cannot do without."""
+    from mrpipe.stages.registry import stages_for
+
+    stages = {name: stage.for_configuration(loaded.config) for name, stage in stages_for(loaded.config).items()}
+    found: set[str] = set()
+    waiting = [name for name in loaded.config.stages if name in stages]
+    while waiting:
+        name = waiting.pop()
+        found.add(name)
+        waiting += [item for item in stages[name].inputs if item in stages and item not in found]
+    return found
 
 
 def stages_without_data(loaded: LoadedConfig) -> dict[str, str]:

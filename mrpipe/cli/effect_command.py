@@ -9,6 +9,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import CheckFailed
+from mrpipe.words import shell_word
 
 
 @with_common_options("config", "run", "overrides", "settings", "campaign", "jobs", "seed", "force", "quiet")
@@ -52,7 +53,7 @@ def check_effect(
         raise CheckFailed(f"{file}: {len(failed)} of {len(checks)} demands are not met")
     if not options.json:
         print(f"all {len(checks)} demands are met")
-        print(f"next: mrpipe close-loop --campaign DIR --set 'close_loop.effect_files=[{file}]'")
+        print(f"next: mrpipe close-loop --campaign DIR --set {shell_word(f'close_loop.effect_files=[{file}]')}")
 
 
 def register(app: typer.Typer) -> None:

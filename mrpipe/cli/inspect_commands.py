@@ -11,7 +11,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.errors import UserError
-from mrpipe.words import counted, listed
+from mrpipe.words import counted, listed, shell_word
 
 if TYPE_CHECKING:
     from mrpipe.cli.checking import CheckResult
@@ -75,10 +75,11 @@ def check(
     """
     from mrpipe.cli import checking
     from mrpipe.cli.output import print_json
-    from mrpipe.cli.session import load
+    from mrpipe.cli.session import load, run_directory
     from mrpipe.errors import CheckFailed
 
     loaded = load(replace(options, quiet=True))
+    run_directory(options, loaded)  # refuses a name that cannot be that of a directory
     checking.check_stages(loaded)
     if explain:
         _explain(loaded.config, options.json)
@@ -87,6 +88,7 @@ def check(
     without = checking.stages_without_data(loaded)
     result = checking.check_campaigns(loaded)
     count = counted(result.errors, "error")
+    named = f"campaign {options.campaign}" if options.campaign else str(_shortest(loaded.path))
     stages = list(loaded.config.stages)
     if options.json:
         print_json(
@@ -100,14 +102,16 @@ def check(
         )
     else:
         verdict = f"{count} in the data" if result.errors else "valid"
-        print(f"{_shortest(loaded.path)}: {verdict}, {len(stages)} stages")
+        print(f"{named}: {verdict}, {counted(len(stages), 'stage')}")
         _print_findings(result, without)
         if not result.errors:
-            named = "" if options.config is None and options.campaign else options.config or _shortest(loaded.path)
-            given = f"--campaign {options.campaign}" if options.campaign else ""
-            print(" ".join(f"next: mrpipe run {named} {given}".split()))
+            words: list[str | Path] = []
+            if options.config is not None or options.campaign is None:
+                words.append(options.config or _shortest(loaded.path))
+            words += ["--campaign", options.campaign] if options.campaign else []
+            print("next: mrpipe run " + " ".join(shell_word(word) for word in words))
     if result.errors:
-        raise CheckFailed(f"{loaded.path}: {count} in the measured data (listed above)")
+        raise CheckFailed(f"{named}: {count} in the measured data (listed above)")
 
 
 def _explain(config: RunSettings, as_json: bool) -> None:
@@ -233,7 +237,8 @@ def _print_project(project: Project, directory: Path) -> None:
     verb = "check the lines marked UNSURE in" if project.proposals else "fill in"
     files = listed([str(directory / item / CAMPAIGN_FILE) for item in project.campaigns])
     print(f"next: {verb} {files},")
-    print(f"then: cd {directory} && mrpipe check configs/{project.name}.yaml && mrpipe run configs/{project.name}.yaml")
+    config = shell_word(f"configs/{project.name}.yaml")
+    print(f"then: cd {shell_word(directory)} && mrpipe check {config} && mrpipe run {config}")
 
 
 def register(app: typer.Typer) -> None:

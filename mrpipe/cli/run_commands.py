@@ -11,6 +11,7 @@ import typer
 
 from mrpipe.cli.options import CommonOptions, one_config, with_common_options
 from mrpipe.errors import CheckFailed, UserError
+from mrpipe.words import shell_word
 
 if TYPE_CHECKING:
     from mrpipe.pipeline.runner import Pipeline
@@ -74,7 +75,10 @@ def _until(names: list[str], until: str | None) -> list[str]:
     from mrpipe.stages.registry import stage_named
 
     if until != "report":
-        stage_named(until)
+        try:
+            stage_named(until)
+        except UserError as error:
+            raise UserError("--until", until, error.problem, error.remedy) from None
     if until not in names:
         raise UserError("--until", until, "is not among the stages of the configuration", f"one of {', '.join(names)}")
     return names[: names.index(until) + 1]
@@ -124,9 +128,9 @@ def _print_run(pipeline: Pipeline, content: dict[str, Any]) -> None:
     if content["failed"]:
         print(f"next: correct what failed, then the same command again; {pipeline.run_directory}/log.txt has details")
     elif content["report"]:
-        print(f"next: open {content['report'][0]}, or mrpipe show {pipeline.run_directory}")
+        print(f"next: open {content['report'][0]}, or mrpipe show {shell_word(pipeline.run_directory)}")
     else:
-        print(f"next: mrpipe report {pipeline.run_directory}")
+        print(f"next: mrpipe report {shell_word(pipeline.run_directory)}")
 
 
 def _write_report(pipeline: Pipeline) -> list[Path]:
@@ -231,8 +235,8 @@ def status(
     for name, reasons in found.items():
         print(f"{name:20} {'; '.join(reasons) if reasons else 'up to date'}")
     if any(reasons and not reasons[0].startswith("skipped") for reasons in found.values()):
-        given = f" --campaign {options.campaign}" if options.campaign else ""
-        print(f"next: mrpipe run {loaded.path}{given} --run {pipeline.run_directory}")
+        given = f" --campaign {shell_word(options.campaign)}" if options.campaign else ""
+        print(f"next: mrpipe run {shell_word(loaded.path)}{given} --run {shell_word(pipeline.run_directory)}")
 
 
 def register(app: typer.Typer) -> None:

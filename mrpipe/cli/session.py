@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from mrpipe.cli.options import CommonOptions
 from mrpipe.errors import UserError
+from mrpipe.words import listed, shell_word
 
 if TYPE_CHECKING:
     from mrpipe.config.loader import LoadedConfig
@@ -89,17 +90,39 @@ def run_directory(options: CommonOptions, loaded: LoadedConfig) -> Path:
     return directory
 
 
+def require_stages(loaded: LoadedConfig) -> None:
+    """Refuse a configuration that lists an unknown stage.
+
+    Raises
+    ------
+    UserError
+        If there is one; the message names its line where the file of the configuration lists it.
+    """
+    from mrpipe.artifacts.yaml_source import read_yaml
+    from mrpipe.stages.registry import stage_named
+
+    for index, name in enumerate(loaded.config.stages):
+        if name == "report":
+            continue
+        try:
+            stage_named(name)
+        except UserError as error:
+            source = read_yaml(loaded.path)
+            written = source.content.get("stages")
+            if not isinstance(written, list) or tuple(written) != loaded.config.stages:
+                raise
+            raise source.error(("stages", index), f"no such stage {name!r}", error.remedy) from None
+
+
 def pipeline_of(options: CommonOptions, loaded: LoadedConfig, *, to_log: bool = True) -> Pipeline:
     """Return the pipeline; nothing is locked yet, and only the log is written (with `to_log`)."""
     import logging
 
     from mrpipe.pipeline.progress import LOGGER_NAME, make_logger
     from mrpipe.pipeline.runner import Pipeline
-    from mrpipe.stages.registry import stage_named, stages_for
+    from mrpipe.stages.registry import stages_for
 
-    for name in loaded.config.stages:
-        if name != "report":
-            stage_named(name)
+    require_stages(loaded)
     directory = run_directory(options, loaded)
     execution = loaded.config.execution
     logger = (
@@ -140,9 +163,24 @@ def _warn_of_another_configuration(options: CommonOptions, loaded: LoadedConfig,
     if name != loaded.config.name:
         print(
             f"mrpipe: {directory} was made with the configuration {name}, and this command uses {loaded.config.name}: "
-            f"every stage that it needs is built again with that. To go on with {name}: --config {kept}",
+            f"every stage that it needs is built again with that. To go on with {name}: --config {shell_word(kept)}",
             file=sys.stderr,
         )
+
+
+def _require_own(directory: Path) -> None:
+    """Refuse a directory with files that no run has written, because the run would write over files of these names.
+
+    A run that was killed before its first stage ended has left its lock and its configuration.
+    """
+    if not directory.is_dir() or (directory / "manifests").is_dir():
+        return
+    if (directory / ".lock").exists() and (directory / "config.yaml").is_file():
+        return
+    there = sorted(path.name for path in directory.iterdir() if not path.name.startswith("."))
+    if there:
+        problem = f"holds {listed(there[:3])}{' and more' if len(there) > 3 else ''}, which no run has written"
+        raise UserError("--run", str(directory), problem, "give an empty or new directory")
 
 
 @contextmanager
@@ -152,6 +190,7 @@ def session(options: CommonOptions) -> Iterator[Pipeline]:
 
     loaded = load(options)
     directory = run_directory(options, loaded)
+    _require_own(directory)
     with run_lock(directory):
         _warn_of_another_configuration(options, loaded, directory)
         pipeline = pipeline_of(options, loaded)

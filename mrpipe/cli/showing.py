@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mrpipe.errors import UserError
+from mrpipe.words import shell_word
 
 MOST_CHANNELS = 8
 MOST_ROWS = 400
@@ -70,7 +71,7 @@ def _refuse_folder(path: Path) -> dict[str, Any]:
 
     known = all_readers()
     if any(ending_of(item) in known for item in path.iterdir() if item.is_file()):
-        remedy = f"propose a campaign with `mrpipe init DIR --from {path}`"
+        remedy = f"propose a campaign with `mrpipe init DIR --from {shell_word(path)}`"
         raise UserError(path, "", "holds data files, but no campaign.yaml", remedy)
     raise UserError(
         path, "", "is neither a campaign nor a run directory", "name a folder with campaign.yaml, or that of a run"
@@ -118,22 +119,26 @@ def _describe_data(path: Path) -> dict[str, Any]:
     import numpy as np
 
     from mrpipe.campaigns.proposal.columns import open_columns
+    from mrpipe.campaigns.proposal.unreadable import why_no_columns
 
-    _, columns = open_columns(path)
+    file, columns = open_columns(path)
     if not columns:
-        raise UserError(path, "", "holds no column of numbers", "name a file of measurements")
+        why = why_no_columns(file)
+        few = why if why.startswith("has ") else "holds no column of numbers"
+        raise UserError(path, "", few, "name a file of measurements")
     rows = [
         {
             "name": item.name,
             "quantity": item.header.quantity or item.header.unit_quantity,
             "unit": item.header.unit,
             "samples": int(item.values.size),
+            "missing": int(np.isnan(item.values).sum()),
             "minimum": float(np.nanmin(item.values)),
             "maximum": float(np.nanmax(item.values)),
         }
         for item in columns
     ]
-    hint = f"mrpipe init DIR --from {path.resolve().parent}"
+    hint = f"mrpipe init DIR --from {shell_word(path.resolve().parent)}"
     return {"kind": "data", "file": str(path), "columns": rows, "next": hint}
 
 
@@ -299,7 +304,7 @@ def _print_run(description: Mapping[str, Any]) -> None:
     print_table(["stage", "s", "warnings", "outputs"], rows)
     for name in description["reports"]:
         print(f"report: {description['directory']}/{name}")
-    print(f"next: mrpipe status {description['directory']}")
+    print(f"next: mrpipe status {shell_word(description['directory'])}")
 
 
 def _print_json_result(description: Mapping[str, Any]) -> None:
@@ -311,9 +316,11 @@ def _print_json_result(description: Mapping[str, Any]) -> None:
 
 def _print_data(description: Mapping[str, Any]) -> None:
     print(f"data file {description['file']}: {description['columns'][0]['samples']} samples")
+    gaps = any(row["missing"] for row in description["columns"])
     rows = [
         [row["name"], row["quantity"] or "?", row["unit"] or "?", _figure(row["minimum"]), _figure(row["maximum"])]
+        + ([str(row["missing"])] if gaps else [])
         for row in description["columns"]
     ]
-    print_table(["column", "quantity", "unit", "minimum", "maximum"], rows)
+    print_table(["column", "quantity", "unit", "minimum", "maximum", *(["missing samples"] if gaps else [])], rows)
     print(f"next: propose a campaign with `{description['next']}`")

@@ -12,6 +12,7 @@ import typer
 from mrpipe.cli.options import CommonOptions, with_common_options
 from mrpipe.control.laws import law_names
 from mrpipe.errors import CheckFailed, UserError
+from mrpipe.words import shell_word
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _EXPORTS = ("controller", "damper", "frame", "forward", "inverse", "opensees")
 _ONE_DAMPER = frozenset({"controller", "damper", "frame"})
 """Exports that contain exactly one damper, its control law or its place in the structure."""
+_FORMATS = ("c", "json", "matlab", "onnx")
 _RIGS = ("bench", "frame", "closed-loop")
 
 
@@ -74,7 +76,7 @@ def build_and_print(
             print_brief(f"{outcome.stage}{note}", brief, outcome.manifest.warnings)
         else:
             print_summary(f"{outcome.stage}{note}", outcome.manifest.summary, outcome.manifest.warnings)
-    print(f"in {pipeline.run_directory}; next: mrpipe report {pipeline.run_directory}")
+    print(f"in {pipeline.run_directory}; next: mrpipe report {shell_word(pipeline.run_directory)}")
     _raise_failures(outcomes, pipeline)
 
 
@@ -316,6 +318,9 @@ def export(
             "is not supported with structure.dampers, because it knows one damper and one law",
             "export opensees for the structure, or use a configuration with one damper",
         )
+    for name in formats or ():
+        if name not in _FORMATS:
+            raise UserError("--format", name, "is not a format", nearest(name, _FORMATS))
     given = {"simulate.damper": damper, "gains.source": gains}
     overrides = [f"{name}={value}" for name, value in given.items() if value is not None]
     if formats:

@@ -72,6 +72,9 @@ def explain(
         section = section_of(model, path[:-1])
         known = list(section.model_fields) if section is not None else []
         return UserError(source, where, "unknown key", nearest(str(path[-1]), known))
+    if first["type"] == "invalid_key":
+        remedy = "write a name; a decimal number has a point and no comma, as in 12.5"
+        return UserError(source, where, f"{shown(path[-1])} is a number in place of a name", remedy)
     if first["type"] == "missing":
         return UserError(source, where, "is missing", "give this setting")
     given = first.get("input")

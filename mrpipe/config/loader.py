@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from mrpipe.artifacts import config_directory
 from mrpipe.artifacts.yaml_source import YamlSource, nearest, parse, read_yaml
 from mrpipe.config.errors import explain, section_of
-from mrpipe.config.model import RunSettings, config_model
+from mrpipe.config.model import RunSettings, config_model, options
 from mrpipe.config.sections.campaigns import LABORATORY, CampaignsSettings
 from mrpipe.errors import UserError
 
@@ -138,11 +138,21 @@ def _locate(path: Path) -> Path:
     if str(path) in {named.stem, f"configs/{named.name}"} and named.is_file():
         return named
     known = sorted(item.stem for item in config_directory().glob("*.yaml"))
-    raise UserError(path, "", "no such configuration", f"give a YAML file, or one of {', '.join(known)}")
+    similar = nearest(path.name.removesuffix(".yaml"), known)
+    remedy = f"give a YAML file, or one of {', '.join(known)}"
+    raise UserError(path, "", "no such configuration", similar if similar.startswith("did") else remedy)
 
 
 def _override_path(override: str) -> tuple[str, ...]:
     return tuple(override.partition("=")[0].strip().split("."))
+
+
+def _with_section(key: str) -> str:
+    """Return a remedy that names the settings of this name within sections; empty without any."""
+    found = [name for name, _, _ in options() if name.endswith(f".{key}") and "[]" not in name]
+    if not found:
+        return ""
+    return f"did you mean {found[0]}?" if len(found) == 1 else f"name the section: {', '.join(found[:6])}"
 
 
 def _apply(content: dict[str, Any], override: str) -> None:
@@ -156,12 +166,9 @@ def _apply(content: dict[str, Any], override: str) -> None:
         if section is None:
             break
         if key not in section.model_fields:
-            raise UserError(
-                "--set",
-                ".".join(map(str, path)),
-                "unknown key",
-                nearest(str(key), list(section.model_fields)),
-            )
+            remedy = _with_section(key) if depth == 0 else ""
+            remedy = remedy or nearest(str(key), list(section.model_fields))
+            raise UserError("--set", ".".join(map(str, path)), "unknown key", remedy)
     try:
         _, value = parse(text, "--set")
     except UserError as error:

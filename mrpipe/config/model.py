@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from pydantic import BaseModel, Field, create_model
+from pydantic import BaseModel, Field, create_model, field_validator
 
 import mrpipe.config.sections
 from mrpipe.config.errors import model_in
@@ -54,7 +54,9 @@ class RunSettings(Section):
         2011, ge=0, description="Seed of all random numbers; the same inputs and seed give the same results."
     )
     stages: tuple[str, ...] = Field(
-        DEFAULT_STAGES, description="Stages of `mrpipe run`, by name; the stages that they need are built too."
+        DEFAULT_STAGES,
+        min_length=1,
+        description="Stages of `mrpipe run`, by name; the stages that they need are built too.",
     )
     campaigns: CampaignsSettings = Field(CampaignsSettings(), description="Sources of the measurements.")
     report: ReportSettings = Field(ReportSettings(), description="The report.")
@@ -62,6 +64,14 @@ class RunSettings(Section):
         ExecutionSettings(),
         description="Execution of the program; these settings change no result, and no stage becomes out of date.",
     )
+
+    @field_validator("stages")
+    @classmethod
+    def _each_once(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        twice = sorted({name for name in value if value.count(name) > 1})
+        if twice:
+            raise ValueError(f"every stage once expected; {', '.join(twice)} is listed more than once")
+        return value
 
 
 @cache

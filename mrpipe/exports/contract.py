@@ -95,6 +95,8 @@ class Subject:
         Its test vectors.
     details
         Where it comes from, for the JSON file; `left_out` are sentences on what the model does not contain.
+    about
+        Sentences for README.md of the folder: what the model is, and where it comes from.
     """
 
     kind: str
@@ -103,6 +105,7 @@ class Subject:
     model: Any
     vectors: Vectors
     details: Mapping[str, Any] = field(default_factory=dict)
+    about: str = ""
 
     @property
     def left_out(self) -> Sequence[str]:

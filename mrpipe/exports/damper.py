@@ -10,16 +10,44 @@ import numpy as np
 from mrpipe.dampers.model import DamperModel
 from mrpipe.dampers.plant import Chain, in_order
 from mrpipe.exports.contract import Channel, Subject, Vectors
+from mrpipe.words import listed
 
 ROWS = 800
 SAMPLE_TIME_S = 2e-3
 _PERIODS = (3.0, 7.0)
 """Periods of the two harmonics in the test motion; together they reverse at many displacements."""
 
+ORIGINS = {
+    "identified": "The identified damper of `identify-damper`",
+    "traced": "The traced damper of `close-loop` (`--damper traced`)",
+}
+"""Name of a damper of the run -> where it comes from."""
+
 
 def damper_subject(damper: DamperModel, name: str = "damper", prefix: str = "mrpipe", **details: Any) -> Subject:
     """Return a damper with test vectors over the stroke and the drives of its tests."""
-    return Subject("damper", name, f"{prefix}_{name}".replace("-", "_"), damper, damper_vectors(damper), details)
+    about = about_damper(damper, str(details.get("source", "")))
+    return Subject("damper", name, f"{prefix}_{name}".replace("-", "_"), damper, damper_vectors(damper), details, about)
+
+
+def about_damper(damper: DamperModel, source: str) -> str:
+    """Return sentences on what a damper is: where it comes from, its base form and its effects.
+
+    Parameters
+    ----------
+    damper
+        The damper.
+    source
+        Value of `simulate.damper`: `identified`, `traced`, a parameter set or a file; empty: not known.
+    """
+    origin = f"{ORIGINS.get(source, f'The damper {source}')}: base" if source else "Base"
+    text = f"{origin} form `{damper.form}` ({damper.base.summary})"
+    acting = [f"`{item.name}` (form {item.form})" for item in damper.effects if not item.sensor]
+    faults = [f"`{item.name}`" for item in damper.effects if item.sensor]
+    text += f", with {listed(acting)}." if acting else ", without effects."
+    if faults:
+        text += f" Faults of sensors, which do not change the force: {listed(faults)}."
+    return text
 
 
 def damper_vectors(damper: DamperModel) -> Vectors:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import pkgutil
+import re
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,9 @@ from mrpipe.exports.contract import ExportFormat, Subject
 
 LOADS_FROM = ("mrpipe.exports.formats",)
 """Packages whose modules are found at run time: they belong to the code version of a stage."""
+
+_FILES = "Files of this export: "
+"""Start of the line of README.md that lists the files."""
 
 
 @cache
@@ -54,6 +58,8 @@ def chosen_formats(kind: str, names: Iterable[str]) -> list[ExportFormat]:
 def write_export(subject: Subject, folder: Path, names: Iterable[str] = ()) -> list[str]:
     """Write a model, its test vectors and a README; return the names of the files.
 
+    Files of an earlier export that this one does not write are removed, because they may hold another model.
+
     Parameters
     ----------
     subject
@@ -73,24 +79,37 @@ def write_export(subject: Subject, folder: Path, names: Iterable[str] = ()) -> l
     for item in chosen:
         files.update(item.files(subject))
     files["vectors.csv"] = subject.vectors.as_csv()
-    files["README.md"] = _readme(subject, chosen)
+    files["README.md"] = _readme(subject, chosen, [*files, "README.md"])
+    outdated = _files_of(folder) - set(files)
     for name, content in files.items():
         with atomic_path(folder / name) as temporary:
             temporary.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+    for name in outdated:
+        (folder / name).unlink(missing_ok=True)
     return list(files)
 
 
-def _readme(subject: Subject, chosen: Iterable[ExportFormat]) -> str:
+def _files_of(folder: Path) -> set[str]:
+    """Return the files that an earlier export wrote into a folder, as its README lists them; other files are kept."""
+    readme = folder / "README.md"
+    text = readme.read_text(encoding="utf-8", errors="replace") if readme.is_file() else ""
+    line = next((line for line in text.splitlines() if line.startswith(_FILES)), "")
+    return {name for name in re.findall(r"`([^`]+)`", line) if Path(name).name == name}
+
+
+def _readme(subject: Subject, chosen: Iterable[ExportFormat], files: Iterable[str]) -> str:
     vectors = subject.vectors
     inputs = ", ".join(f"`{item.name}` [{item.unit}]" for item in vectors.inputs)
     outputs = ", ".join(f"`{item.name}` [{item.unit}]" for item in vectors.outputs)
     interval = f", {vectors.sample_time_s:g} s apart" if vectors.sample_time_s else ""
     parts = [
         f"# Exported {subject.kind}: {subject.name}",
+        *([subject.about] if subject.about else []),
         f"Inputs: {inputs}.\n\nOutputs: {outputs}.",
         f"`vectors.csv` holds {len(vectors.inputs[0].values)} rows of inputs{interval}, and the outputs that mrpipe "
         "computes from them. In double precision every format reproduces the outputs to 1e-9 of their largest "
         "magnitude.",
+        f"{_FILES}{', '.join(f'`{name}`' for name in files)}.",
     ]
     if subject.left_out:
         parts.append("## Not contained\n\n" + "\n".join(f"- {sentence}." for sentence in subject.left_out))

@@ -18,6 +18,9 @@ CHANNELS = ("displacement", "velocity", "acceleration", "drive", "force")
 
 _ATTRIBUTES = ("displacement_m", "velocity_m_s", "acceleration_m_s2", "drive", "force_n")
 
+CONTINUOUS = 2.0
+"""Largest step at a join, over the largest step within a test, of a displacement that is continuous."""
+
 
 @dataclass(frozen=True)
 class History:
@@ -76,8 +79,10 @@ class History:
     def largest_jump(self, channel: str) -> float:
         """Return the ratio of the largest step at a join to the largest step within a test.
 
-        It is at most 2 for displacement, because one test ends one sample before its zero crossing and the next begins
-        one sample after it. It is 0 if the channel is constant within every test (constant drive).
+        It is at most 2 (:data:`CONTINUOUS`) for the displacement of periodic tests, because one test ends one sample
+        before its zero crossing and the next begins one sample after it. A test whose motion is not periodic is used
+        completely, so that the displacement may have a step of any size at its ends. The ratio is 0 if the channel is
+        constant within every test (constant drive).
         """
         values = self.channels[channel]
         steps = np.abs(np.diff(values))
@@ -147,8 +152,9 @@ def join(tests: Sequence[PreparedTest], *, cycles: int, sampling_rate_hz: float)
     """Join the steady cycles of tests at zero crossings of the displacement, at the rate of the network.
 
     Each test is low-passed as a whole before it is cut, so that no filter runs across a join. Displacement is
-    continuous across joins. Other channels are not (the velocity at another frequency, the force at another current);
-    no window of past values crosses a join, because smoothing would invent data.
+    continuous between periodic tests. It has a step where a test begins or ends whose motion is not periodic, because
+    such a test is used completely. Other channels have steps at every join (the velocity at another frequency, the
+    force at another current); no window of past values crosses a join, because smoothing would invent data.
 
     Parameters
     ----------

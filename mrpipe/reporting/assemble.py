@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from mrpipe.networks.assembly import History
+from mrpipe.networks.assembly import CONTINUOUS, History
 from mrpipe.reporting.networks import joined_history
 from mrpipe.reporting.sink import Sink
 
@@ -33,9 +33,10 @@ def describe(sink: Sink, result: TrainingSet) -> None:
     """Write the section."""
     training = result.training
     sink.text(
-        f"{len(training.names)} training tests, joined at zero crossings of the displacement, give {training.samples} "
-        f"samples at {training.sampling_rate_hz:g} Hz. {len(result.validation.names)} validation tests are assembled "
-        "in the same way and kept apart. No window of past values reaches across a join."
+        f"{len(training.names)} training tests, one after the other, give {training.samples} samples at "
+        f"{training.sampling_rate_hz:g} Hz. Periodic tests are cut at upward zero crossings of the displacement; tests "
+        f"with another motion are used completely. {len(result.validation.names)} validation tests are assembled in "
+        "the same way and kept apart. No window of past values reaches across a join."
     )
     sink.table(
         "joins",
@@ -45,7 +46,17 @@ def describe(sink: Sink, result: TrainingSet) -> None:
                 "step at joins over largest step within": list(result.jumps.values()),
             }
         ),
-        "Continuity at the joins. The displacement is continuous; velocity and force of tests at different frequency "
-        "or drive are not, and no network sees these steps.",
+        f"Continuity at the joins. {_continuity(result.jumps)} Velocity and force of tests at different frequency or "
+        "drive have steps. No network sees a step, because no window reaches across a join.",
     )
     sink.figure("history", joined_history(training), "The joined training history.")
+
+
+def _continuity(jumps: Mapping[str, float]) -> str:
+    """Return whether the displacement is continuous at the joins."""
+    if jumps.get("displacement", 0.0) <= CONTINUOUS:
+        return "The displacement is continuous."
+    return (
+        "The displacement is continuous between periodic tests; it has steps where a test with another motion begins "
+        "or ends, because such a test is used completely."
+    )

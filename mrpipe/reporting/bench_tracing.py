@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
+from mrpipe.reporting.traced_words import exchange_in_words, numbers_of
 from mrpipe.words import listed
 
 AFTER = COLOURS[0]
@@ -119,11 +120,13 @@ def candidate_ranking(candidates: Sequence[Mapping[str, Any]], named_share: floa
     for y, share, item, stuck in zip(place, shares, candidates, bound, strict=True):
         note = f" {100.0 * share:.0f} %, NRMSE {item['nrmse']:.3g}{', at a bound' if stuck else ''}"
         inside = share > 0.75
+        # a text in front of a line has a white ground, so that it can be read
+        ground = None if inside else {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
         axis.text(share, y, note + " ", va="center", ha="right" if inside else "left", fontsize=8,
-                  color="white" if inside else "black")  # fmt: skip
+                  color="white" if inside else "black", bbox=ground, zorder=3)  # fmt: skip
     axis.set_yticks(place, [f"{item['name']} ({item['form']})" for item in candidates])
-    axis.axvline(named_share, color="k", lw=0.8, ls="--", label=f"proves a name ({named_share:g})")
-    axis.axvline(least_share, color="k", lw=0.8, ls=":", label=f"least share ({least_share:g})")
+    for limit, style, text in ((named_share, "--", "proves a name"), (least_share, ":", "least share")):
+        axis.axvline(limit, color="k", lw=0.8, ls=style, label=f"{text} ({limit:g})", zorder=0.9)
     axis.set_xlim(0, 1.02)
     axis.grid(axis="y", visible=False)
     axis.legend(fontsize=7, loc="lower right")
@@ -192,6 +195,7 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
         f"{summary.get('noise_from', 'the sensors')}, is {_percent(floor)}."
     )
     effects = [item for item in summary["effects"] if item["name"] != "unattributed"]
+    exchange = exchange_in_words(summary)
     flexible = len(effects) < len(summary["effects"])
     added = (
         f" As requested, a flexible model is added as the effect `unattributed`, with which the error is "
@@ -216,13 +220,13 @@ def in_plain_words(summary: Mapping[str, Any]) -> str:
     if not effects:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         depends = f" It varies with {listed(states)}." if states else ""
-        form = _base_form_in_words(summary.get("base_form") or {})
+        form = f" {exchange}" if exchange else ""
         reached = f" The error is then {_percent(after)}." if form and not flexible else ""
         unproven = _unproven_in_words(summary.get("further_terms", []))
         return (
             f"{start} Something is missing, but no known effect explains it.{form}{unproven}{reached}{depends}{added}"
         )
-    parts = [_effect_in_words(effect) for effect in effects]
+    parts = [*([exchange] if exchange else []), *(_effect_in_words(effect) for effect in effects)]
     share = summary["ceiling"]["recovered"]
     recovers = f"recovers {100 * share:.0f} % of what a flexible model could"
     added_up = "Added to the model, it" if len(effects) == 1 else "Added to the model, they"
@@ -255,14 +259,6 @@ def _difference_in_words(found: Mapping[str, Any]) -> str:
     return text
 
 
-def _base_form_in_words(found: Mapping[str, Any]) -> str:
-    """Return a sentence on another base form than the declared one, if the final model has one."""
-    taken = found.get("taken")
-    if not taken or taken == found.get("declared"):
-        return ""
-    return f" The base form {taken} lowers the error, so the final model has it."
-
-
 def _unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
     if not terms:
         return ""
@@ -277,12 +273,8 @@ def _unproven_in_words(terms: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _effect_in_words(effect: Mapping[str, Any]) -> str:
-    numbers = ", ".join(
-        f"{name.replace('_', ' ')} {value['value']:.4g} {value['unit']}".removesuffix(" 1")
-        for name, value in effect["parameters"].items()
-    )
     text = (
-        f"{effect['name'].capitalize()} in the form {effect['form']} ({numbers}; confidence "
+        f"{effect['name'].capitalize()} in the form {effect['form']} ({numbers_of(effect, digits=4)}; confidence "
         f"{effect['confidence']:.2f}): {effect['physics']} Remedy on the rig: {effect['remedy']}"
     )
     if effect.get("source"):

@@ -34,7 +34,7 @@ def damper_loops(loops: Sequence[DrawnLoop]) -> Figure:
     for column, loop in enumerate(loops):
         for axis, x, name in (
             (axes[0, column], 1e3 * loop.displacement, "displacement [mm]"),
-            (axes[1, column], loop.velocity, "velocity [m/s]"),
+            (axes[1, column], 1e3 * loop.velocity, "velocity [mm/s]"),
         ):
             axis.plot(x, loop.measured, color=MEASURED, linewidth=0.8, label="measured")
             axis.plot(x, loop.modelled, color=MODEL, linewidth=0.8, label="model")

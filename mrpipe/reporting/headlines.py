@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mrpipe.reporting.traced_words import exchanged_form, numbers_of
 from mrpipe.words import counted, duration, listed
 
 
@@ -100,8 +101,10 @@ def _close_loop(summary: Mapping[str, Any]) -> str:
     found = ", ".join(effect["name"] for effect in summary.get("effects") or [])
     unexplained = (summary.get("unexplained") or {}).get("structured")
     differs = "the validation tests differ from the training tests"
+    form = exchanged_form(summary)
+    exchanged = f" with the base form {form} in place of {summary.get('model', '')}" if form else ""
     verdict = (
-        found
+        (f"{found}{exchanged}" if found else "")
         or (differs if summary.get("verdict_class") == "validation differs" else "")
         or ("no known effect explains the residual" if unexplained else "nothing is missing")
     )
@@ -170,10 +173,7 @@ def in_brief(stage: str, summary: Mapping[str, Any]) -> list[str]:
     )
     lines = [f"campaign {summary['campaign']}, model {summary['model']}: {summary['verdict']}"]
     for effect in summary["effects"]:
-        numbers = ", ".join(
-            f"{name.replace('_', ' ')} {_number(value['value'])} {value['unit']}".removesuffix(" 1")
-            for name, value in effect["parameters"].items()
-        )
+        numbers = numbers_of(effect, digits=3)
         rivals = f", not separated from {listed(effect['tied_with'])}" if effect["tied_with"] else ""
         confidence = f", confidence {effect['confidence']:.2f}" if effect["name"] != "unattributed" else ""
         shown = f": {numbers}" if numbers else ""

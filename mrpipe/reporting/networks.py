@@ -91,6 +91,8 @@ def drive_histories(history: History, samples: Samples, estimated: FloatArray) -
         axis.plot(time, samples.target[rows], color=MEASURED, linewidth=1.0, label="measured")
         axis.plot(time, estimated[rows], color=MODEL, linewidth=0.8, label="network")
         label(axis, "time [s]", f"drive [{history.drive_unit}]", history.names[test])
+    for axis in axes.ravel()[len(chosen) :]:
+        axis.set_visible(False)
     if len(chosen):
         axes[0, 0].legend(fontsize=7)
     return figure

@@ -82,9 +82,9 @@ def _loops(response: DampersResponse) -> Figure:
         axes[0, 0].plot(
             1e3 * own.damper_displacement[::step], own.force[::step], color=colour, linewidth=0.6, label=name
         )
-        axes[0, 1].plot(own.damper_velocity[::step], own.force[::step], color=colour, linewidth=0.6)
+        axes[0, 1].plot(1e3 * own.damper_velocity[::step], own.force[::step], color=colour, linewidth=0.6)
     label(axes[0, 0], "damper displacement [mm]", "force [N]")
-    label(axes[0, 1], "damper velocity [m/s]", "force [N]")
+    label(axes[0, 1], "damper velocity [mm/s]", "force [N]")
     axes[0, 0].legend(fontsize=7)
     return figure
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mrpipe.artifacts import FloatArray, IntArray
-from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, figure_with_axes, label
+from mrpipe.reporting.style import COLOURS, MEASURED, MODEL, drawn_in, figure_with_axes, label
 
 Curve = tuple[FloatArray, FloatArray]
 
@@ -23,20 +23,21 @@ def spectra_before_and_after(
     spectra
         Channel -> ((frequencies [Hz], density) before, the same after).
     units
-        Channel -> unit of the channel.
+        Channel -> SI unit of the channel; motions are drawn in mm and mm/s.
     cutoffs_hz
         Channel -> cut-off, missing where the channel was not filtered.
     """
     figure, axes = figure_with_axes((len(spectra) + 1) // 2, 2, height=2.6)
     for axis, (name, (before, after)) in zip(axes.ravel(), spectra.items(), strict=False):
-        axis.loglog(before[0][1:], before[1][1:], color=MEASURED, linewidth=0.7, label="measured")
-        axis.loglog(after[0][1:], after[1][1:], color=MODEL, linewidth=0.9, label="prepared")
+        unit, factor = drawn_in(units.get(name, ""))
+        axis.loglog(before[0][1:], factor**2 * before[1][1:], color=MEASURED, linewidth=0.7, label="measured")
+        axis.loglog(after[0][1:], factor**2 * after[1][1:], color=MODEL, linewidth=0.9, label="prepared")
         if name in cutoffs_hz:
             axis.axvline(cutoffs_hz[name], color=COLOURS[0], linewidth=0.8, linestyle="--", label="cut-off")
-        top = float(np.max(before[1][1:])) if before[1].size > 1 else 1.0
+        top = factor**2 * float(np.max(before[1][1:])) if before[1].size > 1 else 1.0
         if top > 0.0:
             axis.set_ylim(top * 1e-14, top * 10.0)
-        label(axis, "frequency [Hz]", f"density [({units.get(name, '')})²/Hz]", name)
+        label(axis, "frequency [Hz]", f"density [({unit})²/Hz]", name)
         axis.legend(loc="upper right", fontsize=7, frameon=False)
     for axis in axes.ravel()[len(spectra) :]:
         axis.set_visible(False)
@@ -59,7 +60,7 @@ def prepared_history(
     before, after
         Channel -> shape (n,); channels of `after` alone (velocity) are drawn without a measured curve.
     units
-        Channel -> unit.
+        Channel -> SI unit; motions are drawn in mm and mm/s.
     cycles
         Start indices of the steady cycles and the end of the last one; may be empty.
     """
@@ -67,13 +68,15 @@ def prepared_history(
     figure, axes = figure_with_axes(len(names), 1, height=1.5)
     begin, end = _window(cycles, time_s.size)
     for axis, name in zip(axes.ravel(), names, strict=True):
+        unit, factor = drawn_in(units.get(name, ""))
+        shown = time_s[begin:end]
         if name in before:
-            axis.plot(time_s[begin:end], before[name][begin:end], color=MEASURED, linewidth=0.6, label="measured")
-        axis.plot(time_s[begin:end], after[name][begin:end], color=MODEL, linewidth=0.9, label="prepared")
+            axis.plot(shown, factor * before[name][begin:end], color=MEASURED, linewidth=0.6, label="measured")
+        axis.plot(shown, factor * after[name][begin:end], color=MODEL, linewidth=0.9, label="prepared")
         for start in cycles:
             if begin <= start < end:
                 axis.axvline(time_s[start], color=COLOURS[0], linewidth=0.5, linestyle=":")
-        label(axis, "", f"{name} [{units.get(name, '')}]")
+        label(axis, "", f"{name} [{unit}]")
     axes.ravel()[-1].set_xlabel("time [s]", fontsize=8)
     axes.ravel()[0].legend(loc="upper right", fontsize=7, frameon=False, ncols=2)
     return figure
@@ -103,7 +106,9 @@ def loops(tests: Sequence[tuple[str, FloatArray, FloatArray, FloatArray]]) -> Fi
         axes[0, 1].plot(1e3 * velocity, force, color=colour, linewidth=0.7)
     label(axes[0, 0], "displacement [mm]", "force [N]")
     label(axes[0, 1], "velocity [mm/s]", "force [N]")
-    axes[0, 0].legend(loc="upper right", fontsize=7, frameon=False)
+    # below the curves, because a loop leaves no corner free
+    handles, names = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=3, fontsize=7, frameon=False)
     return figure
 
 
@@ -117,7 +122,7 @@ def campaign_overview(
     recordings
         (name, time [s], channel -> samples) of each.
     units
-        Channel -> unit.
+        Channel -> SI unit; motions are drawn in mm and mm/s.
     """
     names = list(dict.fromkeys(name for _, _, channels in recordings for name in channels))
     figure, axes = figure_with_axes(len(recordings), len(names), width=3.2 * len(names), height=1.8)
@@ -127,10 +132,9 @@ def campaign_overview(
             if name not in channels:
                 axis.set_visible(False)
                 continue
-            axis.plot(time, channels[name], color=MEASURED, linewidth=0.5)
+            unit, factor = drawn_in(units.get(name, ""))
+            axis.plot(time, factor * channels[name], color=MEASURED, linewidth=0.5)
             last = row == len(recordings) - 1
             name_shown = name.replace("_", " ")
-            label(
-                axis, "time [s]" if last else "", f"{name_shown} [{units.get(name, '')}]", title if column == 0 else ""
-            )
+            label(axis, "time [s]" if last else "", f"{name_shown} [{unit}]", title if column == 0 else "")
     return figure

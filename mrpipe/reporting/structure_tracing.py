@@ -23,20 +23,19 @@ def storey_maps(maps: Sequence[tuple[int, FloatArray, FloatArray, FloatArray]]) 
     figure = Figure(figsize=(4.4 * columns, 3.4 * rows), layout="constrained")
     for place, (storey, drift, rate, residual) in enumerate(maps, start=1):
         axes = figure.add_subplot(rows, columns, place)
-        edges = [
-            np.linspace(float(np.quantile(v, 0.002)), float(np.quantile(v, 0.998)), 33) for v in (1e3 * drift, rate)
-        ]
+        states = (1e3 * drift, 1e3 * rate)
+        edges = [np.linspace(float(np.quantile(v, 0.002)), float(np.quantile(v, 0.998)), 33) for v in states]
         if any(edge[-1] <= edge[0] for edge in edges):
             continue
-        total, *_ = np.histogram2d(1e3 * drift, rate, bins=edges, weights=residual)
-        count, *_ = np.histogram2d(1e3 * drift, rate, bins=edges)
+        total, *_ = np.histogram2d(*states, bins=edges, weights=residual)
+        count, *_ = np.histogram2d(*states, bins=edges)
         mean = np.where(count > 3, total / np.maximum(count, 1), np.nan)
         limit = float(np.nanquantile(np.abs(mean), 0.98)) or 1.0
         image = axes.pcolormesh(*edges, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit, rasterized=True)
         figure.colorbar(image, ax=axes, label="mean residual [N]")
         axes.set_title(f"storey {storey}", fontsize=9)
         axes.set_xlabel("drift [mm]")
-        axes.set_ylabel("rate [m/s]")
+        axes.set_ylabel("rate [mm/s]")
     return figure
 
 

@@ -64,6 +64,15 @@ def label(axis: Axes, x: str, y: str, title: str = "") -> None:
         axis.set_title(title, fontsize=9)
 
 
+_DRAWN_IN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3)}
+"""SI unit -> unit of a damper's motion in figures, and its number in one SI unit."""
+
+
+def drawn_in(unit: str) -> tuple[str, float]:
+    """Return the unit in which figures show a channel of this SI unit, and the factor of its numbers."""
+    return _DRAWN_IN.get(unit, (unit, 1.0))
+
+
 MOST_POINTS = 20_000
 """Points of a figure up to which the best place of a legend is searched; the search is slow for more."""
 
@@ -80,7 +89,8 @@ def place_legends(figure: Figure) -> None:
 def as_svg(figure: Figure) -> str:
     """Return a figure as an SVG element without time stamp, so that the same figure is the same text.
 
-    Texts stay texts (searchable, small); coordinates are rounded to a hundredth of a point.
+    Texts stay texts (searchable, small). Coordinates are cut to a hundredth of a point: these are the numbers in the
+    attributes of elements, because the content of an element is a text that a reader sees.
     """
     buffer = io.StringIO()
     place_legends(figure)
@@ -89,5 +99,5 @@ def as_svg(figure: Figure) -> str:
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
-    text = re.sub(r"(\d+\.\d{2})\d+", r"\1", text)
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d+\.\d{2})\d+", r"\1", tag[0]), text)
     return re.sub(r"\n\s*", "\n", text)

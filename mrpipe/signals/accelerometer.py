@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +12,26 @@ from mrpipe.signals.fusion import SensorAgreement, fused_displacement, on_displa
 from mrpipe.signals.options import Motion
 
 Channels = dict[str, FloatArray]
+
+
+def require_acceleration(tests: Mapping[str, Collection[str]], motion: Motion, source: str) -> None:
+    """Refuse tests (name -> channels) without an acceleration where the motion comes from both sensors.
+
+    Raises
+    ------
+    UserError
+        If a test lacks the acceleration; the message names the first such test.
+    """
+    if motion == "displacement":
+        return
+    for name, channels in tests.items():
+        if "acceleration" not in channels:
+            raise UserError(
+                source,
+                f"test {name}",
+                f"has no acceleration, and prepare.motion is {motion}",
+                "give the channel, or set prepare.motion to displacement",
+            )
 
 
 def with_accelerometer(
@@ -44,14 +64,7 @@ def with_accelerometer(
     findings = _with_right_sign(measured, sampling_rate_hz)
     if motion == "displacement":
         return findings + (_advice(measured, sampling_rate_hz) if measured else [])
-    for name, channels in tests.items():
-        if "acceleration" not in channels:
-            raise UserError(
-                source,
-                f"test {name}",
-                f"has no acceleration, and prepare.motion is {motion}",
-                "give the channel, or set prepare.motion to displacement",
-            )
+    require_acceleration({name: set(channels) for name, channels in tests.items()}, motion, source)
     found = _agreement(measured, sampling_rate_hz)
     for channels in measured:
         acceleration = on_displacement_clock(channels["acceleration"], found, sampling_rate_hz)

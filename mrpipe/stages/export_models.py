@@ -78,7 +78,8 @@ def _run(context: StageContext, name: str, subject_of: Callable[[StageContext], 
     folder = context.run_directory / FOLDER / name
     files = write_export(subject, folder, context.settings.export.formats)
     section.describe(context.report, subject, files, f"{FOLDER}/{name}")
-    return {"kind": subject.kind, "name": subject.name, "folder": str(folder), "files": files}
+    source = {"source": subject.details["source"]} if "source" in subject.details else {}
+    return {"kind": subject.kind, "name": subject.name, **source, "folder": str(folder), "files": files}
 
 
 def _stage(

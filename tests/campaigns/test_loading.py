@@ -137,6 +137,10 @@ def test_each_fault_of_the_campaign_file_has_its_line(tmp_path: Path, changes: d
         ({"part": 2}, "part: is 2, the file has 1"),
         ({"file": "one.xls"}, "one.xls: data file not found"),
         ({"drive": {"value": 1.0, "unit": "V"}}, "drive: is in A in tests[1] and in V in the tests before"),
+        (
+            {"drive": {"value": 1.0, "unit": "V"}},
+            "a command in V becomes the current with unit: A, scale:",
+        ),
         ({"drive": {"value": 1.0, "column": "i", "unit": "A"}}, "either column or value expected, not both"),
         ({"drive": {"value": float("inf"), "unit": "A"}}, "a finite number expected"),
     ],
@@ -419,3 +423,13 @@ def test_a_mass_driver_and_unknown_masses(tmp_path: Path) -> None:
 )
 def test_faults_of_a_frame_campaign(tmp_path: Path, changes: dict, expected: str) -> None:
     assert expected in told(frame(tmp_path / "a", **changes))
+
+
+@pytest.mark.property
+def test_messages_name_files_without_detours(tmp_path: Path) -> None:
+    campaign(tmp_path / "project" / "data", directory="../../files")
+    files = tmp_path / "files"
+    files.mkdir()
+    with pytest.raises(UserError, match="data file not found") as caught:
+        load_campaign(tmp_path / "project" / "data")
+    assert str(caught.value).startswith(f"{files}/")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from mrpipe.campaigns.schema import TextEntry
 from mrpipe.campaigns.tables import table_of_text
 from mrpipe.errors import UserError
 
@@ -107,6 +108,18 @@ def test_one_word_among_decimal_commas_is_named_and_not_the_numbers() -> None:
 def test_separators_of_thousands_are_named_and_never_read_as_decimal_signs(text: str, line: int, found: str) -> None:
     with pytest.raises(UserError, match=f"line {line}, column x: '{found}' is not a number; write numbers without sep"):
         table_of_text(Path("a.csv"), text).column("x", "")
+
+
+def test_the_remedy_shows_what_would_be_right() -> None:
+    def told(text: str, **layout: str) -> str:
+        with pytest.raises(UserError) as caught:
+            table_of_text(Path("a.csv"), text, TextEntry(**layout)).column("x", "")
+        return str(caught.value)
+
+    assert told("t;x\n0,0;997,41\n0,1;-1.005,39\n").endswith("without separators of thousands, as -1005,39")
+    assert told('t,x\n0.0,997.41\n0.1,"1,005.39"\n').endswith("as 1005.39")
+    commas = told("t;x\n0,0;0,1\n1,0;0,2\n", decimal=".")
+    assert commas.endswith("for decimal commas give text: {decimal: ','} in campaign.yaml")
 
 
 def test_the_minus_sign_of_a_typesetter_is_a_minus() -> None:

@@ -321,3 +321,37 @@ def test_effect_files_are_read_and_not_run(tmp_path: Path, capsys: pytest.Captur
         own.write_text(content, encoding="utf-8")
         status, _, err = checked(capsys, *arguments)
         assert status == 2 and expected in err and err.count("\n") == 1
+
+
+@pytest.mark.planted
+def test_what_the_stages_refuse_is_an_error_of_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    constant = [replace(test, drive=np.full_like(test.drive, 0.5)) for test in sound_tests(4)]
+    config = project(tmp_path, constant)
+    assert checked(capsys, str(config))[0] == 0
+    text = config.read_text(encoding="utf-8")
+    # train-inverse alone needs prepare too
+    config.write_text(text.replace("[prepare, assemble, identify-damper]", "[train-inverse]"), encoding="utf-8")
+    status, out, _ = checked(capsys, str(config), "--set", "prepare.motion=displacement-and-acceleration")
+    assert status == 1
+    assert "error: test T0: has no acceleration, and prepare.motion is displacement-and-acceleration; give" in out
+    assert "error: drive: never changes in the training tests (0.5); an inverse model needs training tests at" in out
+
+
+@pytest.mark.property
+@pytest.mark.parametrize("name", ["a/b", ".."])
+def test_a_name_that_cannot_be_that_of_a_directory(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    config = project(tmp_path)
+    config.write_text(config.read_text().replace("name: own", f"name: '{name}'"), encoding="utf-8")
+    status, _, err = checked(capsys, str(config))
+    assert status == 2 and f"name: {name!r}: is not the name of a directory" in err
+
+
+@pytest.mark.golden
+def test_a_campaign_on_the_command_line_is_what_was_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project(tmp_path / "my rig")
+    campaign = str(tmp_path / "my rig" / "data")
+    status, out, _ = checked(capsys, "--campaign", campaign)
+    assert status == 0 and out.startswith(f"campaign {campaign}: valid")
+    assert f"next: mrpipe run --campaign '{campaign}'" in out

@@ -57,6 +57,11 @@ MISTAKES = {
     "run in the working directory": (["prepare", "--run", ""], "is the working directory"),
     "name of a path": (["prepare", "--set", "name=../x"], "'../x': is not the name of a directory"),
     "until what is not there": (["run", "--until", "prepair"], "did you mean prepare?"),
+    "until part of a name": (["run", "--until", "train"], "--until: train: no such stage; did you mean"),
+    "unknown format": (
+        ["export", "forward", "--format", "onxx"],
+        "--format: onxx: is not a format; did you mean onnx",
+    ),
     "no campaign": (["prepare", "--campaign", "nowhere"], "nowhere"),
     "no file to show": (["show", "nowhere.h5"], "nowhere.h5: no such file or directory"),
     "no picture": (["show", "README.md", "--plot", "x.txt"], "end it in .png, .svg or .pdf"),

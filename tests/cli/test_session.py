@@ -6,6 +6,7 @@ import pytest
 
 from mrpipe.cli.options import CommonOptions
 from mrpipe.cli.session import load, session
+from mrpipe.errors import UserError
 
 
 @pytest.mark.property
@@ -14,6 +15,7 @@ def test_a_run_of_another_configuration_is_named_unless_the_command_names_one(
     named: bool, warned: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """`--run` alone takes the default configuration, which builds the stages of the other one again."""
+    (tmp_path / "manifests").mkdir()
     kept = tmp_path / "config.yaml"
     kept.write_text("name: tower\nseed: 3\n")
     given = tmp_path / "given.yaml"
@@ -61,3 +63,34 @@ def test_modes_over_amplitude_are_looked_for_in_a_measured_frame(
     changes = ["identify_frame.amplitude_dependence=false"] if overrides else []
     options = CommonOptions(config=given if named else None, campaign=tmp_path, overrides=changes)
     assert load(options).config.identify_frame.amplitude_dependence is searched
+
+
+@pytest.mark.property
+def test_a_directory_that_no_run_has_written_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_text("of the user")
+    with (
+        pytest.raises(UserError, match=r"holds report.html, which no run has written; give an empty or new directory"),
+        session(CommonOptions(run=tmp_path)),
+    ):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+    # a run that was killed before its first stage ended goes on
+    killed = tmp_path / "killed"
+    with session(CommonOptions(run=killed)):
+        (killed / "figures").mkdir()
+    with session(CommonOptions(run=killed)) as pipeline:
+        assert pipeline.run_directory == killed
+    hidden = tmp_path / "hidden"
+    hidden.mkdir()
+    (hidden / ".gitkeep").touch()
+    with session(CommonOptions(run=hidden)):
+        pass
+
+
+@pytest.mark.property
+def test_an_unknown_stage_is_named_with_its_line(tmp_path: Path) -> None:
+    config = tmp_path / "own.yaml"
+    config.write_text("name: own\nstages:\n  - prepare\n  - trian-forward\n")
+    said = r"own.yaml: line 4, stages\[1\]: no such stage 'trian-forward'; did you mean train-forward"
+    with pytest.raises(UserError, match=said), session(CommonOptions(config=config, run=tmp_path / "run")):
+        pass

@@ -107,3 +107,13 @@ def test_a_damaged_artifact_is_one_line_with_its_name(tmp_path: Path, capsys: py
             assert line.startswith(f"mrpipe: {path}")
             found += 1
     assert found > 0
+
+
+@pytest.mark.golden
+def test_missing_samples_of_a_data_file_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "gaps.csv"
+    rows = [f"{0.01 * k:.2f},{'NaN' if k in (3, 7) else k},{k % 5}" for k in range(60)]
+    path.write_text("t [s],x [mm],F [N]\n" + "\n".join(rows) + "\n")
+    lines = shown(capsys, str(path))
+    assert any("missing samples" in line for line in lines)
+    assert next(line for line in lines if "x [mm]" in line).split()[-1] == "2"

@@ -24,6 +24,14 @@ FAULTS = {
     ),
     "key twice": ("seed: 1\nname: x\nseed: 2\n", "line 3, seed: appears already in line 1; keep one of the two"),
     "no YAML": ("seed: [1\n", "not valid YAML"),
+    "decimal comma": (
+        "prepare:\n  cutoff_hz: 12,5\n",
+        "line 2, prepare.cutoff_hz: is '12,5'; a number expected; write a decimal point, as in 12.5",
+    ),
+    "decimal comma in braces": ("prepare: {cutoff_hz: 12,5}\n", "a decimal number has a point and no comma"),
+    "true for a number": ("prepare: {cycles: true}\n", "prepare.cycles: is True; a number expected"),
+    "no stage": ("stages: []\n", "line 1, stages: is []; a list of at least 1 value expected"),
+    "stage twice": ("stages: [prepare, assemble, prepare]\n", "prepare is listed more than once"),
     "no mapping": ("- a\n- b\n", "line 1: is not a mapping; write `key: value` lines"),
     "section is a number": ("prepare: 3\n", "line 1, prepare: is 3; a mapping of keys to values expected"),
     "code in YAML": (
@@ -48,6 +56,8 @@ def test_fault_is_one_line_with_place(fault: str, tmp_path: Path) -> None:
 
 OVERRIDES = {
     "prepare.cutof_hz=80": "--set: prepare.cutof_hz: unknown key; did you mean cutoff_hz?",
+    "cutoff_hz=4": "--set: cutoff_hz: unknown key; did you mean prepare.cutoff_hz?",
+    "architecture=[4]": "unknown key; name the section: train_forward.architecture, train_inverse.architecture",
     "prepare": "--set: prepare: is not an assignment; write section.key=value",
     "seed=many": "--set: seed: is 'many'; a whole number expected",
     "train_inverse.architecture=[12, six]": "train_inverse.architecture[1]: is 'six'; a whole number expected",
@@ -80,6 +90,11 @@ def test_override_wins_over_the_file(tmp_path: Path) -> None:
 def test_missing_file_names_those_that_come_along(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"no such configuration; give a YAML file, or one of .*thesis"):
         load_config(tmp_path / "none.yaml")
+
+
+def test_a_misspelt_name_names_the_nearest_configuration() -> None:
+    with pytest.raises(UserError, match=r"thesi: no such configuration; did you mean thesis\?"):
+        load_config(Path("thesi"))
 
 
 def test_file_that_is_not_text(tmp_path: Path) -> None:

@@ -166,6 +166,30 @@ def test_json_of_a_damper_holds_all_its_numbers(tmp_path: Path) -> None:
 
 
 @pytest.mark.property
+def test_the_readme_of_a_damper_says_which_damper_it_is(tmp_path: Path) -> None:
+    sensor = Addition("channel-skew", "shift", {}, {}, True, lambda _: [])
+    damper = with_effect("heating", "cooling")
+    traced = replace(damper, effects=(*damper.effects, sensor))
+    write_export(damper_subject(traced, source="traced"), tmp_path, ["json"])
+    text = (tmp_path / "README.md").read_text()
+    assert "The traced damper of `close-loop` (`--damper traced`): base form `bouc-wen`" in text
+    assert "with `heating` (form cooling). Faults of sensors, which do not change the force: `channel-skew`." in text
+    write_export(damper_subject(model("dahl"), source="identified"), tmp_path, ["json"])
+    text = (tmp_path / "README.md").read_text()
+    assert "The identified damper of `identify-damper`: base form `dahl`" in text and "without effects" in text
+
+
+@pytest.mark.property
+def test_files_of_an_earlier_export_do_not_stay_beside_a_new_one(tmp_path: Path) -> None:
+    subject = networks()["forward"]
+    write_export(subject, tmp_path, ["c", "json"])
+    (tmp_path / "notes.txt").write_text("of the user")
+    write_export(replace(subject, prefix="other"), tmp_path, ["matlab"])
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {"other.m", "other.mat", "self_test.m", "vectors.csv", "README.md", "notes.txt"}
+
+
+@pytest.mark.property
 def test_a_format_that_a_model_does_not_have_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="is not a format of a frame"):
         write_export(frame(), tmp_path, ["onnx"])

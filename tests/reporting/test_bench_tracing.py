@@ -73,3 +73,8 @@ def test_a_base_model_that_fails_is_said_to_fail(summary: dict[str, Any]) -> Non
     sentence = "the model does not predict the validation tests (NRMSE 0.7): nothing is traced"
     failed = {**summary, "effects": [], "candidates": [], "verdict_class": "unknown", "verdict": sentence}
     assert in_plain_words(failed).endswith("(NRMSE 0.7): nothing is traced.")
+
+
+def test_an_exchanged_base_form_is_part_of_the_paragraph(summary: dict[str, Any]) -> None:
+    summary["base_form"] = {"declared": "bouc-wen", "taken": "rounded-yield", "tied_with": []}
+    assert "base form **rounded-yield** in place of bouc-wen" in in_plain_words(summary)

@@ -71,3 +71,17 @@ def test_open_questions_of_one_kind_are_one_sentence() -> None:
     assert line == (
         "2 tests in next-tests.yaml would decide inertia or accumulator, end-stop; whether there is delay or remanence"
     )
+
+
+@pytest.mark.property
+def test_the_line_of_a_tracing_names_an_exchanged_base_form_and_determined_numbers_first() -> None:
+    parameters = {
+        "gas_length": {"value": 0.5, "unit": "m", "interval": [0.104, 2.416]},
+        "stiffness": {"value": 3534.0, "unit": "N/m", "interval": [3501.0, 3567.0]},
+    }
+    form = {"declared": "bouc-wen", "taken": "rounded-yield", "nrmse": {}}
+    found = tracing(base_form=form, effects=[{**tracing()["effects"][0], "parameters": parameters}])
+    assert headline("close-loop", found).startswith("accumulator with the base form rounded-yield in place of bouc-wen")
+    line = next(line for line in in_brief("close-loop", found) if line.startswith("effect"))
+    assert "stiffness 3.53e+03 N/m, gas length 0.5 m (not well determined)" in line
+    assert headline("close-loop", tracing()).startswith("accumulator: ")

@@ -1,7 +1,8 @@
-"""Figures with very many points are drawn without a search for the best place of the legend."""
+"""Figures with very many points are drawn quickly, and the texts of a figure are kept as they are."""
 
 from __future__ import annotations
 
+import re
 import warnings
 
 import numpy as np
@@ -22,3 +23,17 @@ def test_a_figure_of_very_many_points_is_drawn_without_a_warning() -> None:
         as_svg(figure)
     # the legend lies in the upper right corner, in place of a place that is searched
     assert axis.get_legend()._loc == 1
+
+
+@pytest.mark.property
+def test_texts_of_a_figure_keep_their_digits() -> None:
+    figure, axes = figure_with_axes()
+    axis = axes[0, 0]
+    axis.plot([0.0, 0.123456, 0.2], [0.001, 0.0024, 0.0031])
+    axis.set_yticks([0.001, 0.002, 0.003])
+    axis.set_title("NRMSE 0.0046 after, test 3a-1.125Hz")
+    drawing = as_svg(figure)
+    texts = re.findall(r"<text[^>]*>([^<]*)</text>", drawing)
+    assert {"0.001", "0.002", "0.003", "NRMSE 0.0046 after, test 3a-1.125Hz"} <= set(texts)
+    # the coordinates are still short, because they are most of the file
+    assert not re.search(r"\d\.\d{3}", "".join(re.findall(r"<path[^>]*>", drawing)))

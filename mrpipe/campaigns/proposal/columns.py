@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,10 +12,14 @@ import numpy as np
 from mrpipe.artifacts import FloatArray
 from mrpipe.campaigns.columns import DataFile
 from mrpipe.campaigns.plausibility.reference import mean_frequency
+from mrpipe.campaigns.proposal.samples import has_few_levels, motion_and_force
 from mrpipe.campaigns.proposal.words import Header, read_header
 from mrpipe.errors import UserError
+from mrpipe.words import counted, listed
 
 MOST_COLUMNS = 200
+FEWEST_SAMPLES = 20
+"""A column with at most as many samples is not a record."""
 _BESIDE = "no sensor at the base was found; this one is near the structure and may move differently"
 _DRIVE_GUESSED = "no unit in the header; guessed from the numbers"
 
@@ -80,37 +84,12 @@ def columns_of(file: DataFile) -> list[Column]:
                 values = file.column(column, "")
             except UserError:
                 continue
-            if np.isfinite(values).sum() > 20:
+            if np.isfinite(values).sum() > FEWEST_SAMPLES:
                 known = name in file.accelerations
                 header = _of_a_record(name) if known else read_header(column.split("[:,")[0], unit_rows.get(name, ""))
                 found.append(Column(column, header, values))
     longest = max((item.values.size for item in found), default=0)
     return [item for item in found if item.values.size == longest]
-
-
-def unreadable_channels(file: DataFile, columns: Sequence[Column]) -> dict[str, str]:
-    """Return why a column is not used, for each one whose header names a channel and whose samples cannot be read.
-
-    Parameters
-    ----------
-    file
-        Data file.
-    columns
-        Its columns that were read.
-    """
-    lines = {}
-    read = {item.name for item in columns}
-    for name in file.names[:MOST_COLUMNS] if file.table else ():
-        if name in read:
-            continue
-        header = read_header(name)
-        if not (header.quantity or header.unit_quantity):
-            continue
-        try:
-            file.column(name, "")
-        except UserError as error:
-            lines[name] = f"{error.where}: {error.problem}" if error.where else error.problem
-    return lines
 
 
 def _of_a_record(name: str) -> Header:
@@ -169,7 +148,17 @@ def lay_out_bench(columns: list[Column], file: DataFile) -> Layout:
     rest = [item for item in left if item.name not in taken and not item.header.quantity]
     _by_samples(channels, taken, [item for item in rest if not item.header.unit])
     unused = tuple(item.name for item in columns if item.name not in taken)
-    return Layout(channels, unused)
+    return Layout(_with_twins(channels, columns), unused)
+
+
+def _with_twins(channels: Mapping[str, Guess], columns: Sequence[Column]) -> dict[str, Guess]:
+    """Return the channels, with a doubt on each whose header stands above another column as well."""
+    found = {}
+    for channel, guess in channels.items():
+        twins = [item.name for item in columns if guess.column and item.name.rpartition("#")[0] == guess.column]
+        doubt = f"the header is that of {counted(len(twins) + 1, 'column')}; the other is {listed(twins)}"
+        found[channel] = replace(guess, unsure="; ".join(filter(None, (guess.unsure, doubt)))) if twins else guess
+    return found
 
 
 def lay_out_frame(columns: list[Column], file: DataFile) -> Layout:
@@ -347,32 +336,32 @@ def share_units(layouts: Sequence[Layout]) -> list[Layout]:
 def _by_samples(channels: dict[str, Guess], taken: set[str], columns: list[Column]) -> None:
     """Propose displacement, force and drive among columns whose headers name no quantity.
 
-    A drive is constant or has few levels. Of the others, the displacement has the lowest mean frequency, because a
-    damper distorts its force.
+    A drive is constant or has few levels. Of the others, displacement and force are the two of which one follows the
+    derivative of the other best, because the force of a damper follows the velocity. Of these two, the displacement has
+    the lower mean frequency, because a damper distorts its force. Where one more column changes, it is the drive.
     """
     why = "the header names no quantity; guessed from the samples"
-    constant = [item for item in columns if _few_levels(item.values)]
+    constant = [item for item in columns if has_few_levels(item.values)]
     moving = [item for item in columns if item not in constant]
     if "drive" not in channels and constant:
         size = float(np.nanmax(np.abs(constant[0].values)))
         channels["drive"] = Guess(constant[0].name, _drive_unit(constant[0].values), why, size=size)
         taken.add(constant[0].name)
     moving.sort(key=lambda item: mean_frequency(np.nan_to_num(item.values), 1.0))
+    if len(moving) > 2 and not {"displacement", "force"} & set(channels):
+        pair = [moving[place] for place in motion_and_force([item.values for item in moving])]
+        others = [item for item in moving if item not in pair]
+        moving = pair
+        if "drive" not in channels and len(others) == 1:
+            size = float(np.nanmax(np.abs(others[0].values)))
+            channels["drive"] = Guess(others[0].name, _drive_unit(others[0].values), why, size=size)
+            taken.add(others[0].name)
     for channel in ("displacement", "force"):
         if channel not in channels and moving:
             column = moving.pop(0) if channel == "displacement" else moving.pop()
             size = amplitude(column.values)
             channels[channel] = Guess(column.name, unit_by_size(size, channel)[0], why, size=size)
             taken.add(column.name)
-
-
-def _few_levels(values: FloatArray) -> bool:
-    """Whether samples rest on a few levels: half of them lie within 1 % of the range around three values at most."""
-    span = float(np.ptp(values))
-    if span <= 0.02 * float(np.abs(values).max()):
-        return True
-    counts = np.sort(np.histogram(values, bins=100)[0])[::-1]
-    return bool(counts[:3].sum() > 0.9 * values.size)
 
 
 def open_columns(path: Path) -> tuple[DataFile, list[Column]]:

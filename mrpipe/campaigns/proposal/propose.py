@@ -23,7 +23,6 @@ from mrpipe.campaigns.proposal.columns import (
     lay_out_frame,
     open_columns,
     share_units,
-    unreadable_channels,
 )
 from mrpipe.campaigns.proposal.kinds import GAINS, kind_of, kind_of_record, law_of, mode_of
 from mrpipe.campaigns.proposal.roles import (
@@ -34,7 +33,9 @@ from mrpipe.campaigns.proposal.roles import (
     propose_roles,
 )
 from mrpipe.campaigns.proposal.text import TestText, campaign_text
+from mrpipe.campaigns.proposal.unreadable import unreadable_channels, why_no_columns
 from mrpipe.errors import UserError
+from mrpipe.words import counted
 
 Rig = Literal["bench", "frame", "both"]
 
@@ -117,7 +118,7 @@ def propose_campaigns(folder: Path, name: str, rig: Rig | None, beside: Path) ->
             continue
         if len(columns) < 2:
             single = "one channel; put the channels of a record into one zip file"
-            reason = single if file.accelerations else "fewer than two columns of numbers"
+            reason = single if file.accelerations else why_no_columns(file)
             skipped.append(f"{path.relative_to(folder)}: {reason}")
             continue
         as_frame = rig == "frame" or (rig != "bench" and (bool(file.accelerations) or floor_columns(columns) >= 2))
@@ -168,7 +169,7 @@ def _propose(
         ]
     unsure += _not_used(files)
     tests, why, notes = _bench_tests(files, folder, shared) if bench else _frame_tests(files, folder, shared)
-    unsure += notes
+    unsure += [*_guessed_in_tests(tests), *notes]
     unused = sorted({column for item in files for column in item.layout.unused})
     has_clock = all("time" in item.layout.channels or item.file.time_s is not None for item in files)
     rated = has_clock or all(item.file.sampling_rate_hz for item in files)
@@ -235,6 +236,20 @@ def _own(item: _File, shared: dict[str, Guess]) -> dict[str, Guess]:
     }
 
 
+def _guessed_in_tests(tests: Sequence[TestText]) -> list[str]:
+    """Return a line for each guess that belongs to single tests only; tests with the same guess share it."""
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for test in tests:
+        for key, guess in test.channels.items():
+            if guess.unsure and guess.column:
+                found.setdefault((key, guess.column, guess.unsure), []).append(test.name)
+    return [
+        f"channel {key} of {counted(len(names), 'test')} ({', '.join(names[:3])}{', ...' if names[3:] else ''}), "
+        f"column {column}: {why}"
+        for (key, column, why), names in found.items()
+    ]
+
+
 def _test_name(path: Path, folder: Path) -> str:
     relative = path.relative_to(folder)
     parts = [*relative.parent.parts, relative.name[: -len(ending_of(path))]]
@@ -269,7 +284,7 @@ def _bench_tests(files: list[_File], folder: Path, shared: dict[str, Guess]) -> 
         middle = float(first + 0.65 * (last - first))
         tests = [
             replace(tests[0], name=f"{tests[0].name}-1", role="training", segments=((float(first), middle),)),
-            replace(tests[0], name=f"{tests[0].name}-2", role="validation", segments=((middle, float(last) + 1.0),)),
+            replace(tests[0], name=f"{tests[0].name}-2", role="validation", segments=((middle, float(last)),)),
         ]
         notes.append("roles: one file only, so training and validation are parts of one record")
         return tests, found.why, notes

@@ -80,7 +80,7 @@ def campaign_text(
         entry += [f"law: {test.law}"] if test.law else []
         entry += [f"mode: {test.mode}"] if test.mode else []
         entry += (
-            [f"segments_s: [{', '.join(f'[{a:.6g}, {b:.6g}]' for a, b in test.segments)}]"] if test.segments else []
+            [f"segments_s: [{', '.join(f'[{a:.10g}, {b:.10g}]' for a, b in test.segments)}]"] if test.segments else []
         )
         if test.channels:
             own = ", ".join(f"{key}: {_channel(guess)}" for key, guess in test.channels.items())

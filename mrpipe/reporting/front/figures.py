@@ -46,18 +46,25 @@ class TestRun:
 
 
 def model_errors(rows: Sequence[tuple[str, float, str]]) -> Figure:
-    """Draw the error of each model on unseen tests as horizontal bars on a logarithmic axis, best at the top."""
+    """Draw the error of each model on unseen tests as points on a logarithmic axis, best at the top.
+
+    Bars would mislead, because a logarithmic axis has no zero from which their length could begin.
+    """
     figure, axes = figure_with_axes(1, 1, width=5.6, height=0.42 * len(rows) + 0.75)
     axis = axes[0, 0]
     place = np.arange(len(rows))[::-1]
     values = [100.0 * value for _, value, _ in rows]
     left = 0.5 * min(values)
-    axis.barh(place, [value - left for value in values], 0.62, left=left, color=[KIND_COLOURS[row[2]] for row in rows])
+    axis.hlines(place, left, 2.2 * max(values), color="#dddddd", lw=0.8, zorder=1)
+    axis.scatter(values, place, s=60, color=[KIND_COLOURS[row[2]] for row in rows], zorder=2)
     for y, value in zip(place, values, strict=True):
-        axis.text(value * 1.06, y, f"{value:.2g} %", va="center", fontsize=9)
+        ground = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+        axis.annotate(f"{value:.2g} %", (value, y), (8, 0), textcoords="offset points", va="center", fontsize=9,
+                      bbox=ground)  # fmt: skip
     axis.set_yticks(place, [name for name, _, _ in rows], fontsize=9)
     axis.set_xscale("log")
     axis.set_xlim(left, 2.2 * max(values))
+    axis.set_ylim(-0.6, len(rows) - 0.4)
     _plain_log(axis, [left, 2.2 * max(values)])
     axis.grid(axis="y", visible=False)
     label(axis, "RMS error on unseen tests / RMS force [%]", "")

@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 
 from mrpipe.artifacts import Artifact
+from mrpipe.effects.damper import read_damper
+from mrpipe.errors import UserError
 from mrpipe.reporting import modal
 from mrpipe.reporting.closed_loop_words import in_points
 from mrpipe.reporting.facts import RunFacts
@@ -16,6 +18,7 @@ from mrpipe.reporting.front import figures, several_dampers, statements, tables
 from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front.figures import TestRun
 from mrpipe.reporting.places import is_chain, names_of
+from mrpipe.reporting.traced_words import exchange_in_words
 from mrpipe.reporting.words import number, percent, quantity
 from mrpipe.reporting.writer import Section
 from mrpipe.words import listed
@@ -116,6 +119,7 @@ def damper(facts: RunFacts) -> Section:
     if _of_structure(loop):
         return section
     _traced_effects(section, loop)
+    _traced_model(section, facts, loop)
     shown = _shown_tests(facts)
     if shown:
         section.figure(
@@ -158,6 +162,27 @@ def _traced_effects(section: Section, loop: Mapping[str, Any]) -> None:
             figures.candidate_shares(loop["candidates"], [effect["name"] for effect in effects]),
             "Share of the recoverable residual that each effect recovers alone; named effects in blue.",
         )
+
+
+def _traced_model(section: Section, facts: RunFacts, loop: Mapping[str, Any]) -> None:
+    """Add the parameters of the damper with the traced effects, whose base form may be another than the declared."""
+    artifact = facts.artifact("close-loop.h5")
+    if artifact is None or "damper" not in artifact.members("/"):
+        return
+    try:
+        model = read_damper(artifact)
+    except UserError as error:
+        # the file of an own effect was moved or changed: the other results do not depend on it
+        section.text(f"The parameters of the final model cannot be shown: {error}")
+        return
+    exchange = exchange_in_words(loop)
+    if exchange:
+        section.text(exchange)
+    section.table(
+        "traced",
+        tables.traced_parameters(model),
+        f"Parameters of the final model of close-loop, base form {model.form} (damper-traced.h5; SI).",
+    )
 
 
 def _residual(artifact: Artifact, drive_unit: str) -> tuple[list[tuple[str, Any]], Any, Any]:

@@ -14,6 +14,7 @@ from mrpipe.reporting.front import laws as law_facts
 from mrpipe.reporting.front import several_dampers
 from mrpipe.reporting.headlines import weak_network
 from mrpipe.reporting.places import names_of, size_in_words
+from mrpipe.reporting.traced_words import exchange_in_words, exchanged_form, leading_first
 from mrpipe.reporting.words import number, percent, plain, quantity, with_interval
 from mrpipe.words import counted, duration, listed, noun
 
@@ -98,7 +99,8 @@ def missing(facts: RunFacts) -> str:
     errors = f"Error on unseen tests: {percent(before)} before, {percent(after)} after (noise alone: {percent(floor)})."
     kind = verdict_class(summary)
     subject = f"The {summary.get('model') or 'linear'} model"
-    effects = proper_effects(summary)
+    effects, form = proper_effects(summary), exchange_in_words(summary)
+    exchange = f" {form}" if form else ""
     if kind == "validation differs":
         differences = "; ".join(item["sentence"] for item in summary["validation"]["differences"][:3])
         return (
@@ -116,11 +118,11 @@ def missing(facts: RunFacts) -> str:
         states = [item["state"] for item in summary["unexplained"]["depends_on"][:3]]
         varies = f" It varies with {listed(states)}." if states else ""
         drift = _drift_of(summary)
-        return f"{subject} lacks something that no effect of the library explains.{varies}{drift} {errors}"
+        return f"{subject} lacks something that no effect of the library explains.{varies}{drift}{exchange} {errors}"
     named = listed([f"**{effect['name']}**{_value_of(effect)}" for effect in effects])
     sure = listed([_confidence(effect["confidence"]) for effect in effects])
     meanings = "".join(f" {effect['physics'].rstrip('.')}." for effect in effects if effect.get("physics"))
-    text = f"{subject} lacks {named}. Confidence: {sure}.{meanings} {errors}"
+    text = f"{subject} lacks {named}. Confidence: {sure}.{meanings}{exchange} {errors}"
     ceiling = (summary.get("ceiling") or {}).get("nrmse")
     if ceiling is not None:
         text += f" The best any model reached is {percent(ceiling)}."
@@ -147,11 +149,9 @@ def proper_effects(summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _value_of(effect: Mapping[str, Any]) -> str:
-    """Return the leading parameter of an effect with its interval; the first of the effect's own list leads."""
+    """Return the leading parameter of an effect with its interval; a well-determined one leads."""
     place = f" at {effect['place']}" if effect.get("place") else ""
-    for name, entry in effect["parameters"].items():
-        if entry.get("value") is None:
-            continue
+    for name, entry in leading_first(effect):
         low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
         level = f"{100.0 * entry.get('interval_level', 0.95):.0f} % interval"
         if 0.0 < abs(high - low) < 2.0 * NARROW * abs(entry["value"]):
@@ -298,7 +298,8 @@ def model_errors(facts: RunFacts) -> list[tuple[str, float, str]]:
     if loop.get("noise_floor_nrmse"):
         found.append(("noise alone", loop["noise_floor_nrmse"], "noise"))
     if proper_effects(loop):
-        found.append(("damper model with the effect", loop["after"]["nrmse"], "after"))
+        form = exchanged_form(loop)
+        found.append((f"damper model {form + ' ' if form else ''}with the effect", loop["after"]["nrmse"], "after"))
     if "validation_nrmse" in damper:
         found.append((f"damper model {damper['form']}", damper["validation_nrmse"], "before"))
     elif "before" in loop and loop.get("model"):

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from mrpipe.dampers.model import DamperModel
 from mrpipe.reporting.facts import RunFacts
 from mrpipe.reporting.front import laws as law_facts
+from mrpipe.reporting.traced_words import determined, exchanged_form, leading_first
 from mrpipe.reporting.words import number, plain, quantity, readable_unit
-
-UNDETERMINED = 100.0
-"""An interval whose ends differ by more than this factor does not determine the parameter."""
 
 _COLUMNS = {
     "name": ("test", None),
@@ -47,9 +45,11 @@ def rivals(loop: Mapping[str, Any]) -> pd.DataFrame:
 
 def forms(loop: Mapping[str, Any]) -> pd.DataFrame:
     """Return the base forms that were tried, best first."""
-    errors = (loop.get("base_form") or {}).get("nrmse") or {}
+    found = loop.get("base_form") or {}
+    errors, taken = found.get("nrmse") or {}, exchanged_form(loop)
+    notes = {taken: "in the final model", found.get("declared"): "declared"} if taken else {}
     rows = [
-        {"base form": name, "error [%]": number(100.0 * value)}
+        {"base form": name, "error [%]": number(100.0 * value)} | ({"note": notes.get(name, "")} if notes else {})
         for name, value in sorted(errors.items(), key=lambda item: item[1] if item[1] is not None else np.inf)
         if value is not None
     ]
@@ -73,13 +73,25 @@ def parameters(parameters: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def traced_parameters(model: DamperModel) -> pd.DataFrame:
+    """Return the parameters of a damper model: those of its base form, then those of each effect."""
+    found = [(model.form, name, value, model.unit(name)) for name, value in model.parameters.items()]
+    for item in model.effects:
+        part = f"{item.name}{' (in the sensors)' if item.sensor else ''}"
+        found += [(part, name, value, item.units.get(name, "1")) for name, value in item.values.items()]
+    return pd.DataFrame(
+        [
+            {"part": part, "parameter": plain(name), "value": number(value, 4), "unit": readable_unit(unit)}
+            for part, name, value, unit in found
+        ]
+    )
+
+
 def effects(effects: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """Return the parameters of the named effects with their intervals."""
     rows = []
     for effect in effects:
-        for name, entry in effect["parameters"].items():
-            if entry.get("value") is None:
-                continue
+        for name, entry in leading_first(effect):
             low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
             rows.append(
                 {
@@ -123,14 +135,6 @@ def laws(facts: RunFacts, runs: Sequence[law_facts.LawRun]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
-
-
-def determined(low: float, high: float) -> bool:
-    """Return whether an interval determines a parameter: finite, and not of one sign over several decades."""
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return False
-    small, large = sorted((abs(low), abs(high)))
-    return low * high <= 0.0 or large <= UNDETERMINED * small
 
 
 def wanted_tests(tests: Sequence[Mapping[str, Any]], drive_unit: str) -> pd.DataFrame:

@@ -181,3 +181,16 @@ def test_validation_files_that_are_copies_of_training_files(tmp_path: Path) -> N
     folder = builders.campaign(tmp_path)
     (folder / "two.csv").write_bytes((folder / "one.csv").read_bytes())
     assert "same-record" in {item.name for item in judge(load_campaign(folder))}
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("channel", ["displacement", "force"])
+def test_a_single_absurd_sample_is_a_spike_and_no_wrong_unit(channel: str) -> None:
+    def spiked(channels: dict[str, np.ndarray], value: float = -1e10) -> dict[str, np.ndarray]:
+        values = channels[channel].copy()
+        values[2000] = value
+        return {**channels, channel: values}
+
+    assert _names(_bench(spiked)) == {("spikes", channel)}
+    wrong = _names(_bench(lambda channels: spiked(_scaled(channel, 1e9)(channels), -1e25)))
+    assert ("unit-range", channel) in wrong

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from scipy.io import savemat
 
 from mrpipe.campaigns import load_campaign
 from mrpipe.campaigns.plausibility import judge
@@ -249,6 +250,53 @@ def test_a_clock_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     sizes = {"a.csv": (5.0, 90.0, 1.0), "b.csv": (8.0, 170.0, 2.0)}
     found, _ = _proposed(_write_bench(tmp_path / "raw", sizes, tail="End of test\n"), tmp_path / "beside")
     expected = (
-        "column time is not used: a.csv: line 3002, column time: 'End of test' is not a number (and in 1 other files)"
+        "column time is not used: a.csv: line 3002, column time: 'End of test' is not a number; delete the lines after "
+        "the last sample (and in 1 other files)"
     )
     assert expected in found.unsure
+
+
+@pytest.mark.planted
+def test_a_changing_current_without_a_header_is_no_displacement(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    time = np.arange(6000) / 500.0
+    # a random motion of 0.5 to 5 Hz, and a current that changes more slowly than the motion
+    motion = sum(
+        np.sin(2.0 * np.pi * f * time + p) / f for f, p in zip(np.linspace(0.5, 5.0, 19), range(19), strict=True)
+    )
+    velocity = np.gradient(motion, 1.0 / 500.0)
+    current = np.interp(time, np.arange(0.0, 12.5, 0.5), rng.choice([0.0, 0.5, 1.0, 1.5, 2.0], 25))
+    force = (60.0 + 400.0 * current) * np.tanh(velocity / 3.0) + 20.0 * velocity
+    folder = tmp_path / "raw"
+    folder.mkdir()
+    table = np.column_stack([time, motion + rng.normal(0.0, 1e-3, time.size), current, force])
+    savemat(folder / "a.mat", {"M": table})
+    proposal, _ = _proposed(folder, tmp_path / "beside")
+    assert proposal.channels["displacement"].startswith("M[:,1]")
+    assert proposal.channels["drive"].startswith("M[:,2]")
+    assert proposal.channels["force"].startswith("M[:,3]")
+    # one record is divided, and no part ends after it
+    assert "[7.79870000" not in proposal.text and ", 11.998]]" in proposal.text
+
+
+@pytest.mark.planted
+def test_guesses_of_single_tests_and_doubled_headers_are_in_the_summary(tmp_path: Path) -> None:
+    folder = tmp_path / "raw"
+    folder.mkdir()
+    time = np.arange(3000) / 500.0
+    motion, force = 5.0 * np.sin(6.0 * time), 90.0 * np.tanh(9.0 * np.cos(6.0 * time))
+    for name, header, more in (("a", "t [s],x [mm],F [N],F [N]", 0.1 * force), ("b", "t [s],x [mm],F [N],acc", force)):
+        rows = np.column_stack([time, motion, force, more])
+        text = "\n".join(",".join(f"{value:.6f}" for value in row) for row in rows)
+        (folder / f"{name}.csv").write_text(f"{header}\n{text}\n")
+    found, _ = _proposed(folder, tmp_path / "beside")
+    assert any("acceleration of 1 test (b), column acc: no unit in the header" in line for line in found.unsure)
+    assert any("the header is that of 2 columns; the other is F [N]#3" in line for line in found.unsure)
+
+
+@pytest.mark.golden
+def test_a_file_of_two_rows_is_called_that(tmp_path: Path) -> None:
+    folder = bench_folder(tmp_path / "raw", 2)
+    (folder / "short.csv").write_text("t;x\n0,0;0,1\n1,0;0,2\n")
+    found, _ = _proposed(folder, tmp_path / "beside")
+    assert any(line.startswith("short.csv: has 2 rows only") for line in found.skipped)

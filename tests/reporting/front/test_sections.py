@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from mrpipe.artifacts import ArtifactWriter, Provenance
+from mrpipe.dampers.model import write_damper
 from mrpipe.reporting.front.sections import sections
 from mrpipe.reporting.page import first_screen, write_report
+from tests.exports.test_models import with_effect
 from tests.reporting.front.run import EFFECT, run_in, tracing
 
 pytestmark = pytest.mark.property
@@ -125,3 +127,19 @@ def test_modes_without_matrices_are_not_compared_with_a_model(tmp_path: Path) ->
     summary = next(stage.summary for stage in facts.stages if stage.name == "identify-frame")
     summary["stiffness"] = None
     assert "MAC of the model" not in columns()
+
+
+def test_the_parameters_of_the_traced_model_are_a_table(tmp_path: Path) -> None:
+    form = {"declared": "dahl", "taken": "bouc-wen", "tied_with": [], "nrmse": {"dahl": 0.08, "bouc-wen": 0.02}}
+    facts = run_in(tmp_path, tracing(base_form=form))
+    damper = with_effect("heating", "cooling")
+    with ArtifactWriter.create(tmp_path / "close-loop.h5", Provenance("close-loop")) as artifact:
+        write_damper(artifact, damper)
+    found = {section.anchor: section for section in sections(facts)}
+    tables = {item["name"]: item for item in found["damper"].items if item["kind"] == "table"}
+    shown = tables["traced"]["frame"]
+    assert set(shown["part"]) == {"bouc-wen", "heating"}
+    assert len(shown) == len(damper.parameters) + len(damper.effects[0].values)
+    assert "base form bouc-wen" in tables["traced"]["caption"]
+    forms = next(item["frame"] for item in found["trust"].items if item.get("name") == "forms")
+    assert forms["note"].tolist() == ["in the final model", "declared"]

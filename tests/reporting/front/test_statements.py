@@ -212,3 +212,27 @@ def test_the_structure_without_a_damper_moves_in_the_direction_of_the_simulation
     assert without_damper(excitation={**excitation, "direction_deg": 90.0}) == pytest.approx([2.0 * along])
     # the history of the second direction is not in the artifact
     assert without_damper(degrees_of_freedom=[]) == []
+
+
+WIDE = {
+    "gas_length": {"value": 0.5, "unit": "m", "interval": [0.104, 2.416]},
+    "stiffness": {"value": 3534.0, "unit": "N/m", "interval": [3501.0, 3567.0]},
+}
+
+
+def test_a_well_determined_parameter_leads(tmp_path: Path) -> None:
+    text = answers(tmp_path, effects=[{**EFFECT, "parameters": WIDE}])["Missing"]
+    assert "**accumulator** (stiffness 3.534 kN/m, 95 % interval 3.501 to 3.567)" in text
+    alone = answers(tmp_path, effects=[{**EFFECT, "parameters": {"gas_length": WIDE["gas_length"]}}])["Missing"]
+    assert "gas length" in alone
+
+
+def test_an_exchanged_base_form_is_said(tmp_path: Path) -> None:
+    form = {"declared": "bouc-wen", "taken": "rounded-yield", "tied_with": ["dahl"], "nrmse": {}}
+    for changes in ({}, {"effects": [], "unexplained": UNKNOWN}):
+        text = answers(tmp_path, base_form=form, **changes)["Missing"]
+        assert "base form **rounded-yield** in place of bouc-wen" in text
+        assert "do not separate it from dahl" in text
+    assert "damper model rounded-yield with the effect 1.5 %" in answers(tmp_path, base_form=form)["Models"]
+    same = {**form, "taken": "bouc-wen"}
+    assert "in place of" not in answers(tmp_path, base_form=same)["Missing"]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from mrpipe.reporting.front.tables import determined, effects, wanted_tests
+from mrpipe.reporting.front.tables import effects, wanted_tests
+from mrpipe.reporting.traced_words import determined
 
 pytestmark = pytest.mark.property
 

@@ -1,0 +1,65 @@
+"""Words on what a tracing found: an exchanged base form, and the numbers of effects, well-determined ones first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from mrpipe.words import listed
+
+WELL_DETERMINED = 1.0
+"""Width of an interval, over the magnitude of the value, up to which a parameter is called well determined."""
+
+UNDETERMINED = 100.0
+"""An interval whose ends differ by more than this factor does not determine the parameter."""
+
+
+def determined(low: float, high: float) -> bool:
+    """Return whether an interval determines a parameter: finite, and not of one sign over several decades."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return False
+    small, large = sorted((abs(low), abs(high)))
+    return low * high <= 0.0 or large <= UNDETERMINED * small
+
+
+def is_well_determined(entry: Mapping[str, Any]) -> bool:
+    """Return whether the interval of a parameter is narrow; a parameter without an interval is taken as it is."""
+    low, high = (entry.get("interval") or [entry["value"]] * 2)[:2]
+    return bool(math.isfinite(high - low) and abs(high - low) <= WELL_DETERMINED * abs(entry["value"]))
+
+
+def leading_first(effect: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+    """Return the parameters of an effect that have a value: well-determined ones first, else in the effect's order."""
+    known = [(name, entry) for name, entry in effect["parameters"].items() if entry.get("value") is not None]
+    return sorted(known, key=lambda item: not is_well_determined(item[1]))
+
+
+def numbers_of(effect: Mapping[str, Any], digits: int) -> str:
+    """Return the parameters of an effect with units; those with a wide interval come last and are marked."""
+    return ", ".join(
+        f"{name.replace('_', ' ')} {entry['value']:.{digits}g} {entry['unit']}".removesuffix(" 1")
+        + ("" if is_well_determined(entry) else " (not well determined)")
+        for name, entry in leading_first(effect)
+    )
+
+
+def exchanged_form(summary: Mapping[str, Any]) -> str:
+    """Return the base form of the final model where it is not the declared one; else nothing."""
+    found = summary.get("base_form") or {}
+    taken = str(found.get("taken") or "")
+    return "" if taken == found.get("declared") else taken
+
+
+def exchange_in_words(summary: Mapping[str, Any]) -> str:
+    """Return a sentence on another base form than the declared one, if the final model has one."""
+    taken = exchanged_form(summary)
+    if not taken:
+        return ""
+    found = summary["base_form"]
+    rivals = [name for name in found.get("tied_with") or [] if name != taken]
+    as_good = f" These tests do not separate it from {listed(rivals)}." if rivals else ""
+    return (
+        f"The final model has the base form **{taken}** in place of {found.get('declared')}, because it lowers the "
+        f"error.{as_good}"
+    )
