@@ -44,6 +44,10 @@ class CheckFailed(MrpipeError):
     """The program ran, but a requested check failed (exit status 1)."""
 
 
+class StagesRefused(CheckFailed):
+    """Stages refused the user's input, after the results of the others were printed (exit status 2)."""
+
+
 class StageSkipped(MrpipeError):
     """A stage has no data to work on; the message says which (no failure in `mrpipe run`)."""
 

@@ -39,15 +39,19 @@ class Provenance:
     config
         The resolved configuration as YAML.
     inputs
-        Name -> SHA-256 of each file read.
+        Name -> SHA-256 of each file read, as `sha256sum` prints it.
     seed
         Seed of the run.
+    content
+        Declared input -> digest of its content, as the manifest keeps it. It stays the same where an artifact is built
+        again with the same numbers. It is not written.
     """
 
     stage: str
     config: str = ""
     inputs: Mapping[str, str] = field(default_factory=dict)
     seed: int = 0
+    content: Mapping[str, str] = field(default_factory=dict)
 
 
 def library_versions() -> dict[str, str]:

@@ -195,7 +195,7 @@ def require_varying(drives: Mapping[str, FloatArray], source: str) -> None:
             source,
             "drive",
             f"never changes in the training tests ({levels.mean():.4g})",
-            "an inverse model needs training tests at two or more drives",
+            "an inverse model needs training tests at two or more drives, or leave out the stages that use it",
         )
 
 

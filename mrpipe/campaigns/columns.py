@@ -121,8 +121,9 @@ class DataFile:
             if column in self.aliases:
                 return self.aliases[column], None
             match = _INDEXED.match(column)
-            if match and match["name"] in self.names:
-                return match["name"], match["index"]
+            indexed = self.aliases.get(match["name"], match["name"]) if match else ""
+            if match and indexed in self.names:
+                return indexed, match["index"]
             if self.table and match and not match["name"]:
                 column = match["index"].split(",")[-1].strip()
             alike = [name for name in self.names if _plain(name) == _plain(column)]

@@ -265,6 +265,7 @@ def _read_test(reader: _Reader, shared: dict[str, ChannelEntry], index: int) -> 
         segments=segments,
         kind=entry.kind or "",
         details=details,
+        file=file.path,
     )
 
 

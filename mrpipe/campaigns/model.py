@@ -36,6 +36,8 @@ class Recording:
         Frame tests: sweep, free-decay, closed-loop or random; empty on a bench.
     details
         Other entries of the test in campaign.yaml (mode, law, gains, shaker floor, ...).
+    file
+        The data file, for messages; None where the test was not read from a file.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Recording:
     segments: tuple[tuple[int, int], ...]
     kind: str = ""
     details: Mapping[str, Any] = field(default_factory=dict)
+    file: Path | None = None
 
     def used(self, channel: str) -> FloatArray:
         """Return the samples of a channel that lie in segments, concatenated."""

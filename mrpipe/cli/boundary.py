@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from mrpipe.errors import CheckFailed, MrpipeError, UserError
+from mrpipe.errors import CheckFailed, MrpipeError, StagesRefused, UserError
 from mrpipe.words import listed
 
 INTERRUPTED = 130
@@ -67,8 +67,8 @@ def _line(error: BaseException) -> str:
 def exit_with(error: BaseException, arguments: Sequence[str]) -> int:
     """Report an error and return the exit status.
 
-    With `--json` the error is also one JSON document on standard output, except where a check failed: the document of
-    the command has been printed then.
+    With `--json` the error is also one JSON document on standard output, except where a check or single stages failed:
+    the document of the command has been printed then.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def exit_with(error: BaseException, arguments: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CHECK_FAILED
     if isinstance(error, CheckFailed):
-        return say(str(error), CHECK_FAILED)
+        return say(str(error), WRONG_INPUT if isinstance(error, StagesRefused) else CHECK_FAILED)
     known = as_user_error(error)
     if known is None and not isinstance(error, Exception):
         raise error

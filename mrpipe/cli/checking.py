@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mrpipe.campaigns.plausibility import Finding
     from mrpipe.config.loader import LoadedConfig
     from mrpipe.config.model import RunSettings
+    from mrpipe.pipeline.stage import Stage
 
 RIGS = {"bench": "damper-bench", "frame": "shear-frame", "closed_loop": "shear-frame"}
 """Key of `campaigns` -> rig that it takes."""
@@ -296,19 +297,14 @@ def _refused_by_stages(loaded: LoadedConfig, campaign: Campaign) -> list[Finding
     """Return what stages of the configuration refuse of a bench campaign, with the message of the stage."""
     if campaign.rig != "damper-bench":
         return []
-    from mrpipe.campaigns import require_varying
-    from mrpipe.pipeline.settings_view import setting_named
-    from mrpipe.signals.accelerometer import require_acceleration
+    from mrpipe.cli.campaign_refusal import require_drives, require_motion
 
-    needed, source = needed_stages(loaded), str(campaign.file)
+    needed = needed_stages(loaded)
     found = []
     if "prepare" in needed:
-        motion = setting_named(loaded.config, "prepare.motion")
-        channels = {test.name: set(test.channels) for test in campaign.recordings}
-        found.append(_refusal("no-acceleration", lambda: require_acceleration(channels, motion, source)))
+        found.append(_refusal("no-acceleration", lambda: require_motion(loaded, campaign)))
     if "train-inverse" in needed:
-        drives = {test.name: test.used("drive") for test in campaign.with_role("training")}
-        found.append(_refusal("constant-drive", lambda: require_varying(drives, source)))
+        found.append(_refusal("constant-drive", lambda: require_drives(campaign)))
     return [item for item in found if item is not None]
 
 
@@ -336,8 +332,13 @@ def needed_stages(loaded: LoadedConfig) -> set[str]:
     from mrpipe.stages.registry import stages_for
 
     stages = {name: stage.for_configuration(loaded.config) for name, stage in stages_for(loaded.config).items()}
+    return with_required(stages, loaded.config.stages)
+
+
+def with_required(stages: Mapping[str, Stage], names: Collection[str]) -> set[str]:
+    """Return the named stages, and those that they cannot do without."""
     found: set[str] = set()
-    waiting = [name for name in loaded.config.stages if name in stages]
+    waiting = [name for name in names if name in stages]
     while waiting:
         name = waiting.pop()
         found.add(name)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mrpipe.cli.options import CommonOptions, one_config, with_common_options
-from mrpipe.errors import CheckFailed, UserError
-from mrpipe.words import shell_word
+from mrpipe.errors import CheckFailed, StagesRefused, UserError
+from mrpipe.words import counted, shell_word
 
 if TYPE_CHECKING:
     from mrpipe.pipeline.runner import Pipeline
@@ -24,8 +24,9 @@ def run(
 ) -> None:
     """Run every stage that the configuration lists.
 
-    A stage that fails does not end the run: only stages that need it are left out. The report names what failed, and
-    the exit status is 1.
+    Nothing is built where the configuration or a measured campaign is wrong: the exit status is 2. A stage that fails
+    later does not end the run: only stages that need it are left out, and the report names what failed. The exit status
+    is then 2 if the stage refused its input, else 1.
     """
     run_stages(options, until)
 
@@ -35,9 +36,14 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
 
     Raises
     ------
+    UserError
+        If the configuration or a measured campaign is wrong; nothing is built then.
+    StagesRefused
+        If a stage refused its input; it is raised after all results have been printed.
     CheckFailed
-        If a stage failed; it is raised after all results have been printed.
+        The same, if a stage failed for another reason.
     """
+    from mrpipe.cli.campaign_refusal import refuse_wrong_campaigns
     from mrpipe.cli.checking import check_headers
     from mrpipe.cli.output import print_json
     from mrpipe.cli.session import session, stage_runner
@@ -55,6 +61,7 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
             if name != "report":
                 pipeline.check(name)
         to_build = [name for name in names if name != "report"]
+        refuse_wrong_campaigns(pipeline, to_build)
         with compiled_ahead([pipeline.stages[name].run.__module__ for name in to_build], pipeline.jobs) as compiling:
             build_side_by_side(pipeline, to_build, functools.partial(stage_runner, options), compiling)
         if pipeline.errors and not any(item.what in {"built", "reused"} for item in pipeline.outcomes.values()):
@@ -66,7 +73,9 @@ def run_stages(options: CommonOptions, until: str | None = None) -> None:
     else:
         _print_run(pipeline, content)
     if content["failed"]:
-        raise CheckFailed(f"{len(content['failed'])} stages failed or lack a part: {', '.join(content['failed'])}")
+        said = f"{counted(len(content['failed']), 'stage')} failed or lack a part: {', '.join(content['failed'])}"
+        refused = next((error for error in pipeline.errors if isinstance(error, UserError)), None)
+        raise CheckFailed(said) if refused is None else StagesRefused(f"{refused} ({said})")
 
 
 def _until(names: list[str], until: str | None) -> list[str]:

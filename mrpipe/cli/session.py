@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -191,8 +191,41 @@ def session(options: CommonOptions) -> Iterator[Pipeline]:
     loaded = load(options)
     directory = run_directory(options, loaded)
     _require_own(directory)
+    new = [folder for folder in (directory, *directory.parents) if not folder.exists()]
     with run_lock(directory):
-        _warn_of_another_configuration(options, loaded, directory)
-        pipeline = pipeline_of(options, loaded)
-        pipeline.write_config()
-        yield pipeline
+        try:
+            _warn_of_another_configuration(options, loaded, directory)
+            pipeline = pipeline_of(options, loaded)
+            pipeline.write_config()
+            yield pipeline
+        except UserError:
+            if new:
+                _remove_without_results(new)
+            raise
+
+
+def _remove_without_results(folders: Sequence[Path]) -> None:
+    """Remove a new run directory that holds no result, and the folders above it that were made for it.
+
+    Parameters
+    ----------
+    folders
+        Folders that did not exist before, innermost first.
+    """
+    from mrpipe.pipeline.execution import MANIFESTS
+    from mrpipe.pipeline.progress import close_logger
+    from mrpipe.pipeline.runner import LOG
+
+    directory = folders[0]
+    manifests = directory / MANIFESTS
+    own = {directory / name for name in (".lock", ".lock-holder", "config.yaml", LOG)}
+    files = [path for path in directory.rglob("*") if not path.is_dir()]
+    if any(path not in own and path.parent != manifests for path in files):
+        return
+    close_logger()
+    for path in files:
+        with suppress(OSError):
+            path.unlink()
+    for folder in (manifests, *folders):
+        with suppress(OSError):
+            folder.rmdir()

@@ -47,8 +47,9 @@ def build_and_print(
     Raises
     ------
     UserError
-        If a requested stage has no data.
+        If a requested stage has no data, or if it needs an inverse model and the drive of the campaign never changes.
     """
+    from mrpipe.cli.campaign_refusal import refuse_constant_drive
     from mrpipe.cli.output import print_brief, print_json, print_summary
     from mrpipe.cli.session import session
     from mrpipe.reporting.headlines import in_brief
@@ -58,6 +59,7 @@ def build_and_print(
             _require_use(names, pipeline, options.campaign)
         if options.force:
             pipeline.force = frozenset(names)
+        refuse_constant_drive(pipeline, names)
         outcomes = [pipeline.build(name) for name in names]
     outcomes = _with_data(outcomes, where_possible)
     if options.json:

@@ -17,6 +17,7 @@ import numpy as np
 from mrpipe.artifacts import Provenance
 from mrpipe.artifacts.plain import plain
 from mrpipe.errors import StageSkipped
+from mrpipe.pipeline.files_read import files_read
 from mrpipe.pipeline.manifest import Manifest, StageKey
 from mrpipe.pipeline.parts import PartWriter
 from mrpipe.pipeline.progress import stage_progress
@@ -151,7 +152,13 @@ class StageRunner:
             progress=progress,
             report=part,
             log=self.logger,
-            provenance=Provenance(stage.name, self.loaded.as_yaml(), order.key.inputs, seed),
+            provenance=Provenance(
+                stage.name,
+                self.loaded.as_yaml(),
+                files_read(order.inputs, order.key.settings, stage.public_data, self.hashes),
+                seed,
+                order.key.inputs,
+            ),
         )
 
 

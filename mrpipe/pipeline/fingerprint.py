@@ -7,13 +7,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 MISSING = "missing"
 """Digest of a file that does not exist."""
+
+BYTES = " (bytes)"
+"""End of the name under which the digest of the bytes of an artifact is remembered."""
+
 # how the artifact was made, not part of its content
 _NOT_CONTENT = {
     "created_utc",
@@ -97,12 +102,28 @@ class FileHashes:
             stat = path.stat()
         except FileNotFoundError:
             return MISSING
+        return self._remembered(str(path.resolve()), stat, lambda: _digest_of_file(path))
+
+    def sha256(self, path: Path) -> str:
+        """Return the SHA-256 of the bytes of a file, also of an artifact, as `sha256sum` prints it.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        """
+        from mrpipe.artifacts import sha256_of
+
+        # only the digest of an artifact differs from that of its bytes
+        key = f"{path.resolve()}{BYTES if path.suffix == '.h5' else ''}"
+        return self._remembered(key, path.stat(), lambda: sha256_of(path))
+
+    def _remembered(self, key: str, stat: os.stat_result, compute: Callable[[], str]) -> str:
         state = [stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino]
-        key = str(path.resolve())
         entry = self._known.get(key)
         if isinstance(entry, list) and len(entry) == 5 and entry[:4] == state and isinstance(entry[4], str):
             return entry[4]
-        value = _digest_of_file(path)
+        value = compute()
         self.learn({key: [*state, value]})
         return value
 
@@ -164,11 +185,11 @@ def plain_settings(config: Any, names: Iterable[str], hashes: FileHashes) -> dic
         for part in name.split("."):
             value = value[part]
         chosen[name] = value
-        files |= {str(path): hashes.digest(path)[:16] for path in _files_in(value)}
+        files |= {str(path): hashes.digest(path)[:16] for path in files_in(value)}
     return {**chosen, "content of files": files} if files else chosen
 
 
-def _files_in(value: Any) -> Iterator[Path]:
+def files_in(value: Any) -> Iterator[Path]:
     """Yield the files that texts at any depth of a setting name; a bare word is a name and no file."""
     if isinstance(value, str):
         path = Path(value)
@@ -176,7 +197,7 @@ def _files_in(value: Any) -> Iterator[Path]:
             yield path
     elif isinstance(value, Mapping | list | tuple):
         for item in value.values() if isinstance(value, Mapping) else value:
-            yield from _files_in(item)
+            yield from files_in(item)
 
 
 def _is_file(path: Path) -> bool:

@@ -20,10 +20,7 @@ _LEFT = re.compile(r",? *(about )?[\d.]+ (s|min|h) left")
 
 def make_logger(log_file: Path, level: str, quiet: bool) -> logging.Logger:
     """Return a logger that writes to `log_file` and, unless `quiet`, to standard error."""
-    logger = logging.getLogger(LOGGER_NAME)
-    for handler in list(logger.handlers):
-        logger.removeHandler(handler)
-        handler.close()
+    logger = close_logger()
     logger.setLevel(level.upper())
     logger.propagate = False
     log_file.parent.mkdir(parents=True, exist_ok=True)
@@ -35,6 +32,15 @@ def make_logger(log_file: Path, level: str, quiet: bool) -> logging.Logger:
     to_error.setLevel(logging.ERROR if quiet else level.upper())
     to_error.addFilter(lambda record: not getattr(record, "file_only", False))
     logger.addHandler(to_error)
+    return logger
+
+
+def close_logger() -> logging.Logger:
+    """Close the log file of the run, if there is one; return the logger without handlers."""
+    logger = logging.getLogger(LOGGER_NAME)
+    for handler in list(logger.handlers):
+        logger.removeHandler(handler)
+        handler.close()
     return logger
 
 

@@ -198,7 +198,7 @@ class Pipeline:
             return False
         provider = self.sources.provider(name)
         spared = provider is not None and self.campaign_given and self.sources.needs_laboratory(name)
-        return not spared or (provider is not None and self._is_fresh(provider))
+        return not spared or (provider is not None and self.is_fresh(provider))
 
     def _wanted(self, name: str, together: bool) -> bool:
         """Return whether to bring an optional input up to date.
@@ -210,7 +210,7 @@ class Pipeline:
         if provider is None or provider in self.outcomes:
             return True
         if not together or (self.campaign_given and self.sources.needs_laboratory(name)):
-            return self._is_fresh(provider)
+            return self.is_fresh(provider)
         return True
 
     def _provide(self, name: str, required: Sequence[str] = ()) -> str:
@@ -248,11 +248,12 @@ class Pipeline:
         finally:
             self.keep_going = keep_going
 
-    def _is_fresh(self, name: str) -> bool:
+    def is_fresh(self, name: str) -> bool:
+        """Return whether a stage and all that it needs are up to date."""
         stage = self.stages[name]
         for item in stage.inputs:
             provider = self.sources.provider(item)
-            if provider is not None and not self._is_fresh(provider):
+            if provider is not None and not self.is_fresh(provider):
                 return False
         manifest = Manifest.load(self._manifests, name)
         if manifest is None or manifest.skipped:
@@ -279,7 +280,7 @@ class Pipeline:
             return True
         if provider in self.outcomes:
             return self.outcomes[provider].what in {"built", "reused"}
-        return self._is_fresh(provider)
+        return self.is_fresh(provider)
 
     def _key(self, stage: Stage, inputs: Mapping[str, Path]) -> StageKey:
         digests = {name: self.sources.digest(name, path) for name, path in inputs.items()}

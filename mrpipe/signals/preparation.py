@@ -120,7 +120,7 @@ def prepare_campaign(
             channels = work.channels
             channels["displacement"] = advance(channels["displacement"], options.displacement_late_s, rate)
             channels["force"] = options.faults.force(name, channels["force"], channels["drive"], rate)
-            _require_length(work, options, source)
+            _require_length(work, options, str(recording.file or source))
             works.append(work)
     require_known(options.faults, [work.name for work in works])
     findings = with_accelerometer({work.name: work.channels for work in works}, rate, options.motion, source)

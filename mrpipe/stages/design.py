@@ -68,7 +68,7 @@ def _problem(context: StageContext) -> str:
     from mrpipe import __version__
 
     provenance = context.provenance
-    return f"{sorted(provenance.inputs.items())}|{provenance.config}|{provenance.seed}|{__version__}"
+    return f"{sorted(provenance.content.items())}|{provenance.config}|{provenance.seed}|{__version__}"
 
 
 def _uncertainty(context: StageContext, rig: Rig) -> tuple[FrameUncertainty, DamperUncertainty]:

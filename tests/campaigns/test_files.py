@@ -106,7 +106,9 @@ def test_matlab(tmp_path: Path, column: str, version: str) -> None:
 
 
 @pytest.mark.golden
-@pytest.mark.parametrize("column", ["bench/one/F", "/bench/one/F", "bench/all[:,2]", "wide[2,:]", "table/F", "table.F"])
+@pytest.mark.parametrize(
+    "column", ["bench/one/F", "/bench/one/F", "bench/all[:,2]", "/bench/all[:,2]", "wide[2,:]", "table/F", "table.F"]
+)
 def test_hdf5(tmp_path: Path, column: str) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as handle:
         handle["bench/one/F"] = COLUMNS["F"]

@@ -174,19 +174,20 @@ def test_run_goes_on_past_what_is_impossible(
     monkeypatch: pytest.MonkeyPatch,
     request: pytest.FixtureRequest,
 ) -> None:
-    """Two tests at one current: no inverse network is possible, the training set and the report are made."""
+    """A stage refuses its input: the training set and the report are made, and the line names what is wrong."""
     data = tmp_path / "data"
     data.mkdir()
     t = np.arange(0.0, 6.0, 0.002)
-    for name, frequency in (("train", 1.0), ("valid", 1.3)):
+    for name, frequency, current in (("train", 1.0, 2.0), ("less", 1.0, 1.0), ("valid", 1.3, 2.0)):
         x = 0.008 * np.sin(2.0 * np.pi * frequency * t)
         v = np.gradient(x, t)
-        rows = np.column_stack([t, x, np.full_like(t, 2.0), 100.0 * np.tanh(v / 0.005) + 600.0 * v])
+        rows = np.column_stack([t, x, np.full_like(t, current), 100.0 * np.tanh(v / 0.005) + 600.0 * v])
         np.savetxt(data / f"{name}.csv", rows, delimiter=",", header="t,x,i,F", comments="")
     (data / "campaign.yaml").write_text(
-        "campaign: one-current\nrig: damper-bench\nchannels:\n  time: {column: t, unit: s}\n"
+        "campaign: own\nrig: damper-bench\nchannels:\n  time: {column: t, unit: s}\n"
         "  displacement: {column: x, unit: m}\n  drive: {column: i, unit: A}\n  force: {column: F, unit: N}\n"
         "tests:\n  - {name: train, file: train.csv, role: training}\n"
+        "  - {name: less, file: less.csv, role: training}\n"
         "  - {name: valid, file: valid.csv, role: validation}\n"
     )
     config = tmp_path / "own.yaml"
@@ -202,7 +203,7 @@ def test_run_goes_on_past_what_is_impossible(
     monkeypatch.setattr(train_inverse, "STAGE", inverse)
     registry.all_stages.cache_clear()
     request.addfinalizer(registry.all_stages.cache_clear)
-    assert run(["run", str(config), "--run", str(tmp_path / "run"), "--json", "--quiet"]) == 1
+    assert run(["run", str(config), "--run", str(tmp_path / "run"), "--json", "--quiet"]) == 2
     captured = capsys.readouterr()
     document = json.loads(captured.out)
     assert {name: stage["outcome"] for name, stage in document["stages"].items()} == {
@@ -210,7 +211,7 @@ def test_run_goes_on_past_what_is_impossible(
     }  # fmt: skip
     assert document["failed"] == ["train-inverse"]
     assert "drive: never changes" in document["stages"]["train-inverse"]["failed"]
-    assert "train-inverse" in captured.err
+    assert "training.h5: drive: never changes; record another current (1 stage failed" in captured.err
     page = (tmp_path / "run" / "report.md").read_text(encoding="utf-8")
     assert "never changes" in page
     with h5py.File(tmp_path / "run" / "training.h5") as handle:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -40,3 +41,9 @@ def test_every_segment_is_judged() -> None:
     parts = replace(test, segments=((0, 5000), (5000, 5010)))
     (found,) = find_short_tests(campaign(parts), OPTIONS)
     assert found.numbers["samples"] == 10.0
+
+
+def test_the_message_names_the_file_of_the_test() -> None:
+    test = replace(recording("b", seconds=0.04), file=Path("data/b.csv"))
+    with pytest.raises(UserError, match=r"^data/b\.csv: test b: has 40 samples"):
+        prepare_campaign(campaign(recording("a"), test), OPTIONS)

@@ -1,0 +1,120 @@
+"""Refusal of measured campaigns that stages cannot work with, before any stage is built."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+from mrpipe.errors import UserError
+
+if TYPE_CHECKING:
+    from mrpipe.campaigns import Campaign
+    from mrpipe.config.loader import LoadedConfig
+    from mrpipe.pipeline.runner import Pipeline
+
+
+def refuse_wrong_campaigns(pipeline: Pipeline, names: Collection[str]) -> None:
+    """Read every measured campaign that the stages need, and refuse what they would refuse.
+
+    Findings that no stage refuses, such as a doubtful test, do not count. A campaign is not read where all stages that
+    read it are up to date, because they have accepted it.
+
+    Parameters
+    ----------
+    pipeline
+        The stages and their configuration.
+    names
+        Stages that will be built.
+
+    Raises
+    ------
+    UserError
+        If a campaign cannot be read, if a test is too short for the filters, if a channel that `prepare` needs is
+        missing, or if the drive never changes and an inverse model is needed.
+    """
+    from mrpipe.campaigns import load_campaign
+    from mrpipe.cli.checking import measured_campaigns, with_required
+
+    needed = with_required(pipeline.stages, names)
+    checked = set()
+    for key, path in measured_campaigns(pipeline.loaded).items():
+        if path in checked or not _is_read(pipeline, needed, key):
+            continue
+        checked.add(path)
+        campaign = load_campaign(path)
+        if campaign.rig == "damper-bench" and "prepare" in needed:
+            _require_lengths(pipeline, campaign)
+            require_motion(pipeline.loaded, campaign)
+        if campaign.rig == "damper-bench" and "train-inverse" in needed:
+            require_drives(campaign)
+
+
+def refuse_constant_drive(pipeline: Pipeline, names: Collection[str]) -> None:
+    """Refuse a bench campaign whose drive never changes where a stage needs an inverse model.
+
+    Without this, the stages before the inverse model would be built first, which takes minutes.
+
+    Raises
+    ------
+    UserError
+        If that is so, or if the campaign cannot be read.
+    """
+    from mrpipe.campaigns import load_campaign
+    from mrpipe.cli.checking import measured_campaigns, with_required
+
+    path = measured_campaigns(pipeline.loaded).get("bench")
+    if path is None or "train-inverse" not in with_required(pipeline.stages, names):
+        return
+    if not _is_up_to_date(pipeline, "train-inverse"):
+        require_drives(load_campaign(path))
+
+
+def require_motion(loaded: LoadedConfig, campaign: Campaign) -> None:
+    """Refuse a bench campaign without the acceleration that `prepare.motion` needs.
+
+    Raises
+    ------
+    UserError
+        If a test lacks it; the message names the test.
+    """
+    from mrpipe.pipeline.settings_view import setting_named
+    from mrpipe.signals.accelerometer import require_acceleration
+
+    channels = {test.name: set(test.channels) for test in campaign.recordings}
+    require_acceleration(channels, setting_named(loaded.config, "prepare.motion"), str(campaign.file))
+
+
+def require_drives(campaign: Campaign) -> None:
+    """Refuse a bench campaign whose drive never changes in the training tests, for an inverse model.
+
+    Raises
+    ------
+    UserError
+        If that is so; the message names the campaign file and the drive.
+    """
+    from mrpipe.campaigns import require_varying
+
+    drives = {test.name: test.used("drive") for test in campaign.with_role("training")}
+    require_varying(drives, str(campaign.file))
+
+
+def _is_read(pipeline: Pipeline, needed: Collection[str], key: str) -> bool:
+    """Return whether a stage that is not up to date reads a campaign, or judges its drive."""
+    item = f"campaign:{key.replace('_', '-')}"
+    readers = {name for name in needed if item in pipeline.stages[name].all_inputs}
+    if key == "bench":
+        readers |= {"train-inverse"} & set(needed)
+    return not all(_is_up_to_date(pipeline, name) for name in readers)
+
+
+def _is_up_to_date(pipeline: Pipeline, name: str) -> bool:
+    return name not in pipeline.force and pipeline.is_fresh(name)
+
+
+def _require_lengths(pipeline: Pipeline, campaign: Campaign) -> None:
+    from mrpipe.pipeline.settings_view import setting_named
+    from mrpipe.signals.lengths import find_short_tests
+
+    files = {test.name: test.file for test in campaign.recordings}
+    for item in find_short_tests(campaign, setting_named(pipeline.loaded.config, "prepare")):
+        raise UserError(files[item.test] or campaign.file, f"test {item.test}", item.sentence, item.remedy)
