@@ -104,7 +104,7 @@ def test_random_excitation_and_no_decay():
     result = identify(frame, [random_test(frame, rng, replace(RIG, sweep_s=240.0))])
     assert_close(result, frame)
     assert result.damping_source == ("sweep",) * 4
-    assert "no free decay of modes 1, 2, 3, 4: damping from the forced tests" in result.findings
+    assert not any("no free decay" in line for line in result.findings)  # nobody missed a test that was not made
 
 
 @pytest.mark.planted
@@ -177,7 +177,7 @@ def test_modes_beyond_the_excitation_are_left_out_and_named():
     assert count == np.count_nonzero(truth.frequencies_hz < 7.0)
     omega = np.array([item.value for item in result.frequencies])
     assert omega == pytest.approx(truth.angular_frequencies[:count], rel=2e-3)
-    assert any("are not determined by the data" in line for line in result.findings)
+    assert any("not determined by the data" in line for line in result.findings)
     # the storey model is determined by fewer modes where every floor has a sensor
     assert result.frame.stiffness == pytest.approx(frame.stiffness, abs=0.02 * np.abs(frame.stiffness).max())
 

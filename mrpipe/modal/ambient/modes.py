@@ -21,7 +21,7 @@ from scipy import signal
 from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError, install_extra
 from mrpipe.modal.ambient.band import USABLE_BAND, common_motion_ends_hz, lowest_peak_hz
-from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Pole, Records
+from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Pole, Records, least_samples
 from mrpipe.modal.ambient.refine import refine_by_spectra
 from mrpipe.modal.ambient.setup_scales import scaled_by_orthogonality, scaling_notes
 from mrpipe.modal.ambient.setups import SetUp, confirmed, merge_set_ups, pooled_poles
@@ -33,6 +33,8 @@ from mrpipe.modal.search.selection import Layout, complete_set, largest_set
 from mrpipe.modal.spectra import ComplexArray
 
 _BLOCKS = 8
+_LEAST_BLOCKS = 4
+"""Least number of blocks of a short record: fewer give no error of the shapes."""
 _PERIODS = 1.5
 """Length of the correlation functions in periods of the lowest peak."""
 _MOST_BLOCK_ROWS = 80
@@ -66,22 +68,25 @@ def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz:
     high = high_hz or min(spread * first, USABLE_BAND * rate, common_motion_ends_hz(tests[0], first))
     factor = max(1, int(rate / (2.6 * high)))
     sections = signal.butter(4, max(0.5 * low_hz, 0.2 * first), btype="highpass", fs=rate, output="sos")
-    whole = sum(test.responses.shape[0] for test in tests)
-    blocks: list[FloatArray] = []
-    for test in tests:
-        values = signal.sosfiltfilt(sections, test.responses - test.responses.mean(axis=0), axis=0)
-        # blocks of all tests have about the same length, because their statistics are averaged
-        count = max(-(-2 // len(tests)), round(_BLOCKS * values.shape[0] / whole))
-        if factor > 1:
-            values = signal.resample_poly(values, 1, factor, axis=0)
-        blocks += [np.ascontiguousarray(part.T) for part in np.array_split(values, count)]
     own_rate = rate / factor
     rows = int(np.clip(round(_PERIODS * own_rate / first), _LEAST_BLOCK_ROWS, _MOST_BLOCK_ROWS))
+    filtered = []
+    for test in tests:
+        values = signal.sosfiltfilt(sections, test.responses - test.responses.mean(axis=0), axis=0)
+        filtered.append(signal.resample_poly(values, 1, factor, axis=0) if factor > 1 else values)
+    whole = sum(values.shape[0] for values in filtered)
+    # a short record has fewer blocks, because each of them must be longer than the correlation functions
+    most = int(np.clip(whole // least_samples(rows), _LEAST_BLOCKS, _BLOCKS))
+    blocks: list[FloatArray] = []
+    for values in filtered:
+        # blocks of all tests have about the same length, because their statistics are averaged
+        count = max(-(-2 // len(tests)), round(most * values.shape[0] / whole))
+        blocks += [np.ascontiguousarray(part.T) for part in np.array_split(values, count)]
     return Records(tuple(blocks), own_rate, rows, high)
 
 
 def _require_length(records: Records, tests: Sequence[FrameTest], low_hz: float, source: Path) -> None:
-    """Refuse tests whose blocks are shorter than the correlation functions.
+    """Refuse tests whose blocks are too short for the correlation functions.
 
     Raises
     ------
@@ -89,15 +94,14 @@ def _require_length(records: Records, tests: Sequence[FrameTest], low_hz: float,
         If a block is too short.
     """
     shortest = min(block.shape[1] for block in records.blocks)
-    least = 2 * records.block_rows + 2
-    if shortest <= least:
-        place = f"tests.{tests[0].name}"
-        blocks = len(records.blocks) // len(tests)
-        lasts, needed = (blocks * count / records.rate_hz for count in (shortest, least))
+    least = least_samples(records.block_rows)
+    if shortest < least:
+        test = min(tests, key=lambda item: item.duration_s)
+        needed = test.duration_s * (least + 1) / shortest
         peak = f"the lowest peak of the responses, at {lowest_peak_hz(tests, low_hz):.3g} Hz"
-        problem = f"lasts {lasts:.3g} s; {peak}, needs more than {needed:.3g} s"
+        problem = f"lasts {test.duration_s:.3g} s; {peak}, needs at least {needed:.3g} s"
         remedy = "record longer, or set identify_frame.band_low_hz just below the first mode if the peak is a drift"
-        raise UserError(source, place, problem, remedy)
+        raise UserError(source, f"tests.{test.name}", problem, remedy)
 
 
 def _assurance(first: ComplexArray, second: ComplexArray) -> float:
