@@ -9,6 +9,7 @@ import numpy as np
 
 from mrpipe.artifacts import Progress, no_progress
 from mrpipe.modal.ambient.clocks import synchronised
+from mrpipe.modal.ambient.harmonics import harmonic_findings, without_harmonics
 from mrpipe.modal.ambient.modes import find_ambient_modes
 from mrpipe.modal.clocks.delays import SensorClock
 from mrpipe.modal.fit.own_residues import with_own_residues
@@ -51,9 +52,11 @@ def find_modes(
     progress(0.05, "poles")
     if not forced:
         band = (options.band_low_hz, options.band_high_hz)
-        ambient, corrected = synchronised(tests.ambient, band, options)
+        quiet, harmonics = without_harmonics(tests.ambient, options.band_low_hz)
+        ambient, corrected = synchronised(quiet, band, options)
         search = find_ambient_modes(ambient, layout, *band, tests.source, options.ambient_method)
-        findings = [*_ambient_findings(tests), *_clock_findings(corrected), *search.notes]
+        findings = [*_ambient_findings(tests), *harmonic_findings(harmonics)]
+        findings += [*_clock_findings(corrected), *search.notes]
         return ChosenTests(search, ()), corrected, findings
     chosen, findings = choose_tests(forced, tests, layout, options)
     if tests.ambient:

@@ -8,6 +8,7 @@ import numpy as np
 
 from mrpipe.artifacts import FloatArray
 from mrpipe.modal.ambient.clocks import synchronised
+from mrpipe.modal.ambient.harmonics import without_harmonics
 from mrpipe.modal.ambient.modes import find_ambient_modes
 from mrpipe.modal.fit.result import MultiModeFit
 from mrpipe.modal.matrices.added_mass import modal_scale
@@ -101,7 +102,8 @@ def _modes(own: list[FrameTest], tests: FrameTests, layout: Layout, options: Ide
     forced = tuple(test for test in own if test.kind != "ambient")
     if not forced:
         band = (options.band_low_hz, options.band_high_hz)
-        moved, _ = synchronised(own, band, options)
+        quiet, _ = without_harmonics(own, options.band_low_hz)
+        moved, _ = synchronised(quiet, band, options)
         return find_ambient_modes(moved, state, *band, tests.source, options.ambient_method).fit
     alone = FrameTests(forced, (), np.full(layout.floors, np.nan), tests.source)
     chosen, _ = choose_tests(forced, alone, state, options)
