@@ -11,8 +11,9 @@ known: the scale of M, C and K then comes from given masses or from added masses
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from mrpipe.artifacts import FloatArray
 from mrpipe.errors import UserError, install_extra
 from mrpipe.modal.ambient.band import USABLE_BAND, common_motion_ends_hz, lowest_peak_hz
 from mrpipe.modal.ambient.poles import ESTIMATORS, Estimator, Pole, Records, least_samples
-from mrpipe.modal.ambient.refine import refine_by_spectra
+from mrpipe.modal.ambient.refine import refine_by_spectra, two_peaks
 from mrpipe.modal.ambient.setup_scales import scaled_by_orthogonality, scaling_notes
 from mrpipe.modal.ambient.setups import SetUp, confirmed, merge_set_ups, pooled_poles
 from mrpipe.modal.fit.lscf import PoleCandidate
@@ -57,6 +58,11 @@ class _Cluster:
     shape: FloatArray
     collinearity: float
     orders: int
+
+    @property
+    def pole(self) -> tuple[float, float]:
+        """Angular frequency [rad/s] and damping ratio."""
+        return self.angular_frequency, self.damping_ratio
 
 
 def _records(tests: Sequence[FrameTest], layout: Layout, low_hz: float, high_hz: float) -> Records:
@@ -157,24 +163,44 @@ def _summary(group: Sequence[Pole]) -> _Cluster:
     )
 
 
-def _without_copies(clusters: Sequence[_Cluster]) -> tuple[list[_Cluster], list[bool]]:
+def _without_copies(
+    clusters: Sequence[_Cluster],
+    weights: FloatArray,
+    is_second_peak: Callable[[tuple[float, float], tuple[float, float]], bool],
+) -> tuple[list[_Cluster], list[bool]]:
     """Return the clusters without those that repeat the shape of a more stable one: high orders split a pole.
 
     A pole repeats another one where their half-power bands overlap. Farther away, up to a tenth of the frequency, it
-    may also be another mode with a similar shape at the sensors. The second result marks these poles. Both results are
-    sorted by frequency.
+    may also be another mode with a similar shape at the sensors. It is one if the spectra have a peak for each of the
+    two. The second result marks the poles for which they do not. Both results are sorted by frequency.
+
+    Parameters
+    ----------
+    clusters
+        Stable poles.
+    weights
+        Shape (s,): weights of the sensors for the comparison of shapes. Modes are orthogonal to the mass, so that these
+        are the roots of the floor masses where they are known; a light mast would otherwise make all shapes alike.
+    is_second_peak
+        Whether the spectra show a pole (the first argument) beside another one, each as angular frequency and damping.
     """
     kept: list[_Cluster] = []
     doubtful: list[bool] = []
     for item in sorted(clusters, key=lambda cluster: (-cluster.orders, -cluster.collinearity)):
-        alike = [known for known in kept if (known.shape @ item.shape) ** 2 >= _COPY_ASSURANCE]
+        own = weights * item.shape
+        alike = [known for known in kept if _cosine(weights * known.shape, own) ** 2 >= _COPY_ASSURANCE]
         gaps = [abs(known.angular_frequency - item.angular_frequency) for known in alike]
         widths = [sum(pole.damping_ratio * pole.angular_frequency for pole in (known, item)) for known in alike]
         if all(gap >= width for gap, width in zip(gaps, widths, strict=True)):
+            near = [known for known, gap in zip(alike, gaps, strict=True) if gap < _COPY_RANGE * item.angular_frequency]
             kept.append(item)
-            doubtful.append(any(gap < _COPY_RANGE * item.angular_frequency for gap in gaps))
+            doubtful.append(not all(is_second_peak(item.pole, known.pole) for known in near))
     rising = np.argsort([item.angular_frequency for item in kept])
     return [kept[i] for i in rising], [doubtful[i] for i in rising]
+
+
+def _cosine(first: FloatArray, second: FloatArray) -> float:
+    return float(first @ second) / max(float(np.linalg.norm(first) * np.linalg.norm(second)), 1e-300)
 
 
 def _matched(clusters: Sequence[_Cluster], pole: _Cluster) -> _Cluster | None:
@@ -326,8 +352,11 @@ def _search(
 
 def _numbered(fit: MultiModeFit, layout: Layout) -> dict[int, int]:
     """Return pole -> mode number (from 1): a complete set if there is one, else the largest one."""
-    chosen = complete_set(fit, layout)
-    return dict(zip(chosen, range(1, len(chosen) + 1), strict=True)) if chosen else largest_set(fit, layout)
+    # copies of poles have been left out before
+    chosen = complete_set(fit, layout, resolved=True)
+    if chosen:
+        return dict(zip(chosen, range(1, len(chosen) + 1), strict=True))
+    return largest_set(fit, layout, resolved=True)
 
 
 def _set_up(
@@ -342,7 +371,9 @@ def _set_up(
     clusters = [item for item in _clusters(poles) if item.angular_frequency > 2.0 * np.pi * band_hz[0]]
     most = max((item.orders for item in clusters), default=0)
     firm = [item for item in clusters if item.orders >= 0.5 * most and item.collinearity > _LEAST_COLLINEARITY]
-    firm, doubtful = _without_copies(firm)
+    floors = [sensor.floor - 1 for sensor in tests[0].sensors]
+    weights = np.ones(len(floors)) if layout.masses is None else np.sqrt(layout.masses[floors])
+    firm, doubtful = _without_copies(firm, weights, partial(two_peaks, tests))
     if not firm:
         remedy = "record longer, or set identify_frame.band_high_hz"
         raise UserError(source, f"tests.{tests[0].name}", "no stable pole in an ambient test", remedy)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
 from scipy.optimize import minimize
 
 from mrpipe.artifacts import FloatArray
@@ -35,6 +36,8 @@ _LEAST_LINES = 24
 _RANGE_OF_LEVELS = 20.0
 """Bound on the logarithm of noise and neighbours over the lowest power in the band."""
 _LARGEST_EXPONENT = 300.0
+_FALSE_PEAK = 1e-3
+"""Probability that a second peak is found where there is one."""
 _EXPONENT_SPREAD = 2.0
 """Prior standard deviation of the exponent of the frequency: forces of wind fall with up to f^-4."""
 
@@ -136,11 +139,11 @@ class _Peak:
         return np.asarray(information)
 
 
-def _refined(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, float, FloatArray] | None:
-    """Return frequency, damping and their covariance (of logarithms), from the best of several starts."""
+def _best(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, FloatArray]:
+    """Return the least negative log likelihood, from several starts of the damping ratio, and its parameters."""
     power = peak.spectrum.power
     floor = float(np.log(max(np.quantile(power, 0.1), 1e-300)))
-    best = None
+    best = (np.inf, np.zeros(0))
     for zeta in starts:
         top = float(np.log(max(np.quantile(power, 0.95), 1e-300) * 4.0 * zeta**2))
         theta = np.concatenate([[np.log(pole), np.log(zeta), top, floor, 0.0], np.full(len(peak.others), floor)])
@@ -148,12 +151,52 @@ def _refined(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, 
         reach = [(theta[0] - _REACH_FREQUENCY, theta[0] + _REACH_FREQUENCY), tuple(np.log(_DAMPING_RANGE))]
         reach += [(None, None), noise, (None, None)] + [noise] * len(peak.others)
         found = minimize(peak, theta, jac=True, method="L-BFGS-B", bounds=reach, options={"maxiter": 200})
-        if best is None or found.fun < best.fun:
-            best = found
-    if best is None or not np.isfinite(best.fun):
+        if found.fun < best[0]:
+            best = (float(found.fun), np.asarray(found.x))
+    return best
+
+
+def _refined(peak: _Peak, pole: float, starts: Sequence[float]) -> tuple[float, float, FloatArray] | None:
+    """Return frequency, damping and their covariance (of logarithms), from the best of several starts."""
+    cost, theta = _best(peak, pole, starts)
+    if not np.isfinite(cost):
         return None
-    covariance = np.asarray(np.linalg.pinv(peak.information(best.x))[:2, :2], dtype=np.float64)
-    return float(np.exp(best.x[0])), float(np.exp(best.x[1])), covariance
+    covariance = np.asarray(np.linalg.pinv(peak.information(theta))[:2, :2], dtype=np.float64)
+    return float(np.exp(theta[0])), float(np.exp(theta[1])), covariance
+
+
+def two_peaks(tests: Sequence[FrameTest], pole: tuple[float, float], known: tuple[float, float]) -> bool:
+    """Return whether the spectra have a peak at a pole in addition to that of another pole near it.
+
+    A pole that an estimator splits from a mode adds no peak. One resonance, with free frequency and damping, is
+    compared with two by their likelihoods in the power of all sensors together, each over its mean in the band (Wilks
+    1938, Annals of Mathematical Statistics 9). Their sum is treated as one spectrum, because a mode moves all of them.
+
+    Parameters
+    ----------
+    tests
+        The ambient tests.
+    pole, known
+        Angular frequency [rad/s] and damping ratio of each.
+    """
+    middle, half = 0.5 * (pole[0] + known[0]), 2.0 * abs(pole[0] - known[0])
+    periodograms = []
+    for omega, power in _periodograms(tests, np.eye(len(tests[0].sensors))):
+        inside = np.abs(omega - middle) <= half
+        if inside.any():
+            level = np.maximum(power[inside].mean(axis=0), 1e-300)
+            periodograms.append((omega, np.mean(power / level, axis=1, keepdims=True)))
+    width = 2.0 * min(pole[1], known[1], _USUAL_DAMPING) * middle
+    spectrum = _near(periodograms, 0, middle - half, middle + half, width)
+    if spectrum is None:
+        return False
+    one, two = np.inf, np.inf
+    for first, second in ((pole, known), (known, pole)):
+        starts = (first[1], abs(pole[0] - known[0]) / middle)
+        one = min(one, _best(_Peak(spectrum, first[0], []), first[0], starts)[0])
+        two = min(two, _best(_Peak(spectrum, first[0], [second]), first[0], starts)[0])
+    # a second peak has three parameters
+    return bool(stats.chi2.sf(2.0 * (one - two), 3) < _FALSE_PEAK)
 
 
 def _half_width(mode: int, modes: Sequence[tuple[float, float]]) -> float:

@@ -7,17 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from mrpipe.artifacts import Artifact, ArtifactWriter, Provenance
 from mrpipe.errors import UserError
 from mrpipe.modal.ambient.modes import _clusters
 from mrpipe.modal.ambient.poles import Pole
+from mrpipe.modal.ambient.refine import two_peaks
 from mrpipe.modal.identify import identify_frame
 from mrpipe.modal.options import IdentificationOptions
 from mrpipe.modal.records import FrameTest, FrameTests, Place
 from mrpipe.modal.storage import summary, write_identification
 from mrpipe.structures import read_frame
-from tests.modal.towers import Sensors, Tower, ambient_test, random_tower
+from tests.modal.towers import FINE, Sensors, Tower, ambient_test, random_tower, respond, sample
 
 HERE = Path("planted")
 
@@ -142,3 +144,42 @@ def test_a_record_of_25_s_is_divided_into_fewer_blocks():
     result = identify_frame(FrameTests((), (), tower.mass, HERE, (test,)))
     found = [item.value / (2 * np.pi) for item in result.frequencies]
     assert found == pytest.approx(tower.frequencies_hz, rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def tower_with_mast():
+    """Three heavy floors and a light mast that is tuned to their first mode: a close pair that only the mast shows."""
+    mass, springs = np.array([40e3, 40e3, 36e3, 60.0]), np.array([6e7, 5.5e7, 5e7])
+    stiffness = np.zeros((4, 4))
+    stiffness[:3, :3] = (
+        np.diag(springs + np.append(springs[1:], 0.0)) - np.diag(springs[1:], 1) - np.diag(springs[1:], -1)
+    )
+    first = float(np.linalg.eigvals(stiffness[:3, :3] / mass[:3, None]).real.min())
+    stiffness[2:, 2:] += 60.0 * 1.006 * first * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    tower = Tower(mass, stiffness, np.array([0.007, 0.007, 0.01, 0.01]))
+    rng = np.random.default_rng(8)
+    forces = 200.0 * rng.standard_normal((round(1800.0 * 40.0 * FINE), 4)) * [1.0, 1.0, 1.0, 0.01]
+    low = sosfiltfilt(butter(4, 16.0, fs=40.0 * FINE, output="sos"), forces, axis=0)
+    responses = respond(tower, low, 1.0 / (40.0 * FINE))
+    seen = sample(tower, rng, Sensors(noise=0.01), responses, low[:, 0], 40.0)[1]
+    return tower, FrameTest("wind", "ambient", 40.0, None, seen, (False,) * 4, places=tuple(map(Place, range(1, 5))))
+
+
+@pytest.mark.planted
+@pytest.mark.parametrize("known", [True, False])
+def test_a_light_mast_does_not_merge_two_close_modes(tower_with_mast, known):
+    """Their shapes are alike without the mass; they had been one mode between the two, with a fifth of the damping."""
+    pytest.importorskip("pyoma2", reason="pyOMA2 is not installed")
+    tower, test = tower_with_mast
+    result = identify_frame(FrameTests((), (), tower.mass if known else np.full(4, np.nan), HERE, (test,)))
+    found = [item.value / (2 * np.pi) for item in result.frequencies]
+    assert found == pytest.approx(tower.frequencies_hz, rel=0.003)
+    assert [item.value for item in result.damping] == pytest.approx(tower.damping_ratios, rel=0.25)
+
+
+@pytest.mark.planted
+def test_the_spectra_of_one_mode_have_no_second_peak(tower_and_test):
+    tower, test = tower_and_test
+    omega, ratio = 2 * np.pi * tower.frequencies_hz[1], tower.damping_ratios[1]
+    for apart in (0.96, 1.04):
+        assert not two_peaks([test], (apart * omega, ratio), (omega, ratio))
